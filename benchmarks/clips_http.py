@@ -24,7 +24,7 @@ from timing import in_turn
 
 from posefield.batch import clip_archive
 from posefield.encode import archives
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api.settings import Settings
 from posefield.http.decoding import clips_query
 from posefield.synthesis.synthesizer import Synthesizer
@@ -110,8 +110,8 @@ def _first(client: httpx.Client, body: bytes) -> None:
 
 def _made(model: Synthesizer, body: bytes) -> int:
     """Bytes of the same archive without a server."""
-    order = clips_query.order(model, ENCODERS, body, Settings())
-    return sum(map(len, archives.zip(clip_archive.members(order))))
+    order = clips_query.decode_order(model, CLIP_ENCODERS, body, Settings())
+    return sum(map(len, archives.zip(clip_archive.archive_members(order))))
 
 
 def _most_memory(process: subprocess.Popen[bytes]) -> int:

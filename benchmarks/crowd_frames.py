@@ -12,7 +12,7 @@ from scipy import linalg
 from posefield.common.units import Indices, Singles
 from posefield_train.kriging import naive_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 
 Answer = Callable[[], list[Singles]]
 """What answers with rotations (N, J, 4)."""
@@ -28,7 +28,7 @@ class Questions:
     share: Singles
 
 
-def solved(made: Family, field: naive_kriging.Naive, questions: Questions) -> Answer:
+def solved(made: Family, field: naive_kriging.NaiveKriging, questions: Questions) -> Answer:
     """Poses by LU factors of each frame's system, made beforehand, and averages of the samples."""
     factors = [linalg.lu_factor(poses.system(one).astype(np.float32)) for one in field.fields]
     values = field.values.astype(np.float32)
@@ -41,7 +41,7 @@ def solved(made: Family, field: naive_kriging.Naive, questions: Questions) -> An
     return _by_frame(made, field, questions, frame)
 
 
-def dual(made: Family, field: naive_kriging.Naive, questions: Questions) -> Answer:
+def dual(made: Family, field: naive_kriging.NaiveKriging, questions: Questions) -> Answer:
     """Poses by inverse and samples multiplied beforehand."""
     duals = [one.dual.astype(np.float32) for one in field.fields]
     return _by_frame(made, field, questions, lambda index, basis: basis @ duals[index])
@@ -49,7 +49,7 @@ def dual(made: Family, field: naive_kriging.Naive, questions: Questions) -> Answ
 
 def _by_frame(
     made: Family,
-    field: naive_kriging.Naive,
+    field: naive_kriging.NaiveKriging,
     questions: Questions,
     frame: Callable[[int, Singles], Singles],
 ) -> Answer:
@@ -82,7 +82,7 @@ class Single:
     covariance: Callable[[Singles], Singles]
 
 
-def _singles(field: Kriging) -> Single:
+def _singles(field: UniversalKriging) -> Single:
     hyper = field.hyper
     scale = np.float32(hyper.scales[0])
     samples = field.samples.astype(np.float32) * scale

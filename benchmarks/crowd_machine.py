@@ -9,7 +9,7 @@ import onnxruntime
 from rows import Row
 from timing import in_turn
 
-from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 # A product whose three matrices lie in a core's own cache; copies within and far beyond it.
 SIZE, NEAR, FAR = 256, 1 << 18, 1 << 26
@@ -56,8 +56,8 @@ def measure() -> Machine:
 
 
 def _product(right: Any) -> Any:
-    net = Net()
-    net.named("product", net("MatMul", "left", net.weights("right", right)))
+    net = GraphBuilder()
+    net.add_output("product", net("MatMul", "left", net.weights("right", right)))
     shape: list[str | int] = [SIZE, SIZE]
     content = net.model({"left": shape}, {"product": shape}, {}, {})
     options = onnxruntime.SessionOptions()

@@ -29,7 +29,9 @@ def reaching(made: Family) -> Synthesizer:
 def walks() -> dict[str, Gait]:
     """The procedural walk, and that of the motion capture where it is present."""
     with TemporaryDirectory() as folder:
-        found = {"procedural walk": _walk(sample_walk.recipe(), sample_walk.write(Path(folder)))}
+        found = {
+            "procedural walk": _walk(sample_walk.recipe(), sample_walk.write_walk(Path(folder)))
+        }
     data = Path(os.environ.get("POSEFIELD_DATA", BESIDE))
     if (data / "cmu_walk.zip").exists() or (data / "cmu_walk").exists():
         found["CMU walk"] = _walk(recipe.read(WALK), data)
@@ -40,5 +42,5 @@ def _walk(own: Recipe, folder: Path) -> Gait:
     with threadpool_limits(limits=1):
         examples, notes = ingest.ingest(own, folder)
         trained = train.train(own, examples, lambda _: None)
-        content = onnx_export.export(own, trained, notes).content
-    return gait.of(session.open_bytes(content, f"{own.name}.onnx"))
+        content = onnx_export.export_model(own, trained, notes).content
+    return gait.fit_gait(session.open_bytes(content, f"{own.name}.onnx"))

@@ -54,12 +54,12 @@ class Asked:
 
 def rows(made: Family, model: Synthesizer) -> list[Row]:
     """Ours, at levels by view and at the finest, against every rival."""
-    field = naive_kriging.fit(
+    field = naive_kriging.fit_naive(
         made.trained.model.bank.pose.samples,
         naive_graphs.positions(made),
         naive_graphs.numbers(made),
         "matern52",
-        variogram.fit,
+        variogram.fit_by_grid,
     )
     _check(made, field, _asked(made, crowd_scene.around(model, CHECKED)))
     asked = _asked(made, crowd_scene.around(model, MANY))
@@ -109,7 +109,7 @@ def _ours(scene: Scene, levels: Indices) -> Callable[[], None]:
     return run
 
 
-def _naive(made: Family, field: naive_kriging.Naive, asked: Asked) -> dict[str, Answer]:
+def _naive(made: Family, field: naive_kriging.NaiveKriging, asked: Asked) -> dict[str, Answer]:
     content, questions = naive_graphs.Contents(made, field), asked.questions
     return {
         SOLVED: crowd_frames.solved(made, field, questions),
@@ -153,7 +153,7 @@ def _scipy(made: Family, questions: Questions) -> Answer:
     return run
 
 
-def _check(made: Family, field: naive_kriging.Naive, asked: Asked) -> None:
+def _check(made: Family, field: naive_kriging.NaiveKriging, asked: Asked) -> None:
     scene = asked.scene
     rivals = _naive(made, field, asked)
     naive_graphs.check(made, field, rivals, scene.controls, scene.times[:, None])

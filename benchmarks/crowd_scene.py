@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats, Indices
-from posefield.inference.level_selection import Camera, View
+from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.motion.crowd_clip import CrowdPoses, Placement
 from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
@@ -18,7 +18,7 @@ CAMERA = Camera(EYES, math.radians(60.0), 1080.0)
 LIMIT = 1.0
 ROOM = 4.0
 """Square metres for each character."""
-AUTO = View(CAMERA, LIMIT, None, None)
+AUTO = LevelCriteria(CAMERA, LIMIT, None, None)
 SEEN = (
     f"one character to {ROOM:g} m² around a camera at eye height, 60 degrees, 1080 pixels high, "
     f"limit {LIMIT:g} pixel"
@@ -37,7 +37,7 @@ class Scene:
     def __len__(self) -> int:
         return len(self.times)
 
-    def poses(self, detail: Indices | View) -> Callable[[], CrowdPoses]:
+    def poses(self, detail: Indices | LevelCriteria) -> Callable[[], CrowdPoses]:
         """What answers for the crowd, from controls to quaternions where everybody stands."""
         names = (control.name for control in self.model.session.card.controls)
         question = CrowdQuestion(
@@ -50,7 +50,7 @@ class Scene:
             "travelling",
             "warn",
         )
-        return lambda: crowd_synthesis.poses(self.model, question)
+        return lambda: crowd_synthesis.synthesize_crowd(self.model, question)
 
     @property
     def coarsest(self) -> int:

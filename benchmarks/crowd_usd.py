@@ -139,7 +139,7 @@ def _schemas(
 def _character(
     stage: Any, at: str, person: Skeleton, made: Motions, index: int, convert: Convert
 ) -> None:
-    joints = joint_names.paths(joint_names.legal(person.names), person.parents)
+    joints = joint_names.joint_paths(joint_names.legal_names(person.names), person.parents)
     root = UsdSkel.Root.Define(stage, at)
     skeleton = UsdSkel.Skeleton.Define(stage, f"{at}/Skel")
     animation = UsdSkel.Animation.Define(stage, f"{at}/Anim")

@@ -19,7 +19,7 @@ from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.level_selection import Camera
 from posefield.locomotion import floor_plane, stride, walking_crowd
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.locomotion_plan import Plan
+from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.motion import skeleton
 from posefield.synthesis.crowd_synthesis import BATCH
 from posefield.synthesis.synthesizer import Synthesizer
@@ -48,7 +48,9 @@ class Walk:
     def levels(self) -> Indices:
         """Levels (K,) by view."""
         seen, levels = ~np.isnan(self.scale), np.zeros(len(self.scale), dtype=np.int64)
-        levels[seen] = level_selection.choose(self.model.ladder.errors, self.scale[seen], LIMIT)
+        levels[seen] = level_selection.select_by_error(
+            self.model.level_table.errors, self.scale[seen], LIMIT
+        )
         return levels
 
     def posed(self, levels: Indices) -> Callable[[], None]:
@@ -81,7 +83,7 @@ class Walk:
         for level, rows in _parts(levels[which]):
             turns, root, bones = self._answer(level, which[rows])[:3]
             local = skeleton.translations(bones, root)
-            found[rows] = skeleton.forward(card.skeleton.parents, turns, local)[0][:, 0]
+            found[rows] = skeleton.forward_kinematics(card.skeleton.parents, turns, local)[0][:, 0]
         return found
 
 
@@ -97,7 +99,7 @@ def rows(walks: dict[str, Gait]) -> list[Row]:
 
 
 def _walk_rows(name: str, gait: Gait) -> list[Row]:
-    plan = walking_crowd.wandering(gait, COUNT, SECONDS, RATE, seed=0)
+    plan = walking_crowd.plan_random(gait, COUNT, SECONDS, RATE, seed=0)
     own = float(np.ptp(plan.places[:, 0].real))
     found = []
     for extent in (own, *EXTENTS):
@@ -106,12 +108,12 @@ def _walk_rows(name: str, gait: Gait) -> list[Row]:
     return found
 
 
-def _spread(plan: Plan, factor: float) -> Plan:
+def _spread(plan: LocomotionPlan, factor: float) -> LocomotionPlan:
     """The same ways, begun as many times as far apart."""
     return replace(plan, places=plan.places + (factor - 1.0) * plan.places[:, :1])
 
 
-def _walk(gait: Gait, plan: Plan) -> Walk:
+def _walk(gait: Gait, plan: LocomotionPlan) -> Walk:
     model = Synthesizer("walk", gait.session)
     everyone = np.tile(stride.labels(gait.session, plan.who), (plan.phases.shape[1], 1))
     controls = plan.controls.swapaxes(0, 1).reshape(len(everyone), -1)
@@ -120,11 +122,11 @@ def _walk(gait: Gait, plan: Plan) -> Walk:
     return Walk(model, *singles, _scale(model, plan))
 
 
-def _scale(model: Synthesizer, plan: Plan) -> Floats:
+def _scale(model: Synthesizer, plan: LocomotionPlan) -> Floats:
     """Pixels (K,) that a metre covers on each to somebody who stands in the middle."""
     middle = plan.places[:, 0].mean()
     camera = Camera(floor_plane.at_height(middle, np.array(EYES)), FOV, HEIGHT)
-    bodies = floor_plane.at_height(plan.places.T.ravel(), np.zeros(1)) + model.middle
+    bodies = floor_plane.at_height(plan.places.T.ravel(), np.zeros(1)) + model.rest_position
     outside = np.linalg.norm(bodies - camera.position, axis=-1) > model.radius
     scale = np.full(len(bodies), np.nan)
     scale[outside] = level_selection.pixels_per_metre(camera, bodies[outside], model.radius)
@@ -163,7 +165,7 @@ def _error_row(name: str, walk: Walk, levels: Indices) -> Row:
     # Those the camera is in are at the finest level: there is no gap to project.
     pixels = np.linalg.norm(gaps, axis=-1) * np.nan_to_num(walk.scale[which])[:, None]
     each = np.sqrt(np.mean(np.square(pixels), axis=1))
-    near = ~(walk.scale[which] * walk.model.ladder.errors[0] <= LIMIT)
+    near = ~(walk.scale[which] * walk.model.level_table.errors[0] <= LIMIT)
     words = (
         f"{100 * np.mean(each > LIMIT):.2g} % of the characters beyond {LIMIT:g} pixel, "
         f"{100 * np.mean(pixels > LIMIT):.2g} % of the joints, the largest joint "

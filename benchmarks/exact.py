@@ -10,11 +10,11 @@ from rows import Row
 from timing import in_turn
 
 from posefield.constraints import constrained_motion
-from posefield.constraints.constrained_motion import Bench
-from posefield.constraints.constraint import Place
+from posefield.constraints.constrained_motion import LevelCorrector
+from posefield.constraints.constraint import PositionConstraint
 from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.inference.session import Session, State
+from posefield.inference.session import PredictionState, Session
 from posefield.motion.measures import Measure
 
 FRAMES, TARGETS = 100, 64
@@ -27,12 +27,12 @@ class Asked:
     """An open model, a question to it, and targets of a hand at the end."""
 
     opened: Session
-    bench: Bench
+    bench: LevelCorrector
     point: np.ndarray
     times: np.ndarray
-    targets: tuple[Place, ...]
+    targets: tuple[PositionConstraint, ...]
 
-    def state(self, frames: int) -> State:
+    def state(self, frames: int) -> PredictionState:
         """What the poses of some frames are made of."""
         return self.opened.state(self.point, self.times[-frames:])
 
@@ -46,7 +46,7 @@ class Asked:
 
         def run() -> object:
             state = self.state(frames)
-            held = self.bench.held(self.bench.begun(state), [next(target)])
+            held = self.bench.solve(self.bench.predict(state), [next(target)])
             return held.poses(state.frames)
 
         return run
@@ -74,13 +74,13 @@ def rows(made: Family) -> list[Row]:
 
 def _asked(made: Family) -> Asked:
     opened = session.open_bytes(made.exported.content, "reaching.onnx")
-    bench, point = constrained_motion.bench(opened, 0), made.examples[4].controls[None]
+    bench, point = constrained_motion.build_corrector(opened, 0), made.examples[4].controls[None]
     times = np.linspace(0.0, float(opened.durations(point)[0]), FRAMES)
-    begun = bench.begun(opened.state(point, times))
+    begun = bench.predict(opened.state(point, times))
     joint, last = opened.card.skeleton.names.index("RightHand"), float(opened.card.frames - 1)
-    hand, _ = begun.scene.place(begun.numbers, joint, last)
+    hand, _ = begun.scene.position_and_gradient(begun.numbers, joint, last)
     ways = np.random.Generator(np.random.PCG64(TARGETS)).standard_normal((TARGETS, 3))
     ways *= OFF / np.linalg.norm(ways, axis=1, keepdims=True)
     moment = Measure("height", (joint,), "end")
-    targets = (Place(("hand",), moment, (0, 1, 2), hand + way) for way in ways)
+    targets = (PositionConstraint(("hand",), moment, (0, 1, 2), hand + way) for way in ways)
     return Asked(opened, bench, point, times, tuple(targets))

@@ -23,17 +23,17 @@ from pathlib import Path
 from rows import Row, table
 
 from posefield.batch import chunks, layouts, manifest, process_pool, run
-from posefield.batch.checkpoint import Part
-from posefield.batch.job import Job, Work
+from posefield.batch.checkpoint import ChunkResult
+from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.process_pool import Runner
 from posefield.batch.rows import row_sources
-from posefield.batch.rows.row_query import Source
-from posefield.batch.rows.row_sources import Asked
+from posefield.batch.rows.row_query import RowSource
+from posefield.batch.rows.row_sources import SourceOptions
 from posefield.batch.rows.row_validation import Defaults
 from posefield.batch.target import open_target
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.registry import model_loading
-from posefield.synthesis.clips import clip
+from posefield.synthesis.clips import synthesize_clip
 
 ROUNDS, CLIPS, FORM = 3, 2048, "usdc"
 LONGER = 8
@@ -48,18 +48,18 @@ STAGED = chunks.CLIPS
 class Bench:
     """Work for a target that is not said yet, and its queries."""
 
-    work: Work
-    source: Source
+    work: WorkerInput
+    source: RowSource
 
     @classmethod
     def of(cls, model: Path, clips: int, form: str) -> "Bench":
         """Clips at points sampled from a model's controls."""
         content = model.read_bytes()
-        opened = model_loading.opened(model.stem, model, content)
-        source = row_sources.source(Asked(sample=clips), Defaults(form), opened)
+        opened = model_loading.open_model(model.stem, model, content)
+        source = row_sources.open_source(SourceOptions(sample=clips), Defaults(form), opened)
         digest = hashlib.sha256(content).hexdigest()
-        job = Job(opened.identity, digest, source.digest, "folder", 1)
-        return cls(Work(job, content, ""), source)
+        job = ExportJob(opened.identity, digest, source.digest, "folder", 1)
+        return cls(WorkerInput(job, content, ""), source)
 
     def seconds(self, layout: str, runner: Runner) -> float:
         """Of a whole export."""
@@ -70,7 +70,7 @@ class Bench:
 
     def export(self, layout: str, runner: Runner, target: str) -> list[float]:
         """Export; the peak memory of this process after each chunk, MB."""
-        job = replace(self.work.job, layout=layout, chunk=layouts.find(layout).chunk)
+        job = replace(self.work.job, layout=layout, chunk=layouts.find_layout(layout).chunk)
         monitor = PeakMemory([])
         run.run(replace(self.work, job=job, target=target), self.source, monitor, runner)
         return monitor.peaks
@@ -85,7 +85,7 @@ class PeakMemory:
     def begin(self, total: int, done: int) -> None:
         """Show nothing."""
 
-    def advance(self, part: Part) -> None:
+    def advance(self, part: ChunkResult) -> None:
         """Record the peak memory."""
         self.peaks.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
@@ -168,9 +168,9 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
     rows = bench.source.rows()
     asked = [next(rows) for _ in range(STAGED)]
     name = bench.work.job.model.partition("@")[0]
-    opened = model_loading.opened(name, name, bench.work.model)
-    encoder = ENCODERS[form]
-    answers = [clip(opened, query.question) for query in asked]
+    opened = model_loading.open_model(name, name, bench.work.model)
+    encoder = CLIP_ENCODERS[form]
+    answers = [synthesize_clip(opened, query.question) for query in asked]
     files = encoder.write(answers, encoder.usual)
     entries = partial(_entries, asked, answers, files)
     with tempfile.TemporaryDirectory() as folder:
@@ -178,7 +178,7 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
         target.prepare()
         named = [(f"{index}.{form}", content) for index, content in enumerate(files)]
         stages: dict[str, Callable[[], object]] = {
-            "synthesis": lambda: [clip(opened, query.question) for query in asked],
+            "synthesis": lambda: [synthesize_clip(opened, query.question) for query in asked],
             "encoding": lambda: encoder.write(answers, encoder.usual),
             "checksum and line of the manifest": entries,
             "file system": lambda: target.write(named),

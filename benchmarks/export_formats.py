@@ -11,7 +11,7 @@ from family import Family
 from rows import Row, table
 from timing import in_turn
 
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.question.results import ClipAnswer
@@ -27,7 +27,7 @@ def rows(made: Family) -> list[Row]:
     """What a clip of 100 frames takes to synthesise, and what to write in each format."""
     model = Synthesizer("reaching", session.open_bytes(made.exported.content, "reaching"))
     question = _question(model)
-    answers = [clips.clip(model, question)] * BATCH
+    answers = [clips.synthesize_clip(model, question)] * BATCH
     taken = in_turn(
         {"synthesis": partial(_synthesised, model, question), **_writers(answers)},
         rounds=9,
@@ -40,24 +40,24 @@ def rows(made: Family) -> list[Row]:
 def _question(model: Synthesizer) -> ClipQuestion:
     """A clip in the middle of the controls, at the rate at which it has so many frames."""
     middle = {control.name: control.default for control in model.session.card.controls}
-    duration = poses.pose(
+    duration = poses.synthesize_poses(
         model, PoseQuestion(controls=middle, times=[0.0], extrapolate="refuse")
     ).trust.duration
     return ClipQuestion(controls=middle, fps=(FRAMES - 1) / duration)
 
 
 def _synthesised(model: Synthesizer, question: ClipQuestion) -> list[ClipAnswer]:
-    return [clips.clip(model, question) for _ in range(BATCH)]
+    return [clips.synthesize_clip(model, question) for _ in range(BATCH)]
 
 
 def _writers(answers: list[ClipAnswer]) -> dict[str, Callable[[], list[bytes]]]:
-    return {name: partial(e.write, answers, e.usual) for name, e in ENCODERS.items()}
+    return {name: partial(e.write, answers, e.usual) for name, e in CLIP_ENCODERS.items()}
 
 
 def _row(name: str, seconds: float, joints: int, answer: ClipAnswer) -> Row:
     words = f"{1.0 / seconds:,.0f} clips a second"
-    if name in ENCODERS:
-        words += f" of {len(ENCODERS[name].encode(answer)) / 1e3:.0f} kB"
+    if name in CLIP_ENCODERS:
+        words += f" of {len(CLIP_ENCODERS[name].encode(answer)) / 1e3:.0f} kB"
     what = f"clip of {FRAMES} frames, {joints} joints, {name}"
     return Row(what, 1e3 * seconds, "ms", words, None, GOALS.get(name))
 

@@ -19,7 +19,7 @@ from rows import Row, table
 from timing import in_turn
 
 from posefield.encode.character import body_mesh, character, joint_names
-from posefield.encode.character.character import Rig
+from posefield.encode.character.character import CharacterRig
 from posefield.encode.formats import METRES
 from posefield.encode.usd import (
     crate_template,
@@ -29,7 +29,7 @@ from posefield.encode.usd import (
     usd_clip,
     usd_library,
 )
-from posefield.encode.usd.layer_content import Content
+from posefield.encode.usd.layer_content import LayerContent
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -47,13 +47,13 @@ class Form:
 
     name: str
     write: Callable[..., list[bytes]]
-    press: template_cache.Press
+    press: template_cache.TemplateCache
     ordinary: Callable[..., bytes]
     goals: tuple[float | None, float | None]
 
 
 FORMS = (
-    Form("usdc", usd_clip.usdc, template_cache.CRATES, crate_template.ordinary, (200.0, 20.0)),
+    Form("usdc", usd_clip.usdc, template_cache.CRATE_CACHE, crate_template.ordinary, (200.0, 20.0)),
     Form("usda", usd_clip.usda, template_cache.TEXTS, text_template.ordinary, (None, None)),
 )
 
@@ -66,7 +66,7 @@ def rows() -> list[Row]:
 
 
 def _form(answers: list[ClipAnswer], form: Form) -> list[Row]:
-    one, made = answers[0], list(usd_clip.authored(answers, METRES))
+    one, made = answers[0], list(usd_clip.builders_and_contents(answers, METRES))
     expected = [form.ordinary(*each) for each in made]
     if any(form.write(answers, METRES) != expected for _ in range(2)):
         raise AssertionError(f"{form.name} differs from what usd-core writes")
@@ -112,7 +112,7 @@ def _package(answers: list[ClipAnswer]) -> list[Row]:
     taken = in_turn(
         {
             "usdz": lambda: usd_clip.usdz(answers, METRES),
-            "sdf": lambda: usd_clip.package(crate_template.ordinary(*_first([one]))),
+            "sdf": lambda: usd_clip.usdz_package(crate_template.ordinary(*_first([one]))),
         },
         rounds=15,
         repeats=2,
@@ -136,7 +136,9 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
     )
     each = {name: 1e3 * seconds / CLIPS for name, seconds in taken.items()}
     warned = each["warned"] / each["whole"]
-    entries = [usd_library.entry(f"clip {i}", f"clips/{i}.usdc", answers[0]) for i in range(100)]
+    entries = [
+        usd_library.library_entry(f"clip {i}", f"clips/{i}.usdc", answers[0]) for i in range(100)
+    ]
     some = list(itertools.islice(itertools.cycle(entries), ENTRIES))
     stage = in_turn({"stage": lambda: _stage(answers[0], some)}, rounds=1, repeats=1)["stage"]
     return [
@@ -161,17 +163,17 @@ SERIAL = itertools.count()
 
 
 def _new(answers: list[ClipAnswer]) -> None:
-    fresh = template_cache.Press(crate_template, template_cache.CRATES.limit)
-    for each in usd_clip.authored(answers, METRES):
+    fresh = template_cache.TemplateCache(crate_template, template_cache.CRATE_CACHE.limit)
+    for each in usd_clip.builders_and_contents(answers, METRES):
         fresh.write(*each)
 
 
-def _stage(answer: ClipAnswer, entries: list[usd_library.Entry]) -> bytes:
-    return usd_library.stage(answer.clip.skeleton, METRES, 30.0, entries)
+def _stage(answer: ClipAnswer, entries: list[usd_library.LibraryEntry]) -> bytes:
+    return usd_library.library_stage(answer.clip.skeleton, METRES, 30.0, entries)
 
 
-def _first(answers: list[ClipAnswer]) -> tuple[usd_clip.Clips, Content]:
-    return next(usd_clip.authored(answers, METRES))
+def _first(answers: list[ClipAnswer]) -> tuple[usd_clip.ClipLayerBuilder, LayerContent]:
+    return next(usd_clip.builders_and_contents(answers, METRES))
 
 
 def _answers(count: int) -> list[ClipAnswer]:
@@ -212,7 +214,7 @@ def _lists(clip: Clip, frame: int) -> tuple[Any, Any]:
     return [Gf.Vec3f(*move) for move in moves], [Gf.Quatf(*turn) for turn in turns]
 
 
-def _schemas(clip: Clip, content: Content, convert: Convert, path: Path) -> bytes:
+def _schemas(clip: Clip, content: LayerContent, convert: Convert, path: Path) -> bytes:
     """A clip as the schema API's own examples write it."""
     stage, rig = Usd.Stage.CreateInMemory(), character.rig(clip.skeleton)
     UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
@@ -221,7 +223,7 @@ def _schemas(clip: Clip, content: Content, convert: Convert, path: Path) -> byte
     stage.SetFramesPerSecond(30)
     stage.SetStartTimeCode(0)
     stage.SetEndTimeCode(FRAMES - 1)
-    stage.SetMetadata("customLayerData", {"posefield": content.facts.whole()["controls"]})
+    stage.SetMetadata("customLayerData", {"posefield": content.facts.join()["controls"]})
     root = UsdSkel.Root.Define(stage, "/Character")
     stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
@@ -243,16 +245,16 @@ def _schemas(clip: Clip, content: Content, convert: Convert, path: Path) -> byte
     return path.read_bytes()
 
 
-def _skeleton(stage: Any, rig: Rig, content: Content) -> Any:
+def _skeleton(stage: Any, rig: CharacterRig, content: LayerContent) -> Any:
     made = UsdSkel.Skeleton.Define(stage, "/Character/Skel")
     made.CreateJointsAttr(rig.paths)
-    made.CreateJointNamesAttr(joint_names.legal(rig.names))
+    made.CreateJointNamesAttr(joint_names.legal_names(rig.names))
     made.CreateBindTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["bind"]))
     made.CreateRestTransformsAttr(Vt.Matrix4dArray.FromNumpy(content.values["rest"]))
     return made
 
 
-def _mesh(stage: Any, rig: Rig, content: Content, extent: Any) -> Any:
+def _mesh(stage: Any, rig: CharacterRig, content: LayerContent, extent: Any) -> Any:
     made = UsdGeom.Mesh.Define(stage, "/Character/Body")
     made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(content.values["points"]))
     made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(content.values["normals"]))
@@ -264,7 +266,7 @@ def _mesh(stage: Any, rig: Rig, content: Content, extent: Any) -> Any:
     made.CreateExtentAttr(extent)
     made.CreateDisplayColorAttr([Gf.Vec3f(0.75)])
     binding = UsdSkel.BindingAPI.Apply(made.GetPrim())
-    joints = np.repeat(rig.bones.joints, body_mesh.POINTS)
+    joints = np.repeat(rig.bones.joints, body_mesh.POINTS_PER_BOX)
     binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray.FromNumpy(joints))
     binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray(len(joints), 1.0))
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))

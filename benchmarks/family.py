@@ -10,8 +10,8 @@ from threadpoolctl import threadpool_limits
 from posefield.common.units import Floats
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.graph.onnx_export import Exported
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.onnx_export import ExportedModel
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
@@ -26,8 +26,8 @@ class Family:
     """
 
     examples: tuple[Example, ...]
-    trained: Trained
-    exported: Exported
+    trained: TrainedModel
+    exported: ExportedModel
     vectors: Floats
     varies: Floats
     offsets: Floats
@@ -41,7 +41,7 @@ class Family:
     @property
     def samples(self) -> Floats:
         """Controls (N, d) in half-ranges."""
-        return self.trained.laid.half_ranges
+        return self.trained.samples.half_ranges
 
     @property
     def numbers(self) -> Floats:
@@ -55,17 +55,17 @@ def make(folder: Path) -> Family:
     Training is limited to one thread: the matrices are small, and on a busy machine threads that
     wait for each other take ten times as long.
     """
-    path = sample_files.family(folder)
+    path = sample_files.write_family(folder)
     start = time.perf_counter()
     with threadpool_limits(limits=1):
         own = recipe.read(path)
         examples, notes = ingest.ingest(own, path.parent)
         trained = train.train(own, examples, lambda _: None)
-        exported = onnx_export.export(own, trained, notes)
+        exported = onnx_export.export_model(own, trained, notes)
     return of(trained, exported, time.perf_counter() - start)
 
 
-def of(trained: Trained, exported: Exported, seconds: float) -> Family:
+def of(trained: TrainedModel, exported: ExportedModel, seconds: float) -> Family:
     """Return the family of a trained and exported model."""
     aligned = trained.aligned
     vectors = trained.tensor.chart.numbers(aligned.rotations, aligned.root_path)

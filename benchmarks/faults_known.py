@@ -12,14 +12,14 @@ import onnx
 import orjson
 from onnx import numpy_helper
 
-from posefield.encode.archives import PACKS
-from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
+from posefield.encode.archives import ARCHIVE_WRITERS
+from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS, GRID_ENCODERS, POSE_ENCODERS
 from posefield.http.api.settings import Settings
 from posefield.http.app import App, create_app
 from posefield.inference import session
 from posefield.model_file import checksum
 from posefield.model_file.model_card import Control
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
 
 FEWER = 4
@@ -96,7 +96,7 @@ def other_version(content: bytes) -> bytes:
             tensor.CopyFrom(numpy_helper.from_array(values, tensor.name))
     # The checksum is the last entry.
     del model.metadata_props[-1]
-    return checksum.sealed(bytes(model.SerializeToString()))
+    return checksum.append_checksum(bytes(model.SerializeToString()))
 
 
 def of(names: Sequence[str], contents: Sequence[bytes]) -> list[Known]:
@@ -107,7 +107,7 @@ def of(names: Sequence[str], contents: Sequence[bytes]) -> list[Known]:
     found = []
     for name in names:
         versions = [Synthesizer(name, one) for one in sessions]
-        apps = [create_app(Library({name: model}), Settings()) for model in versions]
+        apps = [create_app(ModelRegistry({name: model}), Settings()) for model in versions]
         asked = questions if name == names[0] else questions[::FEWER]
         own = [*asked, *_held(asked, name, apps)]
         answers = [[asyncio.run(answered(app, q, name)) for app in apps] for q in own]
@@ -165,7 +165,7 @@ def _held(questions: Sequence[Question], name: str, apps: Sequence[App]) -> Iter
 def _questions(controls: Sequence[Control]) -> Iterator[Question]:
     rng = random.Random(1)
     yield from _poses(controls, rng)
-    for extension in ENCODERS:
+    for extension in CLIP_ENCODERS:
         for _ in range(2):
             asked = urlencode({**_point(controls, rng), "fps": rng.choice((25, 60))})
             yield Question("GET", f"/clip.{extension}?{asked}")
@@ -173,7 +173,7 @@ def _questions(controls: Sequence[Control]) -> Iterator[Question]:
         yield Question("POST", f"/clip.{extension}", JSON, body)
     for extension in CROWD_ENCODERS:
         yield Question("POST", f"/crowd.{extension}", JSON, _crowd(controls, rng, 60))
-    for pack in PACKS:
+    for pack in ARCHIVE_WRITERS:
         for extension in ("usdc", "glb"):
             yield Question("POST", f"/clips.{pack}", JSON, _clips(controls, rng, extension, 8))
     yield from _grids(controls, rng)

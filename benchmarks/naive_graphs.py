@@ -16,9 +16,9 @@ from posefield.motion import quat
 from posefield_train.align import time_alignment
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.naive_kriging import Naive
-from posefield_train.onnx_graph.graph_builder import Net
-from posefield_train.onnx_graph.level_tables import Ladder
+from posefield_train.kriging.naive_kriging import NaiveKriging
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.tensor import decoder
 
 ABOUT = {"producer_name": "posefield", "producer_version": "naive"}
@@ -28,13 +28,13 @@ def numbers(made: Family) -> Floats:
     """What naive kriging averages (N, T, 3 + 4 J): root positions, and rotation vectors turned
     beforehand as they are in the model, so that decoding costs both the same."""
     means = made.trained.model.decoder.means
-    vectors = decoder.turned(means, made.vectors[..., 3:])
+    vectors = decoder.half_angle_products(means, made.vectors[..., 3:])
     return np.concatenate([made.vectors[..., :3], vectors], axis=-1)
 
 
 def positions(made: Family) -> Floats:
     """Joint positions (N, T, J, 3) of the aligned clips, m."""
-    return time_alignment.positions(made.trained.aligned, made.parents, made.offsets)
+    return time_alignment.joint_positions(made.trained.aligned, made.parents, made.offsets)
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Contents:
     """Graphs of one naive field."""
 
     made: Family
-    field: Naive
+    field: NaiveKriging
 
     def every_frame_once(self) -> bytes:
         """All frames' poses, then two of them for each time."""
@@ -68,22 +68,22 @@ class Contents:
         """The same with inverse and samples multiplied beforehand."""
         return self._graph(partial(self._own, self._dual), alone=True)
 
-    def _graph(self, poses: Callable[[Net, str, str], str], alone: bool = False) -> bytes:
+    def _graph(self, poses: Callable[[GraphBuilder, str, str], str], alone: bool = False) -> bytes:
         """Graph of one question at many times, or of many questions at a time each."""
         model = self.made.trained.model
-        net = Net()
-        ends = Ladder(kriging_graph.entries(model.bank, [model.decoder.reduced.core.shape[2]]))
+        net = GraphBuilder()
+        ends = LevelTables(kriging_graph.entries(model.bank, [model.decoder.reduced.core.shape[2]]))
         fields = kriging_graph.onnx(model.bank, net, "controls", ends.onnx(net))
         duration, place = model.timing.onnx(net, fields["duration"], fields["warp"], "time")
         points = self._points(net)
         axes = net.indices(1, 2) if alone else net.indices(0, 2)
         numbers = poses(net, points, net("Squeeze", place, axes))
-        net.named("rotations", self._rotations(net, numbers))
-        net.named(
+        net.add_output("rotations", self._rotations(net, numbers))
+        net.add_output(
             "root_position", net("Slice", numbers, net.indices(0), net.indices(3), net.indices(1))
         )
-        net.named("bone_offsets", model.proportions.onnx(net, fields["offsets"]))
-        net.named("duration", duration)
+        net.add_output("bone_offsets", model.proportions.onnx(net, fields["offsets"]))
+        net.add_output("duration", duration)
         joints, controls = len(self.made.parents), len(model.bank.low)
         questions, times, answers = ("batch", 1, "batch") if alone else (1, "steps", "steps")
         return net.model(
@@ -98,7 +98,7 @@ class Contents:
             ABOUT,
         )
 
-    def _points(self, net: Net) -> str:
+    def _points(self, net: GraphBuilder) -> str:
         """The controls (B, d), whose sampled range is -1 to 1."""
         bank = self.made.trained.model.bank
         gain = np.diag(2.0 / (bank.high - bank.low))
@@ -106,7 +106,13 @@ class Contents:
         own = net.weights("naive_gain", gain), net.weights("naive_shift", shift)
         return net("Gemm", "controls", *own)
 
-    def _own(self, poses: Callable[[Net, str, str], str], net: Net, points: str, place: str) -> str:
+    def _own(
+        self,
+        poses: Callable[[GraphBuilder, str, str], str],
+        net: GraphBuilder,
+        points: str,
+        place: str,
+    ) -> str:
         """Pose vectors (B, D) of each question's two frames, and a line between them."""
         row, share = self._split(net, place)
         samples = self.field.fields[0].samples
@@ -128,7 +134,7 @@ class Contents:
         found = (poses(net, self._system(net, squared, drift, frame), frame) for frame in frames)
         return self._between(net, *found, share)
 
-    def _system(self, net: Net, squared: str, drift: str, row: str) -> str:
+    def _system(self, net: GraphBuilder, squared: str, drift: str, row: str) -> str:
         """Covariances and drift (B, 1, n + k) in the field of each question's frame."""
         fields = self.field.fields
         worth = net.weights("naive_worth", np.array([f.hyper.scales[:1] ** 2 for f in fields]))
@@ -136,37 +142,37 @@ class Contents:
         covariance = COVARIANCES[fields[0].hyper.covariance].onnx(net, near)
         return net("Unsqueeze", net("Concat", covariance, drift, axis=1), net.indices(1))
 
-    def _dual(self, net: Net, basis: str, row: str) -> str:
+    def _dual(self, net: GraphBuilder, basis: str, row: str) -> str:
         duals = net.weights("duals", np.stack([field.dual for field in self.field.fields]))
         poses = net("MatMul", basis, net("Gather", duals, row))
         return net("Squeeze", poses, net.indices(1))
 
-    def _split(self, net: Net, place: str) -> tuple[str, str]:
+    def _split(self, net: GraphBuilder, place: str) -> tuple[str, str]:
         """Frame below (S,) and the share of the next one (S, 1)."""
         last = self.made.trained.model.timing.frames - 2.0
         before = net("Min", net("Floor", place), net.number(last))
         share = net("Unsqueeze", net("Sub", place, before), net.indices(1))
         return net("Cast", before, to=7), share
 
-    def _between(self, net: Net, below: str, above: str, share: str) -> str:
+    def _between(self, net: GraphBuilder, below: str, above: str, share: str) -> str:
         return net("Add", below, net("Mul", net("Sub", above, below), share))
 
-    def _rows(self, net: Net, frames: str, place: str) -> str:
+    def _rows(self, net: GraphBuilder, frames: str, place: str) -> str:
         """Pose vectors (S, D) between rows of those of all frames (T, D)."""
         row, share = self._split(net, place)
         after = net("Add", row, net.indices(1))
         return self._between(net, net("Gather", frames, row), net("Gather", frames, after), share)
 
-    def _gathered(self, net: Net, points: str, place: str) -> str:
+    def _gathered(self, net: GraphBuilder, points: str, place: str) -> str:
         row, share = self._split(net, place)
         after = net("Add", row, net.indices(1))
         return self._between(net, self._at(net, points, row), self._at(net, points, after), share)
 
-    def _at(self, net: Net, points: str, row: str) -> str:
+    def _at(self, net: GraphBuilder, points: str, row: str) -> str:
         """Pose vectors (S, D) of rows' own systems."""
         return self._weighed(net, net("Gather", self.field.basis(net, points), row), row)
 
-    def _weighed(self, net: Net, basis: str, row: str) -> str:
+    def _weighed(self, net: GraphBuilder, basis: str, row: str) -> str:
         """Averages (S, D) of the samples of rows, by weights from the rows' inverses."""
         fields = self.field.fields
         inverse = np.stack([field.weighing for field in fields])
@@ -174,7 +180,7 @@ class Contents:
         samples = net.weights("values", self.field.values.transpose(1, 0, 2))
         return net("Squeeze", net("MatMul", weights, net("Gather", samples, row)), net.indices(1))
 
-    def _rotations(self, net: Net, numbers: str) -> str:
+    def _rotations(self, net: GraphBuilder, numbers: str) -> str:
         """Quaternions (S, J, 4) of numbers (S, 3 + 4 J), as the model's decoder makes them."""
         means = self.made.trained.model.decoder.means
         end = net.indices(3 + 4 * len(means))
@@ -186,7 +192,7 @@ class Contents:
 
 def check(
     made: Family,
-    field: Naive,
+    field: NaiveKriging,
     rivals: Mapping[str, Callable[[], list[Floats]]],
     controls: Floats,
     times: Floats,

@@ -35,12 +35,12 @@ class Asked:
 def rows(made: Family) -> list[Row]:
     """A clip of 100 frames, a single pose, what pruning saves, and the file's size."""
     model = made.trained.model
-    field = naive_kriging.fit(
+    field = naive_kriging.fit_naive(
         model.bank.pose.samples,
         naive_graphs.positions(made),
         naive_graphs.numbers(made),
         "matern52",
-        variogram.fit,
+        variogram.fit_by_grid,
     )
     content = naive_graphs.Contents(made, field)
     point = _between(made)
@@ -48,7 +48,7 @@ def rows(made: Family) -> list[Row]:
     times = np.linspace(0.0, duration, FRAMES)[None]
     asked = {"controls": point.astype(np.float32), "time": times.astype(np.float32)}
     # As the service opens it.
-    ours = Asked(_session(subgraph.at_level(made.exported.content, 0)), asked)
+    ours = Asked(_session(subgraph.fix_level(made.exported.content, 0)), asked)
     rivals = {
         name: Asked(_session(made_by()), asked)
         for name, made_by in (
@@ -66,7 +66,7 @@ def rows(made: Family) -> list[Row]:
     ]
 
 
-def _batch_rows(made: Family, field: naive_kriging.Naive, ours: Asked) -> list[Row]:
+def _batch_rows(made: Family, field: naive_kriging.NaiveKriging, ours: Asked) -> list[Row]:
     """Poses of as many questions, each at its own time."""
     model = made.trained.model
     rng = np.random.Generator(np.random.PCG64(POSES))

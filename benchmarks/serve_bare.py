@@ -16,7 +16,7 @@ import orjson
 import uvicorn
 
 from posefield.inference import session
-from posefield.synthesis.poses import ANSWERED
+from posefield.synthesis.poses import POSE_OUTPUTS
 
 
 def main(model: Path, port: int) -> None:
@@ -24,7 +24,7 @@ def main(model: Path, port: int) -> None:
     opened = session.load(model)
     names = [control.name for control in opened.card.controls]
     ask, identity = opened.runtimes[0].run, f"{model.stem}@{opened.digest}"
-    outputs = [*ANSWERED]
+    outputs = [*POSE_OUTPUTS]
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
         given = dict(parse_qsl(scope["query_string"].decode()))

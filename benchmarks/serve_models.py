@@ -46,8 +46,12 @@ def content(model: Path, number: int) -> bytes:
 
 def numbered(sealed: bytes, number: int) -> bytes:
     """A model file with a number in its metadata, and the checksum of that."""
-    entry = protobuf_wire.nested(1, b"number") + protobuf_wire.nested(2, b"%04d" % number)
-    return checksum.sealed(sealed[: -checksum.SIZE] + protobuf_wire.nested(14, entry))
+    entry = protobuf_wire.encode_bytes(1, b"number") + protobuf_wire.encode_bytes(
+        2, b"%04d" % number
+    )
+    return checksum.append_checksum(
+        sealed[: -checksum.SIZE] + protobuf_wire.encode_bytes(14, entry)
+    )
 
 
 def _models(model: Path, folder: Path, count: int) -> None:

@@ -7,14 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from posefield.common.errors import InvalidField
-from posefield.constraints.targets import MOST_TARGETS
-from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
+from posefield.constraints.targets import MAX_TARGETS
+from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS, GRID_ENCODERS, POSE_ENCODERS
 from posefield.http.api.settings import Settings
 from posefield.http.decoding import crowd_query
 from posefield.question import text_decoding
 from posefield.question.walk_question import WalkQuestion
 from posefield.registry import model_registry
-from posefield.synthesis.frame_times import MOST_POSES
+from posefield.synthesis.frame_times import MAX_POSES
 from posefield.synthesis.synthesizer import Synthesizer
 
 SETTINGS = Settings()
@@ -81,20 +81,20 @@ class _Asked:
 def _poses(one: _Asked) -> Iterator[Question]:
     end = one.model.session.card.durations[0]
     # Of few digits: the body is bounded, too.
-    times = [round(end * i / MOST_POSES, 3) for i in range(MOST_POSES)]
+    times = [round(end * i / MAX_POSES, 3) for i in range(MAX_POSES)]
     for ending in POSE_ENCODERS:
         asked = {"controls": one.controls, "times": times}
-        yield one.post("pose", f"{MOST_POSES} times, {ending}", f"pose.{ending}", asked)
-    held = {"controls": {}, "targets": one.targets(MOST_TARGETS), "times": times}
-    yield one.post("pose", f"{MOST_TARGETS} targets, open controls, all times, json", "pose", held)
+        yield one.post("pose", f"{MAX_POSES} times, {ending}", f"pose.{ending}", asked)
+    held = {"controls": {}, "targets": one.targets(MAX_TARGETS), "times": times}
+    yield one.post("pose", f"{MAX_TARGETS} targets, open controls, all times, json", "pose", held)
 
 
 def _clips(one: _Asked) -> Iterator[Question]:
-    for ending in ENCODERS:
+    for ending in CLIP_ENCODERS:
         asked = {"controls": one.controls, "fps": 1000}
         yield one.post("clip", f"fps=1000, {ending}", f"clip.{ending}", asked)
-    targets = {"controls": {}, "targets": one.targets(MOST_TARGETS), "fps": 1000}
-    said = f"{MOST_TARGETS} targets, fps=1000, json"
+    targets = {"controls": {}, "targets": one.targets(MAX_TARGETS), "fps": 1000}
+    said = f"{MAX_TARGETS} targets, fps=1000, json"
     yield one.post("clip", said, "clip.json", targets | {"controls": one.controls})
     yield one.post("clip", f"{said}, open controls", "clip.json", targets)
 
@@ -103,14 +103,14 @@ def _archives(one: _Asked) -> Iterator[Question]:
     count = SETTINGS.clips_limit
     # As many frames as all may have, in clips of the mean length.
     rate = int(SETTINGS.clips_poses / count / one.model.session.card.durations[1]) - 1
-    for ending in ENCODERS:
+    for ending in CLIP_ENCODERS:
         clips = [{"controls": one.controls, "fps": rate}] * count
         said = f"{count} clips of {rate} frames a second, {ending}"
         yield one.post("clips", said, "clips.zip", {"format": ending, "clips": clips})
     cost = SETTINGS.clips_targets
-    given = {"controls": one.controls, "targets": one.targets(MOST_TARGETS)}
-    clips = [given] * (cost // MOST_TARGETS)
-    said = f"{len(clips)} clips of {MOST_TARGETS} targets, json"
+    given = {"controls": one.controls, "targets": one.targets(MAX_TARGETS)}
+    clips = [given] * (cost // MAX_TARGETS)
+    said = f"{len(clips)} clips of {MAX_TARGETS} targets, json"
     yield one.post("clips", said, "clips.tar", {"format": "json", "clips": clips})
     clips = [{"controls": {}, "targets": one.targets(1)}] * (cost // 4)
     said = f"{len(clips)} clips of a target, open controls, json"
@@ -185,9 +185,9 @@ def _largest(
 def _legal(one: _Asked, ending: str, query: str) -> bool:
     pairs = [tuple(pair.split("=")) for pair in query.split("&")]
     try:
-        asked = text_decoding.question(WalkQuestion, pairs)
+        asked = text_decoding.decode_question(WalkQuestion, pairs)
         joints = len(one.model.session.card.skeleton)
-        crowd_query.walk_order(asked, ending, joints, SETTINGS)
+        crowd_query.checked_order(asked, ending, joints, SETTINGS)
     except InvalidField:
         return False
     return True

@@ -17,8 +17,8 @@ import pytest
 if TYPE_CHECKING:
     import numpy as np
 
-    from posefield_train.graph.onnx_export import Exported
-    from posefield_train.graph.trained_model import Trained
+    from posefield_train.graph.onnx_export import ExportedModel
+    from posefield_train.graph.trained_model import TrainedModel
     from posefield_train.source.ingest import Example
     from posefield_train.source.recipe import Recipe
 
@@ -94,13 +94,13 @@ def examples(models_trained) -> list[Example]:
 
 
 @pytest.fixture(scope="session")
-def trained(models_trained) -> Trained:
+def trained(models_trained) -> TrainedModel:
     """Return a small model of the procedural family."""
     return models_trained.trained("reaching")
 
 
 @pytest.fixture(scope="session")
-def exported(models_trained) -> Exported:
+def exported(models_trained) -> ExportedModel:
     """Return the small model with its levels of detail and the content of its file."""
     return models_trained.exported("reaching")
 
@@ -132,13 +132,13 @@ def labelled_recipe(models_trained) -> Recipe:
 
 
 @pytest.fixture(scope="session")
-def labelled(models_trained) -> Trained:
+def labelled(models_trained) -> TrainedModel:
     """Return a small model of the procedural family with performers."""
     return models_trained.trained("labelled")
 
 
 @pytest.fixture(scope="session")
-def labelled_exported(models_trained) -> Exported:
+def labelled_exported(models_trained) -> ExportedModel:
     """Return the model with performers, its levels of detail and the content of its file."""
     return models_trained.exported("labelled")
 

@@ -12,7 +12,7 @@ import pytest
 from posefield.http.api import contract
 
 EXAMPLES = Path(__file__).parents[1] / "api/examples"
-OPERATIONS = {operation.id: operation for operation in contract.load().operations}
+OPERATIONS = {operation.id: operation for operation in contract.load_contract().operations}
 CASES = [(name, form) for name, each in OPERATIONS.items() for form in each.formats or [None]]
 """Operation and format; None where the path names none."""
 

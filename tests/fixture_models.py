@@ -8,8 +8,8 @@ import fixture_cache
 
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.graph.onnx_export import Exported
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.onnx_export import ExportedModel
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.sample import sample_files, sample_walk
 from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
@@ -18,7 +18,7 @@ from posefield_train.source.recipe import Recipe
 
 def family() -> Path:
     """Return the folder of the whole procedural family; its recipe is recipe.toml."""
-    return fixture_cache.path("family", sample_files.family)
+    return fixture_cache.path("family", sample_files.write_family)
 
 
 @functools.cache
@@ -44,7 +44,7 @@ def measured_recipe() -> Recipe:
         {"name": name, "auto": {"quantity": name}, "description": name}
         for name in ("speed", "turn")
     ]
-    return Recipe.model_validate({**tomllib.loads(sample_walk.TOML), "controls": measured})
+    return Recipe.model_validate({**tomllib.loads(sample_walk.RECIPE_TEXT), "controls": measured})
 
 
 RECIPES = {
@@ -74,7 +74,7 @@ def examples(model: str) -> list[Example]:
 
 
 @functools.cache
-def trained(model: str) -> Trained:
+def trained(model: str) -> TrainedModel:
     """Return a small model, trained."""
     return fixture_cache.value(
         f"{model}-trained",
@@ -83,13 +83,13 @@ def trained(model: str) -> Trained:
 
 
 @functools.cache
-def exported(model: str) -> Exported:
+def exported(model: str) -> ExportedModel:
     """Return a small model with its levels of detail and the content of its file."""
     return fixture_cache.value(
-        f"{model}-exported", lambda: onnx_export.export(RECIPES[model](), trained(model), [])
+        f"{model}-exported", lambda: onnx_export.export_model(RECIPES[model](), trained(model), [])
     )
 
 
 def _write_strides(folder: Path) -> None:
     folder.mkdir()
-    sample_walk.write(folder)
+    sample_walk.write_walk(folder)

@@ -4,7 +4,7 @@ import numpy as np
 
 from posefield.kriging.kriging_model import Hyper
 from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import Control, Event, Making, ModelCard
+from posefield.model_file.model_card import Control, Event, ModelCard, TrainingParameters
 from posefield.motion.measures import Measure
 from posefield.motion.skeleton import Skeleton
 
@@ -62,7 +62,7 @@ CARD = ModelCard(
     kriging=Hyper("matern52", (0, 1), np.array([0.3, 0.1 + 0.2]), 1e-3, 0.7),
     left_out=(0.01, 0.02, 0.5),
     joint_sigma=(0.5, 1.32),
-    making=Making({"warp": (0.25, 0, 1)}, {"peak": 0.4}, {"chest": 2.0}, in_phase=True),
+    making=TrainingParameters({"warp": (0.25, 0, 1)}, {"peak": 0.4}, {"chest": 2.0}, in_phase=True),
     roles={"hips": "hips", "upperChest": "chest"},
     event=Event(1, 0.75),
     beside=((0.1, 0.0, 0.0, 0.0), (0.2, 0.3, 0.0, 0.0), (0.1, 0.1, 0.1, 0.0), (0.0, 0.0, 0.0, 0.1)),

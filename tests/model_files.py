@@ -12,8 +12,12 @@ METADATA = 14
 
 def numbered(content: bytes, number: int) -> bytes:
     """Return the same model in other bytes: a number is written into its metadata."""
-    entry = protobuf_wire.nested(1, b"number") + protobuf_wire.nested(2, b"%04d" % number)
-    return checksum.sealed(content[: -checksum.SIZE] + protobuf_wire.nested(METADATA, entry))
+    entry = protobuf_wire.encode_bytes(1, b"number") + protobuf_wire.encode_bytes(
+        2, b"%04d" % number
+    )
+    return checksum.append_checksum(
+        content[: -checksum.SIZE] + protobuf_wire.encode_bytes(METADATA, entry)
+    )
 
 
 def written(model: onnx.ModelProto) -> bytes:
@@ -21,7 +25,7 @@ def written(model: onnx.ModelProto) -> bytes:
     others = [entry for entry in model.metadata_props if entry.key != checksum.KEY.decode()]
     del model.metadata_props[:]
     model.metadata_props.extend(others)
-    return checksum.sealed(model.SerializeToString(deterministic=True))
+    return checksum.append_checksum(model.SerializeToString(deterministic=True))
 
 
 def slow(content: bytes) -> bytes:
@@ -38,7 +42,7 @@ def large(content: bytes, numbers: int = 1_500_000_000) -> bytes:
 def many(content: bytes) -> bytes:
     """Return a model with millions of empty nodes, which take long to read."""
     model = onnx.ModelProto(graph=onnx.GraphProto(node=[onnx.NodeProto()] * 10_000_000))
-    return checksum.sealed(content[: -checksum.SIZE] + model.SerializeToString())
+    return checksum.append_checksum(content[: -checksum.SIZE] + model.SerializeToString())
 
 
 def _with_sigma(content: bytes, shape: list[int], products: int) -> bytes:

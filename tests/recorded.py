@@ -33,5 +33,5 @@ def session(
     def recorded(runtimes: Sequence[Any]) -> tuple[Runtime, ...]:
         return tuple(Runtime(runtime, calls, check) for runtime in runtimes)
 
-    graphs = ("runtimes", "clocks", "gauges", "states")
+    graphs = ("runtimes", "duration_sessions", "sigma_sessions", "state_sessions")
     return replace(opened, **{name: recorded(getattr(opened, name)) for name in graphs}), calls

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from posefield import __version__, cli
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import clips, poses
@@ -193,7 +193,7 @@ def test_sample_truth_is_the_noise_free_motion(posefield, tmp_path, fps):
     words = ("sample", "reaching", "--truth", "-o", path, *CONTROLS, "--fps", fps, "--json")
     code, out, _ = posefield(*words)
     assert code == 0
-    expected = noise_free.clip(POINT, fps)
+    expected = noise_free.truth_clip(POINT, fps)
     found = bvh.read(path)
     assert (len(found.values), found.rate) == (len(expected), fps)
     # A BVH file of ours is in centimetres.
@@ -374,7 +374,7 @@ def test_pose_answers_as_json(posefield, model_path):
     assert np.shape(said["bone_offsets"]) == (33, 3)
     assert said["trust"]["controls"] == POINT and said["trust"]["warnings"] == []
     model = model_registry.load([model_path]).models["reaching"]
-    expected = poses.pose(model, PoseQuestion(controls=POINT, times=[0.25, 0.5]))
+    expected = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.25, 0.5]))
     assert np.abs(said["rotations"] - expected.rotations).max() < 1e-6
 
 
@@ -472,7 +472,7 @@ def test_inspect_lists_the_performers_there_are(posefield, labelled_path, model_
 
 
 def test_all_formats_are_tested():
-    assert set(FORMATS) == set(ENCODERS)
+    assert set(FORMATS) == set(CLIP_ENCODERS)
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -481,7 +481,9 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
     code, out, err = posefield("clip", model_path, *CONTROLS, "-o", path, "--json")
     assert (code, err) == (0, "")
     model = model_registry.load([model_path]).models["reaching"]
-    answer = clips.clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn"))
+    answer = clips.synthesize_clip(
+        model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")
+    )
     said = json.loads(out)
     assert said == {
         "file": str(path),
@@ -489,7 +491,7 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
         "rate": 30.0,
         **answer.trust.facts(),
     }
-    assert path.read_bytes() == ENCODERS[ending].encode(answer)
+    assert path.read_bytes() == CLIP_ENCODERS[ending].encode(answer)
     assert stat.S_IMODE(path.stat().st_mode) == 0o644
     assert [p.name for p in path.parent.iterdir()] == [path.name]
 
@@ -524,8 +526,8 @@ def test_clip_names_joints_and_measures_as_asked_for(posefield, model_path, tmp_
     assert found["names"][9:12] == ["Spine", "Spine1", "Spine2"]
     assert (found["units"]["length"], found["units"]["up"]) == ("centimetre", "Z")
     asked = ClipQuestion(controls=POINT, names="humanik", root="in_place")
-    answer = clips.clip(model_registry.load([model_path]).models["reaching"], asked)
-    assert path.read_bytes() == ENCODERS["json"].encode(answer, Convention(0.01, "z"))
+    answer = clips.synthesize_clip(model_registry.load([model_path]).models["reaching"], asked)
+    assert path.read_bytes() == CLIP_ENCODERS["json"].encode(answer, Convention(0.01, "z"))
 
 
 def test_clip_writes_a_loop(posefield, walk_path, tmp_path):

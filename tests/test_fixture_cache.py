@@ -20,8 +20,8 @@ from posefield_train.sample import sample_walk
 from posefield_train.source import ingest
 
 own = sample_walk.recipe()
-found, _ = ingest.ingest(own, sample_walk.write(Path(sys.argv[1])))
-onnx_export.export(own, train.train(own, found, lambda _: None), [])
+found, _ = ingest.ingest(own, sample_walk.write_walk(Path(sys.argv[1])))
+onnx_export.export_model(own, train.train(own, found, lambda _: None), [])
 for module in list(sys.modules.values()):
     file = getattr(module, "__file__", None) or ""
     if file.startswith(sys.argv[2]) and "/.venv" not in file:

@@ -24,7 +24,7 @@ def web(tmp_path):
     (web / "viewer").mkdir()
     page_text = b"<!doctype html><html><head><title>x</title></head></html>"
     (web / "viewer/index.html").write_bytes(page_text)
-    for name in command_page.PARTS:
+    for name in command_page.OFFLINE_FILES:
         plain = name.encode()
         content = gzip.compress(plain) if name.endswith(".gz") else plain
         (web / "offline" / name).write_bytes(content)
@@ -35,7 +35,7 @@ def test_the_folder_holds_the_page_its_parts_and_the_model(model_path, tmp_path,
     folder = tmp_path / "out"
     code, said, _ = posefield("page", model_path, "-o", folder, "--json")
     assert code == 0
-    parts = {name.removesuffix(".gz") for name in command_page.PARTS}
+    parts = {name.removesuffix(".gz") for name in command_page.OFFLINE_FILES}
     found = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert found.keys() == parts | {"index.html", "reaching.onnx"}
     assert json.loads(said)["files"] == {name: len(content) for name, content in found.items()}
@@ -77,7 +77,7 @@ def test_the_same_folder_is_the_same_to_the_byte(model_path, tmp_path, posefield
 
 
 def test_parts_are_unpacked_and_the_page_is_marked_and_comes_last(web):
-    made = dict(command_page.files_of("a.onnx", b"model", "a@0", web))
+    made = dict(command_page.page_files("a.onnx", b"model", "a@0", web))
     assert list(made)[-2:] == ["a.onnx", "index.html"]
     assert made["ort-wasm-simd-threaded.wasm"] == b"ort-wasm-simd-threaded.wasm.gz"
     assert b'<head><meta name="posefield-model" content="a.onnx"' in made["index.html"]
@@ -88,7 +88,9 @@ def test_parts_are_unpacked_and_the_page_is_marked_and_comes_last(web):
 def test_a_part_that_was_not_built_is_named_and_leaves_no_page(part, web, tmp_path):
     (web / part).unlink()
     with pytest.raises(FileError, match=rf"{part}: .*make page"):
-        command_page.write(command_page.files_of("a.onnx", b"", "a@0", web), tmp_path / "out")
+        command_page.write_files(
+            command_page.page_files("a.onnx", b"", "a@0", web), tmp_path / "out"
+        )
     assert not (tmp_path / "out/index.html").exists()
 
 

@@ -15,7 +15,7 @@ from posefield.common.errors import ClusterError
 
 pytestmark = pytest.mark.system
 
-KIT = dask_scheduler.Kit(("posefield",), ("numpy", "onnxruntime"))
+KIT = dask_scheduler.RequiredSoftware(("posefield",), ("numpy", "onnxruntime"))
 
 # Every client in a process of its own: its loop and sockets are nobody else's.
 CONNECT = f"""
@@ -71,7 +71,7 @@ def test_a_worker_with_another_source_is_named(cluster, tmp_path):
     cluster.add(path=str(copy))
     found = connect(cluster.address)
     assert found.count("worker tcp://") == 1
-    assert f"expected {dask_scheduler.installed(KIT)['posefield']}" in found
+    assert f"expected {dask_scheduler.installed_versions(KIT)['posefield']}" in found
 
 
 @pytest.mark.parametrize("address", ["nonsense", "nope://127.0.0.1:8786", ""])
@@ -91,19 +91,19 @@ def test_no_workers(tmp_path):
 
 
 def test_another_source_or_version_is_a_difference(tmp_path):
-    here = dask_scheduler.installed(KIT)
+    here = dask_scheduler.installed_versions(KIT)
     assert set(here) == {"Python", "posefield", "numpy", "onnxruntime"}
-    assert dask_scheduler.differences(here, here) == ""
+    assert dask_scheduler.describe_differences(here, here) == ""
     there = {**here, "numpy": "1.0", "posefield": "source 00000000"}
-    assert dask_scheduler.differences(there, here) == (
+    assert dask_scheduler.describe_differences(there, here) == (
         f"posefield source 00000000, expected {here['posefield']}, "
         f"numpy 1.0, expected {here['numpy']}"
     )
 
 
 def test_what_is_missing_is_none():
-    found = dask_scheduler.installed(
-        dask_scheduler.Kit(("no_such_package",), ("no-such-distribution",))
+    found = dask_scheduler.installed_versions(
+        dask_scheduler.RequiredSoftware(("no_such_package",), ("no-such-distribution",))
     )
     assert (found["no_such_package"], found["no-such-distribution"]) == ("none", "none")
 

@@ -10,7 +10,7 @@ from timing import in_turn
 
 from paper import poses, precomputation
 from paper.measurement import CORE_GOAL, PRECOMPUTE_GOAL, SHOWN, Baseline, Size, Table1
-from posefield_train.kriging.variogram import Experimental, Fit
+from posefield_train.kriging.variogram import ExperimentalVariogram, VariogramModel
 
 
 def rows(table: Table1) -> list[Row]:
@@ -59,10 +59,12 @@ def library_rows(made: Family) -> list[Row]:
     ]
 
 
-def _fit_by_gstools(experimental: Experimental, _: str) -> Fit:
+def _fit_by_gstools(experimental: ExperimentalVariogram, _: str) -> VariogramModel:
     model = gstools.Matern(dim=4, nu=2.5)
     weights = experimental.pairs / experimental.values**2
     model.fit_variogram(
         experimental.distances, experimental.values, weights=weights, nu=False, max_eval=10_000
     )
-    return Fit(float(model.nugget), float(model.var), float(model.percentile_scale(0.95)))
+    return VariogramModel(
+        float(model.nugget), float(model.var), float(model.percentile_scale(0.95))
+    )

@@ -16,13 +16,13 @@ from paper import precomputation
 from posefield.common.units import Floats
 from posefield.motion import skeleton
 from posefield_train.graph import ranks
-from posefield_train.graph.ranks import Front, Triple
-from posefield_train.graph.truncation_cost import Price
+from posefield_train.graph.ranks import ParetoFront, RankTriple
+from posefield_train.graph.truncation_cost import RankCost
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.naive_kriging import Naive
-from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.kriging.naive_kriging import NaiveKriging
+from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor.decoder import Decoder
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.hosvd import TuckerTensor
 
 # Control points that the search for ranks uses; control points evaluated together.
 SOME, CHUNK = 100, 100
@@ -45,7 +45,7 @@ class Errors:
         """Joint positions (Q, T, J, 3), m, of the model at full rank."""
         return self.positions(self.of(self.made.trained.full))
 
-    def truncation(self, reduced: Multilinear) -> float:
+    def truncation(self, reduced: TuckerTensor) -> float:
         """Return the summed distance, m, of a truncation from full rank with the same weights."""
         return between(self.positions(self.of(reduced)), self.whole)
 
@@ -59,11 +59,11 @@ class Errors:
         translations = skeleton.translations(self.made.offsets.mean(axis=0), root)
         return skeleton.positions(self.made.parents, rotations, translations)
 
-    def field(self, reduced: Multilinear) -> Kriging:
+    def field(self, reduced: TuckerTensor) -> UniversalKriging:
         """Return the kriging model of a truncation's sample basis."""
         return universal_kriging.solve(self.hyper, self.made.samples, reduced.bases[2])
 
-    def of(self, reduced: Multilinear) -> Poses:
+    def of(self, reduced: TuckerTensor) -> Poses:
         """Return the pose function of a truncation."""
         own, field = self.made.trained.tensor, self.field(reduced)
         decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means)
@@ -72,7 +72,7 @@ class Errors:
             field.predict(points), np.tile(frames, (len(points), 1))
         )
 
-    def of_naive(self, field: Naive) -> Poses:
+    def of_naive(self, field: NaiveKriging) -> Poses:
         """Return the pose function of per-frame kriging of the degrees of freedom that vary."""
         own = self.made.trained.tensor
 
@@ -101,7 +101,7 @@ def between(found: Floats, expected: Floats) -> float:
     return float(np.sqrt(np.mean(np.square(sums))))
 
 
-def smallest(errors: Errors, threshold: float) -> Triple:
+def smallest(errors: Errors, threshold: float) -> RankTriple:
     """Return the ranks of the smallest core within `threshold`, m, of full rank.
 
     The search follows the Pareto front of size and error in the training metric, with SOME of the
@@ -111,7 +111,7 @@ def smallest(errors: Errors, threshold: float) -> Triple:
     some = replace(errors, points=errors.points[:SOME])
     places = made.trained.tensor.values[0].size * len(made.parents)
     own = _front(errors)
-    found = ranks.cheapest(
+    found = ranks.cheapest_within(
         own,
         lambda triple: some.truncation(full.truncated(triple)) / threshold,
         (threshold / (made.vectors.shape[1] * len(made.parents))) ** 2 * places,
@@ -122,7 +122,7 @@ def smallest(errors: Errors, threshold: float) -> Triple:
     return own[place]
 
 
-def _front(errors: Errors) -> Front:
+def _front(errors: Errors) -> ParetoFront:
     """Return the Pareto front with sample directions weighted by their predicted size.
 
     Kriging smooths: it predicts smaller coefficients for the last sample directions than the clips
@@ -131,4 +131,4 @@ def _front(errors: Errors) -> Front:
     full = errors.made.trained.full
     predicted = errors.field(full).predict(errors.points)
     used = np.mean(np.square(predicted), axis=0) * len(errors.made.samples)
-    return ranks.front(full.core * np.sqrt(used), Price((0, 0, 0)))
+    return ranks.pareto_front(full.core * np.sqrt(used), RankCost((0, 0, 0)))

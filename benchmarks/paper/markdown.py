@@ -2,7 +2,7 @@
 
 from paper import poses, precomputation
 from paper.measurement import CORE_GOAL, SEARCHED, SHOWN, Baseline, Size, Table1
-from posefield_train.graph.truncation_cost import Price
+from posefield_train.graph.truncation_cost import RankCost
 
 # Table 1 as printed: threshold, ranks, seconds of precomputation, milliseconds per pose.
 PAPER = (
@@ -47,7 +47,7 @@ def _paper_rows() -> list[str]:
     rows = []
     for asked, (r1, r2, r3), seconds, milliseconds in PAPER:
         core = raw[0] * raw[1] * raw[2] / (r1 * r2 * r3)
-        stored = raw[0] * raw[1] * raw[2] / Price(raw).of(r1, r2, r3) if core > 1 else 1.0
+        stored = raw[0] * raw[1] * raw[2] / RankCost(raw).evaluate(r1, r2, r3) if core > 1 else 1.0
         rows.append(
             f"| {asked} | {r1} × {r2} × {r3} | {core:.0f} | {stored:.0f} | | | {seconds} s "
             f"| {slow / seconds:.1f} | {milliseconds} ms | {late / milliseconds:.1f} |"

@@ -17,12 +17,12 @@ from paper import errors, poses, precomputation
 from paper.errors import Errors
 from posefield.common.units import Floats
 from posefield_train.graph import truncation_cost
-from posefield_train.graph.ranks import Triple
-from posefield_train.kriging.naive_kriging import Naive
+from posefield_train.graph.ranks import RankTriple
+from posefield_train.kriging.naive_kriging import NaiveKriging
 
 # The paper states no unit for its thresholds: summed distances in m, under two assumptions.
 THRESHOLDS = {"500 cm": 5.0, "750 cm": 7.5, "1000 cm": 10.0, "500 mm": 0.5}
-PAPER_RANKS: tuple[Triple, ...] = ((22, 6, 24), (18, 6, 28), (20, 6, 20))
+PAPER_RANKS: tuple[RankTriple, ...] = ((22, 6, 24), (18, 6, 28), (20, 6, 20))
 # Every naive form is compared with posefield at the first size in the paper.
 SHOWN = PAPER_RANKS[0]
 SEARCHED = "SciPy's least_squares"
@@ -40,7 +40,7 @@ class Size:
     """
 
     asked: str
-    ranks: Triple
+    ranks: RankTriple
     error: float
     from_naive: float
     core: float
@@ -117,13 +117,13 @@ def of(made: Family, points: int, rounds: int) -> Table1:
     )
 
 
-def _asked(over: Errors) -> dict[str, Triple]:
+def _asked(over: Errors) -> dict[str, RankTriple]:
     """Return the ranks for each threshold, and those in the paper."""
     found = {name: errors.smallest(over, metres) for name, metres in THRESHOLDS.items()}
     return found | {f"the paper's {_times(ranks)}": ranks for ranks in PAPER_RANKS}
 
 
-def _precompute_times(made: Family, asked: dict[str, Triple], rounds: int) -> dict[str, float]:
+def _precompute_times(made: Family, asked: dict[str, RankTriple], rounds: int) -> dict[str, float]:
     runs = {name: partial(precomputation.ours, made, ranks) for name, ranks in asked.items()}
     naive = {
         name: partial(precomputation.naive, made, fit) for name, fit in precomputation.FITS.items()
@@ -132,7 +132,7 @@ def _precompute_times(made: Family, asked: dict[str, Triple], rounds: int) -> di
 
 
 def _pose_times(
-    made: Family, asked: dict[str, Triple], field: Naive, rounds: int
+    made: Family, asked: dict[str, RankTriple], field: NaiveKriging, rounds: int
 ) -> dict[str, float]:
     """Return seconds per pose of compiled code that computes poses one at a time."""
     question = poses.questions(made, POSES)
@@ -145,11 +145,11 @@ def _pose_times(
 
 
 def _size(
-    over: Errors, from_naive: Floats, name: str, ranks: Triple, before: float, single: float
+    over: Errors, from_naive: Floats, name: str, ranks: RankTriple, before: float, single: float
 ) -> Size:
     own = over.made.trained
     found = over.positions(over.of(own.full.truncated(ranks)))
-    compression = truncation_cost.compression(own.tensor, ranks, over.made.samples.shape[1])
+    compression = truncation_cost.tensor_compression(own.tensor, ranks, over.made.samples.shape[1])
     return Size(
         name,
         ranks,
@@ -162,5 +162,5 @@ def _size(
     )
 
 
-def _times(ranks: Triple) -> str:
+def _times(ranks: RankTriple) -> str:
     return "×".join(map(str, ranks))

@@ -16,9 +16,9 @@ from scipy import linalg
 from paper import kernels
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.naive_kriging import Naive
-from posefield_train.kriging.universal_kriging import Kriging
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.kriging.naive_kriging import NaiveKriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
+from posefield_train.tensor.hosvd import TuckerTensor
 
 OURS = (
     "covariances, kriging weights, core, linear interpolation between two rows of the time basis, "
@@ -57,7 +57,7 @@ def questions(made: Family, count: int) -> Questions:
 
 
 def ours(
-    made: Family, reduced: Multilinear, field: Kriging, asked: Questions
+    made: Family, reduced: TuckerTensor, field: UniversalKriging, asked: Questions
 ) -> Callable[[], Floats]:
     """Return a function of the model's pose vectors (Q, D) between frames."""
     own = made.trained.tensor
@@ -71,7 +71,7 @@ def ours(
     return _bound(kernels.ours, asked.points, asked.places, arrays, (r3, r2 * r1, r1))
 
 
-def naive(field: Naive, asked: Questions) -> dict[str, Callable[[], Floats]]:
+def naive(field: NaiveKriging, asked: Questions) -> dict[str, Callable[[], Floats]]:
     """Return functions of pose vectors (Q, D) for each form of the naive method."""
     samples, values = field.fields[0].samples.T, field.values.transpose(1, 0, 2)
     n = samples.shape[1]
@@ -131,7 +131,7 @@ def lu_factors(systems: Floats) -> tuple[Floats, Floats, Floats]:
     return stacked, np.stack(orders), 1.0 / np.diagonal(stacked, axis1=1, axis2=2)
 
 
-def system(field: Kriging) -> Floats:
+def system(field: UniversalKriging) -> Floats:
     """Return the kriging system (m, m) of one frame with linear drift."""
     n, drift = len(field.samples), np.insert(field.samples, 0, 1.0, axis=1)
     near = universal_kriging.covariances(field.hyper, field.samples, field.samples)

@@ -6,23 +6,23 @@ from family import Family
 from posefield_train.align import time_alignment
 from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
 from posefield_train.kriging import naive_kriging as per_frame
-from posefield_train.kriging.naive_kriging import Fitter, Naive
-from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.kriging.naive_kriging import NaiveKriging, VariogramFitter
+from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor import hosvd, motion_tensor
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.hosvd import TuckerTensor
 
 OURS = "metric, whitened tensor, HOSVD at the given ranks, one variogram, one kriging system"
 NAIVE = (
     "naive kriging: kinematics of all frames, then for each frame the dissimilarity of all pairs "
     "of poses, an experimental variogram fitted by {}, and a kriging system with its inverse"
 )
-FITS: dict[str, Fitter] = {
+FITS: dict[str, VariogramFitter] = {
     "SciPy's least_squares": variogram.fit_by_search,
-    "our own linearised grid search": variogram.fit,
+    "our own linearised grid search": variogram.fit_by_grid,
 }
 
 
-def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[Multilinear, Kriging]:
+def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[TuckerTensor, UniversalKriging]:
     """Return the reduced tensor and the kriging model of its sample basis.
 
     The dissimilarity of two motions is the distance between their slices of the core (Mukai &
@@ -31,18 +31,18 @@ def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[Multilinear, Krigin
     """
     weights = np.ones(len(made.parents))
     chart = made.trained.tensor.chart
-    own = motion_tensor.build(made.vectors, chart, made.parents, made.offsets, weights)
-    reduced = hosvd.decompose_at(own.values, ranks)
+    own = motion_tensor.build_tensor(made.vectors, chart, made.parents, made.offsets, weights)
+    reduced = hosvd.decompose_truncated(own.values, ranks)
     return reduced, universal_kriging.solve(guess(made, reduced), made.samples, reduced.bases[2])
 
 
-def guess(made: Family, reduced: Multilinear) -> Hyper:
+def guess(made: Family, reduced: TuckerTensor) -> Hyper:
     """Return kriging parameters from the variogram of the motions' slices of the core."""
-    experimental = variogram.of_residuals(made.samples, reduced.motions, 1)
-    return kriging_tuning.first_guess(experimental, made.samples.shape[1], "matern52", (1,))
+    experimental = variogram.residual_variogram(made.samples, reduced.motions, 1)
+    return kriging_tuning.initial_guess(experimental, made.samples.shape[1], "matern52", (1,))
 
 
-def naive(made: Family, fitter: Fitter) -> Naive:
+def naive(made: Family, fitter: VariogramFitter) -> NaiveKriging:
     """Return the per-frame kriging model of the family's pose vectors."""
-    positions = time_alignment.positions(made.trained.aligned, made.parents, made.offsets)
-    return per_frame.fit(made.samples, positions, made.numbers, "matern52", fitter)
+    positions = time_alignment.joint_positions(made.trained.aligned, made.parents, made.offsets)
+    return per_frame.fit_naive(made.samples, positions, made.numbers, "matern52", fitter)

@@ -7,7 +7,7 @@ from pathlib import Path
 from posefield.common.errors import InvalidField, TrainingError
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.graph.onnx_export import Exported
+from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.parallel import single_thread
 from posefield_train.parallel.jobs import Jobs
 from posefield_train.source import ingest, recipe
@@ -16,14 +16,14 @@ from posefield_train.source.recipe import Recipe
 
 
 @dataclass(frozen=True)
-class Made:
+class SweepResult:
     """Result of a recipe: an exported model, or the error that prevented it."""
 
     name: str
-    found: Exported | TrainingError
+    found: ExportedModel | TrainingError
 
 
-def models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterator[Made]:
+def train_models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterator[SweepResult]:
     """Yield the models of recipes, named after their files, in the order in which they finish.
 
     data: folder of the motion data; None for each recipe's own. Raises InvalidField if two files
@@ -35,15 +35,15 @@ def models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterator[Mad
     read = [(path, recipe.read(path)) for path in paths]
     # Data are read when jobs are started, so that few recipes' data are in memory.
     return jobs.run(
-        _model,
+        _train_model,
         ((path.stem, own, *ingest.ingest(own, data or path.parent)) for path, own in read),
     )
 
 
-def _model(name: str, own: Recipe, examples: list[Example], notes: list[str]) -> Made:
-    with single_thread.one():
+def _train_model(name: str, own: Recipe, examples: list[Example], notes: list[str]) -> SweepResult:
+    with single_thread.single_threaded():
         try:
             trained = train.train(own, examples, lambda _: None)
-            return Made(name, onnx_export.export(own, trained, notes))
+            return SweepResult(name, onnx_export.export_model(own, trained, notes))
         except TrainingError as error:
-            return Made(name, error)
+            return SweepResult(name, error)

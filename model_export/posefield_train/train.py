@@ -11,18 +11,18 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment, travel
-from posefield_train.align.canonical_timing import Timing
-from posefield_train.align.time_alignment import Aligned
+from posefield_train.align.canonical_timing import CanonicalTiming
+from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
 from posefield_train.graph import ranks, truncation_cost
-from posefield_train.graph.float_model import Model
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.float_model import FloatModel
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import coefficient_models, sample_points, universal_kriging
-from posefield_train.kriging.coefficient_models import Fitted
-from posefield_train.kriging.kriging_bank import FieldBank
-from posefield_train.kriging.kriging_tuning import Tuned
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.coefficient_models import FittedModel
+from posefield_train.kriging.kriging_bank import KrigingBank
+from posefield_train.kriging.kriging_tuning import TunedKriging
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.outliers import outlier_detection
 from posefield_train.parallel import single_thread
 from posefield_train.source.half_turns import Finding
@@ -30,59 +30,61 @@ from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import hosvd, motion_tensor, truncation_error
 from posefield_train.tensor.decoder import Decoder, Proportions
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
-from posefield_train.tensor.pose_vectors import Chart
-from posefield_train.tensor.truncation_error import Judge
+from posefield_train.tensor.pose_vectors import PoseChart
+from posefield_train.tensor.truncation_error import TruncationReference
 
-Report = Callable[[str], None]
+StepCallback = Callable[[str], None]
 """Callback for progress messages."""
 
 
 @dataclass(frozen=True)
-class _Moved:
+class _VectorizedClips:
     """Aligned clips as pose vectors.
 
     numbers: (N, T, D). offsets: bone offsets (N, J, 3), m. laid: their sample points. travels: (N,
     3) of cycles, otherwise empty.
     """
 
-    laid: Samples
+    samples: SamplePoints
     performers: tuple[str, ...]
-    aligned: Aligned
+    aligned: AlignedClips
     offsets: Floats
     numbers: Floats
-    chart: Chart
+    chart: PoseChart
     travels: dict[str, Floats]
     findings: list[Finding]
 
 
-def train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Trained:
+def train(recipe: Recipe, examples: Sequence[Example], report: StepCallback) -> TrainedModel:
     """Return a model of a recipe's examples.
 
     report: called with a description of each step. Raises TrainingError if the samples do not
     determine a kriging model.
     """
-    with single_thread.one():
+    with single_thread.single_threaded():
         return _train(recipe, examples, report)
 
 
-def _train(recipe: Recipe, examples: Sequence[Example], report: Report) -> Trained:
+def _train(recipe: Recipe, examples: Sequence[Example], report: StepCallback) -> TrainedModel:
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
-    universal_kriging.check(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
+    universal_kriging.check_samples(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
     examples = _sorted(examples)
     report(f"aligning {len(examples)} clips")
     weights = truncation_error.joint_weights(recipe, examples)
-    examples = phase_alignment.in_phase(recipe, examples, weights)
-    moved = _move(recipe, examples, weights)
+    examples = phase_alignment.align_phases(recipe, examples, weights)
+    moved = _vectorize(recipe, examples, weights)
     report("building the motion tensor")
     parents = examples[0].clip.skeleton.parents
-    own_tensor = motion_tensor.build(moved.numbers, moved.chart, parents, moved.offsets, weights)
+    own_tensor = motion_tensor.build_tensor(
+        moved.numbers, moved.chart, parents, moved.offsets, weights
+    )
     full = hosvd.decompose(own_tensor.values)
     report("fitting the fields")
-    trained = _fit(recipe, examples, moved, own_tensor, full)
-    return replace(trained, outliers=outlier_detection.find(recipe, trained))
+    trained = _fit_and_truncate(recipe, examples, moved, own_tensor, full)
+    return replace(trained, outliers=outlier_detection.find_outliers(recipe, trained))
 
 
 def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
@@ -94,31 +96,34 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
     return tuple(sorted(examples, key=key))
 
 
-def _move(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _Moved:
+def _vectorize(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _VectorizedClips:
     """Align clips and convert them to pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
-    laid, performers = sample_points.lay(recipe, examples)
+    laid, performers = sample_points.make_samples(recipe, examples)
     predict = _predictor(recipe, laid)
     aligned = time_alignment.align(
         examples, recipe.motion.frames, basis, settings.rounds, weights, predict
     )
     travels = {}
     if recipe.motion.cyclic:
-        aligned, travels["travel"] = travel.take_out(aligned)
+        aligned, travels["travel"] = travel.remove_travel(aligned)
     offsets = np.stack([example.offsets for example in examples])
     parents = examples[0].clip.skeleton.parents
     numbers, chart, noticed = motion_tensor.pose_vectors(aligned, parents, offsets)
     jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
     findings = jumps + noticed
-    return _Moved(laid, performers, aligned, offsets, numbers, chart, travels, findings)
+    return _VectorizedClips(laid, performers, aligned, offsets, numbers, chart, travels, findings)
 
 
-def _predictor(recipe: Recipe, laid: Samples) -> time_alignment.Predict:
+def _predictor(recipe: Recipe, laid: SamplePoints) -> time_alignment.Predictor:
     """Return a function that predicts each clip from the others by a tuned kriging model."""
 
     def predict(values: Floats) -> Floats:
         covariance = recipe.kriging.covariances[0]
-        return values - coefficient_models.tuned(recipe.kriging, covariance, laid, values).residuals
+        return (
+            values
+            - coefficient_models.tune_drift(recipe.kriging, covariance, laid, values).residuals
+        )
 
     def mean(values: Floats) -> Floats:
         return np.broadcast_to(values.mean(axis=0), values.shape)
@@ -127,7 +132,7 @@ def _predictor(recipe: Recipe, laid: Samples) -> time_alignment.Predict:
 
 
 @dataclass(frozen=True)
-class _Fits:
+class _FittedModels:
     """Tuned models of all quantities.
 
     values: sample values (N, m) by name. missed: mean squared leave-one-out distance (N,), m².
@@ -135,88 +140,92 @@ class _Fits:
 
     proportions: Proportions
     values: dict[str, Floats]
-    pose: Tuned
-    beside: dict[str, Fitted]
-    missed: Floats
+    pose: TunedKriging
+    beside: dict[str, FittedModel]
+    left_out_errors: Floats
 
 
-def _fits(recipe: Recipe, moved: _Moved, own_tensor: MotionTensor, full: Multilinear) -> _Fits:
-    laid = moved.laid
-    proportions, bones = coefficient_models.proportions(moved.offsets)
+def _fit_models(
+    recipe: Recipe, moved: _VectorizedClips, own_tensor: MotionTensor, full: TuckerTensor
+) -> _FittedModels:
+    laid = moved.samples
+    proportions, bones = coefficient_models.fit_proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
-    pose = coefficient_models.chosen(recipe.kriging, laid, full.motions)
+    pose = coefficient_models.choose_covariance(recipe.kriging, laid, full.motions)
     covariance = pose.hyper.covariance
     fitted = {
         k: coefficient_models.fit(recipe.kriging, covariance, laid, v) for k, v in beside.items()
     }
     values = {"pose": full.motions, **beside}
-    missed = _missed(own_tensor, pose, fitted)
-    return _Fits(proportions, values, pose, fitted, missed)
+    missed = _left_out_errors(own_tensor, pose, fitted)
+    return _FittedModels(proportions, values, pose, fitted, missed)
 
 
-def _model(
+def _assemble(
     recipe: Recipe,
     controls: Floats,
-    moved: _Moved,
+    moved: _VectorizedClips,
     own_tensor: MotionTensor,
-    fits: _Fits,
-    reduced: Multilinear,
-) -> Model:
+    fits: _FittedModels,
+    reduced: TuckerTensor,
+) -> FloatModel:
     """Assemble the model of controls (N, d) from the tuned models and the truncated tensor."""
-    solved = universal_kriging.solve(fits.pose.hyper, moved.laid.points, reduced.bases[2])
+    solved = universal_kriging.solve(fits.pose.hyper, moved.samples.points, reduced.bases[2])
     others = {name: found.field for name, found in fits.beside.items()}
     ends = controls.min(axis=0), controls.max(axis=0)
-    sill = float(np.mean(fits.missed / fits.pose.variances))
-    return Model(
-        FieldBank(*ends, moved.performers, solved, others, sill),
-        Timing(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
+    sill = float(np.mean(fits.left_out_errors / fits.pose.variances))
+    return FloatModel(
+        KrigingBank(*ends, moved.performers, solved, others, sill),
+        CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
         Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means),
         fits.proportions,
         Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
     )
 
 
-def _fit(
+def _fit_and_truncate(
     recipe: Recipe,
     examples: Sequence[Example],
-    moved: _Moved,
+    moved: _VectorizedClips,
     own_tensor: MotionTensor,
-    full: Multilinear,
-) -> Trained:
+    full: TuckerTensor,
+) -> TrainedModel:
     """Fit the coefficient models, choose the ranks within the budgets, and assemble the model."""
-    fits = _fits(recipe, moved, own_tensor, full)
+    fits = _fit_models(recipe, moved, own_tensor, full)
     controls = np.stack([example.controls for example in examples])
-    judge = truncation_error.judge(recipe, examples, own_tensor)
-    price = truncation_cost.PRICES[recipe.size.cost](own_tensor, controls.shape[1])
-    reduced = full.truncated(ranks.choose(recipe.size, full, price, judge))
+    judge = truncation_error.truncation_reference(recipe, examples, own_tensor)
+    price = truncation_cost.RANK_COSTS[recipe.size.cost](own_tensor, controls.shape[1])
+    reduced = full.truncated(ranks.choose_ranks(recipe.size, full, price, judge))
     explained = {name: found.explained for name, found in fits.beside.items()}
     residuals = {name: found.residuals for name, found in fits.beside.items()}
-    return Trained(
-        _model(recipe, controls, moved, own_tensor, fits, reduced),
+    return TrainedModel(
+        _assemble(recipe, controls, moved, own_tensor, fits, reduced),
         tuple(examples),
-        moved.laid,
+        moved.samples,
         _mean_skeleton(examples, moved.offsets),
         moved.aligned,
         own_tensor,
         full,
         fits.pose,
         fits.values,
-        fits.missed,
+        fits.left_out_errors,
         {"pose": 1.0 - fits.pose.unexplained, **explained},
         moved.findings,
         residuals,
-        judge.of(reduced),
-        of_joints(judge, full, fits.pose, residuals.get("travel")),
+        judge.evaluate(reduced),
+        joint_error_shares(judge, full, fits.pose, residuals.get("travel")),
     )
 
 
-def _missed(own_tensor: MotionTensor, pose: Tuned, fitted: dict[str, Fitted]) -> Floats:
+def _left_out_errors(
+    own_tensor: MotionTensor, pose: TunedKriging, fitted: dict[str, FittedModel]
+) -> Floats:
     """Return leave-one-out mean squared joint distances (N,), m², of all clips."""
     frames = own_tensor.values.shape[1]
     missed = np.sum(np.square(pose.residuals), axis=1) / (own_tensor.weight * frames)
     if "travel" in fitted:
-        missed += travel.spread(fitted["travel"].residuals)
+        missed += travel.mean_squared_distance(fitted["travel"].residuals)
     return missed
 
 
@@ -230,10 +239,12 @@ def _mean_skeleton(examples: Sequence[Example], offsets: Floats) -> Skeleton:
 
 
 # Least share of a joint, so that its sigma is never zero.
-LEAST = 0.01
+MIN_JOINT_SHARE = 0.01
 
 
-def of_joints(judge: Judge, full: Multilinear, pose: Tuned, travels: Floats | None) -> Floats:
+def joint_error_shares(
+    judge: TruncationReference, full: TuckerTensor, pose: TunedKriging, travels: Floats | None
+) -> Floats:
     """Return the root mean square error (J,) of each joint as a share of that of all joints.
 
     pose: kriging model of the full tensor's motions; its variances normalize the error of each
@@ -245,7 +256,7 @@ def of_joints(judge: Judge, full: Multilinear, pose: Tuned, travels: Floats | No
     apart = truncation_error.positions(own, predicted, judge.parents, judge.offsets) - judge.whole
     squares = np.mean(np.sum(np.square(apart), axis=-1), axis=1)
     if travels is not None:
-        squares += travel.spread(travels)[:, None]
+        squares += travel.mean_squared_distance(travels)[:, None]
     usual = np.mean(squares / pose.variances[:, None], axis=0)
     every = np.mean(usual)
-    return np.maximum(np.sqrt(usual / every), LEAST) if every > 0 else np.ones_like(usual)
+    return np.maximum(np.sqrt(usual / every), MIN_JOINT_SHARE) if every > 0 else np.ones_like(usual)

@@ -45,7 +45,7 @@ def test_full_rank_has_no_error_and_fewer_ranks_have_more(over, made):
 def test_at_the_samples_without_nugget_the_motions_are_the_clips(over, made, small_recipe):
     """With mean bones for all, as Table 1 has them."""
     at_samples = replace(over, points=made.samples, hyper=replace(over.hyper, nugget=0.0))
-    judge = truncation_error.judge(small_recipe, made.examples, made.trained.tensor)
+    judge = truncation_error.truncation_reference(small_recipe, made.examples, made.trained.tensor)
     bones = np.broadcast_to(made.offsets.mean(axis=0), made.offsets.shape)
     clips = truncation_error.positions(
         judge.own_tensor, judge.own_tensor.values, judge.parents, np.array(bones)
@@ -81,7 +81,7 @@ def test_every_size_says_what_it_costs(measured, made):
     for asked, limit in measurement.THRESHOLDS.items():
         size = named[asked]
         assert size.error <= limit
-        compression = truncation_cost.compression(made.trained.tensor, size.ranks, 4)
+        compression = truncation_cost.tensor_compression(made.trained.tensor, size.ranks, 4)
         assert (size.core, size.stored) == (compression.core, compression.stored)
     assert named["500 cm"].core < named["1000 cm"].core
     assert all(size.from_naive > 0.5 * measured.full_from_naive for size in measured.sizes)

@@ -11,13 +11,13 @@ from starlette.types import ASGIApp
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.registry import model_registry
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="session")
-def loaded(models) -> Library:
+def loaded(models) -> ModelRegistry:
     return model_registry.load([models])
 
 

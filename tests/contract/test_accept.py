@@ -4,8 +4,8 @@ from urllib.parse import urlencode
 
 import pytest
 
-from posefield.encode.archives import PACKS
-from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, GRID_ENCODERS, POSE_ENCODERS
+from posefield.encode.archives import ARCHIVE_WRITERS
+from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS, GRID_ENCODERS, POSE_ENCODERS
 
 REACH = "/v1/models/reach"
 WALK = "/v1/models/walk/crowd"
@@ -14,16 +14,22 @@ WALK = "/v1/models/walk/crowd"
 def questions(controls):
     """Method, path, content and formats, the usual one first, of all that is negotiated."""
     once, columns = {**controls, "time": 0.3}, {n: [v, v] for n, v in controls.items()}
-    usd = {name: ENCODERS[name] for name in ("usdc", "usda", "usdz")}
+    usd = {name: CLIP_ENCODERS[name] for name in ("usdc", "usda", "usdz")}
     body = {"controls": controls}
     many = {"format": "bvh", "clips": [body]}
     crowd = {"controls": columns, "time": 0.1}
     return [
         ("GET", f"{REACH}/pose", f"?{urlencode(once)}", None, POSE_ENCODERS),
         ("POST", f"{REACH}/pose", "", {**body, "times": [0.3]}, POSE_ENCODERS),
-        ("GET", f"{REACH}/clip", f"?{urlencode({**controls, 'end': 0.2})}", None, usd | ENCODERS),
-        ("POST", f"{REACH}/clip", "", {**body, "end": 0.2}, usd | ENCODERS),
-        ("POST", f"{REACH}/clips", "", many, PACKS),
+        (
+            "GET",
+            f"{REACH}/clip",
+            f"?{urlencode({**controls, 'end': 0.2})}",
+            None,
+            usd | CLIP_ENCODERS,
+        ),
+        ("POST", f"{REACH}/clip", "", {**body, "end": 0.2}, usd | CLIP_ENCODERS),
+        ("POST", f"{REACH}/clips", "", many, ARCHIVE_WRITERS),
         ("POST", f"{REACH}/crowd", "", crowd, CROWD_ENCODERS),
         ("GET", f"{REACH}/sigma", "?across=turn&along=stature&rows=3", None, GRID_ENCODERS),
         ("POST", f"{REACH}/sigma", "", {"across": "turn", "along": "stature"}, GRID_ENCODERS),

@@ -18,7 +18,7 @@ from posefield.http.access import api_keys
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 SCOPES = {
     "every": ["read:*"],
@@ -30,7 +30,7 @@ SCOPES = {
 
 @pytest.fixture(scope="module")
 def issued():
-    return {name: api_keys.make() for name in SCOPES}
+    return {name: api_keys.generate_key() for name in SCOPES}
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,7 @@ def test_the_challenge_names_an_error_only_where_something_was_sent(guarded):
 def test_every_operation_with_a_scope_refuses_who_is_unknown_and_who_lacks_it(guarded, as_):
     """401 and 403 are what the contract says of each, and of no other."""
     ask, tried = asker(guarded), 0
-    for operation in contract.load().operations:
+    for operation in contract.load_contract().operations:
         form = next(iter(operation.formats), "")
         path = operation.path.replace("{model}", "reach").replace("{format}", form)
         unknown = ask(operation.method, path).status_code
@@ -249,36 +249,36 @@ def test_each_refusal_is_one_line_without_secrets(guarded, as_, issued, caplog):
 )
 def test_an_open_service_on_an_open_address_does_not_start(host, lines):
     with pytest.raises(InvalidField, match=r"POSEFIELD_HOST: .*POSEFIELD_OPEN=1"):
-        create_app(Library({}), Settings(host=host))
-    assert create_app(Library({}), Settings(host=host, open=True))
-    assert create_app(Library({}), Settings(host=host, keys=lines))
+        create_app(ModelRegistry({}), Settings(host=host))
+    assert create_app(ModelRegistry({}), Settings(host=host, open=True))
+    assert create_app(ModelRegistry({}), Settings(host=host, keys=lines))
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.10", "::1", "localhost"])
 def test_on_this_machine_alone_no_keys_are_needed(host):
-    assert create_app(Library({}), Settings(host=host))
+    assert create_app(ModelRegistry({}), Settings(host=host))
 
 
 def test_a_file_without_keys_lets_nobody_start(tmp_path):
     empty = tmp_path / "keys"
     empty.write_text("# none yet\n")
     with pytest.raises(InvalidField, match="POSEFIELD_HOST"):
-        create_app(Library({}), Settings(host="0.0.0.0", keys_file=str(empty)))
+        create_app(ModelRegistry({}), Settings(host="0.0.0.0", keys_file=str(empty)))
     with pytest.raises(FileError, match="no file of keys"):
-        create_app(Library({}), Settings(keys_file=str(tmp_path / "nowhere")))
+        create_app(ModelRegistry({}), Settings(keys_file=str(tmp_path / "nowhere")))
 
 
 @pytest.mark.parametrize("missing", ["jwt_keys", "jwt_issuer", "jwt_audience"])
 def test_half_of_what_tokens_need_is_refused(missing, signed):
     trusted = {**signed[0], missing: ""}
     with pytest.raises(InvalidField, match=f"POSEFIELD_{missing.upper()}: missing"):
-        create_app(Library({}), Settings(**trusted))
+        create_app(ModelRegistry({}), Settings(**trusted))
 
 
 def test_an_algorithm_of_shared_secrets_is_refused(signed):
     for algorithm in ("HS256", "none", "rs256"):
         with pytest.raises(InvalidField, match="POSEFIELD_JWT_ALGORITHM"):
-            create_app(Library({}), Settings(**signed[0], jwt_algorithm=algorithm))
+            create_app(ModelRegistry({}), Settings(**signed[0], jwt_algorithm=algorithm))
 
 
 @pytest.mark.system
@@ -303,7 +303,7 @@ def test_the_command_makes_a_key_whose_line_lets_it_in(loaded, tmp_path):
     assert names(answer) == ["walk"]
     told = subprocess.run([*command, "--json"], capture_output=True, text=True, check=True)
     made = json.loads(told.stdout)
-    assert api_keys.read(made["line"], "KEYS").find(made["key"]).name == "blender"
+    assert api_keys.parse_keys(made["line"], "KEYS").find(made["key"]).name == "blender"
 
 
 @pytest.mark.system

@@ -11,11 +11,11 @@ from pxr import Usd
 
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
-from posefield.http.app import build
+from posefield.http.app import build_app
 from posefield.http.operations import OPERATIONS
 from posefield.model_file import model_card as cards
 from posefield.question.motion_question import PoseQuestion
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis import poses
 
 CLIP = "/v1/models/reach/clip"
@@ -35,7 +35,7 @@ def test_the_card_is_the_whole_card(ask, loaded):
 @pytest.mark.parametrize("extension", FORMATS)
 def test_a_file_says_how_far_it_may_be_trusted(extension, ask, controls, loaded):
     model = loaded.find("reach")
-    trust = poses.pose(model, PoseQuestion(controls=controls, times=[0.0])).trust
+    trust = poses.synthesize_poses(model, PoseQuestion(controls=controls, times=[0.0])).trust
     answer = ask("GET", url(f"{CLIP}.{extension}", controls))
     assert answer.headers["posefield-model"] == model.identity
     assert float(answer.headers["posefield-sigma"]) == trust.sigma
@@ -142,7 +142,12 @@ def test_a_failure_shows_its_id_and_nothing_else(caplog):
     async def fails(service, request):
         raise RuntimeError("secret /etc/path")
 
-    app = build(contract.load(), {**OPERATIONS, "getLiveness": fails}, Library({}), Settings())
+    app = build_app(
+        contract.load_contract(),
+        {**OPERATIONS, "getLiveness": fails},
+        ModelRegistry({}),
+        Settings(),
+    )
     with caplog.at_level(logging.ERROR):
         answer = asker(app)("GET", "/livez", headers={"x-request-id": "id-1"})
     problem = answer.json()

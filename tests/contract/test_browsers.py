@@ -7,7 +7,7 @@ from posefield.common.errors import InvalidField
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.middleware import security_headers
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 PAGE = "https://a.example"
 ANSWERS = [
@@ -37,10 +37,10 @@ def test_every_answer_is_data_and_nothing_to_run(method, path, status, ask):
 
 
 def test_a_page_of_our_own_says_what_it_loads():
-    policy = security_headers.page("'self'", "'self'")["Content-Security-Policy"]
+    policy = security_headers.page_headers("'self'", "'self'")["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "http" not in policy and "*" not in policy
-    assert b"content-security-policy" not in dict(security_headers.of("text/html"))
-    assert b"content-security-policy" in dict(security_headers.of("application/json"))
+    assert b"content-security-policy" not in dict(security_headers.headers_for("text/html"))
+    assert b"content-security-policy" in dict(security_headers.headers_for("application/json"))
 
 
 @pytest.mark.parametrize(("method", "path", "status"), ANSWERS)
@@ -91,4 +91,4 @@ def test_a_browser_is_told_before_it_has_to_say_who_asks(loaded):
 
 def test_pages_that_are_none_stop_the_start():
     with pytest.raises(InvalidField, match="POSEFIELD_ORIGINS"):
-        create_app(Library({}), Settings(origins="https://a.example/x"))
+        create_app(ModelRegistry({}), Settings(origins="https://a.example/x"))

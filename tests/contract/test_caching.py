@@ -12,7 +12,7 @@ from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.middleware import caching
 from posefield.registry import model_registry
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 PURE = ("pose?time=0.25&", "clip.usdc?", "clip.json?", "clip.usda?", "clip.bvh?")
 
@@ -38,13 +38,13 @@ def test_what_a_client_has_is_not_sent_again(rest, ask, controls):
     [('"a"', True), ('W/"a"', True), ('"b", "a"', True), ("*", True), ('"b"', False), ("a", False)],
 )
 def test_an_if_none_match_is_a_list_compared_weakly(given, held):
-    assert caching.held(given, '"a"') is held
+    assert caching.matches_tag(given, '"a"') is held
 
 
 def test_a_tag_is_known_without_asking_the_model(loaded, controls):
     model = loaded.find("reach")
     session, calls = recorded.session(model.session)
-    ask = asker(create_app(Library({"reach": replace(model, session=session)}), Settings()))
+    ask = asker(create_app(ModelRegistry({"reach": replace(model, session=session)}), Settings()))
     url = asked(controls, "clip.usdc?")
     tag = ask("GET", url).headers["etag"]
     calls.clear()
@@ -101,14 +101,14 @@ def test_another_model_under_the_same_name_has_other_tags(models, tmp_path, ask,
 
 
 def test_tags_follow_from_the_code(tmp_path, monkeypatch):
-    before = caching.code()
-    assert before == caching.code()
+    before = caching.code_digest()
+    assert before == caching.code_digest()
     # Another version of a library, as it would be found before the one that is installed.
     about = tmp_path / "numpy-0.0.0.dist-info" / "METADATA"
     about.parent.mkdir()
     about.write_text("Metadata-Version: 2.1\nName: numpy\nVersion: 0.0.0\n")
     monkeypatch.syspath_prepend(tmp_path)
-    assert caching.code() != before
+    assert caching.code_digest() != before
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import jsonschema
 import pytest
 from asking import asker, unpacked
 
-from posefield.encode.archives import PACKS
-from posefield.encode.formats import ENCODERS
+from posefield.encode.archives import ARCHIVE_WRITERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 
@@ -35,8 +35,8 @@ def asked(extension, clips):
     return {"format": extension, "clips": clips}
 
 
-@pytest.mark.parametrize("kind", PACKS)
-@pytest.mark.parametrize("extension", ENCODERS)
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
+@pytest.mark.parametrize("extension", CLIP_ENCODERS)
 def test_each_file_is_what_its_own_path_answers(extension, kind, ask, questions):
     answer = ask("POST", f"{CLIPS}.{kind}", json=asked(extension, questions))
     assert answer.status_code == 200, answer.text
@@ -69,7 +69,7 @@ def test_what_a_format_or_model_forbids_is_refused_before_the_answer_begins(ask,
     assert_refused(loop, 422, "1/loop", "does not lead into its first")
 
 
-@pytest.mark.parametrize("kind", PACKS)
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_the_manifest_says_what_each_file_is(kind, ask, questions, spec):
     answer = ask("POST", f"{CLIPS}.{kind}", json=asked("json", questions))
     found = unpacked(kind, answer.content)
@@ -100,7 +100,7 @@ def test_an_archive_says_where_it_comes_from(ask, questions, loaded):
     assert "posefield-warning" not in within.headers
 
 
-@pytest.mark.parametrize("kind", PACKS)
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_the_same_questions_give_the_same_bytes(kind, ask, questions):
     once, again, other = (
         ask("POST", f"{CLIPS}.{kind}", json=asked("usdc", clips)).content
@@ -225,7 +225,7 @@ def test_a_clip_of_an_archive_is_as_large_as_one_alone_may_be(loaded, controls):
     assert within.json()["detail"].endswith(alone.json()["detail"])
 
 
-@pytest.mark.parametrize("kind", PACKS)
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_other_methods_media_types_and_archives_are_refused(kind, ask):
     for method in ("GET", "HEAD", "PUT"):
         answer = ask(method, f"{CLIPS}.{kind}")

@@ -13,11 +13,11 @@ from asking import listening
 from test_server import address, process
 
 from posefield.batch.clip_archive import CLIPS
-from posefield.encode.archives import PACKS
-from posefield.encode.formats import ENCODERS
+from posefield.encode.archives import ARCHIVE_WRITERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
-from posefield.http.app import build
+from posefield.http.app import build_app
 from posefield.http.clip_operations import query_clips
 from posefield.http.operations import OPERATIONS
 
@@ -33,15 +33,15 @@ def counting(most=MANY):
         made.extend(answers)
         if len(made) > most:
             raise RuntimeError("out of everything")
-        return ENCODERS["usdc"].write(answers, convention)
+        return CLIP_ENCODERS["usdc"].write(answers, convention)
 
-    return dataclasses.replace(ENCODERS["usdc"], write=write), made
+    return dataclasses.replace(CLIP_ENCODERS["usdc"], write=write), made
 
 
 def served(loaded, encoder):
     """The application with one encoder in place of the others for many clips."""
     handlers = {"queryClipsInFormat": query_clips({"usdc": encoder})}
-    return build(contract.load(), {**OPERATIONS, **handlers}, loaded, Settings())
+    return build_app(contract.load_contract(), {**OPERATIONS, **handlers}, loaded, Settings())
 
 
 def asked(controls, count, extension="usdc"):
@@ -57,7 +57,7 @@ def settled(made):
     return count
 
 
-@pytest.mark.parametrize("kind", PACKS)
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_work_waits_for_a_client_that_reads_slowly_and_ends_when_it_goes(kind, loaded, controls):
     encoder, made = counting()
     with listening(served(loaded, encoder)) as base, httpx.Client(timeout=30) as client:
@@ -69,7 +69,7 @@ def test_work_waits_for_a_client_that_reads_slowly_and_ends_when_it_goes(kind, l
         assert settled(made) <= waiting + CLIPS
 
 
-@pytest.mark.parametrize("kind", PACKS)
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_work_goes_on_for_a_client_that_stays(kind, loaded, controls):
     """Negative control of the test above."""
     encoder, made = counting()
@@ -78,7 +78,7 @@ def test_work_goes_on_for_a_client_that_stays(kind, loaded, controls):
     assert len(made) == MANY and b"manifest.jsonl" in answer.content
 
 
-@pytest.mark.parametrize("kind", PACKS)
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_an_archive_that_cannot_be_finished_breaks_off(kind, loaded, controls, caplog):
     encoder, _ = counting(most=2 * CLIPS)
     got = bytearray()

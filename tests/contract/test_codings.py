@@ -38,7 +38,7 @@ def raw(ask, url, accepted):
     ],
 )
 def test_a_coding_is_chosen_by_weight(accepted, coding):
-    assert compression.preferred(accepted.encode()) == coding
+    assert compression.preferred_coding(accepted.encode()) == coding
 
 
 @pytest.mark.parametrize("coding", UNPACK)

@@ -8,13 +8,13 @@ import pytest
 import yaml
 from asking import asker
 
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api import contract, problems
 from posefield.http.api.settings import Settings
-from posefield.http.app import build, create_app
+from posefield.http.app import build_app, create_app
 from posefield.http.operations import OPERATIONS
 from posefield.http.steps import Steps
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 
 def test_the_contract_is_valid_openapi(spec):
@@ -24,7 +24,7 @@ def test_the_contract_is_valid_openapi(spec):
 def test_routes_and_operations_are_the_same_set(spec, app):
     agreed = {
         (operation.method, operation.path.replace("{format}", form))
-        for operation in contract.load().operations
+        for operation in contract.load_contract().operations
         for form in operation.formats or [""]
     }
     assert len({path.partition(".{")[0] for path in spec["paths"]}) > 10
@@ -35,24 +35,26 @@ def test_routes_and_operations_are_the_same_set(spec, app):
 
 
 def test_an_operation_without_a_handler_stops_the_start():
-    agreed = contract.load()
+    agreed = contract.load_contract()
     handlers = {name: OPERATIONS[name] for name in OPERATIONS if name != "getPose"}
     with pytest.raises(ValueError, match=r"without a handler \['getPose'\]"):
-        build(agreed, handlers, Library({}), Settings())
+        build_app(agreed, handlers, ModelRegistry({}), Settings())
 
 
 def test_a_handler_without_an_operation_stops_the_start():
-    agreed = contract.load()
+    agreed = contract.load_contract()
     fewer = tuple(o for o in agreed.operations if o.id != "getPose")
     with pytest.raises(ValueError, match=r"without an operation \['getPose'\]"):
-        build(dataclasses.replace(agreed, operations=fewer), OPERATIONS, Library({}), Settings())
+        build_app(
+            dataclasses.replace(agreed, operations=fewer), OPERATIONS, ModelRegistry({}), Settings()
+        )
 
 
 @pytest.mark.parametrize(
     "name", [n for n, h in OPERATIONS.items() if isinstance(h, Steps) and h.formats]
 )
 def test_formats_and_media_types_are_those_of_the_encoders(name):
-    (operation,) = (o for o in contract.load().operations if o.id == name)
+    (operation,) = (o for o in contract.load_contract().operations if o.id == name)
     encoders = {form: each.media_type for form, each in OPERATIONS[name].formats.items()}
     assert all(form == each.extension for form, each in OPERATIONS[name].formats.items())
     assert sorted(operation.media_types) == sorted(encoders.values())
@@ -61,21 +63,21 @@ def test_formats_and_media_types_are_those_of_the_encoders(name):
 
 def test_descriptions_name_all_formats(spec):
     """The search of `/docs` finds an operation by the words of its description."""
-    for operation in (o for o in contract.load().operations if o.formats):
+    for operation in (o for o in contract.load_contract().operations if o.formats):
         said = spec["paths"][operation.path][operation.method.lower()]["description"]
         assert all(f"`{form}`" in said for form in operation.formats), operation.id
 
 
 def test_many_clips_have_the_formats_of_one(spec):
     schemas = spec["components"]["schemas"]
-    assert schemas["ClipsQuestion"]["properties"]["format"]["enum"] == [*ENCODERS]
+    assert schemas["ClipsQuestion"]["properties"]["format"]["enum"] == [*CLIP_ENCODERS]
 
 
 def changed(spec, change):
     """The contract after a change, as the service reads it."""
     other = copy.deepcopy(spec)
     change(other["components"]["parameters"]["clipFormat"], other["components"]["responses"])
-    return contract.parse(yaml.safe_dump(other, sort_keys=False).encode())
+    return contract.parse_contract(yaml.safe_dump(other, sort_keys=False).encode())
 
 
 def without_a_format(format_, _):
@@ -102,7 +104,7 @@ def answered_with_less(_, responses):
 def test_formats_other_than_the_encoders_stop_the_start(change, spec):
     agreed = changed(spec, change)
     with pytest.raises(ValueError, match=r"getClip.*: the contract has .*, its handler "):
-        build(agreed, OPERATIONS, Library({}), Settings())
+        build_app(agreed, OPERATIONS, ModelRegistry({}), Settings())
 
 
 def test_a_format_that_no_handler_makes_stops_the_start():
@@ -111,7 +113,7 @@ def test_a_format_that_no_handler_makes_stops_the_start():
 
     handlers = {**OPERATIONS, "getClipInFormat": answer}
     with pytest.raises(ValueError, match=r"getClipInFormat: the contract has .*, its handler "):
-        build(contract.load(), handlers, Library({}), Settings())
+        build_app(contract.load_contract(), handlers, ModelRegistry({}), Settings())
 
 
 def test_a_format_without_a_media_type_is_refused(spec):
@@ -124,7 +126,7 @@ OPEN = {"/livez", "/readyz", *PAGES}
 
 
 def test_only_these_operations_never_ask_for_a_key():
-    assert {o.path for o in contract.load().operations if o.scope is None} == OPEN
+    assert {o.path for o in contract.load_contract().operations if o.scope is None} == OPEN
 
 
 def test_every_operation_documents_the_errors_it_can_give(spec):
@@ -177,10 +179,10 @@ def test_headers_that_come_with_a_status_are_documented(spec):
 
 def test_the_contract_lists_every_problem_type(spec):
     listed = spec["components"]["schemas"]["Problem"]["properties"]["type"]["enum"]
-    assert set(listed) == {kind.type for kind in problems.KINDS}
-    assert len(listed) == len(problems.KINDS)
+    assert set(listed) == {kind.type for kind in problems.PROBLEM_KINDS}
+    assert len(listed) == len(problems.PROBLEM_KINDS)
 
 
 def test_an_empty_library_is_an_empty_list():
-    answer = asker(create_app(Library({}), Settings()))("GET", "/v1/models")
+    answer = asker(create_app(ModelRegistry({}), Settings()))("GET", "/v1/models")
     assert answer.json() == {"models": []}

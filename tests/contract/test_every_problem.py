@@ -11,12 +11,12 @@ from asking import Answer, asker
 
 from posefield.http.access import api_keys
 from posefield.http.api import contract, problems
-from posefield.http.api.problems import KINDS
+from posefield.http.api.problems import PROBLEM_KINDS
 from posefield.http.api.settings import Settings
-from posefield.http.app import build, create_app
+from posefield.http.app import build_app, create_app
 from posefield.http.operations import OPERATIONS
 from posefield.http.pages import problems_page as page
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 MODEL = "/v1/models/reach"
 CLIP = f"{MODEL}/clip.json"
@@ -33,12 +33,12 @@ def answered(response):
     return Answer(response.status_code, dict(response.headers), response.content)
 
 
-KEY = api_keys.make()
+KEY = api_keys.generate_key()
 
 
 def with_key(**headers):
     """Provoke at a service with one key, which may not read metrics."""
-    closed = create_app(Library({}), Settings(keys=api_keys.line("one", ["read:*"], KEY)))
+    closed = create_app(ModelRegistry({}), Settings(keys=api_keys.line("one", ["read:*"], KEY)))
     return lambda app: answered(asker(closed)("GET", "/metrics", headers=headers))
 
 
@@ -52,7 +52,9 @@ async def broken(service, request):
 
 def served_by(handler, concurrency=1):
     handlers = {**OPERATIONS, "listModels": handler}
-    return build(contract.load(), handlers, Library({}), Settings(concurrency=concurrency))
+    return build_app(
+        contract.load_contract(), handlers, ModelRegistry({}), Settings(concurrency=concurrency)
+    )
 
 
 def fault(app):
@@ -74,7 +76,7 @@ def overloaded(app):
 
 
 def not_ready(app):
-    return answered(asker(create_app(Library({}), Settings()))("GET", "/readyz"))
+    return answered(asker(create_app(ModelRegistry({}), Settings()))("GET", "/readyz"))
 
 
 PROVOKED = {
@@ -109,21 +111,21 @@ PROVOKED = {
 
 
 def kinds_declared():
-    return {value for value in vars(problems).values() if isinstance(value, problems.Kind)}
+    return {value for value in vars(problems).values() if isinstance(value, problems.ProblemKind)}
 
 
 def test_every_kind_is_provoked_here_and_is_one_of_all():
-    assert set(PROVOKED) == {kind.name for kind in KINDS}
-    assert kinds_declared() | set(problems.TABLE.values()) == set(KINDS)
+    assert set(PROVOKED) == {kind.name for kind in PROBLEM_KINDS}
+    assert kinds_declared() | set(problems.QUERY_ERROR_PROBLEMS.values()) == set(PROBLEM_KINDS)
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", PROBLEM_KINDS, ids=lambda kind: kind.name)
 def test_it_comes_as_its_page_says(kind, app, spec):
     answer = PROVOKED[kind.name](app)
     assert (answer.status, answer.headers["link"]) == (kind.status, kind.help)
     assert answer.headers["content-type"] == "application/problem+json"
-    found, said = json.loads(answer.body), page.example(kind)
+    found, said = json.loads(answer.body), page.problem_example(kind)
     schema = {"$ref": "#/components/schemas/Problem", "components": spec["components"]}
     for problem in (found, said):
         jsonschema.validate(problem, schema, jsonschema.Draft202012Validator)
@@ -138,5 +140,5 @@ def alike(problem):
 
 @pytest.mark.parametrize("change", [{"detail": "other"}, {"errors": []}, {"title": "Another"}])
 def test_an_example_that_is_not_so_would_be_seen(change):
-    said = page.example(problems.BAD_PARAMETER)
+    said = page.problem_example(problems.BAD_PARAMETER)
     assert alike(said | change) != alike(said)

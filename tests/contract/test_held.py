@@ -11,7 +11,7 @@ from asking import asker, unpacked
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.motion import skeleton
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 MODEL = "/v1/models/reach"
 CONTROLS = {"stature": 1.72, "hip_height": 0.9, "turn": 20.0, "target_height": 1.1}
@@ -160,7 +160,7 @@ def places(clip, joint):
     offsets = np.array(clip["bone_offsets"])
     translations = np.repeat(offsets[None], len(roots), axis=0)
     translations[:, 0] = roots
-    found, _ = skeleton.forward(tuple(clip["parents"]), rotations, translations)
+    found, _ = skeleton.forward_kinematics(tuple(clip["parents"]), rotations, translations)
     return found[:, clip["names"].index(joint)]
 
 
@@ -249,7 +249,7 @@ def test_other_targets_are_other_answers_to_a_cache(ask):
 @pytest.fixture(scope="module")
 def ask_measured(labelled_path):
     """Ask a model of which `target_height` is measured on the motion."""
-    return asker(create_app(Library({"reach": measured.reaching(labelled_path)}), Settings()))
+    return asker(create_app(ModelRegistry({"reach": measured.reaching(labelled_path)}), Settings()))
 
 
 def test_a_measured_control_is_met_if_not_asked_otherwise(ask_measured):

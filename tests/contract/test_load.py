@@ -9,17 +9,19 @@ from starlette.responses import Response
 
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
-from posefield.http.app import build
+from posefield.http.app import build_app
 from posefield.http.middleware import deadline
 from posefield.http.operations import OPERATIONS
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 SOON = {"prefer": "respond-async, wait=1"}
 
 
 def app_with(**handlers):
     settings = Settings(concurrency=2, deadline=60)
-    return build(contract.load(), {**OPERATIONS, **handlers}, Library({}), settings)
+    return build_app(
+        contract.load_contract(), {**OPERATIONS, **handlers}, ModelRegistry({}), settings
+    )
 
 
 async def ask_many(app, paths, **headers):
@@ -92,12 +94,12 @@ def test_others_are_answered_meanwhile():
     ],
 )
 def test_a_client_may_have_less_patience_but_not_more(prefer, expected):
-    assert deadline.seconds(prefer, 30.0) == expected
+    assert deadline.requested_deadline(prefer, 30.0) == expected
 
 
 def test_a_task_cancelled_by_others_is_not_late():
     async def cancelled():
-        watch = deadline.Watch()
+        watch = deadline.DeadlineTimer()
         task = asyncio.create_task(watch.within(30.0, asyncio.sleep(60)))
         await asyncio.sleep(0)
         task.cancel()

@@ -40,6 +40,6 @@ def test_the_contract_knows_all_that_can_be_measured(spec):
     known = spec["components"]["schemas"]["Measure"]["properties"]
     assert tuple(known["quantity"]["enum"]) == QUANTITIES
     assert tuple(known["at"]["enum"]) == MOMENTS
-    valid(spec, "Measure", measures.plain(Measure("height", (3, 4), "landmark", 0.25)))
+    valid(spec, "Measure", measures.to_dict(Measure("height", (3, 4), "landmark", 0.25)))
     with pytest.raises(jsonschema.ValidationError):
         valid(spec, "Measure", {"quantity": "pace"})

@@ -24,8 +24,8 @@ from posefield.inference import graph_ports, onnx_runtime
 from posefield.inference import session as sessions
 from posefield.inference.session import Session
 from posefield.model_file import card_check, card_reader, onnx_check
-from posefield.registry.model_registry import Library
-from posefield.registry.model_reload import Fixed
+from posefield.registry.model_registry import ModelRegistry
+from posefield.registry.model_reload import FixedRegistry
 from posefield.synthesis.synthesizer import Synthesizer
 
 DEEP = "[" * 300 + "]" * 300
@@ -84,9 +84,9 @@ class Tried:
 
     def __init__(self, content: bytes, spec: dict[str, Any]) -> None:
         self.onnx = onnx_check.check(content)
-        self.runtime = onnx_runtime.start(content, "whole")
+        self.runtime = onnx_runtime.open_session(content, "whole")
         self.session: Session = sessions.open_bytes(content, "odd.onnx")
-        self.models = Fixed(Library({}))
+        self.models = FixedRegistry(ModelRegistry({}))
         self.ask = asker(create_app(Readiness(self.models), Settings()))
         schema = {"$ref": "#/components/schemas/ModelCard", "components": spec["components"]}
         self.schema = jsonschema.Draft202012Validator(schema)
@@ -113,7 +113,7 @@ class Tried:
     def answers(self, session: Session) -> list[Any]:
         """What the graph alone decides of the answers of a session, of which there is each kind."""
         card = session.card
-        self.models.library = Library({"odd": Synthesizer("odd", session)})
+        self.models.registry = ModelRegistry({"odd": Synthesizer("odd", session)})
         self.schema.validate(self.get())
         controls = {control.name: control.default for control in card.controls}
         pose = self.get("/pose.json", **controls, time=0, exact="none")

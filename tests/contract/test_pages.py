@@ -13,11 +13,11 @@ from asking import asker
 from posefield.http import pages
 from posefield.http.access import api_keys
 from posefield.http.api import contract
-from posefield.http.api.problems import KINDS
+from posefield.http.api.problems import PROBLEM_KINDS
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.pages import static_page, templates
-from posefield.http.pages.problems_page import TEXTS, example
+from posefield.http.pages.problems_page import PROBLEM_TEXTS, problem_example
 
 BUILT = {"/": static_page.VIEWER, "/docs": static_page.DOCS}
 NO_ICON = '<link rel="icon" href="data:,"'
@@ -26,7 +26,7 @@ ALL = ["/openapi.yaml", "/openapi.json", "/problems", *BUILT]
 
 def test_the_contract_is_served_as_it_is_written(ask, spec):
     written = ask("GET", "/openapi.yaml")
-    assert written.content == contract.load().source
+    assert written.content == contract.load_contract().source
     assert yaml.safe_load(written.content) == ask("GET", "/openapi.json").json() == spec
 
 
@@ -50,7 +50,9 @@ def test_a_page_is_not_sent_again(path, coding, ask):
 
 def test_the_tag_is_of_what_the_page_says(app):
     agreed = app.site.service.pages
-    changed = pages.made(contract.parse(contract.load().source.replace(b"clips out", b"clips", 1)))
+    changed = pages.static_pages(
+        contract.parse_contract(contract.load_contract().source.replace(b"clips out", b"clips", 1))
+    )
     for name, page in changed.items():
         assert (page.digest == agreed[name].digest) is (page.content == agreed[name].content)
     assert changed["getContractJson"].digest != agreed["getContractJson"].digest
@@ -59,7 +61,7 @@ def test_the_tag_is_of_what_the_page_says(app):
 
 def test_a_closed_service_shows_its_pages_to_everybody(loaded):
     ask = asker(
-        create_app(loaded, Settings(keys=api_keys.line("one", ["read:*"], api_keys.make())))
+        create_app(loaded, Settings(keys=api_keys.line("one", ["read:*"], api_keys.generate_key())))
     )
     assert ask("GET", "/v1/models").status_code == 401
     for path in ALL:
@@ -130,17 +132,17 @@ def test_every_link_of_the_problems_leads_somewhere(ask):
 
 
 def test_every_kind_of_problem_has_its_text_its_place_and_an_example(ask):
-    assert set(TEXTS) == set(KINDS)
+    assert set(PROBLEM_TEXTS) == set(PROBLEM_KINDS)
     page = ask("GET", "/problems").text
     articles = re.findall(r'<article id="([^"]+)">(.*?)</article>', page, re.DOTALL)
-    assert sorted(name for name, _ in articles) == sorted(kind.name for kind in KINDS)
+    assert sorted(name for name, _ in articles) == sorted(kind.name for kind in PROBLEM_KINDS)
     by_name = dict(articles)
-    for kind in KINDS:
+    for kind in PROBLEM_KINDS:
         article = html.unescape(by_name[kind.name])
         for part in (kind.type, str(kind.status), kind.title):
             assert part in article
         (shown,) = re.findall(r"<pre><code>(.*?)</code></pre>", article, re.DOTALL)
-        assert shown == json.dumps(example(kind), indent=2)
+        assert shown == json.dumps(problem_example(kind), indent=2)
 
 
 def test_text_in_a_template_is_text():
@@ -153,11 +155,11 @@ def test_text_in_a_template_is_text():
 
 
 def test_a_page_that_was_not_built_says_how_to_build_it(tmp_path):
-    content = static_page.built(tmp_path / "index.html")
+    content = static_page.built_page(tmp_path / "index.html")
     assert b"make page" in content and loads(content.decode().replace(NO_ICON, "")) == []
     there = tmp_path / "index.html"
     there.write_bytes(b"built")
-    assert static_page.built(there) == b"built"
+    assert static_page.built_page(there) == b"built"
 
 
 @pytest.mark.parametrize("path", BUILT)

@@ -22,7 +22,7 @@ SCHEMAS = {
     "SigmaQuestion": SigmaQuestion,
     "WhyQuestion": WhyQuestion,
 }
-AGREED = contract.load()
+AGREED = contract.load_contract()
 
 
 def resolved(node):

@@ -13,8 +13,8 @@ from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.readiness import Readiness
 from posefield.registry import model_registry
-from posefield.registry.model_registry import Bounds, Library
-from posefield.registry.model_reload import Fixed, Shelf
+from posefield.registry.model_registry import ModelRegistry, VersionLimits
+from posefield.registry.model_reload import FixedRegistry, ReloadingRegistry
 
 
 @pytest.fixture
@@ -50,23 +50,23 @@ def test_a_model_that_answers_otherwise_than_it_did_is_not(told, loaded):
     models = dict(loaded.models)
     golden = models["walk"].session.golden
     models["walk"] = changed(models["walk"], golden=golden[:-1] + bytes([golden[-1] ^ 1]))
-    assert refused(told(Library(models))) == (
+    assert refused(told(ModelRegistry(models))) == (
         f"not as when opened answers {models['walk'].identity}"
     )
 
 
 def test_a_model_that_no_longer_answers_at_all_is_not(told, loaded):
     model = loaded.models["reach"]
-    broken = changed(model, runtimes=(model.session.clocks[0],))
-    assert model.identity in refused(told(Library({"reach": broken})))
+    broken = changed(model, runtimes=(model.session.duration_sessions[0],))
+    assert model.identity in refused(told(ModelRegistry({"reach": broken})))
 
 
 def test_no_model_is_not_ready(told):
-    assert refused(told(Library({}))) == "there is no model"
+    assert refused(told(ModelRegistry({}))) == "there is no model"
 
 
 def test_a_service_that_ends_is_not(told, loaded):
-    ending = Readiness(Fixed(loaded))
+    ending = Readiness(FixedRegistry(loaded))
     assert told(ending).status_code == 200
     ending.draining = True
     assert refused(told(ending)) == "the service is ending"
@@ -85,24 +85,24 @@ def test_models_are_asked_once_a_second_and_anew_when_they_change(loaded, monkey
     counted = changed(model, runtimes=(Counted(),))
     clock = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
-    fixed = Fixed(Library({"reach": counted}))
+    fixed = FixedRegistry(ModelRegistry({"reach": counted}))
     ready = Readiness(fixed)
     for moment, times in ((100.0, 1), (100.9, 1), (101.1, 2)):
         clock[0] = moment
         ready.document(lambda name: True)
         assert len(asked) == times
-    fixed.library = Library({"other": counted})
+    fixed.registry = ModelRegistry({"other": counted})
     ready.document(lambda name: True)
     assert len(asked) == 3
 
 
 def test_a_broken_new_file_is_told_and_the_old_one_is_ready(told, models, tmp_path, caplog):
     shutil.copy(models / "reach.onnx", tmp_path)
-    shelf = Shelf([tmp_path], Bounds())
-    identity = shelf.library.find("reach").identity
+    shelf = ReloadingRegistry([tmp_path], VersionLimits())
+    identity = shelf.registry.find("reach").identity
     (tmp_path / "reach.onnx").write_bytes(b"half a mod")
-    shelf.look()
-    shelf.look()
+    shelf.scan()
+    shelf.scan()
     answer = told(Readiness(shelf))
     assert answer.status_code == 200
     assert answer.json()["models"] == [identity]
@@ -134,11 +134,11 @@ def test_a_file_that_is_meant_to_do_harm_is_told_and_the_others_are_taken(
 ):
     """In /readyz, the metric and the log."""
     shutil.copy(models / "reach.onnx", tmp_path)
-    shelf = Shelf([tmp_path], Bounds())
+    shelf = ReloadingRegistry([tmp_path], VersionLimits())
     (tmp_path / "bad.onnx").write_bytes(hostile((models / "reach.onnx").read_bytes()))
     shutil.copy(models / "walk.onnx", tmp_path)
-    shelf.look()
-    shelf.look()
+    shelf.scan()
+    shelf.scan()
     ready = Readiness(shelf)
     answer = told(ready)
     assert answer.status_code == 200
@@ -157,7 +157,7 @@ def test_versions_are_listed_and_each_answers_under_its_hash(models, tmp_path):
     for version in (1, 2):
         (tmp_path / "reach").mkdir(exist_ok=True)
         (tmp_path / f"reach/{version}.onnx").write_bytes(numbered(content, version))
-    ask = asker(create_app(Readiness(Shelf([tmp_path], Bounds())), Settings()))
+    ask = asker(create_app(Readiness(ReloadingRegistry([tmp_path], VersionLimits())), Settings()))
     (listed,) = ask("GET", "/v1/models").json()["models"]
     assert listed["identity"] == listed["versions"][0] and len(listed["versions"]) == 2
     for key in ("reach", *listed["versions"]):

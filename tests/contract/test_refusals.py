@@ -12,7 +12,7 @@ from asking import asker
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.registry import model_registry
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 CLIP = "/v1/models/reach/clip.json"
 POSE = "/v1/models/reach/pose"
@@ -89,7 +89,7 @@ def test_a_wrong_parameter_is_named(changes, status, kind, name, words, assert_r
 @pytest.mark.parametrize(
     ("times", "status", "kind", "words"),
     [
-        ([], 400, "bad-parameter", "missing, expected seconds"),
+        ([], 400, "bad-parameter", "missing, expected time"),
         (["0", "99"], 422, "invalid-field", "expected 0 to"),
         (["-0.1"], 422, "invalid-field", "expected 0 to"),
         (["nan"], 400, "bad-parameter", "expected a finite number"),
@@ -330,7 +330,7 @@ def largest(calls):
 def test_an_answer_too_large_to_make_is_not_made(loaded, controls):
     model = loaded.find("reach")
     session, calls = recorded.session(model.session)
-    one = Library({"reach": replace(model, session=session)})
+    one = ModelRegistry({"reach": replace(model, session=session)})
     small = asker(create_app(one, Settings(output_limit=64 * 1024)))
     url = f"/v1/models/reach/clip.usda?{urlencode({**controls, 'fps': 1000})}"
     answer = small("GET", url)

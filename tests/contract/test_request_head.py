@@ -4,10 +4,10 @@ import pytest
 from asking import asker
 
 from posefield.common.errors import InvalidField
-from posefield.http.api.problems import LONGEST
+from posefield.http.api.problems import MAX_DETAIL_LENGTH
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 
 def kind(answer):
@@ -33,9 +33,9 @@ def test_headers_have_a_size_and_a_number(ask):
 def test_a_long_detail_is_cut_and_keeps_both_ends(ask):
     answer = ask("POST", "/v1/models/reach/pose", json={"begin" + "x" * 5000 + "end": 1})
     detail = answer.json()["detail"]
-    assert answer.status_code == 400 and len(detail) <= LONGEST
+    assert answer.status_code == 400 and len(detail) <= MAX_DETAIL_LENGTH
     assert detail.startswith("beginxxx") and "xend`" in detail
-    assert all(len(error["detail"]) <= LONGEST for error in answer.json()["errors"])
+    assert all(len(error["detail"]) <= MAX_DETAIL_LENGTH for error in answer.json()["errors"])
 
 
 LOCAL = [
@@ -65,7 +65,7 @@ def test_two_hosts_are_refused(ask):
 
 
 def answers(hosts, host):
-    ask = asker(create_app(Library({}), Settings(hosts=hosts)))
+    ask = asker(create_app(ModelRegistry({}), Settings(hosts=hosts)))
     return ask("GET", "/livez", headers={"host": host}).status_code == 200
 
 
@@ -90,7 +90,7 @@ def test_the_operator_lists_names(hosts, host, expected):
 @pytest.mark.parametrize("hosts", ["https://a.example", "a.example:80", "a b", "*a.example", "a/"])
 def test_what_is_no_name_stops_the_start(hosts):
     with pytest.raises(InvalidField, match="POSEFIELD_HOSTS"):
-        create_app(Library({}), Settings(hosts=hosts))
+        create_app(ModelRegistry({}), Settings(hosts=hosts))
 
 
 def test_what_clients_make_up_is_not_remembered_without_end(app):

@@ -22,7 +22,7 @@ from schemathesis.generation import GenerationMode
 from posefield.http.api import contract
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 
 SEED = 1
 
@@ -64,7 +64,7 @@ def test_every_right_question_to_this_model_is_answered(spec, loaded, phases):
     reach = loaded.find("reach")
     own = reach.session
     # Links from the list of models lead to all that are in it.
-    alone = create_app(Library({"reach": reach}), Settings(hosts=HOST))
+    alone = create_app(ModelRegistry({"reach": reach}), Settings(hosts=HOST))
     narrow = narrowed(spec, own.card)
     with_few_tags(narrow)
     accepted = Acceptance(expected_statuses=["2xx", "304", "414"])
@@ -94,7 +94,7 @@ def assert_enough(calls, phases):
 
 def formats(spec):
     """Method and path of each format that ends a path of the contract, for the model reach."""
-    operations = contract.parse(yaml.safe_dump(spec, sort_keys=False).encode()).operations
+    operations = contract.parse_contract(yaml.safe_dump(spec, sort_keys=False).encode()).operations
     return {
         (each.method, each.path.format(model="reach", format=form))
         for each in operations

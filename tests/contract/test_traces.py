@@ -18,7 +18,7 @@ from posefield.common.errors import InvalidField
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.telemetry import tracing
-from posefield.http.telemetry.telemetry import Telling
+from posefield.http.telemetry.telemetry import Telemetry
 from posefield.http.telemetry.tracing import Tracer
 
 PARENT = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01"
@@ -30,7 +30,7 @@ def spans(loaded):
     held = InMemorySpanExporter()
     provider = TracerProvider()
     provider.add_span_processor(SimpleSpanProcessor(held))
-    ask = asker(create_app(loaded, Settings(), Telling(tracer=Tracer(provider))))
+    ask = asker(create_app(loaded, Settings(), Telemetry(tracer=Tracer(provider))))
 
     def asked(*args, **given):
         held.clear()
@@ -97,11 +97,11 @@ def test_spans_reach_the_endpoint_that_is_set(models, collector):
 
 
 def test_nobody_traces_where_no_endpoint_is_set():
-    assert tracing.of({"OTEL_SERVICE_NAME": "posefield"}) is None
+    assert tracing.from_environment({"OTEL_SERVICE_NAME": "posefield"}) is None
 
 
 def test_an_endpoint_without_the_sdk_is_an_error(monkeypatch):
     monkeypatch.setitem(sys.modules, "opentelemetry.sdk.trace", None)
     environ = {"OTEL_EXPORTER_OTLP_ENDPOINT": "http://127.0.0.1:1"}
     with pytest.raises(InvalidField, match=r"expected posefield\[trace\]"):
-        tracing.of(environ)
+        tracing.from_environment(environ)

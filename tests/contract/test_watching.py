@@ -14,7 +14,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.http.telemetry import log, metrics
-from posefield.http.telemetry.telemetry import Telling
+from posefield.http.telemetry.telemetry import Telemetry
 
 
 def value(page, name, **labels):
@@ -68,8 +68,8 @@ def told(loaded):
 
     def asked(*args, **given):
         source, target = os.pipe()
-        lines = log.Lines(target)
-        answer = asker(create_app(loaded, Settings(), Telling(lines)))(*args, **given)
+        lines = log.LogBuffer(target)
+        answer = asker(create_app(loaded, Settings(), Telemetry(lines)))(*args, **given)
         lines.flush()
         os.close(target)
         with os.fdopen(source, "rb") as found:
@@ -116,12 +116,12 @@ def test_a_line_holds_nothing_that_a_client_wrote_but_its_id(told):
 
 
 def test_a_moment_is_a_time_of_day():
-    assert log.moment(0.25) == "1970-01-01T00:00:00.250Z"
-    assert log.moment(1_763_742_000.999) == "2025-11-21T16:20:00.999Z"
+    assert log.timestamp(0.25) == "1970-01-01T00:00:00.250Z"
+    assert log.timestamp(1_763_742_000.999) == "2025-11-21T16:20:00.999Z"
 
 
 async def written(contents, target):
-    lines = log.Lines(target)
+    lines = log.LogBuffer(target)
     for content in contents:
         lines.add(content)
     lines.flush()
@@ -160,7 +160,7 @@ def test_versions_of_models_are_shown_while_they_answer(ask, loaded):
 
 
 def test_a_version_that_is_gone_is_shown_to_be():
-    metrics.models(["gone@0123456789abcdef"], {})
-    metrics.models([], {})
-    page = metrics.page().decode()
+    metrics.set_models(["gone@0123456789abcdef"], {})
+    metrics.set_models([], {})
+    page = metrics.metrics_text().decode()
     assert 'posefield_model{hash="0123456789abcdef",model="gone"} 0.0' in page

@@ -13,7 +13,7 @@ import httpx
 import pytest
 from serving import address, children, host_and_port, process, started, within
 
-from posefield.common.cpu_cores import ALONE
+from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.http import server
 
 pytestmark = pytest.mark.system
@@ -21,22 +21,23 @@ pytestmark = pytest.mark.system
 BLOCKED = """
 import socket, threading, time, uvicorn
 from functools import partial
-from posefield.registry.model_registry import Bounds, Library
-from posefield.registry.model_reload import Shelf
+from posefield.registry.model_registry import VersionLimits, ModelRegistry
+from posefield.registry.model_reload import ReloadingRegistry
 from posefield.http.api import contract
-from posefield.http.app import build
-from posefield.http.lifespan import Announcement, lifespan
+from posefield.http.app import build_app
+from posefield.http.lifespan import StartAnnouncement, lifespan
 from posefield.http.operations import OPERATIONS
 from posefield.http.api.settings import Settings
-from posefield.http.telemetry.telemetry import SILENT
+from posefield.http.telemetry.telemetry import NO_TELEMETRY
 async def block_the_loop(service, request):
     time.sleep(100)
 own = socket.create_server(("127.0.0.1", 0))
-line = Announcement("at http://127.0.0.1:%d" % own.getsockname()[1], threading.Semaphore(1))
-beside = partial(lifespan, shelf=Shelf([], Bounds()), announcement=line)
+line = StartAnnouncement("at http://127.0.0.1:%d" % own.getsockname()[1], threading.Semaphore(1))
+beside = partial(lifespan, shelf=ReloadingRegistry([], VersionLimits()), announcement=line)
 handlers = {**OPERATIONS, "listModels": block_the_loop}
 settings = Settings(unresponsive=2)
-app = build(contract.load(), handlers, Library({}), settings, SILENT, beside)
+agreed = contract.load_contract()
+app = build_app(agreed, handlers, ModelRegistry({}), settings, NO_TELEMETRY, beside)
 uvicorn.Server(uvicorn.Config(app, log_level="critical", lifespan="on")).run([own])
 """
 
@@ -177,7 +178,7 @@ def test_they_end_when_their_parent_is_killed(models):
 def test_numpy_has_one_thread_in_each_unless_the_operator_says_otherwise(
     models, threads, monkeypatch
 ):
-    for name in ALONE:
+    for name in SINGLE_THREAD_ENV:
         monkeypatch.delenv(name, raising=False)
     with process(models, POSEFIELD_WORKERS="2", **threads) as child:
         address(child)
@@ -185,7 +186,9 @@ def test_numpy_has_one_thread_in_each_unless_the_operator_says_otherwise(
         for pid in workers(child):
             environ = Path(f"/proc/{pid}/environ").read_bytes().split(b"\0")
             said = {word for word in environ if b"_NUM_THREADS=" in word}
-            expected = {f"{name}={value}".encode() for name, value in (threads or ALONE).items()}
+            expected = {
+                f"{name}={value}".encode() for name, value in (threads or SINGLE_THREAD_ENV).items()
+            }
             assert said == expected
 
 
@@ -194,18 +197,18 @@ def test_as_many_as_the_container_may_use(quota, most, tmp_path):
     file = tmp_path / "cpu.max"
     if quota:
         file.write_text(f"{quota}\n")
-    assert server.processors(file) == min(most, len(os.sched_getaffinity(0)))
+    assert server.usable_processors(file) == min(most, len(os.sched_getaffinity(0)))
 
 
 def test_a_quota_without_limit_is_none(tmp_path):
     (tmp_path / "cpu.max").write_text("max 100000\n")
-    assert server.processors(tmp_path / "cpu.max") == len(os.sched_getaffinity(0))
+    assert server.usable_processors(tmp_path / "cpu.max") == len(os.sched_getaffinity(0))
 
 
 def test_as_many_as_there_are_processors(models):
     with process(models, POSEFIELD_WORKERS="0") as child:
         assert answers(address(child))
-        count = server.processors(server.QUOTA)
+        count = server.usable_processors(server.CPU_QUOTA_FILE)
         assert len(workers(child)) == (count if count > 1 else 0)
         child.send_signal(signal.SIGINT)
         assert child.wait(30) == 0

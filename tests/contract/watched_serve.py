@@ -19,10 +19,10 @@ def tell(event, arguments):
 sys.addaudithook(tell)
 
 from posefield import cli  # noqa: E402
-from posefield.registry.model_registry import Library  # noqa: E402
+from posefield.registry.model_registry import ModelRegistry  # noqa: E402
 
 if os.environ.get("PLANT"):
-    find = Library.find
+    find = ModelRegistry.find
 
     def careless(self, key):
         try:
@@ -30,6 +30,6 @@ if os.environ.get("PLANT"):
         except (OSError, ValueError):
             return find(self, key)
 
-    Library.find = careless
+    ModelRegistry.find = careless
 
 cli.main()

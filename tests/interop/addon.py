@@ -144,7 +144,9 @@ def _row(name: str, found: Any, meant: Clip, case: dict[str, Any], right: bool) 
     joints = [case["joints"].index(joint) for joint in meant.skeleton.names]
     if right and len(found) != len(meant):
         return Row(name, np.inf, np.inf, right)
-    positions, turns = skeleton.forward(meant.skeleton.parents, meant.rotations, meant.translations)
+    positions, turns = skeleton.forward_kinematics(
+        meant.skeleton.parents, meant.rotations, meant.translations
+    )
     frames = min(len(found), len(meant))
     found = found[:frames, joints]
     metres = np.linalg.norm(found[..., :3, 3] - positions[:frames], axis=-1).max()
@@ -167,7 +169,7 @@ class _Expected:
         changed = {key: value for key, value in other.items() if key != "body"}
         if "controls" in changed:
             changed["controls"] = question["controls"] | changed["controls"]
-        clip = clips.clip(self.model, ClipQuestion(**question | changed)).clip
+        clip = clips.synthesize_clip(self.model, ClipQuestion(**question | changed)).clip
         return self._on(body, _cycles(clip, self.case.get("cycles", 1)))
 
     def _on(self, body: str, clip: Clip) -> Clip:

@@ -6,7 +6,7 @@ import numpy as np
 import trained
 
 from posefield.encode.character import joint_names
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import clip as clips
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
@@ -75,7 +75,7 @@ def write(folder: Path) -> dict[str, dict[str, Path]]:
         found = matrices_of(meant.clip)
         for extension in FORMATS:
             path = folder / f"{name}.{extension}"
-            path.write_bytes(ENCODERS[extension].encode(written))
+            path.write_bytes(CLIP_ENCODERS[extension].encode(written))
             expectation = folder / f"{path.name}.npz"
             np.savez(expectation, **found | {"joints": _names(meant.clip, extension)})
             expected[path.name] = {WHO: expectation}
@@ -86,7 +86,7 @@ def write_invalid(folder: Path) -> str:
     """Name of a glTF file whose quaternions are no rotations."""
     clip, trust = (made := answers_by_hand()[0][1]).clip, made.trust
     longer = Clip(clip.skeleton, 1.1 * clip.rotations, clip.translations, clip.rate)
-    (folder / INVALID).write_bytes(ENCODERS["glb"].encode(ClipAnswer(longer, trust)))
+    (folder / INVALID).write_bytes(CLIP_ENCODERS["glb"].encode(ClipAnswer(longer, trust)))
     return INVALID
 
 
@@ -100,17 +100,17 @@ def person() -> Skeleton:
 def matrices_of(clip: Clip) -> dict[str, np.ndarray]:
     """Joint names in the file and matrices (F, J, 4, 4) in the world, for column vectors, m."""
     parents = clip.skeleton.parents
-    positions, turns = skeleton.forward(parents, clip.rotations, clip.translations)
+    positions, turns = skeleton.forward_kinematics(parents, clip.rotations, clip.translations)
     matrices = np.zeros((*positions.shape[:-1], 4, 4))
     matrices[..., :3, :3], matrices[..., :3, 3] = quat.to_matrix(turns), positions
     matrices[..., 3, 3] = 1.0
-    return {"joints": np.array(joint_names.legal(clip.skeleton.names)), "matrices": matrices}
+    return {"joints": np.array(joint_names.legal_names(clip.skeleton.names)), "matrices": matrices}
 
 
 def _names(clip: Clip, extension: str) -> np.ndarray:
     """What joints are called in a format: glTF allows any names."""
     own = clip.skeleton.names
-    return np.array(own if extension == "glb" else joint_names.legal(own))
+    return np.array(own if extension == "glb" else joint_names.legal_names(own))
 
 
 def _answer(frames: int, rate: float) -> ClipAnswer:

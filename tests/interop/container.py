@@ -18,7 +18,7 @@ import trained
 from image import Image
 
 from posefield import __version__
-from posefield.encode.formats import ENCODERS, POSE_ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.http.access import api_keys
 from posefield.http.pages import static_page
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
@@ -108,7 +108,7 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
     models, temporary = _places(folder)
     model, content = trained.family()
     (models / "reaching.onnx").write_bytes(content)
-    port, key = str(running.ports(1)[0]), api_keys.make()
+    port, key = str(running.ports(1)[0]), api_keys.generate_key()
     told = {"POSEFIELD_PORT": port}
     health = built.config["Healthcheck"]["Test"][1:]
     command = [*built.config["Entrypoint"], *built.config["Cmd"]]
@@ -139,13 +139,13 @@ def _served(built: Image, folder: Path) -> Iterator[str]:
 def _answers(url: str, key: str, model: Synthesizer) -> Iterator[str]:
     """Faults of answers, which have to be those of here to the last byte."""
     controls = {control.name: control.default for control in model.session.card.controls}
-    clip = clips.clip(model, ClipQuestion(controls=controls))
+    clip = clips.synthesize_clip(model, ClipQuestion(controls=controls))
     expected = {
         f"/v1/models/{model.name}/pose": POSE_ENCODERS["json"].encode(
-            poses.pose(model, PoseQuestion(controls=controls, times=[0.5]))
+            poses.synthesize_poses(model, PoseQuestion(controls=controls, times=[0.5]))
         ),
-        f"/v1/models/{model.name}/clip.usdc": ENCODERS["usdc"].encode(
-            clip, ENCODERS["usdc"].convention(None, None)
+        f"/v1/models/{model.name}/clip.usdc": CLIP_ENCODERS["usdc"].encode(
+            clip, CLIP_ENCODERS["usdc"].convention(None, None)
         ),
     }
     known = {"Authorization": f"Bearer {key}"}

@@ -53,5 +53,5 @@ def _taken(model: Synthesizer, entry: dict, folder: Path) -> tuple[str, dict[str
     shutil.copyfile(made, path)
     expectation = folder / f"{path.name}.npz"
     question = ClipQuestion(controls=entry["controls"], fps=entry["fps"])
-    np.savez(expectation, **cases.matrices_of(clips.clip(model, question).clip))
+    np.savez(expectation, **cases.matrices_of(clips.synthesize_clip(model, question).clip))
     return path.name, {cases.WHO: expectation}

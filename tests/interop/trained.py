@@ -35,7 +35,7 @@ def answers() -> list[tuple[str, ClipAnswer]]:
 def family() -> tuple[Synthesizer, bytes]:
     """Model of the procedural family, and its file's content."""
     with tempfile.TemporaryDirectory() as name:
-        path = sample_files.family(Path(name) / "reaching")
+        path = sample_files.write_family(Path(name) / "reaching")
         return _trained(path, path.parent)
 
 
@@ -52,7 +52,7 @@ def real(name: str) -> bytes | None:
 def walk() -> bytes:
     """File of the model of the procedural walk."""
     with tempfile.TemporaryDirectory() as name:
-        sample_walk.write(Path(name))
+        sample_walk.write_walk(Path(name))
         return _of(sample_walk.recipe(), Path(name))[1]
 
 
@@ -63,13 +63,13 @@ def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
 
 def _of(own: Recipe, data: Path) -> tuple[Synthesizer, bytes]:
     examples, notes = ingest.ingest(own, data)
-    exported = onnx_export.export(own, train.train(own, examples, lambda _: None), notes)
+    exported = onnx_export.export_model(own, train.train(own, examples, lambda _: None), notes)
     model = Synthesizer(own.name, session.open_bytes(exported.content, own.name))
     return model, exported.content
 
 
 def _middle(model: Synthesizer) -> tuple[str, ClipAnswer]:
     controls = {control.name: control.default for control in model.session.card.controls}
-    return model.name, clips.clip(
+    return model.name, clips.synthesize_clip(
         model, ClipQuestion(controls=controls, fps=30.0, extrapolate="refuse")
     )

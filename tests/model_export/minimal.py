@@ -64,7 +64,7 @@ def small_clip(phase: float = 0.0, frames: int = 21, heading: float = 0.3) -> Cl
     t = np.linspace(0.0, 1.0, frames)
     swing = 0.4 * np.sin(5 * t[:, None, None] + phase + np.arange(15).reshape(5, 3))
     rotations = quat.exp(swing)
-    yaw = quat.about(np.array([0.0, 1.0, 0.0]), heading + 0.2 * t)
+    yaw = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), heading + 0.2 * t)
     rotations[:, 0] = quat.mul(yaw, quat.exp(0.2 * swing[:, 0]))
     path = np.stack([2 + t * np.sin(heading), 0.9 + 0.05 * t, 1 + t * np.cos(heading)], axis=-1)
     return assemble(SKELETON, rotations, path, SKELETON.offsets, 30.0)

@@ -6,7 +6,7 @@ import numpy as np
 import onnxruntime
 
 from posefield.common.units import Floats
-from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 
 def outputs(
@@ -19,14 +19,14 @@ def outputs(
 
     level: of detail, for what is built with a ladder; the default of its graph if not said.
     """
-    net = Net()
+    net = GraphBuilder()
     built = build(net, *inputs)
     names = [built] if isinstance(built, str) else list(built)
     shapes = {name: [f"{name}_{i}" for i in range(a.ndim)] for name, a in inputs.items()}
     shapes |= {} if level is None else {"level": []}
     results = {f"result_{i}": [f"axis_{i}_{j}" for j in range(n)] for i, n in enumerate(axes)}
     for result, name in zip(results, names, strict=True):
-        net.named(result, name)
+        net.add_output(result, name)
     content = net.model(shapes, results, {}, {"producer_name": "test"})
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1

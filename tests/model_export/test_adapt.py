@@ -18,10 +18,10 @@ from posefield_train.adapt import (
 )
 from posefield_train.align import phase_alignment
 from posefield_train.evaluate import compared_motion, methods, motion_errors
-from posefield_train.evaluate.methods import Asked
+from posefield_train.evaluate.methods import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.kriging_bank import Constant
+from posefield_train.kriging.kriging_bank import ConstantModel
 from posefield_train.sample import sample_walk
 from posefield_train.source import ingest
 from posefield_train.tensor import hosvd
@@ -42,7 +42,7 @@ def trained(recipe, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def known(recipe, trained):
-    return canonical_clips.known(recipe, trained)
+    return canonical_clips.adaptable(recipe, trained)
 
 
 def examples(trained, who, controls):
@@ -51,7 +51,7 @@ def examples(trained, who, controls):
     return [
         ingest.Example(
             replace(row, place=row.place.with_name(f"{who}{value:g}.bvh"), performer=who),
-            ingest.canonical(newcomers.clip(who, value), row, False, False)[0],
+            ingest.canonicalize(newcomers.clip(who, value), row, False, False)[0],
             np.array([value]),
             (),
             (),
@@ -68,13 +68,13 @@ def adapted(trained, known):
 def misses(recipe, trained, model, name):
     """Mean distance of a model's answers from the newcomer's own clips that it was not shown, m."""
     asked = examples(trained, "cy", ASKED)
-    said = Asked(np.stack([e.controls for e in asked]), [name] * len(asked))
-    made = methods.ours(recipe, replace(trained, model=model), said)
+    said = Queries(np.stack([e.controls for e in asked]), [name] * len(asked))
+    made = methods.predict_posefield(recipe, replace(trained, model=model), said)
     pairs = zip(made, asked, strict=True)
     return np.mean(
         [
-            motion_errors.compare(
-                own, compared_motion.of_clip(e.clip, None), ()
+            motion_errors.compare_motions(
+                own, compared_motion.motion_of_clip(e.clip, None), ()
             ).plain_relative.mean
             for own, e in pairs
         ]
@@ -109,8 +109,8 @@ def test_those_who_were_known_are_met_as_before(trained, known, adapted):
     old, new = trained.model, adapted.model
     assert new.bank.performers == ("a", "b", "cy", "d")
     assert old.bank.performers == ("a", "b", "d")
-    controls, times = trained.laid.half_ranges * 7.0 + 7.0, np.full((newcomers.CLIPS, 1), 0.5)
-    whose = [old.bank.performers[i] for i in trained.laid.moved_by]
+    controls, times = trained.samples.half_ranges * 7.0 + 7.0, np.full((newcomers.CLIPS, 1), 0.5)
+    whose = [old.bank.performers[i] for i in trained.samples.moved_by]
 
     def joints(model, names):
         order = [model.bank.performers.index(name) for name in names]
@@ -134,7 +134,7 @@ def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(kno
     assert np.abs(numbers[:n] - expected).max() < 1e-9
 
     def lost(numbers):
-        gaps = (numbers[n:] - adapted.moved.numbers) @ extended.tensor.whiten.T
+        gaps = (numbers[n:] - adapted.new_clips.numbers) @ extended.tensor.whiten.T
         return np.sqrt(np.sum(gaps**2) / (k * gaps.shape[1] * extended.tensor.weight))
 
     assert lost(numbers) < known.truncation
@@ -147,7 +147,7 @@ def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(kno
 
 def test_a_model_that_was_cut_nowhere_takes_up_no_rounding_errors(known, adapted):
     whole = replace(known, truncation=0.0)
-    moved, parents = adapted.moved, known.skeleton.parents
+    moved, parents = adapted.new_clips, known.skeleton.parents
     found = tensor_extension.extend(whole.model, parents, known.joint_weights, moved.numbers, 0.0)
     gaps = (moved.numbers - found.tensor.mean) @ found.tensor.whiten.T
     said = found.full.truncated(found.ranks).restored()[:, :, -len(SHOWN) :]
@@ -158,7 +158,7 @@ def test_a_model_that_was_cut_nowhere_takes_up_no_rounding_errors(known, adapted
 
 def test_no_sign_hangs_on_the_machine(known, adapted, monkeypatch):
     def extended():
-        numbers = adapted.moved.numbers
+        numbers = adapted.new_clips.numbers
         parents, weights = known.skeleton.parents, known.joint_weights
         return tensor_extension.extend(
             known.model, parents, weights, numbers, known.truncation
@@ -176,7 +176,7 @@ def test_no_sign_hangs_on_the_machine(known, adapted, monkeypatch):
     monkeypatch.setattr(np.linalg, "eigh", lambda rows: (eigh(rows)[0], -eigh(rows)[1]))
     assert np.allclose(extended().values, own.values, rtol=0, atol=1e-9)
     # Negative control: as they come, the vectors of such a machine differ, and not when turned.
-    gram = adapted.moved.numbers[0] @ adapted.moved.numbers[0].T
+    gram = adapted.new_clips.numbers[0] @ adapted.new_clips.numbers[0].T
     here, there = eigh(gram)[1], np.linalg.eigh(gram)[1]
     assert np.abs(here - there).max() > 1e-3
     assert np.array_equal(hosvd.fix_signs(here), hosvd.fix_signs(there))
@@ -186,7 +186,7 @@ def test_a_range_that_grows_moves_no_field(trained, known):
     """The same distances in a longer unit: the old samples alone give the very same field."""
     bank = known.model.bank
     far = examples(trained, "cy", (30.0,))
-    laid = extended_models.lay(bank, known.groups, far, "cy")
+    laid = extended_models.extend_samples(bank, known.groups, far, "cy")
     assert (laid.low, laid.high) == (0.0, 30.0) and laid.growth == pytest.approx(30 / 14)
     n, values = len(bank.pose.samples), bank.pose.values
     rng = np.random.Generator(np.random.PCG64(1))
@@ -207,10 +207,10 @@ def test_a_range_that_grows_moves_no_field(trained, known):
 
 def test_what_the_controls_do_not_explain_is_the_mean_of_all(trained, known):
     bank = known.model.bank
-    others = bank.others | {"duration": Constant(np.array([0.5]))}
+    others = bank.others | {"duration": ConstantModel(np.array([0.5]))}
     flat = replace(bank, others=others)
-    laid = extended_models.lay(flat, known.groups, examples(trained, "cy", SHOWN), "cy")
-    field = extended_models.solve(laid, flat, "duration", np.array([[1.0], [1.5], [2.0]]))
+    laid = extended_models.extend_samples(flat, known.groups, examples(trained, "cy", SHOWN), "cy")
+    field = extended_models.solve_extended(laid, flat, "duration", np.array([[1.0], [1.5], [2.0]]))
     assert field.mean == pytest.approx((newcomers.CLIPS * 0.5 + 4.5) / (newcomers.CLIPS + 3))
 
 
@@ -218,10 +218,10 @@ def test_what_the_controls_do_not_explain_is_the_mean_of_all(trained, known):
 def test_bones_that_were_all_alike_are_told_apart_by_name(trained, known, size):
     mean = trained.model.proportions.mean
     bank = replace(known.model.bank, others=known.model.bank.others | {"offsets": flat(trained)})
-    laid = extended_models.lay(bank, known.groups, examples(trained, "cy", SHOWN), "cy")
+    laid = extended_models.extend_samples(bank, known.groups, examples(trained, "cy", SHOWN), "cy")
     own = np.repeat((size * mean)[None], len(SHOWN), axis=0)
-    field, longer = extended_models.bones(laid, bank, trained.model.proportions, own)
-    assert isinstance(field, Constant) == (size == 1.0)
+    field, longer = extended_models.solve_bones(laid, bank, trained.model.proportions, own)
+    assert isinstance(field, ConstantModel) == (size == 1.0)
     points = np.array([[-0.5, 0, 1, 0, 0], [-0.5, 0, 0, 1, 0]], dtype=float)
     found = longer.numpy(field.predict(points))
     assert np.abs(found[1] - own[0]).max() < 1e-3
@@ -230,7 +230,7 @@ def test_bones_that_were_all_alike_are_told_apart_by_name(trained, known, size):
 
 def flat(trained):
     """A field of bones that are the mean everywhere."""
-    return Constant(np.zeros(len(trained.model.proportions.directions)))
+    return ConstantModel(np.zeros(len(trained.model.proportions.directions)))
 
 
 def test_sigma_says_that_the_newcomer_is_known(adapted):
@@ -243,18 +243,18 @@ def test_sigma_says_that_the_newcomer_is_known(adapted):
 
 def test_a_clip_of_another_action_is_refused_with_the_numbers(trained, known):
     good = examples(trained, "cy", SHOWN)
-    canonical_clips.refuse_strangers(known, canonical_clips.move(known, good))
+    canonical_clips.refuse_outliers(known, canonical_clips.to_canonical(known, good))
     rotations = good[1].clip.rotations.copy()
-    rotations[:, 1] = quat.about(np.array([1.0, 0.0, 0.0]), np.array(2.0))
+    rotations[:, 1] = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(2.0))
     strange = [good[0], replace(good[1], clip=replace(good[1].clip, rotations=rotations))]
     with pytest.raises(TrainingError, match=r"cy7\.bvh: lies \d+\.\d cm .* times the .* at most 2"):
-        canonical_clips.refuse_strangers(known, canonical_clips.move(known, strange))
+        canonical_clips.refuse_outliers(known, canonical_clips.to_canonical(known, strange))
 
 
 @pytest.mark.parametrize("size", [0.18, 0.6, 1.6, 5.6])
 def test_a_clip_in_another_unit_is_refused_by_its_bones(trained, known, size):
-    good = canonical_clips.move(known, examples(trained, "cy", SHOWN))
-    canonical_clips.refuse_strangers(known, good)
+    good = canonical_clips.to_canonical(known, examples(trained, "cy", SHOWN))
+    canonical_clips.refuse_outliers(known, good)
 
     def of_size(size):
         first, own, last = good.examples
@@ -262,14 +262,14 @@ def test_a_clip_in_another_unit_is_refused_by_its_bones(trained, known, size):
         return replace(good, examples=(first, replace(own, clip=scaled), last))
 
     with pytest.raises(TrainingError, match=r"cy7\.bvh: its bones are .* at most 1\.5 times "):
-        canonical_clips.refuse_strangers(known, of_size(size))
+        canonical_clips.refuse_outliers(known, of_size(size))
     # Negative control: a performer of another stature is none.
-    canonical_clips.refuse_strangers(known, of_size(1.1))
+    canonical_clips.refuse_outliers(known, of_size(1.1))
 
 
 def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, adapted):
-    content = onnx_export.export(recipe, trained, []).content
-    reopened = model_reconstruction.reopen(content, "small.onnx").known
+    content = onnx_export.export_model(recipe, trained, []).content
+    reopened = model_reconstruction.reconstruct(content, "small.onnx").known
     found = adaptation.adapt(reopened, examples(trained, "cy", SHOWN), "cy").model
     rng = np.random.Generator(np.random.PCG64(2))
     question = (
@@ -303,7 +303,7 @@ def walkers(strides):
 
 def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
     recipe, trained, shown = walkers
-    model = adaptation.adapt(canonical_clips.known(recipe, trained), shown, "new").model
+    model = adaptation.adapt(canonical_clips.adaptable(recipe, trained), shown, "new").model
     who = np.eye(3)[[model.bank.performers.index("new")]]
     for example in shown:
         seconds = model.evaluate(example.controls[None], np.zeros((1, 1)), who).duration[0]
@@ -320,11 +320,13 @@ def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
 
 def test_a_cycle_that_was_cut_elsewhere_is_begun_with_the_family(walkers):
     recipe, trained, shown = walkers
-    known = canonical_clips.known(recipe, trained)
-    late = [phase_alignment.begin(example, 0.3) for example in shown]
-    assert canonical_clips.begin(replace(known, in_phase=False), late) == tuple(late)
-    found = canonical_clips.begin(replace(known, in_phase=True), late)
-    cut, begun, right = (canonical_clips.move(known, clips) for clips in (late, found, shown))
+    known = canonical_clips.adaptable(recipe, trained)
+    late = [phase_alignment.shift_start(example, 0.3) for example in shown]
+    assert canonical_clips.align_phase(replace(known, in_phase=False), late) == tuple(late)
+    found = canonical_clips.align_phase(replace(known, in_phase=True), late)
+    cut, begun, right = (
+        canonical_clips.to_canonical(known, clips) for clips in (late, found, shown)
+    )
     assert begun.distances.max() < 1.5 * right.distances.max()
     assert cut.distances.min() > 2.0 * begun.distances.max()
     assert [round(example.shift, 1) for example in begun.examples] == [-0.3] * 3

@@ -30,7 +30,7 @@ def base(folder):
     recipe = newcomers.recipe()
     trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
     path = folder / "small.onnx"
-    path.write_bytes(onnx_export.export(recipe, trained, []).content)
+    path.write_bytes(onnx_export.export_model(recipe, trained, []).content)
     return path
 
 
@@ -65,7 +65,7 @@ def test_the_new_file_says_who_it_knows_and_where_that_comes_from(base, adapted)
         f"adapted from tiny@{checked_file.digest(base.read_bytes())} to 'cy' by 3 clips"
         in (new.diagnostics["notes"][-1])
     )
-    assert 0.0 < facts["parity_m"] < onnx_export.ALLOWED
+    assert 0.0 < facts["parity_m"] < onnx_export.PARITY_LIMIT
 
 
 def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp_path):
@@ -82,14 +82,16 @@ def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp
 def head(path, who, level=0):
     """Path of the head in a clip of somebody, on the whole."""
     model = Synthesizer("small", session.load(path))
-    answer = clips.clip(model, ClipQuestion(controls={"speed": 4.0}, performer=who, level=level))
+    answer = clips.synthesize_clip(
+        model, ClipQuestion(controls={"speed": 4.0}, performer=who, level=level)
+    )
     return answer.clip.positions()[:, 2].mean(axis=0)
 
 
 def test_the_service_answers_for_the_newcomer_at_every_level(adapted):
     path, _ = adapted
     true = newcomers.clip("cy", 4.0)
-    expected = ingest.canonical(true, None, False, False)[0].positions()[:, 2].mean(axis=0)
+    expected = ingest.canonicalize(true, None, False, False)[0].positions()[:, 2].mean(axis=0)
     for number, level in enumerate(session.load(path).card.levels):
         own, other = (np.linalg.norm(head(path, who, number) - expected) for who in ("cy", "a"))
         assert own < 0.02 + 2.0 * level.rms
@@ -166,7 +168,7 @@ def measuring(folder):
     recipe = Recipe.model_validate({**plain, "controls": asked})
     trained = train.train(recipe, ingest.ingest(recipe, folder)[0], lambda _: None)
     path = folder / "measuring.onnx"
-    path.write_bytes(onnx_export.export(recipe, trained, []).content)
+    path.write_bytes(onnx_export.export_model(recipe, trained, []).content)
     return path
 
 

@@ -11,11 +11,11 @@ from posefield.kriging.kriging_model import half_ranges
 from posefield.motion import clip, quat
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import dtw, time_alignment
-from posefield_train.align.warp import DENSE, WarpBasis
+from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.kriging import coefficient_models
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source import ingest
-from posefield_train.source.clip_table import Row
+from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Kriging
 
@@ -38,14 +38,16 @@ def poses(s, size):
     bell = np.exp(-0.5 * ((s - EVENT) / 0.12) ** 2)
     angles = [0.3 * s, 0.2 * np.sin(4 * s), size * bell, 0.8 * size * np.sin(6 * s) * s]
     axes = [UP, np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), UP]
-    rotations = np.stack([quat.about(a, v) for a, v in zip(axes, angles, strict=True)], axis=1)
+    rotations = np.stack(
+        [quat.from_axis_angle(a, v) for a, v in zip(axes, angles, strict=True)], axis=1
+    )
     return rotations, np.stack([0.5 * s, 0.9 + 0.05 * bell, 0.1 * s**2], axis=1)
 
 
 def example(size, times, landmarks=()):
     """Clip that is at canonical time `times` (F,) at each of its frames."""
     rotations, path = poses(times, size)
-    row = Row(Path("x.bvh"), "clips.csv", 2, "", 0, None, np.array([size]), ())
+    row = ClipRow(Path("x.bvh"), "clips.csv", 2, "", 0, None, np.array([size]), ())
     own = clip.assemble(JOINTS, rotations, path, JOINTS.offsets, 60.0)
     return Example(row, own, row.controls, landmarks, jumps=())
 
@@ -74,9 +76,11 @@ def to_the_mean(values):
 def to_the_prediction(family):
     """What the others predict for each by a field over its size, as training has it."""
     sizes = np.array([e.controls for e in family])
-    laid = Samples(half_ranges(sizes, sizes.min(axis=0), sizes.max(axis=0)), 1, np.arange(CLIPS))
+    laid = SamplePoints(
+        half_ranges(sizes, sizes.min(axis=0), sizes.max(axis=0)), 1, np.arange(CLIPS)
+    )
     settings = Kriging(drift=1, covariance="matern52")
-    return lambda v: v - coefficient_models.tuned(settings, "matern52", laid, v).residuals
+    return lambda v: v - coefficient_models.tune_drift(settings, "matern52", laid, v).residuals
 
 
 def aligned(family, rounds=2, basis=BASIS, weights=WEIGHTS, predict=to_the_mean):
@@ -90,7 +94,7 @@ def disagreement(found, true):
     """
     moments = np.stack(
         [
-            BASIS.evaluate(own, BASIS.invert(known, DENSE))
+            BASIS.evaluate(own, BASIS.invert(known, FIT_TIMES))
             for own, known in zip(found, true, strict=True)
         ]
     )
@@ -117,7 +121,7 @@ def test_equal_clips_are_not_warped(family):
 
 
 def mean_inverse(logs):
-    return np.mean([BASIS.invert(log, DENSE) for log in logs], axis=0)
+    return np.mean([BASIS.invert(log, FIT_TIMES) for log in logs], axis=0)
 
 
 def test_what_others_predict_aligns_better_than_the_mean_where_clips_differ(logs):
@@ -136,8 +140,8 @@ def test_what_others_predict_aligns_better_than_the_mean_where_clips_differ(logs
 
 def test_mean_warp_is_the_identity(found, logs):
     # What six increments cannot follow of the correction.
-    assert np.max(np.abs(mean_inverse(found.logs) - DENSE)) < 0.004
-    assert np.max(np.abs(mean_inverse(logs) - DENSE)) > 0.02
+    assert np.max(np.abs(mean_inverse(found.logs) - FIT_TIMES)) < 0.004
+    assert np.max(np.abs(mean_inverse(logs) - FIT_TIMES)) > 0.02
 
 
 def test_where_nothing_moves_landmarks_say_what_time_it_is(rng):
@@ -167,7 +171,7 @@ def positions(rotations, path):
 def test_alignment_does_not_multiply_acceleration(family, found):
     offsets = np.tile(JOINTS.offsets, (CLIPS, 1, 1))
     truth = np.stack([positions(*poses(CANONICAL, e.controls[0])) for e in family])
-    joints = time_alignment.positions(found, PARENTS, offsets)
+    joints = time_alignment.joint_positions(found, PARENTS, offsets)
     assert acceleration(joints) < 1.2 * acceleration(truth)
     even = np.stack([positions(*time_alignment.resample(e.clip, CANONICAL)) for e in family])
     paths = dtw.warp(even.reshape(CLIPS, FRAMES, -1), truth[5].reshape(FRAMES, -1))
@@ -198,7 +202,7 @@ def test_aligned_clips_differ_by_their_controls_and_no_longer_by_their_timing(fa
         left = flat - sizes @ np.linalg.lstsq(sizes, flat, rcond=None)[0]
         return np.sqrt(np.mean(np.sum(left.reshape(hands.shape) ** 2, axis=-1)))
 
-    assert scatter(time_alignment.positions(found, PARENTS, offsets)) < 0.2 * scatter(uniform)
+    assert scatter(time_alignment.joint_positions(found, PARENTS, offsets)) < 0.2 * scatter(uniform)
 
 
 def test_rounds_to_the_mean_better_the_one_to_the_medoid(family, logs):

@@ -198,12 +198,12 @@ def test_numbers_are_written_as_percent_f_writes_them(rng, decimals):
     expected = "".join(
         " ".join(f"{number:.{decimals}f}" for number in row) + "\n" for row in rounded
     )
-    assert bvh_writer.written(values, decimals).decode() == expected
+    assert bvh_writer.format_numbers(values, decimals).decode() == expected
 
 
 def test_numbers_of_too_many_digits_are_refused():
     with pytest.raises(ValueError, match=r"numbers of up to 1e\+12, expected fewer digits"):
-        bvh_writer.written(np.array([[1.0, -1e12]]), 7)
+        bvh_writer.format_numbers(np.array([[1.0, -1e12]]), 7)
 
 
 def nearest_by_hand(angles):
@@ -219,7 +219,7 @@ def nearest_by_hand(angles):
 def test_angles_are_as_near_as_taking_one_frame_after_another(rng):
     wild = quat.exp(np.cumsum(rng.normal(0.0, 0.3, (2000, 3)), axis=0))
     angles = quat.to_euler(wild, "ZYX")
-    found = bvh_writer.continuous(angles)
+    found = bvh_writer.unwrap_euler(angles)
     assert np.abs(found - nearest_by_hand(angles)).max() < 1e-9
     assert np.abs(found - angles).max() > np.pi
 

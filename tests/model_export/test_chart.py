@@ -31,21 +31,21 @@ def raised(peak):
     """One joint in five clips that swing up to an angle from where they start and back."""
     bell = np.sin(np.linspace(0.0, np.pi, 80))
     peaks = np.array([0.3, 0.3, 0.3, 0.3, peak])
-    return quat.about(UP, peaks[:, None] * bell)[:, :, None]
+    return quat.from_axis_angle(UP, peaks[:, None] * bell)[:, :, None]
 
 
 def test_poses_of_numbers_are_the_poses(rotations, path):
-    own, findings = pose_vectors.fit(rotations)
+    own, findings = pose_vectors.fit_chart(rotations)
     back, root = own.poses(own.numbers(rotations, path))
     assert apart(back, rotations) < TOLERANCE
     assert np.array_equal(root, path)
     assert findings == []
-    other = pose_vectors.Chart(own.means[::-1])
+    other = pose_vectors.PoseChart(own.means[::-1])
     assert apart(other.poses(own.numbers(rotations, path))[0], rotations) > 0.1
 
 
 def test_layout_is_root_and_then_three_numbers_a_joint(rotations, path):
-    own, _ = pose_vectors.fit(rotations)
+    own, _ = pose_vectors.fit_chart(rotations)
     numbers = own.numbers(rotations, path)
     assert numbers.shape == (6, 40, 12)
     assert np.array_equal(numbers[..., :3], path)
@@ -54,9 +54,9 @@ def test_layout_is_root_and_then_three_numbers_a_joint(rotations, path):
 
 
 def test_quaternion_and_its_negative_are_one_pose(rotations, path, rng):
-    own, _ = pose_vectors.fit(rotations)
+    own, _ = pose_vectors.fit_chart(rotations)
     signed = rotations * rng.choice([-1.0, 1.0], size=rotations.shape[:-1])[..., None]
-    flipped, _ = pose_vectors.fit(signed)
+    flipped, _ = pose_vectors.fit_chart(signed)
     assert np.max(np.abs(flipped.means - own.means)) < TOLERANCE
     gap = flipped.numbers(signed, path) - own.numbers(rotations, path)
     assert np.max(np.abs(gap)) < TOLERANCE
@@ -64,8 +64,10 @@ def test_quaternion_and_its_negative_are_one_pose(rotations, path, rng):
 
 def test_turn_of_the_whole_family_changes_no_numbers(rotations, path):
     away = rotations.copy()
-    away[:, :, 0] = quat.mul(quat.about(UP, np.array(np.radians(178.0))), rotations[:, :, 0])
-    first, second = pose_vectors.fit(rotations)[0], pose_vectors.fit(away)[0]
+    away[:, :, 0] = quat.mul(
+        quat.from_axis_angle(UP, np.array(np.radians(178.0))), rotations[:, :, 0]
+    )
+    first, second = pose_vectors.fit_chart(rotations)[0], pose_vectors.fit_chart(away)[0]
     gap = second.numbers(away, path) - first.numbers(rotations, path)
     assert np.max(np.abs(gap)) < 1e-9
     assert np.max(np.abs(first.numbers(away, path) - first.numbers(rotations, path))) > 1.0
@@ -73,7 +75,7 @@ def test_turn_of_the_whole_family_changes_no_numbers(rotations, path):
 
 def test_arm_past_half_a_turn_is_followed_without_a_jump():
     rotations = raised(1.4 * np.pi)
-    own, findings = pose_vectors.fit(rotations)
+    own, findings = pose_vectors.fit_chart(rotations)
     numbers = own.numbers(rotations, np.zeros((5, 80, 3)))[..., 3:]
     plain = quat.log(quat.mul(quat.conj(own.means), rotations))[:, :, 0]
     assert np.linalg.norm(np.diff(numbers, axis=1), axis=-1).max() < 0.3
@@ -87,7 +89,7 @@ def test_arm_past_half_a_turn_is_followed_without_a_jump():
 
 def test_clips_that_stay_near_are_on_the_same_sheet_as_one_that_wraps():
     rotations = raised(1.4 * np.pi)
-    own, _ = pose_vectors.fit(rotations)
+    own, _ = pose_vectors.fit_chart(rotations)
     numbers = own.numbers(rotations, np.zeros((5, 80, 3)))[..., 3:]
     # All five start at one pose.
     assert np.max(np.abs(numbers[:, 0] - numbers[0, 0])) < TOLERANCE
@@ -95,7 +97,7 @@ def test_clips_that_stay_near_are_on_the_same_sheet_as_one_that_wraps():
 
 def test_joint_close_to_half_a_turn_is_named_but_not_changed():
     rotations = raised(1.05 * np.pi)
-    own, findings = pose_vectors.fit(rotations)
+    own, findings = pose_vectors.fit_chart(rotations)
     assert [(f.kind, f.joint, f.clip) for f in findings] == [("far", 0, 4)]
     assert 0.9 * np.pi < findings[0].angle <= np.pi
     plain = quat.log(quat.mul(quat.conj(own.means), rotations))[:, :, 0]

@@ -8,22 +8,23 @@ import pytest
 from onnx import numpy_helper
 
 from posefield_train.graph import truncation_cost
-from posefield_train.graph.truncation_cost import Price
+from posefield_train.graph.truncation_cost import RankCost
 
 RANKS = (3, 4, 5)
 
 
 def test_price_is_of_the_core_of_each_rank_and_of_pairs():
-    assert Price((100, 10, 1)).of(*RANKS) == 60 + 300 + 40 + 5
-    assert Price((100, 10, 1), pair=2).of(*RANKS) == 60 + 300 + 40 + 5 + 24
+    assert RankCost((100, 10, 1)).evaluate(*RANKS) == 60 + 300 + 40 + 5
+    assert RankCost((100, 10, 1), pair=2).evaluate(*RANKS) == 60 + 300 + 40 + 5 + 24
 
 
 def test_price_of_arrays_is_that_of_their_entries():
-    price = Price((7, 5, 3), pair=2)
-    found = price.of(*np.ix_(np.arange(1, 4), np.arange(1, 5), np.arange(1, 6)))
+    price = RankCost((7, 5, 3), pair=2)
+    found = price.evaluate(*np.ix_(np.arange(1, 4), np.arange(1, 5), np.arange(1, 6)))
     assert found.shape == RANKS
     assert all(
-        found[r1, r2, r3] == price.of(r1 + 1, r2 + 1, r3 + 1) for r1, r2, r3 in np.ndindex(RANKS)
+        found[r1, r2, r3] == price.evaluate(r1 + 1, r2 + 1, r3 + 1)
+        for r1, r2, r3 in np.ndindex(RANKS)
     )
 
 
@@ -39,7 +40,7 @@ def test_numbers_are_those_that_the_file_holds(held, trained):
     motion = sum(held[name].size for name in ("core", "directions", "time_basis", "pose_weights"))
     # Those of one and of the controls stand side by side for all fields.
     drift = ranks[2] * len(held["drift_weights"])
-    assert motion + drift == truncation_cost.numbers(trained.tensor, 4).of(*ranks)
+    assert motion + drift == truncation_cost.storage_cost(trained.tensor, 4).evaluate(*ranks)
     assert motion + drift < sum(own.size for own in held.values()), "sigma's matrix is the largest"
 
 
@@ -62,18 +63,18 @@ def test_levels_read_what_the_file_holds_for_them(held, exported):
 def test_compression_is_the_raw_tensor_over_what_is_stored(trained):
     freedoms, frames, samples = trained.tensor.values.shape
     raw = freedoms * frames * samples
-    found = truncation_cost.compression(trained.tensor, (22, 6, 24), 4)
+    found = truncation_cost.tensor_compression(trained.tensor, (22, 6, 24), 4)
     bases = freedoms * 22 + frames * 6 + (samples + 5) * 24
     assert found.core == pytest.approx(raw / (22 * 6 * 24))
     assert found.stored == pytest.approx(raw / (22 * 6 * 24 + bases))
-    assert truncation_cost.compression(trained.tensor, (22, 6, 25), 4).stored < found.stored
+    assert truncation_cost.tensor_compression(trained.tensor, (22, 6, 25), 4).stored < found.stored
 
 
 def test_papers_core_is_267_times_smaller_and_106_times_with_its_bases():
     """Mukai & Kuriyama 2006, table 1: 92 x 100 x 92 against 22 x 6 x 24."""
     raw, core = 92 * 100 * 92, 22 * 6 * 24
     assert raw / core == pytest.approx(267.2, abs=0.05)
-    assert raw / Price((92, 100, 92)).of(22, 6, 24) == pytest.approx(105.8, abs=0.05)
+    assert raw / RankCost((92, 100, 92)).evaluate(22, 6, 24) == pytest.approx(105.8, abs=0.05)
 
 
 def test_operations_are_those_of_the_products_of_one_pose(trained):
@@ -86,14 +87,16 @@ def test_operations_are_those_of_the_products_of_one_pose(trained):
         "time": r1 * r2,
         "decoding": r1 * (4 * joints + 3),
     }
-    assert truncation_cost.operations(trained.tensor, 4).of(*RANKS) == sum(products.values())
+    assert truncation_cost.operation_cost(trained.tensor, 4).evaluate(*RANKS) == sum(
+        products.values()
+    )
 
 
 def test_the_card_tells_the_compression_and_every_distance(exported, trained):
     told = exported.card.diagnostics
     ranks = trained.model.decoder.reduced.core.shape
-    expected = asdict(truncation_cost.compression(trained.tensor, ranks, 4))
+    expected = asdict(truncation_cost.tensor_compression(trained.tensor, ranks, 4))
     assert told["compression"] == pytest.approx(expected, rel=1e-3)
-    distances = {name: told[f"truncation_{name}_m"] for name in asdict(trained.fidelity)}
-    assert distances == pytest.approx(asdict(trained.fidelity), rel=1e-3)
+    distances = {name: told[f"truncation_{name}_m"] for name in asdict(trained.truncation_errors)}
+    assert distances == pytest.approx(asdict(trained.truncation_errors), rel=1e-3)
     assert distances["rms"] < distances["p99"] < distances["max"]

@@ -111,7 +111,9 @@ def test_members_of_every_method_are_read(tmp_path, method):
         data_folder.read(place, len(content) - 1, "a file")
 
 
-@pytest.fixture(params=data_folder.METHODS, ids=data_folder.METHODS.values())
+@pytest.fixture(
+    params=data_folder.COMPRESSION_METHODS, ids=data_folder.COMPRESSION_METHODS.values()
+)
 def method(request):
     return request.param
 

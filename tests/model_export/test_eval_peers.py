@@ -5,15 +5,15 @@ import pytest
 from scipy.interpolate import RBFInterpolator
 
 from posefield_train.evaluate import interpolation_peers
-from posefield_train.evaluate.interpolation_peers import PEERS
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.evaluate.interpolation_peers import INTERPOLATORS
+from posefield_train.kriging.sample_points import SamplePoints
 
 EXACT = 1e-8
 
 
 def laid(points, labels=None):
     labels = np.zeros((len(points), 0)) if labels is None else labels
-    return Samples(np.hstack([points, labels]), points.shape[1], np.arange(len(points)))
+    return SamplePoints(np.hstack([points, labels]), points.shape[1], np.arange(len(points)))
 
 
 @pytest.fixture
@@ -43,16 +43,16 @@ REPRODUCE_LINES = (
 )
 
 
-@pytest.mark.parametrize("name", PEERS)
+@pytest.mark.parametrize("name", INTERPOLATORS)
 def test_a_constant_is_predicted_as_such(name, points, queries):
-    found = PEERS[name][0](laid(points), np.full((24, 2), 7.0), queries)
+    found = INTERPOLATORS[name][0](laid(points), np.full((24, 2), 7.0), queries)
     assert found.shape == (7, 2)
     assert np.abs(found - 7.0).max() < 1e-6
 
 
 @pytest.mark.parametrize("name", REPRODUCE_LINES)
 def test_lines_are_reproduced_by_those_with_a_linear_part(name, points, queries):
-    predict = PEERS[name][0]
+    predict = INTERPOLATORS[name][0]
     found = predict(laid(points), linear(points), queries)
     assert np.abs(found - linear(queries)).max() < EXACT
     # Negative control: a curve is not a line.
@@ -61,29 +61,29 @@ def test_lines_are_reproduced_by_those_with_a_linear_part(name, points, queries)
 
 @pytest.mark.parametrize("name", ["thin_plate", "linear_rbf", "cubic_rbf", "linear_coefficients"])
 def test_interpolators_meet_their_samples(name, points):
-    found = PEERS[name][0](laid(points), curved(points), points)
+    found = INTERPOLATORS[name][0](laid(points), curved(points), points)
     assert np.abs(found - curved(points)).max() < EXACT
 
 
 @pytest.mark.parametrize("name", ["thin_plate_smoothed", "gp", "mean", "linear_regression"])
 def test_what_smooths_does_not_meet_noise(name, points, rng):
     noise = rng.standard_normal((24, 2))
-    found = PEERS[name][0](laid(points), noise, points + 1e-3)
+    found = INTERPOLATORS[name][0](laid(points), noise, points + 1e-3)
     assert np.abs(found - noise).max() > 0.1
 
 
 def test_thin_plates_are_scipys_own(points, queries):
     values = curved(points)
     own = RBFInterpolator(points, values, kernel="thin_plate_spline", degree=1)(queries)
-    found = PEERS["thin_plate"][0](laid(points), values, queries)
+    found = INTERPOLATORS["thin_plate"][0](laid(points), values, queries)
     assert np.abs(found - own).max() < EXACT
-    assert np.abs(PEERS["cubic_rbf"][0](laid(points), values, queries) - own).max() > 1e-3
+    assert np.abs(INTERPOLATORS["cubic_rbf"][0](laid(points), values, queries) - own).max() > 1e-3
 
 
 def test_smoothing_is_chosen_by_what_is_left_out(points, queries, rng):
     noisy = linear(points) + 0.3 * rng.standard_normal((24, 2))
     smoothed = interpolation_peers.thin_plate_smoothed(laid(points), noisy, queries)
-    plain = PEERS["thin_plate"][0](laid(points), noisy, queries)
+    plain = INTERPOLATORS["thin_plate"][0](laid(points), noisy, queries)
     truth = linear(queries)
     assert np.abs(smoothed - truth).mean() < 0.7 * np.abs(plain - truth).mean()
     clean = interpolation_peers.thin_plate_smoothed(laid(points), linear(points), queries)
@@ -95,10 +95,12 @@ def test_equal_controls_are_trials_of_one_motion(points, queries):
     twice = laid(np.vstack([points, points]))
     apart = np.vstack([values + 0.2, values - 0.2])
     for name in ("thin_plate", "linear_rbf", "cubic_rbf", "thin_plate_smoothed"):
-        found = PEERS[name][0](twice, apart, queries)
+        found = INTERPOLATORS[name][0](twice, apart, queries)
         assert np.isfinite(found).all()
-    found = PEERS["thin_plate"][0](twice, apart, queries)
-    assert np.abs(found - PEERS["thin_plate"][0](laid(points), values, queries)).max() < EXACT
+    found = INTERPOLATORS["thin_plate"][0](twice, apart, queries)
+    assert (
+        np.abs(found - INTERPOLATORS["thin_plate"][0](laid(points), values, queries)).max() < EXACT
+    )
 
 
 def test_the_nearest_of_the_same_performer_is_taken(points):
@@ -106,9 +108,9 @@ def test_the_nearest_of_the_same_performer_is_taken(points):
     values = np.arange(24.0)[:, None]
     asked = np.hstack([points[:1], [[0.0, 1.0]]])
     own = 12 + int(np.argmin(np.linalg.norm(points[12:] - points[0], axis=1)))
-    assert interpolation_peers.nearest_same(laid(points, labels), values, asked) == own
+    assert interpolation_peers.nearest_of_performer(laid(points, labels), values, asked) == own
     nobody = np.hstack([points[:1], [[0.0, 0.0]]])
-    assert interpolation_peers.nearest_same(laid(points, labels), values, nobody) == 0
+    assert interpolation_peers.nearest_of_performer(laid(points, labels), values, nobody) == 0
 
 
 def test_the_process_tells_performers_apart_where_it_is_told(points, queries):
@@ -116,9 +118,11 @@ def test_the_process_tells_performers_apart_where_it_is_told(points, queries):
     values = linear(points) + 5.0 * labels[:, :1]
     asked = np.hstack([queries, np.tile([0.0, 1.0], (7, 1))])
     truth = linear(queries)
-    told = np.abs(interpolation_peers.gp(laid(points, labels), values, asked) - truth).mean()
+    told = np.abs(
+        interpolation_peers.gp_with_performers(laid(points, labels), values, asked) - truth
+    ).mean()
     untold = np.abs(
-        interpolation_peers.gp_controls(laid(points, labels), values, asked) - truth
+        interpolation_peers.gp_without_performers(laid(points, labels), values, asked) - truth
     ).mean()
     assert told < 0.3 * untold
 

@@ -26,9 +26,9 @@ from posefield_train.evaluate import (
     new_performers,
     protocol,
 )
-from posefield_train.evaluate.methods import Asked
+from posefield_train.evaluate.methods import Queries
 from posefield_train.evaluate.pages import evaluation_charts, evaluation_page
-from posefield_train.parallel.jobs import Processes
+from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.report.drawing import svg_chart
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
@@ -36,7 +36,7 @@ from posefield_train.train import train
 
 CLIPS = 12
 # In this process: starting others takes longer, and other tests do.
-JOBS = Processes(1)
+JOBS = ProcessJobs(1)
 
 LABELLED = TOML.replace('file = "file"\n', 'file = "file"\nperformer = "who"\n').replace(
     "[size]", '[kriging]\nlabel = "performer"\n[size]'
@@ -83,7 +83,9 @@ def family(recipe, folder):
 def results(recipe, family):
     said = []
     found = [
-        protocol.run(recipe, family, name, JOBS, lambda done, parts: said.append((done, parts)))
+        protocol.run_protocol(
+            recipe, family, name, JOBS, lambda done, parts: said.append((done, parts))
+        )
         for name in ("clip", "performer")
     ]
     return found, said
@@ -94,7 +96,7 @@ def test_every_clip_is_held_out_once_with_all_of_its_take(family):
         replace(e, row=replace(e.row, place=family[i // 3].row.place)) for i, e in enumerate(family)
     ]
     for examples, parts in ((family, CLIPS), (same, CLIPS // 3)):
-        own = folds.clips(examples)
+        own = folds.clip_folds(examples)
         assert sorted(i for fold in own for i in fold.held) == list(range(CLIPS))
         assert len(own) == parts
         for fold in own:
@@ -107,14 +109,14 @@ def test_many_takes_are_dealt_into_parts_of_whole_takes(family):
         return replace(family[0].row, place=family[0].row.place.with_name(f"{i // 2:03}.bvh"))
 
     many = [replace(family[0], row=take(i)) for i in range(2 * folds.MANY + 6)]
-    own = folds.clips(many)
+    own = folds.clip_folds(many)
     assert len(own) == folds.PARTS
     assert sorted(i for fold in own for i in fold.held) == list(range(len(many)))
     assert all(set(fold.held) == {i ^ 1 for i in fold.held} for fold in own)
 
 
 def test_performers_are_held_out_whole(family):
-    assert [set(fold.held) for fold in folds.performers(family)] == [
+    assert [set(fold.held) for fold in folds.performer_folds(family)] == [
         set(range(first, CLIPS, 3)) for first in range(3)
     ]
 
@@ -124,7 +126,9 @@ def answers(recipe, family, held):
     rest = [example for i, example in enumerate(family) if i != held]
     trained = train(recipe, rest, lambda _: None)
     example = family[held]
-    found = methods.answers(recipe, trained, Asked(example.controls[None], [example.row.performer]))
+    found = methods.predict_all(
+        recipe, trained, Queries(example.controls[None], [example.row.performer])
+    )
     return {name: motions[0].points for name, motions in found.motions.items()}
 
 
@@ -132,18 +136,18 @@ def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, 
     """The protocol's errors are those of a model that never saw the clip."""
     held = 4
     by_hand = answers(recipe, family, held)
-    event = compared_motion.Event(recipe_joint(family), 1.0)
-    true = compared_motion.of_clip(family[held].clip, event)
+    event = compared_motion.MotionEvent(recipe_joint(family), 1.0)
+    true = compared_motion.motion_of_clip(family[held].clip, event)
     feet = (recipe_joint(family),)
     for name, points in by_hand.items():
-        own = compared_motion.Motion(points, 1.0, None)
-        expected = motion_errors.compare(own, true, feet).relative.mean
+        own = compared_motion.ComparedMotion(points, 1.0, None)
+        expected = motion_errors.compare_motions(own, true, feet).relative.mean
         assert results[0][0].errors[name][held].relative.mean == pytest.approx(expected, abs=1e-9)
     # Negative control: a model that saw it comes nearer.
     trained = train(recipe, family, lambda _: None)
-    asked = Asked(family[held].controls[None], [family[held].row.performer])
-    seen = methods.answers(recipe, trained, asked).motions["thin_plate"][0]
-    told = motion_errors.compare(seen, true, feet).relative.mean
+    asked = Queries(family[held].controls[None], [family[held].row.performer])
+    seen = methods.predict_all(recipe, trained, asked).motions["thin_plate"][0]
+    told = motion_errors.compare_motions(seen, true, feet).relative.mean
     assert told < 0.5 * results[0][0].errors["thin_plate"][held].relative.mean
 
 
@@ -154,16 +158,18 @@ def recipe_joint(family):
 def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
     trained = train(recipe, family, lambda _: None)
     ordered = trained.examples
-    asked = Asked(np.stack([e.controls for e in ordered]), [e.row.performer for e in ordered])
-    found = methods.answers(recipe, trained, asked).motions["thin_plate"]
-    event = compared_motion.Event(recipe_joint(family), 1.0)
-    captured = [compared_motion.of_clip(example.clip, event) for example in ordered]
+    asked = Queries(np.stack([e.controls for e in ordered]), [e.row.performer for e in ordered])
+    found = methods.predict_all(recipe, trained, asked).motions["thin_plate"]
+    event = compared_motion.MotionEvent(recipe_joint(family), 1.0)
+    captured = [compared_motion.motion_of_clip(example.clip, event) for example in ordered]
     for own, true in zip(found, captured, strict=True):
         assert own.duration == pytest.approx(true.duration)
 
     def farthest(motions):
         pairs = zip(motions, captured, strict=True)
-        return max(motion_errors.compare(own, true, ()).plain_absolute.mean for own, true in pairs)
+        return max(
+            motion_errors.compare_motions(own, true, ()).plain_absolute.mean for own, true in pairs
+        )
 
     # What is lost is resampling to 20 frames and back.
     assert farthest(found) < 0.005
@@ -172,9 +178,9 @@ def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
 
 def test_all_methods_are_asked_the_same_clips(results):
     (clips, performers), _ = results
-    peers = {"posefield", "posefield_exact", "naive", *methods.PEERS}
-    assert set(clips.errors) == {*peers, new_performers.NOBODY}
-    assert set(performers.errors) == {*peers, *new_performers.SHOWN}
+    peers = {"posefield", "posefield_exact", "naive", *methods.INTERPOLATORS}
+    assert set(clips.errors) == {*peers, new_performers.NO_PERFORMER}
+    assert set(performers.errors) == {*peers, *new_performers.ADAPTATION_COUNTS}
     assert all(len(found) == CLIPS for r in (clips, performers) for found in r.errors.values())
     assert clips.protocol == "leave_one_clip_out"
     assert performers.protocol == "leave_one_performer_out"
@@ -198,30 +204,30 @@ def test_places_a_metre_off_are_told_to_be_out_of_reach(results):
     """Arms of the small skeleton are shorter than that."""
     found = [c for result in results[0] for c in result.corrections]
     assert not any(c.far.reached for c in found)
-    assert all(len(c.beyond) == len(corrected_answers.BEYOND) for c in found)
+    assert all(len(c.beyond) == len(corrected_answers.BEYOND_DISTANCES) for c in found)
     assert any(c.reached for c in found)
     assert all(c.beyond == tuple(sorted(c.beyond, reverse=True)) for c in found)
 
 
 def test_ours_is_drawn_in_orange_however_it_is_asked(results):
-    found, figure = evaluation_summary.of(results[0][1]), Figure()
+    found, figure = evaluation_summary.summarize(results[0][1]), Figure()
     evaluation_charts.paint_bars(found, figure)
     orange = {
         one.name
         for one, bar in zip(found, figure.axes[0].patches, strict=True)
         if to_hex(bar.get_facecolor()) == to_hex(svg_chart.ORANGE)
     }
-    assert orange == {methods.OURS, methods.EXACT, *new_performers.SHOWN} & {
+    assert orange == {methods.OURS, methods.EXACT, *new_performers.ADAPTATION_COUNTS} & {
         one.name for one in found
     }
     # Negative control: there are others, who are not.
-    assert {methods.OURS, *new_performers.SHOWN} <= orange < {one.name for one in found}
+    assert {methods.OURS, *new_performers.ADAPTATION_COUNTS} <= orange < {one.name for one in found}
 
 
 def test_of_the_root_nothing_is_asked_that_lies_farther_from_it(recipe, family):
     event = recipe.event.model_copy(update={"joint": "Hips"})
     own = recipe.model_copy(update={"event": event})
-    found = protocol.run(own, family, "performer", JOBS, lambda done, parts: None)
+    found = protocol.run_protocol(own, family, "performer", JOBS, lambda done, parts: None)
     assert all(c.beyond == () and c.far is None for c in found.corrections)
     facts = corrections.facts(found)
     assert all(np.isfinite(value) for value in facts.values())
@@ -234,7 +240,7 @@ def test_of_the_root_nothing_is_asked_that_lies_farther_from_it(recipe, family):
 
 def test_without_an_event_nothing_is_held(recipe, family):
     plain = recipe.model_copy(update={"event": None})
-    found = protocol.run(plain, family, "performer", JOBS, lambda done, parts: None)
+    found = protocol.run_protocol(plain, family, "performer", JOBS, lambda done, parts: None)
     assert found.corrections == ()
     assert methods.EXACT not in found.errors
     assert "exact" not in str(evaluation_summary.facts(found)["methods"].keys())
@@ -281,26 +287,26 @@ def test_clips_are_shown_as_far_apart_as_they_come_and_never_the_asked_ones_take
         replace(e, row=replace(e.row, place=family[i // 2].row.place)) for i, e in enumerate(family)
     ]
     for asked in range(CLIPS):
-        shown = new_performers.choose(held, asked, 5)
+        shown = new_performers.choose_clips(held, asked, 5)
         takes = [i // 2 for i in shown]
         assert len(shown) == 5 == len(set(takes)) and asked // 2 not in takes
-        three = new_performers.choose(held, asked, 3)
+        three = new_performers.choose_clips(held, asked, 3)
         assert set(three) <= set(shown)
         controls = np.array([held[i].controls[0] for i in three])
         assert np.ptp(controls) >= 7
     # No more than there are other takes.
-    assert len(new_performers.choose(held, 0, 20)) == CLIPS // 2 - 1
+    assert len(new_performers.choose_clips(held, 0, 20)) == CLIPS // 2 - 1
 
 
 def test_who_has_too_few_takes_is_shown_nobodys_clips(recipe, family):
     trained = train(recipe, family[:9], lambda _: None)
     few = [replace(e, row=replace(e.row, performer="z")) for e in family[9:]]
-    assert new_performers.adapted(recipe, trained, few) == {
-        n: [None] * 3 for n in new_performers.SHOWN
+    assert new_performers.predict_adapted(recipe, trained, few) == {
+        n: [None] * 3 for n in new_performers.ADAPTATION_COUNTS
     }
     # Negative control: of one take more, each clip is asked for.
     more = [replace(e, row=replace(e.row, performer="z")) for e in family[8:]]
-    found = new_performers.adapted(recipe, trained, more)
+    found = new_performers.predict_adapted(recipe, trained, more)
     assert all(len(m) == 4 and None not in m for m in found.values())
 
 
@@ -308,17 +314,19 @@ def test_clips_that_a_method_was_not_asked_for_are_counted_and_left_out_of_its_r
     whole = results[0][1]
     some = [e if i > 2 else None for i, e in enumerate(whole.errors["posefield_adapt_3"])]
     result = replace(whole, errors={**whole.errors, "posefield_adapt_3": tuple(some)})
-    row = next(one for one in evaluation_summary.of(result) if one.name == "posefield_adapt_3")
+    row = next(
+        one for one in evaluation_summary.summarize(result) if one.name == "posefield_adapt_3"
+    )
     assert (row.clips, row.left_out) == (CLIPS - 3, 3)
     assert row.facts()["clips_left_out"] == 3
     assert f"| posefield_adapt_3 ({CLIPS - 3} clips) " in evaluation_summary.table(result)
     ours, own = (
-        evaluation_summary.relative(result.of(name, range(3, CLIPS)))
+        evaluation_summary.relative_distances(result.of(name, range(3, CLIPS)))
         for name in ("posefield", "posefield_adapt_3")
     )
     assert row.worse == pytest.approx(float(np.mean(own - ours)))
     # Negative control: beside all of ours it would be another figure.
-    everyone = evaluation_summary.relative(result.of("posefield", range(CLIPS)))
+    everyone = evaluation_summary.relative_distances(result.of("posefield", range(CLIPS)))
     assert row.worse != pytest.approx(float(own.mean() - everyone.mean()))
 
 
@@ -345,7 +353,8 @@ def test_the_order_in_which_jobs_finish_changes_nothing(recipe, family):
     named = [replace(e, row=replace(e.row, performer="aaab"[i])) for i, e in enumerate(family[:4])]
     jobs = Backwards()
     found, backwards = (
-        protocol.run(plain, named, "clip", jobs, lambda done, parts: None) for _ in range(2)
+        protocol.run_protocol(plain, named, "clip", jobs, lambda done, parts: None)
+        for _ in range(2)
     )
     assert any(None in own for own in found.errors.values())
     # Text, as a NaN is not equal to itself; the order of the methods counts too.
@@ -356,15 +365,15 @@ def test_the_order_in_which_jobs_finish_changes_nothing(recipe, family):
 def test_without_labels_rows_that_would_repeat_others_are_left_out(recipe, family):
     plain = recipe.model_copy(update={"kriging": recipe.kriging.model_copy(update={"label": None})})
     trained = train(plain, family, lambda _: None)
-    found = methods.answers(plain, trained, Asked(family[0].controls[None], [""])).motions
-    assert not set(methods.LABELLED) & set(found)
+    found = methods.predict_all(plain, trained, Queries(family[0].controls[None], [""])).motions
+    assert not set(methods.PERFORMER_METHODS) & set(found)
     assert {"gp", "nearest"} <= set(found)
 
 
 def test_what_cannot_be_trained_is_named(recipe, family):
     few = family[:4]
     with pytest.raises(TrainingError, match=r"held out: 2 samples, expected at least 3"):
-        protocol.run(recipe, few, "performer", JOBS, lambda done, parts: None)
+        protocol.run_protocol(recipe, few, "performer", JOBS, lambda done, parts: None)
 
 
 def test_a_recipe_says_what_can_be_asked(recipe, family):
@@ -388,7 +397,7 @@ def test_facts_are_what_was_measured(results):
         assert own["relative_cm"] == pytest.approx(np.mean(relative), rel=1e-5)
         expected = np.std(relative, ddof=1) / np.sqrt(CLIPS)
         assert own["standard_error_cm"] == pytest.approx(expected, rel=1e-5)
-    ours = [error.squared for error in result.errors["posefield"]]
+    ours = [error.mean_squared_error for error in result.errors["posefield"]]
     assert facts["sigma_ratio"] == pytest.approx(np.mean(ours / result.sigma**2), rel=1e-5)
     assert facts["methods"]["mean"]["difference_cm"] == pytest.approx(
         facts["methods"]["mean"]["relative_cm"] - facts["methods"]["posefield"]["relative_cm"],
@@ -407,7 +416,9 @@ def test_sigma_of_each_joint_is_compared_with_that_joint(results):
     assert found[result.joints[joint]] == pytest.approx(expected, rel=1e-5)
     # Together they are what the answer as a whole is off by.
     squares = [np.mean(error.joints) for error in result.errors["posefield"]]
-    assert squares == pytest.approx([error.squared for error in result.errors["posefield"]])
+    assert squares == pytest.approx(
+        [error.mean_squared_error for error in result.errors["posefield"]]
+    )
 
 
 def test_the_flag_is_held_to_its_promise_on_the_same_folds(results):
@@ -460,24 +471,24 @@ def test_the_page_has_the_learning_curve(results):
 
 @pytest.fixture(scope="module")
 def truth_result(small_recipe, examples):
-    points = ground_truth.points(6)
-    return protocol.against_truth(small_recipe, examples[::2], points, JOBS, lambda a, b: None)
+    points = ground_truth.truth_points(6)
+    return protocol.run_against_truth(small_recipe, examples[::2], points, JOBS, lambda a, b: None)
 
 
 def test_truth_is_asked_where_bodies_can_be_and_is_reproducible():
     from posefield_train.sample import sample_controls
 
-    points = ground_truth.points(200)
-    assert np.array_equal(points[:10], ground_truth.points(10))
+    points = ground_truth.truth_points(200)
+    assert np.array_equal(points[:10], ground_truth.truth_points(10))
     for point in points:
-        sample_controls.parse(list(point))
+        sample_controls.parse_controls(list(point))
     low, high = np.array([r[:2] for r in sample_controls.RANGES.values()]).T
     spread = (points - low) / (high - low)
     assert (spread.std(axis=0) > 0.2).all()
 
 
 def test_the_truth_is_nearer_to_a_model_than_to_the_mean(truth_result):
-    means = {one.name: one.mean.relative.mean for one in evaluation_summary.of(truth_result)}
+    means = {one.name: one.mean.relative.mean for one in evaluation_summary.summarize(truth_result)}
     assert means["posefield"] < 0.5 * means["mean"]
     assert means["posefield"] < means["nearest"]
 

@@ -7,7 +7,7 @@ import pytest
 from minimal import SKELETON, small_clip
 
 from posefield.motion import quat
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.outliers import mirrored_clips, outlier_detection, outlier_distances
 from posefield_train.source import bone_lengths
@@ -25,12 +25,12 @@ def spoiled(clip, frames, joint, by):
 @pytest.mark.parametrize("frames", [slice(50, None), slice(50, 51)])
 def test_a_leap_is_found_whether_or_not_it_leads_back(frames):
     clip = small_clip(frames=100)
-    found = outlier_detection.worst(spoiled(clip, frames, 4, 0.3))
+    found = outlier_detection.largest_jump(spoiled(clip, frames, 4, 0.3))
     assert found.frame in (49, 50)
     assert (found.joint, found.whole) == (4, False)
     assert found.distance == pytest.approx(0.3, abs=0.03)
-    assert outlier_detection.worst(clip) is None
-    assert outlier_detection.worst(spoiled(clip, frames, 0, 0.3)).whole
+    assert outlier_detection.largest_jump(clip) is None
+    assert outlier_detection.largest_jump(spoiled(clip, frames, 0, 0.3)).whole
 
 
 def test_who_sets_off_does_not_leap():
@@ -39,18 +39,18 @@ def test_who_sets_off_does_not_leap():
     runner = clip.translations.copy()
     runner[:, 0, 2] = ahead
     still = replace(clip, rotations=np.repeat(clip.rotations[:1], 100, axis=0), translations=runner)
-    assert outlier_detection.worst(still) is None
+    assert outlier_detection.largest_jump(still) is None
 
 
 def test_a_size_names_the_unit_that_explains_it():
     offsets = (
         np.repeat(SKELETON.offsets[None], 5, axis=0) * np.array([1, 1, 100, 1, 1.1])[:, None, None]
     )
-    assert bone_lengths.sizes(offsets) == pytest.approx([1, 1, 100, 1, 1.1])
-    assert bone_lengths.unit(1.0, 100.0) == "centimetres"
-    assert bone_lengths.unit(0.0564444, 1 / 17.72) == "metres"
-    assert bone_lengths.unit(0.01, 1 / 2.54) == "inches"
-    assert bone_lengths.unit(1.0, 1.7) == ""
+    assert bone_lengths.relative_sizes(offsets) == pytest.approx([1, 1, 100, 1, 1.1])
+    assert bone_lengths.guess_unit(1.0, 100.0) == "centimetres"
+    assert bone_lengths.guess_unit(0.0564444, 1 / 17.72) == "metres"
+    assert bone_lengths.guess_unit(0.01, 1 / 2.54) == "inches"
+    assert bone_lengths.guess_unit(1.0, 1.7) == ""
 
 
 @pytest.fixture
@@ -64,32 +64,34 @@ WHO = tuple("aaabbbccc")
 
 
 def test_bones_of_another_performer_are_named(offsets):
-    assert all(bone_lengths.foreign(offsets, WHO, clip) is None for clip in range(9))
+    assert all(bone_lengths.find_foreign_bones(offsets, WHO, clip) is None for clip in range(9))
     wrong = offsets.copy()
     wrong[1] = offsets[7]
-    found = bone_lengths.foreign(wrong, WHO, 1)
-    assert (found.alike, found.others, found.within) == ("c", 2, 0.0)
+    found = bone_lengths.find_foreign_bones(wrong, WHO, 1)
+    assert (found.nearest_performer, found.others, found.nearest_distance) == ("c", 2, 0.0)
     assert found.apart > 0.01
-    assert all(bone_lengths.foreign(wrong, WHO, clip) is None for clip in range(9) if clip != 1)
+    assert all(
+        bone_lengths.find_foreign_bones(wrong, WHO, clip) is None for clip in range(9) if clip != 1
+    )
 
 
 def test_bones_of_nobody_are_found_where_others_agree(offsets):
     wrong = offsets.copy()
     wrong[1] *= 1.1
-    assert bone_lengths.foreign(wrong, WHO, 1).alike == ""
-    assert bone_lengths.foreign(wrong, ("",) * 9, 1) is None, "nobody says who moved"
+    assert bone_lengths.find_foreign_bones(wrong, WHO, 1).nearest_performer == ""
+    assert bone_lengths.find_foreign_bones(wrong, ("",) * 9, 1) is None, "nobody says who moved"
 
 
 def test_of_two_clips_that_differ_neither_is_believed(offsets):
     wrong = offsets[1:].copy()
     wrong[0] *= 1.1
-    assert bone_lengths.foreign(wrong, WHO[1:], 0) is None
-    assert bone_lengths.foreign(wrong, WHO[1:], 1) is None
+    assert bone_lengths.find_foreign_bones(wrong, WHO[1:], 0) is None
+    assert bone_lengths.find_foreign_bones(wrong, WHO[1:], 1) is None
 
 
 def test_sides_are_known_by_their_names():
-    assert mirrored_clips.others(NAMES) == (0, 2, 1, 4, 3, 5)
-    assert mirrored_clips.others(("root", "left", "relay")) == (0, 1, 2)
+    assert mirrored_clips.mirrored_joints(NAMES) == (0, 2, 1, 4, 3, 5)
+    assert mirrored_clips.mirrored_joints(("root", "left", "relay")) == (0, 1, 2)
 
 
 def body(rng):
@@ -100,9 +102,11 @@ def body(rng):
 
 def test_a_disguise_is_seen_through(rng):
     expected, left = body(rng), np.array([1.0, 0.0, 0.0])
-    swap, flip = list(mirrored_clips.others(NAMES)), np.array([-1.0, 1.0, 1.0])
-    up = quat.rotate(quat.about(left, np.array(np.pi / 2)), expected)
-    round_about = quat.rotate(quat.about(np.array([0.0, 1.0, 0.0]), np.array(np.pi / 2)), expected)
+    swap, flip = list(mirrored_clips.mirrored_joints(NAMES)), np.array([-1.0, 1.0, 1.0])
+    up = quat.rotate(quat.from_axis_angle(left, np.array(np.pi / 2)), expected)
+    round_about = quat.rotate(
+        quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi / 2)), expected
+    )
     worn = {
         "mirrored left to right": expected[:, swap] * flip,
         "with the names of left and right joints exchanged": expected[:, swap],
@@ -111,38 +115,38 @@ def test_a_disguise_is_seen_through(rng):
         "turned by -90 degrees about the vertical": round_about,
     }
     for said, own in worn.items():
-        found = mirrored_clips.found(own, expected, NAMES, left)
-        assert (found.said, found.after < 1e-9, found.before > 0.1) == (said, True, True)
-    assert mirrored_clips.found(expected + 0.1, expected, NAMES, left) is None
-    assert mirrored_clips.found(body(rng), expected, NAMES, left) is None
+        found = mirrored_clips.find_transform(own, expected, NAMES, left)
+        assert (found.description, found.after < 1e-9, found.before > 0.1) == (said, True, True)
+    assert mirrored_clips.find_transform(expected + 0.1, expected, NAMES, left) is None
+    assert mirrored_clips.find_transform(body(rng), expected, NAMES, left) is None
 
 
 def test_the_left_is_where_the_left_hands_are_of_most(rng):
     family = np.stack([body(rng) for _ in range(5)])
     family[0] = family[0] * [-1.0, 1.0, 1.0]
-    assert mirrored_clips.leftwards(family, NAMES) @ [1.0, 0.0, 0.0] > 0.98
+    assert mirrored_clips.left_direction(family, NAMES) @ [1.0, 0.0, 0.0] > 0.98
 
 
 def line(rng, count=30):
     """Samples along one control and values that follow it, with a little noise."""
     at = np.linspace(-1.0, 1.0, count)[:, None]
     values = at * [1.0, -0.5, 0.2] + 0.05 * rng.normal(size=(count, 3))
-    return Samples(at, 1, np.arange(count)), values
+    return SamplePoints(at, 1, np.arange(count)), values
 
 
 def test_an_outsider_is_found_and_its_neighbours_are_not(rng):
     laid, values = line(rng)
-    assert outlier_distances.judge(HYPER, laid, values).outside == ()
+    assert outlier_distances.measure_outliers(HYPER, laid, values).outside == ()
     values[[10, 12]] += [[0.0, 3.0, 0.0], [0.0, 0.0, 2.0]]
-    judged = outlier_distances.judge(HYPER, laid, values)
+    judged = outlier_distances.measure_outliers(HYPER, laid, values)
     assert set(judged.outside) == {10, 12}
     # Each is judged by those who belong, so the two do not spoil each other's distance.
     assert judged.distances[[10, 12]] == pytest.approx([3.0, 2.0], abs=0.3)
-    assert judged.times[11] < outlier_distances.TIMES
+    assert judged.times[11] < outlier_distances.MEDIAN_FACTOR
     assert judged.usual < 0.2
 
 
 def test_no_more_than_a_share_of_a_family_are_strangers(rng):
     laid, values = line(rng)
     values[::3] += 10.0 ** np.arange(1, 11)[:, None]
-    assert len(outlier_distances.judge(HYPER, laid, values).outside) <= 0.25 * 30 + 1
+    assert len(outlier_distances.measure_outliers(HYPER, laid, values).outside) <= 0.25 * 30 + 1

@@ -19,7 +19,7 @@ from posefield.inference.graph_ports import OUTPUTS
 from posefield.motion import quat
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.graph.float_model import Outputs
+from posefield_train.graph.float_model import ModelOutputs
 from posefield_train.source import ingest, recipe
 
 # The gate's figure, m: float32 against float64.
@@ -80,7 +80,7 @@ def asked(exported, opened):
 def made_in_this_process(path, folder):
     own = recipe.read(path)
     examples, notes = ingest.ingest(own, folder)
-    return onnx_export.export(own, train.train(own, examples, lambda _: None), notes).content
+    return onnx_export.export_model(own, train.train(own, examples, lambda _: None), notes).content
 
 
 @pytest.mark.system
@@ -104,7 +104,7 @@ def test_other_data_give_other_bytes(quick_recipe, reaching_folder):
     path[:, 0, 1] += 1e-3
     moved = [replace(examples[0], clip=replace(examples[0].clip, translations=path)), *examples[1:]]
     made = [
-        onnx_export.export(own, train.train(own, these, lambda _: None), notes).content
+        onnx_export.export_model(own, train.train(own, these, lambda _: None), notes).content
         for these in (examples, moved)
     ]
     assert made[0] != made[1]
@@ -158,15 +158,15 @@ def test_the_card_says_what_the_motion_is_for(full_family):
 
 
 def test_graph_and_reference_agree_at_ten_thousand_points(exported, model_path, opened):
-    assert onnx_export.POINTS == 10_000 and onnx_export.ALLOWED == GATE
-    worst = onnx_export.gate(exported.model, model_path.read_bytes(), opened.card)
+    assert onnx_export.POINTS == 10_000 and onnx_export.PARITY_LIMIT == GATE
+    worst = onnx_export.check_parity(exported.model, model_path.read_bytes(), opened.card)
     assert 0.0 < worst < GATE
     assert opened.card.diagnostics["parity_m"] == float(f"{worst:.1e}")
 
 
 def test_every_output_agrees_with_the_reference(exported, opened, asked):
     expected = exported.model.evaluate(*asked)
-    found = Outputs(*opened.run(*asked, *OUTPUTS))
+    found = ModelOutputs(*opened.run(*asked, *OUTPUTS))
     parents = opened.card.skeleton.parents
     gaps = np.linalg.norm(found.positions(parents) - expected.positions(parents), axis=-1)
     assert gaps.max() < GATE
@@ -178,7 +178,9 @@ def test_every_output_agrees_with_the_reference(exported, opened, asked):
     # Negative control: a thousandth of the range of one control is seen at that tolerance.
     low, high = exported.model.bank.low, exported.model.bank.high
     nudged = opened.run(asked[0] + 1e-3 * (high - low) * np.eye(4)[2], asked[1], *OUTPUTS)
-    assert np.abs(Outputs(*nudged).positions(parents) - expected.positions(parents)).max() > GATE
+    assert (
+        np.abs(ModelOutputs(*nudged).positions(parents) - expected.positions(parents)).max() > GATE
+    )
 
 
 def bent(exported, joint, radians):
@@ -197,7 +199,7 @@ def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(exported, model_p
     for joint, parent in enumerate(parents):
         hanging |= {joint} if parent in hanging else set()
     with pytest.raises(ExportRefused) as caught:
-        onnx_export.gate(bent(exported, arm, 0.01), model_path.read_bytes(), opened.card)
+        onnx_export.check_parity(bent(exported, arm, 0.01), model_path.read_bytes(), opened.card)
     found = re.match(r"the graph puts (\w+) ([0-9.]+) cm from", str(caught.value))
     assert names.index(found[1]) in hanging - {arm}
     # A forearm with its hand is some 0.4 m long: a hundredth of a radian moves its end by 0.4 cm.
@@ -215,9 +217,9 @@ def test_the_gate_lies_where_it_says(exported, model_path, opened, metres, refus
     moved = replace(exported.model, decoder=replace(decoder, mean=mean))
     if refused:
         with pytest.raises(ExportRefused, match=r"0\.02\d\d cm from where"):
-            onnx_export.gate(moved, model_path.read_bytes(), opened.card)
+            onnx_export.check_parity(moved, model_path.read_bytes(), opened.card)
     else:
-        worst = onnx_export.gate(moved, model_path.read_bytes(), opened.card)
+        worst = onnx_export.check_parity(moved, model_path.read_bytes(), opened.card)
         assert metres * 0.5 < worst < GATE
 
 
@@ -227,7 +229,7 @@ def test_the_gate_refuses_damaged_weights_of_the_field(exported, model_path, ope
     dual[7] *= 1.01
     damaged = replace(bank, pose=replace(bank.pose, dual=dual))
     with pytest.raises(ExportRefused, match=r"cm from where the reference does"):
-        onnx_export.gate(
+        onnx_export.check_parity(
             replace(exported.model, bank=damaged), model_path.read_bytes(), opened.card
         )
 
@@ -239,7 +241,7 @@ def test_the_gate_refuses_a_wrong_duration(exported, model_path, opened):
     others = bank.others | {"duration": slower}
     with pytest.raises(ExportRefused):
         model = replace(exported.model, bank=replace(bank, others=others))
-        onnx_export.gate(model, model_path.read_bytes(), opened.card)
+        onnx_export.check_parity(model, model_path.read_bytes(), opened.card)
 
 
 @pytest.fixture(scope="module")
@@ -313,15 +315,15 @@ def test_onnxruntime_alone_reads_the_metadata(model_path):
 
 
 def test_quaternions_are_unit_durations_positive_and_sigmas_not_negative(opened, asked):
-    out = Outputs(*opened.run(*asked, *OUTPUTS))
+    out = ModelOutputs(*opened.run(*asked, *OUTPUTS))
     assert np.abs(np.linalg.norm(out.rotations, axis=-1) - 1.0).max() < 1e-5
     assert out.duration.min() > 0.5
     assert out.sigma.min() > 0.0
     assert np.abs(out.bone_offsets[:, 0]).max() < 1e-12
     # Still so far outside, where a straight line in the place of an exponential would fail.
     far = opened.run(asked[0] + 3 * (asked[0] - asked[0].mean(axis=0)), asked[1], *OUTPUTS)
-    assert Outputs(*far).duration.min() > 0.0
-    assert np.median(Outputs(*far).sigma) > 3 * np.median(out.sigma)
+    assert ModelOutputs(*far).duration.min() > 0.0
+    assert np.median(ModelOutputs(*far).sigma) > 3 * np.median(out.sigma)
     assert np.abs(np.linalg.norm(far[0], axis=-1) - 1.0).max() < 1e-5
 
 

@@ -18,7 +18,7 @@ EXACT = 1e-9
 
 @pytest.fixture(scope="module")
 def judge(small_recipe, trained):
-    return truncation_error.judge(small_recipe, trained.examples, trained.tensor)
+    return truncation_error.truncation_reference(small_recipe, trained.examples, trained.tensor)
 
 
 @pytest.fixture(scope="module")
@@ -36,19 +36,19 @@ def gaps(trained, judge, reduced):
 
 
 def test_whole_tensor_is_the_aligned_clips(trained, judge):
-    clips = time_alignment.positions(trained.aligned, judge.parents, judge.offsets)
+    clips = time_alignment.joint_positions(trained.aligned, judge.parents, judge.offsets)
     assert np.abs(judge.whole - clips).max() < EXACT
-    shuffled = time_alignment.positions(trained.aligned, judge.parents, judge.offsets[::-1])
+    shuffled = time_alignment.joint_positions(trained.aligned, judge.parents, judge.offsets[::-1])
     assert np.abs(judge.whole - shuffled).max() > 1e-2
 
 
 def test_nothing_cut_off_costs_nothing(trained, judge, reduced):
-    assert judge.of(trained.full).max < EXACT
-    assert judge.of(reduced).max > 1e-2
+    assert judge.evaluate(trained.full).max < EXACT
+    assert judge.evaluate(reduced).max > 1e-2
 
 
 def test_distances_are_those_of_the_joints(judge, reduced, gaps):
-    found = judge.of(reduced)
+    found = judge.evaluate(reduced)
     assert found.rms == pytest.approx(np.sqrt(np.mean(gaps**2)))
     assert found.max == pytest.approx(gaps.max())
     assert np.mean(gaps > found.p99) == pytest.approx(0.01, abs=1e-4)
@@ -56,22 +56,25 @@ def test_distances_are_those_of_the_joints(judge, reduced, gaps):
 
 
 def hand(judge):
-    return judge.moment.joint
+    return judge.event_frame.joint
 
 
 def test_joint_weights_weigh_the_rms_alone(judge, reduced, gaps):
     only = np.zeros(len(judge.weights))
     only[hand(judge)] = 2.0
-    found = replace(judge, weights=only).of(reduced)
+    found = replace(judge, weights=only).evaluate(reduced)
     assert found.rms == pytest.approx(np.sqrt(np.mean(gaps[..., hand(judge)] ** 2)))
-    assert found.rms > 1.1 * judge.of(reduced).rms
-    assert (found.p99, found.max) == (judge.of(reduced).p99, judge.of(reduced).max)
+    assert found.rms > 1.1 * judge.evaluate(reduced).rms
+    assert (found.p99, found.max) == (judge.evaluate(reduced).p99, judge.evaluate(reduced).max)
 
 
 def test_without_an_event_there_is_no_effector(small_recipe, trained, reduced):
     plain = small_recipe.model_copy(update={"event": None})
     assert (
-        truncation_error.judge(plain, trained.examples, trained.tensor).of(reduced).effector is None
+        truncation_error.truncation_reference(plain, trained.examples, trained.tensor)
+        .evaluate(reduced)
+        .effector
+        is None
     )
     assert truncation_error.event(plain, trained.examples) is None
 
@@ -84,7 +87,9 @@ def test_an_event_at_a_landmark_is_at_the_mean_of_its_times(small_recipe, traine
     for at in ("lift", "touch", "end"):
         event = Event(joint="LeftHand", at=at)
         own = small_recipe.model_copy(update={"clips": clips, "event": event})
-        frames[at] = truncation_error.judge(own, marked, trained.tensor).moment.frame
+        frames[at] = truncation_error.truncation_reference(
+            own, marked, trained.tensor
+        ).event_frame.frame
         told = truncation_error.event(own, marked)
         assert trained.skeleton.names[told.joint] == "LeftHand"
         shares[at] = told.share
@@ -95,16 +100,16 @@ def test_an_event_at_a_landmark_is_at_the_mean_of_its_times(small_recipe, traine
 def test_a_joint_that_is_not_there_is_refused_by_name(small_recipe, trained):
     own = small_recipe.model_copy(update={"event": Event(joint="Tail", at="end")})
     with pytest.raises(TrainingError, match=r"event\.joint 'Tail', expected one of Hips, .*Head"):
-        truncation_error.judge(own, trained.examples, trained.tensor)
+        truncation_error.truncation_reference(own, trained.examples, trained.tensor)
 
 
 def chosen(own, trained, judge, **size):
     """Fidelity and cost of the ranks that a size asks for."""
     empty = {"rms_budget_cm": None, "p99_budget_cm": None, "effector_budget_cm": None}
     asked = own.size.model_copy(update={**empty, **size})
-    price = truncation_cost.PRICES[asked.cost](trained.tensor, 4)
-    found = ranks.choose(asked, trained.full, price, judge)
-    return judge.of(trained.full.truncated(found)), price.of(*found), found
+    price = truncation_cost.RANK_COSTS[asked.cost](trained.tensor, 4)
+    found = ranks.choose_ranks(asked, trained.full, price, judge)
+    return judge.evaluate(trained.full.truncated(found)), price.evaluate(*found), found
 
 
 @pytest.mark.parametrize("name", ["rms", "p99", "effector"])
@@ -126,17 +131,19 @@ def test_all_budgets_given_are_kept(small_recipe, trained, judge):
 
 
 def test_cost_decides_which_ranks_are_the_cheapest(small_recipe, trained, judge):
-    numbers, operations = (price(trained.tensor, 4) for price in truncation_cost.PRICES.values())
-    fronts = [ranks.front(trained.full.core, price) for price in (numbers, operations)]
+    numbers, operations = (
+        price(trained.tensor, 4) for price in truncation_cost.RANK_COSTS.values()
+    )
+    fronts = [ranks.pareto_front(trained.full.core, price) for price in (numbers, operations)]
     pairs = []
     for error in np.geomspace(1e-4, 0.1, 12) * np.sum(trained.full.core**2):
         stored, done = (front[front.near(error, -1, len(front.errors))] for front in fronts)
-        assert numbers.of(*stored) <= numbers.of(*done)
-        assert operations.of(*done) <= operations.of(*stored)
+        assert numbers.evaluate(*stored) <= numbers.evaluate(*done)
+        assert operations.evaluate(*done) <= operations.evaluate(*stored)
         pairs.append(stored != done)
     assert any(pairs)
     found = chosen(small_recipe, trained, judge, rms_budget_cm=1.0, cost="operations")
-    assert found[1] == operations.of(*found[2])
+    assert found[1] == operations.evaluate(*found[2])
 
 
 def test_predicted_error_is_the_true_one(small_recipe, trained, judge):
@@ -144,9 +151,11 @@ def test_predicted_error_is_the_true_one(small_recipe, trained, judge):
     kept = trained.model.decoder.reduced
     predicted = trained.tensor.rms(np.sum(trained.full.core**2) - np.sum(kept.core**2))
     # Training computes on one thread, which rounds otherwise.
-    assert vars(trained.fidelity) == pytest.approx(vars(judge.of(kept)))
-    assert abs(trained.fidelity.rms / (0.01 * small_recipe.size.rms_budget_cm) - 1.0) < 0.05
-    assert abs(predicted / trained.fidelity.rms - 1.0) > 0.005
+    assert vars(trained.truncation_errors) == pytest.approx(vars(judge.evaluate(kept)))
+    assert (
+        abs(trained.truncation_errors.rms / (0.01 * small_recipe.size.rms_budget_cm) - 1.0) < 0.05
+    )
+    assert abs(predicted / trained.truncation_errors.rms - 1.0) > 0.005
 
 
 def test_a_recipe_that_gives_ranks_is_told_what_they_cost(small_recipe, examples):
@@ -154,4 +163,9 @@ def test_a_recipe_that_gives_ranks_is_told_what_they_cost(small_recipe, examples
     own = small_recipe.model_copy(update={"size": size})
     trained = train.train(own, examples[::2], lambda _: None)
     assert trained.model.decoder.reduced.core.shape == (9, 4, 9)
-    assert 0.005 < trained.fidelity.rms < trained.fidelity.p99 < trained.fidelity.max
+    assert (
+        0.005
+        < trained.truncation_errors.rms
+        < trained.truncation_errors.p99
+        < trained.truncation_errors.max
+    )

@@ -12,7 +12,7 @@ PARENTS = (-1, 0, 1, 2)
 OFFSETS = np.array([[0, 0.9, 0], [0, 0.4, 0], [0.3, 0, 0], [0.08, 0, 0]])
 JOINTS = Skeleton(("hips", "arm", "hand", "finger"), PARENTS, OFFSETS, (), np.zeros((0, 3)))
 AXIS = np.array([1.0, 0.0, 0.0])
-HALF_TURN = quat.about(AXIS, np.array(np.pi))
+HALF_TURN = quat.from_axis_angle(AXIS, np.array(np.pi))
 ARM, HAND, FINGER = 1, 2, 3
 
 
@@ -55,7 +55,7 @@ def test_small_joints_carry_nothing_beyond_a_hand():
 def test_jump_of_a_small_joint_is_taken_out(smooth):
     broken = smooth.copy()
     broken[20:, FINGER] = quat.mul(broken[20:, FINGER], HALF_TURN)
-    clean, (finding,) = half_turns.without_jumps(clip(broken), 7)
+    clean, (finding,) = half_turns.remove_jumps(clip(broken), 7)
     assert steps(broken).max() > 3.0
     assert steps(clean.rotations).max() < 0.1
     assert apart(clean.rotations[:20], smooth[:20]) < 1e-7
@@ -67,7 +67,7 @@ def test_jump_of_a_small_joint_is_taken_out(smooth):
 def test_what_follows_a_jump_keeps_its_own_motion(smooth):
     broken = smooth.copy()
     broken[20:, FINGER] = quat.mul(HALF_TURN, broken[20:, FINGER])
-    clean, _ = half_turns.without_jumps(clip(broken), 0)
+    clean, _ = half_turns.remove_jumps(clip(broken), 0)
     own = steps(smooth)[20:, FINGER]
     assert np.max(np.abs(steps(clean.rotations)[20:, FINGER] - own)) < 1e-7
     assert np.ptp(own) > 1e-3
@@ -76,13 +76,13 @@ def test_what_follows_a_jump_keeps_its_own_motion(smooth):
 def test_jump_of_an_arm_is_left_alone(smooth):
     broken = smooth.copy()
     broken[20:, ARM] = quat.mul(broken[20:, ARM], HALF_TURN)
-    clean, findings = half_turns.without_jumps(clip(broken), 0)
+    clean, findings = half_turns.remove_jumps(clip(broken), 0)
     assert np.array_equal(clean.rotations, broken)
     assert findings == []
 
 
 def test_smooth_clip_is_left_alone(smooth):
-    clean, findings = half_turns.without_jumps(clip(smooth), 0)
+    clean, findings = half_turns.remove_jumps(clip(smooth), 0)
     assert np.array_equal(clean.rotations, smooth)
     assert findings == []
 
@@ -90,11 +90,11 @@ def test_smooth_clip_is_left_alone(smooth):
 def test_sign_of_a_quaternion_is_no_jump(smooth):
     signed = smooth.copy()
     signed[20:] *= -1.0
-    assert half_turns.without_jumps(clip(signed), 0)[1] == []
+    assert half_turns.remove_jumps(clip(signed), 0)[1] == []
 
 
 def test_clip_of_one_frame_has_no_jumps(smooth):
-    clean, findings = half_turns.without_jumps(clip(smooth[:1]), 0)
+    clean, findings = half_turns.remove_jumps(clip(smooth[:1]), 0)
     assert np.array_equal(clean.rotations, smooth[:1])
     assert findings == []
 
@@ -104,7 +104,7 @@ def test_clip_half_a_turn_off_is_turned_back(family, joint):
     broken = family.copy()
     broken[4, :, joint] = quat.mul(broken[4, :, joint], HALF_TURN)
     small = half_turns.small_joints(PARENTS, OFFSETS)
-    clean, (finding,) = half_turns.without_flips(broken, small)
+    clean, (finding,) = half_turns.remove_flips(broken, small)
     assert (finding.kind, finding.joint, finding.clip) == ("flip", joint, 4)
     assert abs(finding.angle - np.pi) < 0.5
     # The clip's own middle becomes the family's: it lies within its swing of it.
@@ -116,12 +116,12 @@ def test_clip_half_a_turn_off_is_turned_back(family, joint):
 
 def test_flip_of_an_arm_is_left_alone(family):
     family[4, :, ARM] = quat.mul(family[4, :, ARM], HALF_TURN)
-    clean, findings = half_turns.without_flips(family, half_turns.small_joints(PARENTS, OFFSETS))
+    clean, findings = half_turns.remove_flips(family, half_turns.small_joints(PARENTS, OFFSETS))
     assert np.array_equal(clean, family)
     assert findings == []
 
 
 def test_clip_that_only_passes_half_a_turn_is_no_flip(family):
-    sweep = quat.about(AXIS, np.linspace(0.0, 3.0, 50))
+    sweep = quat.from_axis_angle(AXIS, np.linspace(0.0, 3.0, 50))
     family[4, :, FINGER] = quat.mul(family[4, :, FINGER], sweep)
-    assert half_turns.without_flips(family, half_turns.small_joints(PARENTS, OFFSETS))[1] == []
+    assert half_turns.remove_flips(family, half_turns.small_joints(PARENTS, OFFSETS))[1] == []

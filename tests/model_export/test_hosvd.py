@@ -87,7 +87,7 @@ def test_norms_of_slices_are_the_singular_values(tensor):
 
 def test_decomposition_at_given_ranks_is_the_truncated_one(tensor):
     ranks = tuple(max(1, size - 1) for size in tensor.shape)
-    found, full = hosvd.decompose_at(tensor, ranks), hosvd.decompose(tensor)
+    found, full = hosvd.decompose_truncated(tensor, ranks), hosvd.decompose(tensor)
     expected = full.truncated(ranks)
     assert found.core.shape == ranks
     assert np.max(np.abs(found.core - expected.core)) < TOLERANCE

@@ -36,7 +36,7 @@ def first(found):
 
 def turned(clip, angle, move):
     """The clip as seen by a camera that was turned and moved."""
-    turn = np.broadcast_to(quat.about(UP, np.asarray(angle)), (len(clip), 4))
+    turn = np.broadcast_to(quat.from_axis_angle(UP, np.asarray(angle)), (len(clip), 4))
     rotations, translations = clip.rotations.copy(), clip.translations.copy()
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])
     translations[:, 0] = quat.rotate(turn, translations[:, 0]) + move
@@ -49,7 +49,7 @@ def gap(a, b):
 
 def around_root(clip):
     """Joint positions (F, J, 3) from below the root and seen from its heading, m."""
-    facing = quat.about(UP, -ingest.heading(clip))[:, None]
+    facing = quat.from_axis_angle(UP, -ingest.heading(clip))[:, None]
     return quat.rotate(facing, clip.positions() - (clip.root_path * FLOOR)[:, None])
 
 
@@ -259,7 +259,7 @@ def test_a_cyclic_clip_sets_out_along_the_line_of_its_heading(read):
     """A pelvis swings: its heading at the first frame is not where the walker is going."""
     t = np.linspace(0.0, 1.0, 21)
     source = small_clip(heading=0.0)
-    swing = quat.about(UP, 0.5 * np.cos(2 * np.pi * t))
+    swing = quat.from_axis_angle(UP, 0.5 * np.cos(2 * np.pi * t))
     rotations = source.rotations.copy()
     rotations[:, 0] = swing
     loop = first(read(replace(source, rotations=rotations), motion={"cyclic": True}))

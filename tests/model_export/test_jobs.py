@@ -6,7 +6,7 @@ import time
 import pytest
 
 from posefield.common.errors import TrainingError
-from posefield_train.parallel.jobs import Processes
+from posefield_train.parallel.jobs import ProcessJobs
 
 
 def divide(dividend, divisor):
@@ -21,16 +21,16 @@ def wait(seconds):
 
 
 def test_one_process_runs_jobs_here_and_in_order():
-    found = list(Processes(1).run(divide, [(1,), (2,), (3,)], (12,)))
+    found = list(ProcessJobs(1).run(divide, [(1,), (2,), (3,)], (12,)))
     assert found == [(12, os.getpid()), (6, os.getpid()), (4, os.getpid())]
 
 
 def test_a_single_job_needs_no_other_process():
-    assert list(Processes(8).run(divide, [(3,)], (12,))) == [(4, os.getpid())]
+    assert list(ProcessJobs(8).run(divide, [(3,)], (12,))) == [(4, os.getpid())]
 
 
 def test_no_jobs_have_no_results():
-    assert list(Processes().run(divide, [])) == []
+    assert list(ProcessJobs().run(divide, [])) == []
 
 
 def test_arguments_are_read_as_jobs_are_started():
@@ -41,7 +41,7 @@ def test_arguments_are_read_as_jobs_are_started():
             read.append(seconds)
             yield (0,)
 
-    results = Processes(1).run(wait, arguments())
+    results = ProcessJobs(1).run(wait, arguments())
     assert next(results) == 0
     assert len(read) < 5
     assert len(list(results)) == 49
@@ -49,13 +49,13 @@ def test_arguments_are_read_as_jobs_are_started():
 
 def test_an_error_in_a_job_is_raised():
     with pytest.raises(TrainingError, match="divided by 0"):
-        list(Processes(1).run(divide, [(1,), (0,), (2,)], (12,)))
+        list(ProcessJobs(1).run(divide, [(1,), (0,), (2,)], (12,)))
 
 
 @pytest.mark.system
 def test_more_processes_share_the_jobs_and_the_first_result_comes_first():
     jobs = [(1.5,), (0.01,), (0.02,), (0.03,)]
-    found = list(Processes(2).run(wait, jobs))
+    found = list(ProcessJobs(2).run(wait, jobs))
     assert sorted(found) == sorted(own for (own,) in jobs)
     # The longest job began first.
     assert found[-1] == 1.5
@@ -64,4 +64,4 @@ def test_more_processes_share_the_jobs_and_the_first_result_comes_first():
 @pytest.mark.system
 def test_an_error_in_another_process_is_raised():
     with pytest.raises(TrainingError, match="divided by 0"):
-        list(Processes(2).run(divide, [(1,), (0,), (2,)], (12,)))
+        list(ProcessJobs(2).run(divide, [(1,), (0,), (2,)], (12,)))

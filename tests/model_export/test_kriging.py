@@ -241,13 +241,13 @@ def test_one_leave_one_out_serves_fields_of_all_parameters(hyper, samples):
         replace(hyper, scales=2.0 * hyper.scales),
         replace(hyper, drifts=(0,) if hyper.drifts == (1,) else (1,)),
     ]
-    first = shared.matrix(hyper)
+    first = shared.residual_matrix(hyper)
     assert np.array_equal(first, universal_kriging.leave_out(hyper, samples, TAKES))
     for other in others:
-        found = shared.matrix(other)
+        found = shared.residual_matrix(other)
         assert np.array_equal(found, universal_kriging.leave_out(other, samples, TAKES))
         assert far(found, first) > 1e-3
-    assert np.array_equal(shared.matrix(hyper), first)
+    assert np.array_equal(shared.residual_matrix(hyper), first)
 
 
 def test_names_of_groups_do_not_matter(hyper, samples):
@@ -258,7 +258,9 @@ def test_names_of_groups_do_not_matter(hyper, samples):
 
 
 def check(samples, degree=1, nugget_is_zero=False, names=NAMES):
-    return universal_kriging.check(samples, names[: samples.shape[1]], degree, nugget_is_zero)
+    return universal_kriging.check_samples(
+        samples, names[: samples.shape[1]], degree, nugget_is_zero
+    )
 
 
 def refusal(*given, **more):

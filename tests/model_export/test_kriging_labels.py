@@ -20,7 +20,7 @@ def hyper(request):
 
 
 def who(*names):
-    return sample_points.labels(names, PERFORMERS)
+    return sample_points.performer_labels(names, PERFORMERS)
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def far(a, b):
 def test_labels_are_ones_own_and_none_for_a_stranger():
     expected = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     assert np.array_equal(who("bob", "ann", "eve"), expected)
-    assert sample_points.labels(("ann", "bob"), ()).shape == (2, 0)
+    assert sample_points.performer_labels(("ann", "bob"), ()).shape == (2, 0)
 
 
 def test_a_performer_is_nothing_from_himself_and_the_label_from_all_others(hyper):

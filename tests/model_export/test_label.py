@@ -15,12 +15,12 @@ from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.model_file import model_card
 from posefield_train.graph import onnx_export
-from posefield_train.graph.float_model import Outputs
+from posefield_train.graph.float_model import ModelOutputs
 from posefield_train.kriging import kriging_graph, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.kriging_bank import Constant, FieldBank
+from posefield_train.kriging.kriging_bank import ConstantModel, KrigingBank
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.level_tables import Ladder
+from posefield_train.onnx_graph.level_tables import LevelTables
 
 SAMPLES, CONTROLS, BATCH = 25, 3, 40
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
@@ -49,8 +49,8 @@ def labelled_bank(covariance="matern52", drifts=(0, 1), names=NAMES, constant=()
         hyper = Hyper(covariance, drifts, scales, nugget, label)
         values = own.normal(size=(SAMPLES, size))
         solved = universal_kriging.solve(hyper, samples, values)
-        fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
-    return FieldBank(LOW, HIGH, names, fields.pop("pose"), fields, 0.04)
+        fields[name] = ConstantModel(values.mean(axis=0)) if name in constant else solved
+    return KrigingBank(LOW, HIGH, names, fields.pop("pose"), fields, 0.04)
 
 
 def asked():
@@ -65,7 +65,7 @@ def graph_of(bank, rank=6):
     """Function of controls, and of labels where they are given, that runs the fields and sigma."""
 
     def build(net, controls, *_):
-        ends = Ladder(kriging_graph.entries(bank, [rank])).onnx(net)
+        ends = LevelTables(kriging_graph.entries(bank, [rank])).onnx(net)
         return tuple(kriging_graph.onnx(bank, net, controls, ends).values())
 
     return lambda controls, **labels: outputs(build, (2, 2, 2, 1), controls=controls, **labels)
@@ -162,19 +162,19 @@ def test_every_output_of_a_labelled_model_agrees_with_the_reference(
     labelled_exported, opened, question
 ):
     points, times, labels = question
-    found = Outputs(*opened.run(points, times, *OUTPUTS, labels=labels))
+    found = ModelOutputs(*opened.run(points, times, *OUTPUTS, labels=labels))
     expected = labelled_exported.model.evaluate(points, times, labels)
     parents = opened.card.skeleton.parents
 
     def away(answer):
         return np.abs(answer.positions(parents) - found.positions(parents)).max()
 
-    assert away(expected) < onnx_export.ALLOWED
+    assert away(expected) < onnx_export.PARITY_LIMIT
     assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-3
     assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-5
-    assert away(labelled_exported.model.evaluate(points, times)) > 10 * onnx_export.ALLOWED
+    assert away(labelled_exported.model.evaluate(points, times)) > 10 * onnx_export.PARITY_LIMIT
     # Of somebody who was seen more is known, as a rule, than of anybody.
-    nobody = Outputs(*opened.run(points, times, *OUTPUTS))
+    nobody = ModelOutputs(*opened.run(points, times, *OUTPUTS))
     seen = labels.any(axis=1)
     assert np.mean(found.sigma[seen] < nobody.sigma[seen]) > 0.8
     assert np.array_equal(found.sigma[~seen], nobody.sigma[~seen])
@@ -183,7 +183,9 @@ def test_every_output_of_a_labelled_model_agrees_with_the_reference(
 def test_the_gate_asks_for_performers(labelled_exported, labelled_path, opened):
     content = labelled_path.read_bytes()
     assert (
-        0.0 < onnx_export.gate(labelled_exported.model, content, opened.card) < onnx_export.ALLOWED
+        0.0
+        < onnx_export.check_parity(labelled_exported.model, content, opened.card)
+        < onnx_export.PARITY_LIMIT
     )
     bank = labelled_exported.model.bank
     # Two performers change places: nobody would notice who asks for controls alone.
@@ -195,7 +197,7 @@ def test_the_gate_asks_for_performers(labelled_exported, labelled_path, opened):
     before, after = (m.evaluate(points, times).rotations for m in (labelled_exported.model, model))
     assert np.array_equal(before, after)
     with pytest.raises(ExportRefused, match=r"at (middle|short), \{'stature': "):
-        onnx_export.gate(model, content, opened.card)
+        onnx_export.check_parity(model, content, opened.card)
 
 
 def question_of_nobody(opened):
@@ -245,12 +247,13 @@ def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_pat
 
 
 def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, labelled_path):
-    again = onnx_export.export(labelled_recipe, labelled, []).content
+    again = onnx_export.export_model(labelled_recipe, labelled, []).content
     assert again == labelled_path.read_bytes()
     others = ("anna", *labelled.model.bank.performers[1:])
     renamed = replace(labelled.model, bank=replace(labelled.model.bank, performers=others))
     assert (
-        onnx_export.export(labelled_recipe, replace(labelled, model=renamed), []).content != again
+        onnx_export.export_model(labelled_recipe, replace(labelled, model=renamed), []).content
+        != again
     )
 
 
@@ -262,7 +265,7 @@ def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, label
     d = len(labelled.model.bank.low)
     # In the order in which samples say most of the others, each with the controls that it had.
     assert np.array_equal(np.argmax(told[:, d:], axis=1), whose)
-    points = labelled.laid.points.tolist()
+    points = labelled.samples.points.tolist()
     names = [labelled.examples[points.index(own)].row.performer for own in told.tolist()]
     assert names == [labelled.model.bank.performers[i] for i in whose]
 

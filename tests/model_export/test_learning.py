@@ -21,21 +21,24 @@ def curve(suggested, chance):
 
 def test_it_is_as_fast_as_it_comes_to_where_chance_ends():
     found = curve([4.0, 2.0, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
-    assert (found.reached, found.faster) == (pytest.approx(60.0), pytest.approx(3.0))
+    assert (found.equivalent_samples, found.speedup) == (pytest.approx(60.0), pytest.approx(3.0))
     between = curve([4.0, 2.5, 1.5, 1.0], [4.0, 3.0, 2.5, 2.0])
-    assert (between.reached, between.faster) == (pytest.approx(70.0), pytest.approx(2.0))
+    assert (between.equivalent_samples, between.speedup) == (
+        pytest.approx(70.0),
+        pytest.approx(2.0),
+    )
 
 
 def test_random_samples_that_do_not_help_give_no_ratio():
     found = curve([4.0, 3.0, 2.0, 1.0], [4.0, 4.5, 4.5, 4.5])
-    assert found.faster is None and learning_curves.facts(found)["faster"] is None
+    assert found.speedup is None and learning_curves.facts(found)["faster"] is None
     assert "nothing to compare with" in learning_curves.table(found)
 
 
 def test_what_is_no_faster_and_what_is_slower_is_not_called_so():
     same = curve([4.0, 3.0, 2.5, 2.0], [4.0, 3.0, 2.5, 2.0])
-    assert same.faster == pytest.approx(1.0)
-    assert curve([4.0, 3.5, 3.0, 2.5], [4.0, 3.0, 2.5, 2.0]).faster == pytest.approx(1.0)
+    assert same.speedup == pytest.approx(1.0)
+    assert curve([4.0, 3.5, 3.0, 2.5], [4.0, 3.0, 2.5, 2.0]).speedup == pytest.approx(1.0)
 
 
 def test_it_is_told_as_a_table_and_as_figures():
@@ -55,7 +58,7 @@ def test_it_is_told_as_a_table_and_as_figures():
 
 def test_samples_of_ones_own_are_a_family(tmp_path):
     chosen = list(sample_family.samples())[3:6]
-    file = sample_files.family(tmp_path / "own", chosen)
+    file = sample_files.write_family(tmp_path / "own", chosen)
     found, _ = ingest.ingest(recipe.read(file), file.parent)
     expected = [[*vars(sample.controls).values()] for sample in chosen]
     assert [example.controls.tolist() for example in found] == expected

@@ -27,14 +27,14 @@ def with_levels(recipe, *details):
 
 @pytest.fixture(scope="module")
 def exam(small_recipe, trained):
-    return level_errors.of(small_recipe, trained, 2_000)
+    return level_errors.level_test(small_recipe, trained, 2_000)
 
 
 @pytest.fixture(scope="module")
 def still(small_recipe, trained):
     """Levels of which the coarser ones keep a hand, and then a whole arm, still."""
     details = Detail(times=2.0, drop_joints=[HAND]), Detail(times=8.0, drop_joints=["LeftArm"])
-    return levels.build(with_levels(small_recipe, *details), trained)
+    return levels.build_levels(with_levels(small_recipe, *details), trained)
 
 
 def test_every_level_is_a_leading_part_of_the_one_before(exported):
@@ -44,7 +44,7 @@ def test_every_level_is_a_leading_part_of_the_one_before(exported):
         assert all(low <= high for low, high in zip(coarser.ranks, finer.ranks, strict=True))
         assert coarser.samples <= finer.samples
         assert set(coarser.joints) <= set(finer.joints)
-    whole, last = exported.model.decoder.reduced, exported.model.decoder.at(3).reduced
+    whole, last = exported.model.decoder.reduced, exported.model.decoder.at_level(3).reduced
     r1, r2, r3 = ladder[3].ranks
     assert np.array_equal(last.core, whole.core[:r1, :r2, :r3])
     assert not np.array_equal(last.core, whole.core[-r1:, -r2:, -r3:])
@@ -79,7 +79,7 @@ def test_the_card_says_what_an_exam_of_other_questions_finds(exported, exam, tra
     )
     every = range(len(trained.skeleton))
     for number, level in enumerate(exported.card.levels):
-        found = fewer.answers(exported.model, number).errors(every)
+        found = fewer.outputs(exported.model, number).errors(every)
         assert found.rms == pytest.approx(level.rms, rel=0.15)
     assert exported.card.levels[0].rms < 0.7 * exported.card.levels[1].rms
 
@@ -87,12 +87,14 @@ def test_the_card_says_what_an_exam_of_other_questions_finds(exported, exam, tra
 def test_the_event_of_an_answer_is_that_of_the_whole_body(exported, exam):
     """At the event the chain of its joint alone is computed, and the core at its frame alone."""
     asked = exam.controls[:20], exam.labels[:20]
-    chain = skeleton.chain(exam.parents, exam.moment.joint)
+    chain = skeleton.joint_chain(exam.parents, exam.moment.joint)
     place = np.full((20, 1), float(exam.moment.frame))
     for level in range(len(exported.card.levels)):
         fields = exported.model.fields(*asked, level)
         found = exported.model.joint_at_frame(fields, chain, exam.moment.frame, level)
-        whole = exported.model.posed(asked[0], place, asked[1], level).positions(exam.parents)[:, 0]
+        whole = exported.model.outputs_at_frames(asked[0], place, asked[1], level).positions(
+            exam.parents
+        )[:, 0]
         assert np.abs(found - whole[:, exam.moment.joint]).max() < 1e-12
         assert np.abs(found - whole[:, chain[-2]]).max() > 0.1
 
@@ -104,7 +106,7 @@ def test_durations_are_those_of_whole_answers(exported, exam):
 
 
 def test_samples_are_asked_in_the_order_in_which_they_say_most(trained):
-    bank = thinning.ordered(trained.model.bank)
+    bank = thinning.sort_samples(trained.model.bank)
     own = bank.pose
     matrix = universal_kriging.covariances(own.hyper, own.samples, own.samples)
 
@@ -120,7 +122,7 @@ def test_samples_are_asked_in_the_order_in_which_they_say_most(trained):
 def test_the_order_of_samples_changes_no_answer(trained, rng):
     bank = trained.model.bank
     points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
-    before, after = bank.numpy(points), thinning.ordered(bank).numpy(points)
+    before, after = bank.numpy(points), thinning.sort_samples(bank).numpy(points)
     for name, values in before.items():
         assert np.abs(after[name] - values).max() < 1e-9
     other = replace(bank, pose=replace(bank.pose, samples=bank.pose.samples[::-1]))
@@ -129,15 +131,15 @@ def test_the_order_of_samples_changes_no_answer(trained, rng):
 
 def test_as_many_covariances_as_there_are_answer_exactly(trained, rng):
     """Least squares over the whole basis finds the weights of kriging again."""
-    bank = thinning.ordered(trained.model.bank)
+    bank = thinning.sort_samples(trained.model.bank)
     rank = bank.pose.dual.shape[1]
     points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
     exact = bank.numpy(points)
 
     def away(columns):
-        own = replace(bank, coarse=(thinning.lesson(bank).weights(columns, rank, 0.0),)).numpy(
-            points, 1
-        )
+        own = replace(
+            bank, coarse=(thinning.thinning_data(bank).weights(columns, rank, 0.0),)
+        ).numpy(points, 1)
         return max(np.abs(own[name] - exact[name]).max() for name in exact if name != VARIANCE)
 
     assert away(bank.columns(0)) < 2e-3
@@ -156,7 +158,7 @@ def test_sigma_of_a_coarser_level_counts_its_own_error(exported, rng):
 def test_joints_that_a_level_drops_do_not_move(still, trained):
     names, parents = trained.skeleton.names, trained.skeleton.parents
     arm, hand = names.index("LeftArm"), names.index(HAND)
-    below = np.flatnonzero(skeleton.descendants(parents)[arm])
+    below = np.flatnonzero(skeleton.descendant_matrix(parents)[arm])
     assert hand in below
     dropped = [set(range(len(names))) - set(level.joints) for level in still.levels]
     assert dropped[0] == set()
@@ -180,11 +182,11 @@ def test_what_a_still_hand_costs_is_counted(still, exported):
 def test_joints_that_cannot_be_dropped_are_named(small_recipe, trained, joint):
     asked = with_levels(small_recipe, Detail(times=2.0, drop_joints=[joint]))
     with pytest.raises(TrainingError, match=rf"drop_joints \['{joint}'\], expected some of "):
-        levels.build(asked, trained)
+        levels.build_levels(asked, trained)
 
 
 def test_a_model_of_one_level_has_one(small_recipe, trained):
-    found = levels.build(with_levels(small_recipe), trained)
+    found = levels.build_levels(with_levels(small_recipe), trained)
     assert len(found.levels) == 1 and found.model.bank.coarse == ()
 
 
@@ -227,7 +229,7 @@ def test_who_feeds_no_level_gets_the_finest(model_path, question):
 
 def test_a_frozen_file_has_no_level_to_feed(model_path):
     content = model_path.read_bytes()
-    frozen = runtime(subgraph.at_level(content, 2))
+    frozen = runtime(subgraph.fix_level(content, 2))
     assert [port.name for port in frozen.get_overridable_initializers()] == []
     assert frozen.get_modelmeta().custom_metadata_map  # all else is still there
 
@@ -235,12 +237,12 @@ def test_a_frozen_file_has_no_level_to_feed(model_path):
 @pytest.mark.parametrize("cut", [1, 100, 10_000])
 def test_half_a_file_cannot_be_frozen(model_path, cut):
     with pytest.raises(ValueError):
-        subgraph.at_level(model_path.read_bytes()[:-cut], 0)
+        subgraph.fix_level(model_path.read_bytes()[:-cut], 0)
 
 
 def test_what_leads_to_one_output_is_less_than_half_of_the_graph(model_path):
     whole = onnx.load(model_path)
-    part = onnx.load_from_string(subgraph.for_outputs(model_path.read_bytes(), "duration"))
+    part = onnx.load_from_string(subgraph.select_outputs(model_path.read_bytes(), "duration"))
     assert 0 < len(part.graph.node) < len(whole.graph.node) / 2
     assert [port.name for port in part.graph.output] == ["duration"]
     onnx.checker.check_model(part)
@@ -251,4 +253,4 @@ def test_the_worst_pose_is_off_by_no_more_than_some_times_the_rest(exported, sma
     budget = small_recipe.size.budgets["rms"]
     for times, level in zip((2, 4, 8), exported.card.levels[1:], strict=True):
         # Others than it was tried with may be somewhat worse.
-        assert level.rms < level.pose < 1.3 * level_errors.TAIL * times * budget
+        assert level.rms < level.pose < 1.3 * level_errors.TAIL_RATIO * times * budget

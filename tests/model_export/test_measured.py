@@ -11,7 +11,7 @@ from test_phase import cycle
 from posefield.common.errors import RecipeError, TrainingError
 from posefield.model_file import card_reader, model_card
 from posefield.motion import measures
-from posefield.motion.measures import Measure, Seen
+from posefield.motion.measures import Measure, MeasuredMotion
 from posefield_train import train
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export
@@ -42,7 +42,7 @@ LEG = control("leg", quantity="leg_length", joints=["LeftUpLeg", "LeftFoot"])
 
 
 def auto_recipe(*controls, **sections):
-    plain = tomllib.loads(sample_walk.TOML)
+    plain = tomllib.loads(sample_walk.RECIPE_TEXT)
     plain["controls"] = list(controls)
     for section, values in sections.items():
         plain[section] = {**plain.get(section, {}), **values}
@@ -52,7 +52,7 @@ def auto_recipe(*controls, **sections):
 @pytest.fixture(scope="module")
 def strides(tmp_path_factory):
     """Folder of the stroll with a frame in the middle of each stride as a landmark, down."""
-    folder = sample_walk.write(tmp_path_factory.mktemp("strides"))
+    folder = sample_walk.write_walk(tmp_path_factory.mktemp("strides"))
     first, *rows = (folder / "strides.csv").read_text().splitlines()
     rows = [f"{row},{20 + index % 3}" for index, row in enumerate(rows)]
     (folder / "strides.csv").write_text("\n".join([f"{first},down", *rows]) + "\n")
@@ -74,7 +74,7 @@ def seen(example):
     gone = measured_controls.travel(clip.rotations[:, 0], clip.root_path)
     at = example.landmarks[0] * (len(clip) - 1)
     parents = clip.skeleton.parents
-    return Seen(clip.positions(), clip.duration, gone, parents, example.offsets, at)
+    return MeasuredMotion(clip.positions(), clip.duration, gone, parents, example.offsets, at)
 
 
 MEASURES = {
@@ -95,7 +95,7 @@ def columns(own, examples):
 def test_controls_are_what_is_measured_of_the_clips_in_the_recipes_order(own, examples):
     found = columns(own, examples)
     for name, asked in MEASURES.items():
-        expected = np.array([measures.value(asked, seen(example)) for example in examples])
+        expected = np.array([measures.evaluate(asked, seen(example)) for example in examples])
         assert np.abs(found[name] - expected).max() < KEPT, name
         assert np.ptp(expected) > 10 * KEPT, "negative control: it is not the same in all"
 
@@ -139,7 +139,9 @@ def test_a_leg_is_that_of_the_roles_where_no_joints_are_named(strides):
     roles = {"leftUpperLeg": "RightUpLeg", "leftFoot": "RightFoot"}
     own = auto_recipe(control("leg", quantity="leg_length"), roles=roles)
     joints = ingest.ingest(own, strides)[0][0].clip.skeleton
-    assert measured_controls.of(own, own.measured[0], joints) == Measure("leg_length", (5, 6))
+    assert measured_controls.control_measure(own, own.measured[0], joints) == Measure(
+        "leg_length", (5, 6)
+    )
 
 
 @pytest.mark.parametrize(
@@ -180,11 +182,12 @@ def test_a_cycle_begun_elsewhere_is_measured_from_there():
     cuts = np.array([-12, 4, 8, -3, 3]) / 100
     family = [cycle(cut) for cut in cuts]
     family = [
-        replace(e, controls=measured_controls.controls(auto, e.row, e.clip, ())) for e in family
+        replace(e, controls=measured_controls.control_values(auto, e.row, e.clip, ()))
+        for e in family
     ]
-    begun = phase_alignment.in_phase(auto, tuple(family), np.ones(len(SKELETON)))
+    begun = phase_alignment.align_phases(auto, tuple(family), np.ones(len(SKELETON)))
     for before, after in zip(family, begun, strict=True):
-        again = measured_controls.controls(auto, after.row, after.clip, after.landmarks)
+        again = measured_controls.control_values(auto, after.row, after.clip, after.landmarks)
         assert np.array_equal(after.controls, again)
         assert after.controls[1] == pytest.approx(before.controls[1], abs=1e-6)
     hands = np.array([[e.controls[0] for e in own] for own in (family, begun)])
@@ -204,7 +207,7 @@ def made(strides):
     own = auto_recipe(*AUTO[:2])
     found, notes = ingest.ingest(own, strides)
     trained = train.train(own, found, lambda _: None)
-    return own, trained, onnx_export.export(own, trained, notes).card
+    return own, trained, onnx_export.export_model(own, trained, notes).card
 
 
 def test_a_models_examples_are_what_is_measured_of_its_clips(made):
@@ -214,7 +217,7 @@ def test_a_models_examples_are_what_is_measured_of_its_clips(made):
     assert [control.unit for control in own_card.controls] == ["m/s", "deg"]
     for example, kept in zip(trained.examples, own_card.examples, strict=True):
         clip = replace(example, landmarks=(0.0,))
-        expected = [measures.value(one, seen(clip)) for one in asked]
+        expected = [measures.evaluate(one, seen(clip)) for one in asked]
         assert np.abs(np.array(kept) - expected).max() < KEPT
     entries = {key: text.encode() for key, text in model_card.dump(own_card).items()}
     again = card_reader.decode(entries)
@@ -225,7 +228,7 @@ def test_the_card_has_a_landmark_where_canonical_time_has_it(own, examples, stri
     joints = examples[0].clip.skeleton
     marks = np.array([example.landmarks for example in examples])
     hips = own.measured[-1]
-    found = measured_controls.on_the_card(own, hips, joints, marks)
+    found = measured_controls.card_measure(own, hips, joints, marks)
     assert found == Measure("height", (0,), "landmark", round(float(marks.mean()), 4))
-    assert measured_controls.on_the_card(own, own.typed[0], joints, marks) is None
+    assert measured_controls.card_measure(own, own.column_controls[0], joints, marks) is None
     assert found.share != round(float(marks[0, 0]), 4), "negative control: clips differ"

@@ -28,8 +28,8 @@ def skin(means, numbers, bones):
     """Six points (J * 6, 3) on the sphere of skin around every joint, in one pose."""
     rotations = quat.mul(means, quat.exp(numbers[3:].reshape(-1, 3)))
     translations = np.vstack([numbers[:3], bones[1:]])
-    positions, orientations = skeleton.forward(PARENTS, rotations, translations)
-    axes = pose_metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
+    positions, orientations = skeleton.forward_kinematics(PARENTS, rotations, translations)
+    axes = pose_metric.SHELL_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
     return (positions[:, None] + quat.rotate(orientations[:, None], axes)).reshape(-1, 3)
 
 
@@ -71,7 +71,7 @@ def test_turn_about_a_bone_counts_by_the_skin():
     """A lone joint: only its own sphere moves, by two thirds of its squared radius."""
     still = np.zeros((1, 1, 3)), np.zeros((1, 1, 3))
     found = pose_metric.gram((-1,), quat.exp(still[0]), *still, np.array([2.0]))
-    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * pose_metric.SHELL**2] * 3)
+    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * pose_metric.SHELL_RADIUS**2] * 3)
     assert np.max(np.abs(found - expected)) < 1e-15
 
 

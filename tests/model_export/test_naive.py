@@ -32,7 +32,7 @@ def values(positions, rng):
 
 @pytest.fixture(params=COVARIANCES)
 def own(request, points, positions, values):
-    return naive_kriging.fit(points, positions, values, request.param, variogram.fit)
+    return naive_kriging.fit_naive(points, positions, values, request.param, variogram.fit_by_grid)
 
 
 @pytest.mark.parametrize("form", ["onnx", "onnx_dual"])
@@ -59,7 +59,7 @@ def test_frames_are_kriged_each_on_its_own(own, values, rng):
 
 
 def test_frame_is_what_scipy_interpolates(points, positions, values, rng):
-    own = naive_kriging.fit(points, positions, values, "gaussian", variogram.fit)
+    own = naive_kriging.fit_naive(points, positions, values, "gaussian", variogram.fit_by_grid)
     asked = rng.uniform(-1.0, 1.0, size=(9, 3))
     found = own.numpy(asked)
     for frame, field in enumerate(own.fields):
@@ -74,17 +74,19 @@ def test_frame_is_what_scipy_interpolates(points, positions, values, rng):
 
 
 def test_nugget_and_range_are_those_of_each_frames_variogram(points, positions, values):
-    own = naive_kriging.fit(points, positions, values, "matern52", variogram.fit)
+    own = naive_kriging.fit_naive(points, positions, values, "matern52", variogram.fit_by_grid)
     for frame, field in enumerate(own.fields):
         left = variogram.residuals(points, positions[:, frame].reshape(SAMPLES, -1), 1)
-        fit = variogram.fit(variogram.experimental(points, left), "matern52")
+        fit = variogram.fit_by_grid(variogram.experimental_variogram(points, left), "matern52")
         assert np.array_equal(field.hyper.scales, np.full(3, 1.0 / fit.range))
         assert 1e-4 <= field.hyper.nugget <= 10.0
 
 
 def test_fitter_is_the_one_that_is_given(points, positions, values):
-    by_grid = naive_kriging.fit(points, positions, values, "gaussian", variogram.fit)
-    by_search = naive_kriging.fit(points, positions, values, "gaussian", variogram.fit_by_search)
+    by_grid = naive_kriging.fit_naive(points, positions, values, "gaussian", variogram.fit_by_grid)
+    by_search = naive_kriging.fit_naive(
+        points, positions, values, "gaussian", variogram.fit_by_search
+    )
     gaps = [
         abs(np.log(a.hyper.scales[0] / b.hyper.scales[0]))
         for a, b in zip(by_grid.fields, by_search.fields, strict=True)

@@ -13,7 +13,7 @@ from posefield.motion import quat
 from posefield.motion.clip import assemble
 from posefield_train.align import phase_alignment, time_alignment
 from posefield_train.source import ingest
-from posefield_train.source.clip_table import Row
+from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.ingest import Example
 
 CLIPS, FRAMES = 9, 100
@@ -28,12 +28,12 @@ def cycle(cut, size=1.0, turn=0.3, landmarks=()):
     u = cut + np.linspace(0.0, 1.0, FRAMES + 1)
     waves = [np.sin(2 * np.pi * (u + k / 7)) + 0.4 * np.sin(4 * np.pi * u + k) for k in range(15)]
     rotations = quat.exp(0.3 * size * np.stack(waves, axis=1).reshape(-1, 5, 3))
-    rotations[:, 0] = quat.mul(quat.about(UP, turn * u), rotations[:, 0])
+    rotations[:, 0] = quat.mul(quat.from_axis_angle(UP, turn * u), rotations[:, 0])
     # Along an arc, on which every cycle goes on from the last as the first did.
     path = np.stack([-np.cos(turn * u), 0 * u, np.sin(turn * u)], axis=1) * 1.2 / turn
     clip = assemble(SKELETON, rotations, path + 0.9 * UP, SKELETON.offsets, 100.0)
-    row = Row(Path("x.bvh"), "clips.csv", 2, "", 0, None, np.array([size]), ())
-    return Example(row, ingest.set_out(clip), row.controls, landmarks, jumps=())
+    row = ClipRow(Path("x.bvh"), "clips.csv", 2, "", 0, None, np.array([size]), ())
+    return Example(row, ingest.straighten_gait(clip), row.controls, landmarks, jumps=())
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def cuts(rng):
 
 
 def begun(examples, recipe=IN_PHASE):
-    return phase_alignment.in_phase(recipe, tuple(examples), np.ones(5))
+    return phase_alignment.align_phases(recipe, tuple(examples), np.ones(5))
 
 
 def around(example):
@@ -88,7 +88,7 @@ def test_half_a_cycle_away_is_found_too(cuts):
 @pytest.mark.parametrize("frames", [1, 30, 99, -20])
 def test_what_is_cut_off_goes_on_at_the_other_end(frames):
     """As if the walker had walked on and the cycle had been cut later."""
-    found = phase_alignment.begin(cycle(0.0), frames / FRAMES)
+    found = phase_alignment.shift_start(cycle(0.0), frames / FRAMES)
     # The cycle's own end is where the next begins: the same arc cut elsewhere.
     later = cycle(frames / FRAMES)
     assert np.abs(around(found) - rotated(later, found)).max() < ROUNDING
@@ -99,28 +99,28 @@ def test_what_is_cut_off_goes_on_at_the_other_end(frames):
 
 def rotated(example, like):
     """Joints around the root, turned to the heading that another clip sets out in."""
-    turn = quat.about(UP, ingest.heading(like.clip)[0] - ingest.heading(example.clip)[0])
+    turn = quat.from_axis_angle(UP, ingest.heading(like.clip)[0] - ingest.heading(example.clip)[0])
     return quat.rotate(np.broadcast_to(turn, (1, 1, 4)), around(example))
 
 
 def test_the_line_of_the_heading_goes_on():
     """A pelvis swings: fitted anew, the line would depend on where in the swing it begins."""
     whole = cycle(0.0)
-    quarter = phase_alignment.begin(whole, 0.25)
+    quarter = phase_alignment.shift_start(whole, 0.25)
     expected = ingest.heading(whole.clip)[25] - 0.25 * 0.3
     assert ingest.heading(quarter.clip)[0] == pytest.approx(expected, abs=1e-6)
-    fitted = ingest.heading(ingest.set_out(quarter.clip))[0]
+    fitted = ingest.heading(ingest.straighten_gait(quarter.clip))[0]
     assert abs(fitted - expected) > 0.01
 
 
 def test_a_whole_cycle_later_is_the_same_clip():
     whole = cycle(0.0)
-    assert phase_alignment.begin(whole, 1.0) is whole
-    assert phase_alignment.begin(whole, 0.3 * HALF_A_FRAME) is whole
+    assert phase_alignment.shift_start(whole, 1.0) is whole
+    assert phase_alignment.shift_start(whole, 0.3 * HALF_A_FRAME) is whole
 
 
 def test_landmarks_move_with_the_cycle():
-    found = phase_alignment.begin(cycle(0.0, landmarks=(0.2, 0.9)), 0.1)
+    found = phase_alignment.shift_start(cycle(0.0, landmarks=(0.2, 0.9)), 0.1)
     assert found.landmarks == pytest.approx((0.1, 0.8))
     assert found.shift == pytest.approx(0.1)
 
@@ -140,25 +140,25 @@ def test_a_landmark_that_would_pass_the_cut_is_refused():
 def test_the_frames_say_where_a_cycle_begins_unless_the_recipe_says_else(cuts, begin):
     own = recipe_with(motion={"cyclic": True}, alignment={"begin": begin} if begin else {})
     family = tuple(cycle(cut) for cut in cuts)
-    assert phase_alignment.in_phase(own, family, np.ones(5)) is family
+    assert phase_alignment.align_phases(own, family, np.ones(5)) is family
 
 
 def test_what_is_no_cycle_has_a_beginning(cuts):
     family = tuple(cycle(cut) for cut in cuts)
     open_ended = recipe_with(alignment={"begin": "in_phase"})
-    assert phase_alignment.in_phase(open_ended, family, np.ones(5)) is family
+    assert phase_alignment.align_phases(open_ended, family, np.ones(5)) is family
 
 
 def test_in_place_stays_in_place():
     walker = cycle(0.0)
-    standing = replace(walker, clip=ingest.stay(walker.clip))
-    kept = phase_alignment.begin(standing, 0.3, in_place=True).clip.root_path
+    standing = replace(walker, clip=ingest.remove_drift(walker.clip))
+    kept = phase_alignment.shift_start(standing, 0.3, in_place=True).clip.root_path
     assert np.abs((kept[-1] - kept[0]) * (1.0 - UP)).max() < ROUNDING
 
 
 def test_large_shifts_are_noted():
-    found = [phase_alignment.begin(cycle(0.0), share) for share in (0.05, 0.2, -0.1)]
-    assert phase_alignment.notes(found) == [
+    found = [phase_alignment.shift_start(cycle(0.0), share) for share in (0.05, 0.2, -0.1)]
+    assert phase_alignment.shift_notes(found) == [
         "line 2, x.bvh: begun 20% of its cycle later than it was cut",
         "line 2, x.bvh: begun 10% of its cycle earlier than it was cut",
     ]

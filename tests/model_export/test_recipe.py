@@ -331,7 +331,7 @@ def test_what_a_message_shows_of_a_value_is_bounded(read):
 
 
 def test_the_size_of_a_recipe_is_bounded(read, tmp_path):
-    filled = MINIMAL + "#" * (recipe.MOST_BYTES - len(MINIMAL))
+    filled = MINIMAL + "#" * (recipe.MAX_BYTES - len(MINIMAL))
     assert read(filled).name == "tiny"
     with pytest.raises(RecipeError) as caught:
         read(filled + "#")
@@ -481,7 +481,7 @@ def test_what_is_measured_knows_its_unit_and_keeps_the_schema(read, schema, auto
     text = measured(auto, changes)
     found = read(text)
     assert [control.unit for control in found.measured] == [unit]
-    assert found.typed == []
+    assert found.column_controls == []
     jsonschema.Draft202012Validator(schema).validate(tomllib.loads(text))
 
 

@@ -11,7 +11,7 @@ from model_files import written
 from posefield.common.errors import ModelError
 from posefield_train.adapt import canonical_clips, model_reconstruction
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.kriging_bank import Constant
+from posefield_train.kriging.kriging_bank import ConstantModel
 
 # What float32 may cost, m.
 SAME = 1e-5
@@ -24,7 +24,7 @@ def content(labelled_path):
 
 @pytest.fixture(scope="module")
 def reopened(content):
-    return model_reconstruction.reopen(content, "labelled.onnx")
+    return model_reconstruction.reconstruct(content, "labelled.onnx")
 
 
 def asked(model, count=200):
@@ -66,8 +66,8 @@ def test_what_the_fields_were_laid_through_comes_back(labelled, reopened):
     for name, field in bank.others.items():
         expected = labelled.values[name]
         scale = np.ptp(expected, axis=0).max()
-        assert np.abs(bank.at_samples(name) - expected).max() < 1e-4 * scale
-        assert isinstance(field, Constant) == (name not in reopened.making.fields)
+        assert np.abs(bank.sample_values(name) - expected).max() < 1e-4 * scale
+        assert isinstance(field, ConstantModel) == (name not in reopened.making.fields)
     fields = {n: (3.0 * v[0], *v[1:]) for n, v in reopened.making.fields.items()}
     wrong = wrong_nuggets(reopened, fields)
     gaps = [np.abs(wrong[name] - labelled.values[name]).max() for name in fields]
@@ -99,7 +99,7 @@ def test_the_motions_of_the_samples_come_back_in_the_cards_order(labelled, reope
 
 
 def test_what_is_known_is_what_training_knows(labelled_recipe, labelled, reopened):
-    expected, found = canonical_clips.known(labelled_recipe, labelled), reopened.known
+    expected, found = canonical_clips.adaptable(labelled_recipe, labelled), reopened.known
     assert np.array_equal(found.joint_weights, expected.joint_weights)
     assert np.array_equal(found.groups, expected.groups)
     assert found.truncation == pytest.approx(expected.truncation, rel=1e-3)
@@ -122,7 +122,7 @@ def test_a_field_whose_making_is_missing_is_named(content):
         entries["posefield.making"] = entries["posefield.making"].replace("warp", "woof")
 
     with pytest.raises(ModelError, match="does not say what its field 'warp' is made with"):
-        model_reconstruction.reopen(rewritten(content, change), "odd.onnx")
+        model_reconstruction.reconstruct(rewritten(content, change), "odd.onnx")
 
 
 def test_a_card_of_another_graph_is_refused(content):
@@ -135,4 +135,4 @@ def test_a_card_of_another_graph_is_refused(content):
         entries["posefield.examples"] = json.dumps(examples)
 
     with pytest.raises(ModelError, match="lists other samples than its graph holds"):
-        model_reconstruction.reopen(rewritten(content, change), "odd.onnx")
+        model_reconstruction.reconstruct(rewritten(content, change), "odd.onnx")

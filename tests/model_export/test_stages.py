@@ -8,17 +8,17 @@ from numpy.random import PCG64, Generator
 from running import outputs
 
 from posefield.motion import quat
-from posefield_train.align.canonical_timing import Timing
+from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
 from posefield_train.kriging import kriging_graph, thinning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.kriging_bank import VARIANCE, Constant, FieldBank
+from posefield_train.kriging.kriging_bank import VARIANCE, ConstantModel, KrigingBank
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.level_tables import Ladder
+from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.tensor import hosvd
-from posefield_train.tensor.decoder import MOTIONS, Decoder, Proportions, Rung
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.decoder import BLOCK_NUMBERS, Decoder, LevelSize, Proportions
+from posefield_train.tensor.hosvd import TuckerTensor
 
 SAMPLES, CONTROLS, BATCH, STEPS = 25, 3, 40, 11
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
@@ -57,9 +57,9 @@ def bank(covariance="matern52", drifts=(1,), constant=(), offsets=None):
             hyper = replace(hyper, drifts=offsets)
         values = own.normal(size=(SAMPLES, size))
         solved = universal_kriging.solve(hyper, samples, values)
-        fields[name] = Constant(values.mean(axis=0)) if name in constant else solved
+        fields[name] = ConstantModel(values.mean(axis=0)) if name in constant else solved
     pose = fields.pop("pose")
-    return FieldBank(LOW, HIGH, (), pose, fields, 0.04)
+    return KrigingBank(LOW, HIGH, (), pose, fields, 0.04)
 
 
 def asked():
@@ -80,7 +80,7 @@ def graph_of(own, ranks):
     """Function that builds the fields of a bank, the pose last, and sigma behind it."""
 
     def build(net, controls):
-        ends = Ladder(kriging_graph.entries(own, ranks)).onnx(net)
+        ends = LevelTables(kriging_graph.entries(own, ranks)).onnx(net)
         return tuple(kriging_graph.onnx(own, net, controls, ends).values())
 
     return build
@@ -103,8 +103,8 @@ LEVELS = ((5, 4), (SAMPLES, 3), (3 * SAMPLES, 3), (4 * SAMPLES, 6))
 
 def coarse_bank():
     """A bank of coarser levels that ask some samples, all of them, and further fields."""
-    own = thinning.ordered(bank())
-    lesson = thinning.lesson(own)
+    own = thinning.sort_samples(bank())
+    lesson = thinning.thinning_data(own)
     weights = tuple(lesson.weights(columns, rank, 0.1) for columns, rank in LEVELS)
     return replace(own, coarse=weights)
 
@@ -135,7 +135,7 @@ def spread(covariance, drifts):
 
 def timing(knots=6):
     own = rng()
-    stage = Timing(WarpBasis(knots), 60)
+    stage = CanonicalTiming(WarpBasis(knots), 60)
     length, logs = own.normal(size=(BATCH, 1)), 0.5 * own.normal(size=(BATCH, knots))
     time = own.uniform(-0.2, 1.3, (BATCH, STEPS)) * np.exp(length)
     time[:, :2] = 0.0, 100.0
@@ -149,7 +149,7 @@ def timing(knots=6):
     duration, place = stage.numpy(length, logs, time)
     assert place.min() == 0.0
     assert place.max() > 58.999
-    wrong = Timing(stage.basis, 61).numpy(length + 0.01, logs, time)
+    wrong = CanonicalTiming(stage.basis, 61).numpy(length + 0.01, logs, time)
     # Frames, of which 0.01 is less than a thousandth of a second; cubes of many knots cancel.
     return Case(found, [duration, place], list(wrong), 2e-4 if knots <= 6 else 1e-2)
 
@@ -181,7 +181,7 @@ def decoder(stage):
     coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
 
     def build(net, coefficients, place):
-        ends = Ladder(stage.entries()).onnx(net)
+        ends = LevelTables(stage.entries()).onnx(net)
         return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)
 
     found = outputs(build, (4, 3), coefficients=coefficients, place=place)
@@ -190,9 +190,9 @@ def decoder(stage):
 
 
 RUNGS = (
-    Rung((5, 4, 3), (0, 1, 2, 3)),
-    Rung((5, 3, 3), (0, 1, 3)),
-    Rung((1, 1, 1), (0,)),
+    LevelSize((5, 4, 3), (0, 1, 2, 3)),
+    LevelSize((5, 3, 3), (0, 1, 3)),
+    LevelSize((1, 1, 1), (0,)),
 )
 
 
@@ -200,19 +200,19 @@ def level_of_decoder(level):
     """Coarser levels, of which some keep joints still; a joint in the middle goes first."""
     own = rng()
     stage = replace(decoder_stage(), coarse=RUNGS)
-    coefficients = own.normal(size=(BATCH, stage.rungs[level].ranks[2]))
+    coefficients = own.normal(size=(BATCH, stage.level_sizes[level].ranks[2]))
     place = own.uniform(0.0, 19.0, (BATCH, STEPS))
     coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
 
     def build(net, coefficients, place):
-        ends = Ladder(stage.entries()).onnx(net)
+        ends = LevelTables(stage.entries()).onnx(net)
         return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)
 
     found = outputs(build, (4, 3), level=level, coefficients=coefficients, place=place)
-    moving = replace(stage, coarse=(*RUNGS[:-1], Rung((1, 1, 1), (0, 1))))
-    other = stage.at(level) if level < 3 else moving.at(level)
+    moving = replace(stage, coarse=(*RUNGS[:-1], LevelSize((1, 1, 1), (0, 1))))
+    other = stage.at_level(level) if level < 3 else moving.at_level(level)
     nearest = other.numpy(coefficients, np.rint(place))
-    return Case(found, list(stage.at(level).numpy(coefficients, place)), list(nearest), 2e-5)
+    return Case(found, list(stage.at_level(level).numpy(coefficients, place)), list(nearest), 2e-5)
 
 
 def poses_at_the_means():
@@ -222,7 +222,7 @@ def poses_at_the_means():
     nothing = np.zeros((3, 6))
 
     def build(net, coefficients, place):
-        ends = Ladder(still.entries()).onnx(net)
+        ends = LevelTables(still.entries()).onnx(net)
         return still.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)[0]
 
     found = outputs(build, (4,), coefficients=nothing, place=np.zeros((3, 2)))
@@ -336,7 +336,7 @@ def test_spread_at_a_sample_is_never_less_than_the_nugget():
 
 
 def test_times_outside_the_clip_count_as_its_ends():
-    stage, logs = Timing(WarpBasis(6), 60), 0.3 * rng().normal(size=(1, 6))
+    stage, logs = CanonicalTiming(WarpBasis(6), 60), 0.3 * rng().normal(size=(1, 6))
     _, place = stage.numpy(np.zeros((1, 1)), logs, np.array([[-5.0, 0.0, 1.0, 9.0]]))
     assert np.max(np.abs(place - [0.0, 0.0, 59.0, 59.0])) < 1e-9
 
@@ -350,7 +350,7 @@ def test_poses_at_whole_frames_are_those_of_the_tensor():
     rotations = quat.mul(stage.means, quat.exp(numbers[..., 3:].reshape(15, 20, 4, 3)))
     assert np.max(np.abs(quat.to_matrix(found[0]) - quat.to_matrix(rotations))) < 1e-12
     assert np.max(np.abs(found[1] - numbers[..., :3])) < 1e-12
-    full = Multilinear(stage.reduced.core[::-1], stage.reduced.bases)
+    full = TuckerTensor(stage.reduced.core[::-1], stage.reduced.bases)
     other = replace(stage, reduced=full).numpy(coefficients, frames)
     assert np.max(np.abs(other[1] - numbers[..., :3])) > 1e-2
 
@@ -358,7 +358,7 @@ def test_poses_at_whole_frames_are_those_of_the_tensor():
 def test_poses_at_one_frame_are_those_at_that_frame():
     stage, coefficients = decoder_stage(), rng().normal(size=(5, 6))
     joints = (0, 1, 3)
-    for decoder in (stage, stage.of_joints(joints)):
+    for decoder in (stage, stage.select_joints(joints)):
         rotations, root = stage.numpy(coefficients, np.full((5, 1), 7.0))
         found = decoder.at_frame(coefficients, 7)
         kept = range(4) if decoder is stage else joints
@@ -372,7 +372,7 @@ def test_poses_in_several_batches_are_those_of_a_few():
     stage, coefficients = decoder_stage(), rng().normal(size=(5, 6))
     few = stage.numpy(coefficients, np.full((5, 1), 7.3))
     r1, r2, _ = stage.reduced.core.shape
-    many = 1 + MOTIONS // (r1 * r2)
+    many = 1 + BLOCK_NUMBERS // (r1 * r2)
     both = stage.numpy(np.resize(coefficients, (many, 6)), np.full((many, 1), 7.3))
     last = (many - 1) % 5
     for one, all_ in zip(few, both, strict=True):

@@ -27,7 +27,7 @@ def reversed_axis(clip):
 
 
 def exchanged(clip):
-    other = list(mirrored_clips.others(clip.skeleton.names))
+    other = list(mirrored_clips.mirrored_joints(clip.skeleton.names))
     return replace(
         clip, rotations=clip.rotations[:, other], translations=clip.translations[:, other]
     )
@@ -36,7 +36,7 @@ def exchanged(clip):
 def lying(clip):
     """A file with Z up that was read as if Y were."""
     turn = np.broadcast_to(
-        quat.about(np.array([1.0, 0.0, 0.0]), np.array(np.pi / 2)), (len(clip), 4)
+        quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(np.pi / 2)), (len(clip), 4)
     )
     rotations, translations = clip.rotations.copy(), clip.translations.copy()
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])
@@ -64,7 +64,7 @@ def kicking(clip):
     bell = np.exp(-0.5 * ((np.linspace(0.0, 1.0, len(clip)) - 0.5) / 0.15) ** 2)
     joint = clip.skeleton.names.index("RightUpLeg")
     rotations = clip.rotations.copy()
-    kick = quat.about(np.array([1.0, 0.0, 0.0]), -1.8 * bell)
+    kick = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), -1.8 * bell)
     rotations[:, joint] = quat.mul(rotations[:, joint], kick)
     return replace(clip, rotations=rotations)
 
@@ -131,7 +131,9 @@ def test_a_clean_family_has_no_strangers(trained):
 def test_strangers_stand_on_the_card_and_train_on(small_recipe, examples):
     trained = planted(small_recipe, examples, kicking(examples[PLANTED].clip))
     assert len(trained.examples) == len(examples)
-    notes = onnx_export.export(small_recipe, trained, ["said before"]).card.diagnostics["notes"]
+    notes = onnx_export.export_model(small_recipe, trained, ["said before"]).card.diagnostics[
+        "notes"
+    ]
     assert notes[0] == "said before"
     assert notes[1] == trained.outlier_notes()[0]
 

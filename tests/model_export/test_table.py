@@ -213,7 +213,7 @@ def test_the_number_of_columns_is_bounded(refused):
 
 
 def test_the_size_of_a_table_is_bounded(refused):
-    fault = refused("file,v\n" + " " * clip_table.MOST_BYTES)
+    fault = refused("file,v\n" + " " * clip_table.MAX_BYTES)
     assert fault.message == "found more than 16000 kB, expected a table of at most 16000 kB"
 
 

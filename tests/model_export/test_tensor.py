@@ -7,7 +7,7 @@ import pytest
 
 from posefield.motion import quat, skeleton
 from posefield_train.align import time_alignment
-from posefield_train.align.time_alignment import Aligned
+from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.tensor import motion_tensor, pose_metric, pose_vectors
 
 PARENTS = (-1, 0, 1, 2, 1)
@@ -24,7 +24,7 @@ def family(rng, size):
     rotations = quat.mul(quat.exp(rng.normal(size=(5, 3))), quat.exp(swing))
     root = size * np.cos(time[..., 0] + rng.normal(size=(CLIPS, 1, 3))) + [0.0, 0.9, 0.0]
     root[..., 2] = 0.25
-    return Aligned(rotations, root, np.zeros((CLIPS, 6)), np.ones(CLIPS), 0)
+    return AlignedClips(rotations, root, np.zeros((CLIPS, 6)), np.ones(CLIPS), 0)
 
 
 @pytest.fixture
@@ -40,15 +40,15 @@ def offsets(rng):
 
 def build(aligned, offsets):
     numbers, own_chart, _ = motion_tensor.pose_vectors(aligned, PARENTS, offsets)
-    return motion_tensor.build(numbers, own_chart, PARENTS, offsets, WEIGHTS)
+    return motion_tensor.build_tensor(numbers, own_chart, PARENTS, offsets, WEIGHTS)
 
 
 def skin(aligned, offsets):
     """Points (N, T, J, 6, 3) on the skin around every joint."""
     translations = np.repeat(offsets[:, None], FRAMES, axis=1)
     translations[:, :, 0] = aligned.root_path
-    positions, turns = skeleton.forward(PARENTS, aligned.rotations, translations)
-    axes = pose_metric.SHELL * np.vstack([np.eye(3), -np.eye(3)])
+    positions, turns = skeleton.forward_kinematics(PARENTS, aligned.rotations, translations)
+    axes = pose_metric.SHELL_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
     return positions[..., None, :] + quat.rotate(turns[..., None, :], axes)
 
 
@@ -109,7 +109,7 @@ def test_order_of_clips_is_the_order_of_slices(small, offsets, rng):
     order = rng.permutation(CLIPS)
     # So few frames that the metric is an average over all poses, not over some of them.
     few = replace(small, rotations=small.rotations[:, ::6], root_path=small.root_path[:, ::6])
-    assert CLIPS * len(few.root_path[0]) <= pose_metric.POSES
+    assert CLIPS * len(few.root_path[0]) <= pose_metric.SAMPLED_POSES
     shuffled = replace(few, rotations=few.rotations[order], root_path=few.root_path[order])
     first, second = build(few, offsets), build(shuffled, offsets[order])
     assert np.max(np.abs(second.values - first.values[..., order])) < 1e-9
@@ -117,15 +117,17 @@ def test_order_of_clips_is_the_order_of_slices(small, offsets, rng):
 
 
 def test_facing_of_the_whole_family_changes_no_distance(small, offsets):
-    turn = quat.about(np.array([0.0, 1.0, 0.0]), np.array(np.radians(178.0)))
+    turn = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.radians(178.0)))
     rotations = small.rotations.copy()
     rotations[:, :, 0] = quat.mul(turn, rotations[:, :, 0])
-    away = Aligned(rotations, quat.rotate(turn, small.root_path), small.logs, small.durations, 0)
+    away = AlignedClips(
+        rotations, quat.rotate(turn, small.root_path), small.logs, small.durations, 0
+    )
     first, second = build(small, offsets), build(away, offsets)
     near = between_pairs(first.values.transpose(2, 1, 0))
     gap = between_pairs(second.values.transpose(2, 1, 0)) / near - 1.0
     assert np.max(np.abs(gap)) < 1e-6
-    identity = pose_vectors.Chart(np.tile(quat.IDENTITY, (5, 1)))
+    identity = pose_vectors.PoseChart(np.tile(quat.IDENTITY, (5, 1)))
     plain = identity.numbers(small.rotations, small.root_path)
     turned = identity.numbers(rotations, away.root_path)
     assert np.max(np.abs(between_pairs(turned) / between_pairs(plain) - 1.0)) > 1e-2
@@ -136,7 +138,7 @@ def test_poses_of_the_tensor_are_the_aligned_poses(rng, offsets):
     wide = family(rng, 0.6)
     own = build(wide, offsets)
     rotations, root = own.chart.poses(own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T)
-    found = time_alignment.positions(
-        Aligned(rotations, root, wide.logs, wide.durations, 0), PARENTS, offsets
+    found = time_alignment.joint_positions(
+        AlignedClips(rotations, root, wide.logs, wide.durations, 0), PARENTS, offsets
     )
-    assert np.max(np.abs(found - time_alignment.positions(wide, PARENTS, offsets))) < 1e-9
+    assert np.max(np.abs(found - time_alignment.joint_positions(wide, PARENTS, offsets))) < 1e-9

@@ -11,7 +11,7 @@ from posefield.motion import skeleton
 from posefield.motion.clip import assemble
 from posefield_train import train
 from posefield_train.evaluate import compared_motion, methods, motion_errors
-from posefield_train.evaluate.methods import Asked
+from posefield_train.evaluate.methods import Queries
 from posefield_train.sample import noise_free
 from posefield_train.sample import sample_controls as ranges
 from posefield_train.source import ingest
@@ -51,7 +51,7 @@ def positions(parents, rotations, root, offsets):
     """Joint positions (N, T, J, 3) with bone offsets (N, J, 3), m."""
     translations = np.repeat(offsets[:, None], rotations.shape[1], axis=1)
     translations[:, :, 0] = root
-    return skeleton.forward(parents, rotations, translations)[0]
+    return skeleton.forward_kinematics(parents, rotations, translations)[0]
 
 
 def at_samples(trained, examples):
@@ -209,13 +209,18 @@ def test_clips_aligned_to_what_others_predict_make_the_better_model(
     figure = examples[0].clip.skeleton
     points = unseen(rng, 40)
     captured = [
-        compared_motion.of_clip(noise_free.clip(point.tolist(), 120.0), None) for point in points
+        compared_motion.motion_of_clip(noise_free.truth_clip(point.tolist(), 120.0), None)
+        for point in points
     ]
 
     def error(made):
-        found = methods.answers(small_recipe, made, Asked(points, [""] * 40)).motions["posefield"]
+        found = methods.predict_all(small_recipe, made, Queries(points, [""] * 40)).motions[
+            "posefield"
+        ]
         pairs = zip(found, captured, strict=True)
-        return motion_errors.mean([motion_errors.compare(a, b, ()) for a, b in pairs]).relative.mean
+        return motion_errors.mean(
+            [motion_errors.compare_motions(a, b, ()) for a, b in pairs]
+        ).relative.mean
 
     def jerked(made):
         offsets = np.stack([example.offsets for example in made.examples])
@@ -225,7 +230,7 @@ def test_clips_aligned_to_what_others_predict_make_the_better_model(
 
     assert error(trained) < 0.92 * error(other)
     assert jerked(trained) < 0.95 * jerked(other)
-    assert trained.missed.mean() < 0.9 * other.missed.mean()
+    assert trained.left_out_errors.mean() < 0.9 * other.left_out_errors.mean()
     basis = trained.model.timing.basis
     for made in (trained, other):
         logs = made.aligned.logs
@@ -280,7 +285,7 @@ def test_ranks_that_the_tensor_does_not_have_are_refused(small_recipe, few):
 
 def test_a_budget_is_kept_and_not_wasted(trained, small_recipe):
     budget = 0.01 * small_recipe.size.rms_budget_cm
-    assert 0.9 * budget < trained.fidelity.rms <= budget
+    assert 0.9 * budget < trained.truncation_errors.rms <= budget
 
 
 def test_progress_is_told_step_by_step(small_recipe, few):

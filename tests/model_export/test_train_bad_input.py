@@ -30,7 +30,7 @@ def model(tmp_path):
         own = recipe_with(**sections)
         examples, notes = ingest.ingest(own, tmp_path)
         trained = train.train(own, examples, lambda _: None)
-        return trained, onnx_export.export(own, trained, notes)
+        return trained, onnx_export.export_model(own, trained, notes)
 
     return of
 
@@ -69,7 +69,7 @@ def turning_arm(angle):
     clip = small_clip()
     rotations = clip.rotations.copy()
     share = np.linspace(0.0, 1.0, len(clip))
-    rotations[:, 3] = quat.about(np.array([0.0, 0.0, 1.0]), share * angle)
+    rotations[:, 3] = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), share * angle)
     return assemble(SKELETON, rotations, clip.root_path, SKELETON.offsets, 30.0)
 
 
@@ -225,7 +225,7 @@ def test_fewer_samples_than_a_line_needs_are_refused(model, count):
 def test_as_many_samples_as_a_line_needs_are_enough(model):
     trained, exported = model(EIGHT[:3])
     assert exported.card.samples == 3
-    assert np.isfinite(trained.missed).all()
+    assert np.isfinite(trained.left_out_errors).all()
 
 
 def test_one_performer_is_told_apart_from_nobody(model):
@@ -246,7 +246,7 @@ def test_two_performers_are_told_apart(model):
     assert exported.card.performers == ("ann", "bob")
     assert notes(exported) == []
     blind, _ = model(apart, rows, "file,v,who")
-    assert trained.missed.mean() < 0.5 * blind.missed.mean()
+    assert trained.left_out_errors.mean() < 0.5 * blind.left_out_errors.mean()
 
 
 @pytest.mark.parametrize("values", [(0, 1) * 4, (0, 1, 2, 2) * 2], ids=["two", "three"])
@@ -254,7 +254,7 @@ def test_a_control_of_few_values_is_taken_and_they_are_listed(model, values):
     trained, exported = model(EIGHT, speeds(*values))
     (control,) = exported.card.controls
     assert control.values == tuple(map(float, sorted(set(values))))
-    assert np.isfinite(trained.missed).all()
+    assert np.isfinite(trained.left_out_errors).all()
     assert np.isfinite([*trained.pose.hyper.scales, trained.pose.hyper.nugget]).all()
 
 
@@ -268,7 +268,7 @@ def test_a_value_that_one_clip_alone_has_is_refused_for_a_line(model):
     with pytest.raises(TrainingError, match=r"without the clip of line 9 .* set kriging.drift to"):
         model(EIGHT, speeds(0, 0, 0, 0, 0, 0, 0, 1))
     trained, _ = model(EIGHT, speeds(0, 0, 0, 0, 0, 0, 0, 1), kriging={"drift": 0})
-    assert np.isfinite(trained.missed).all()
+    assert np.isfinite(trained.left_out_errors).all()
 
 
 def test_clips_of_one_take_make_a_model_that_says_so(model):
@@ -281,6 +281,6 @@ def test_clips_of_one_take_make_a_model_that_says_so(model):
 
 def test_motions_that_are_all_the_same_make_a_model_of_their_mean(model):
     trained, _ = model([EIGHT[0]] * 8)
-    assert np.sqrt(trained.missed.mean()) < 1e-6
+    assert np.sqrt(trained.left_out_errors.mean()) < 1e-6
     answer = trained.model.evaluate(np.array([[0.0], [7.0]]), np.full((2, 1), 0.3))
     assert np.ptp(answer.positions(SKELETON.parents), axis=0).max() < 1e-6

@@ -5,7 +5,7 @@ import numpy as np
 from posefield.common.units import UP
 from posefield.motion import quat
 from posefield_train.align import travel
-from posefield_train.align.time_alignment import Aligned
+from posefield_train.align.time_alignment import AlignedClips
 
 ROUNDING = 1e-12
 
@@ -16,17 +16,19 @@ def cycles(rng):
     swing = np.sin(2 * np.pi * share)[None, :, None, None] * rng.normal(size=(3, 1, 4, 3))
     rotations = quat.exp(0.3 * swing)
     turns = np.array([-0.4, 0.0, 0.9])
-    rotations[:, :, 0] = quat.mul(quat.about(UP, turns[:, None] * share), rotations[:, :, 0])
+    rotations[:, :, 0] = quat.mul(
+        quat.from_axis_angle(UP, turns[:, None] * share), rotations[:, :, 0]
+    )
     ways = rng.normal(size=(3, 2))
     path = 0.1 * np.cos(2 * np.pi * share)[:, None] * np.ones((3, 1, 3))
     path[..., [0, 2]] += share[:, None] * ways[:, None]
-    aligned = Aligned(rotations, path, np.zeros((3, 6)), np.ones(3), 0)
+    aligned = AlignedClips(rotations, path, np.zeros((3, 6)), np.ones(3), 0)
     return aligned, np.column_stack([ways, turns])
 
 
 def test_travel_is_found_and_what_is_left_closes(rng):
     aligned, expected = cycles(rng)
-    closed, found = travel.take_out(aligned)
+    closed, found = travel.remove_travel(aligned)
     assert np.abs(found - expected).max() < ROUNDING
     assert np.array_equal(closed.rotations[:, 0], closed.rotations[:, -1])
     assert np.array_equal(closed.root_path[:, 0], closed.root_path[:, -1])
@@ -36,7 +38,7 @@ def test_travel_is_found_and_what_is_left_closes(rng):
 
 def test_put_back_it_gives_the_clips_again(rng):
     aligned, _ = cycles(rng)
-    closed, found = travel.take_out(aligned)
+    closed, found = travel.remove_travel(aligned)
     share = np.linspace(0.0, 1.0, 20)
     rotations, path = travel.put_back(closed.rotations, closed.root_path, found, share)
     assert np.abs(path - aligned.root_path).max() < ROUNDING
@@ -46,4 +48,7 @@ def test_put_back_it_gives_the_clips_again(rng):
 
 
 def test_errors_of_the_way_count_a_third_of_their_square():
-    assert travel.spread(np.array([[0.3, 0.0, 1.0], [0.0, 0.6, 0.0]])).tolist() == [0.03, 0.12]
+    assert travel.mean_squared_distance(np.array([[0.3, 0.0, 1.0], [0.0, 0.6, 0.0]])).tolist() == [
+        0.03,
+        0.12,
+    ]

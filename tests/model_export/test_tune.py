@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
-from posefield_train.kriging.kriging_tuning import LABELS, NUGGETS, SCALES
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.kriging_tuning import LABEL_BOUNDS, NUGGET_BOUNDS, SCALE_BOUNDS
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 
 
@@ -21,13 +21,13 @@ def wave(samples):
 
 
 def guess(samples, values, covariance="matern52"):
-    experimental = variogram.of_residuals(samples, values, 1)
-    return kriging_tuning.first_guess(experimental, samples.shape[1], covariance, (1,))
+    experimental = variogram.residual_variogram(samples, values, 1)
+    return kriging_tuning.initial_guess(experimental, samples.shape[1], covariance, (1,))
 
 
 def alone(samples):
     """Samples each of its own group, of performers that nobody tells apart."""
-    return Samples(samples, samples.shape[1], np.arange(len(samples)))
+    return SamplePoints(samples, samples.shape[1], np.arange(len(samples)))
 
 
 def tuned_at(samples, values, nugget=None):
@@ -47,14 +47,14 @@ def left_out(hyper, samples, values):
 def test_first_guess_keeps_within_the_bounds(samples, rng):
     for values in (wave(samples), samples.copy(), rng.normal(size=(50, 3)), np.zeros((50, 2))):
         hyper = guess(samples, values)
-        assert np.all((hyper.scales >= SCALES[0]) & (hyper.scales <= SCALES[1]))
-        assert NUGGETS[0] <= hyper.nugget <= NUGGETS[1]
+        assert np.all((hyper.scales >= SCALE_BOUNDS[0]) & (hyper.scales <= SCALE_BOUNDS[1]))
+        assert NUGGET_BOUNDS[0] <= hyper.nugget <= NUGGET_BOUNDS[1]
 
 
 def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
     values = wave(samples) + 0.2 * rng.normal(size=(50, 2))
     hyper = Hyper("matern52", (1,), np.array([1.0, 0.5]), 0.1, 0.0)
-    found = kriging_tuning.fixed(hyper, alone(samples), values)
+    found = kriging_tuning.evaluate_fixed(hyper, alone(samples), values)
     mean_of_others = (values.sum(axis=0) - values) / 49
     share = left_out(hyper, samples, values) / np.sum((values - mean_of_others) ** 2)
     assert abs(found.unexplained - share) < 1e-9
@@ -70,7 +70,7 @@ def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
         universal_kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400)
     )
     values = np.sqrt(2.5) * root @ rng.normal(size=(400, 6))
-    found = kriging_tuning.fixed(hyper, alone(samples), values)
+    found = kriging_tuning.evaluate_fixed(hyper, alone(samples), values)
     # Summed over six values; 2400 squares scatter by three per cent.
     assert abs(found.sill / (6 * 2.5) - 1.0) < 0.1
     unscaled = np.mean(np.sum(np.square(found.residuals), axis=1))
@@ -86,16 +86,20 @@ def test_tuning_leaves_less_than_any_start(samples, rng):
         for nugget in (0.02, 0.3, 2.0):
             start = Hyper("matern52", (1,), np.full(2, scale), nugget, 0.0)
             assert best <= np.sum(
-                np.square(kriging_tuning.fixed(start, alone(samples), values).residuals)
+                np.square(kriging_tuning.evaluate_fixed(start, alone(samples), values).residuals)
             )
-    assert best <= np.sum(np.square(kriging_tuning.fixed(own, alone(samples), values).residuals))
+    assert best <= np.sum(
+        np.square(kriging_tuning.evaluate_fixed(own, alone(samples), values).residuals)
+    )
 
 
 def test_tuned_parameters_keep_within_the_bounds(samples, rng):
     for values in (wave(samples), samples @ np.ones((2, 1)), rng.normal(size=(50, 2))):
         hyper = tuned_at(samples, values).hyper
-        assert np.all((hyper.scales >= SCALES[0] - 1e-12) & (hyper.scales <= SCALES[1] + 1e-12))
-        assert NUGGETS[0] * (1 - 1e-9) <= hyper.nugget <= NUGGETS[1] * (1 + 1e-9)
+        assert np.all(
+            (hyper.scales >= SCALE_BOUNDS[0] - 1e-12) & (hyper.scales <= SCALE_BOUNDS[1] + 1e-12)
+        )
+        assert NUGGET_BOUNDS[0] * (1 - 1e-9) <= hyper.nugget <= NUGGET_BOUNDS[1] * (1 + 1e-9)
 
 
 def test_control_that_matters_more_gets_the_larger_scale(samples):
@@ -133,7 +137,9 @@ def test_controls_explain_a_smooth_field_and_no_noise(samples, rng):
 
 def test_values_that_never_change_count_as_unexplained(samples):
     hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 0.0)
-    assert kriging_tuning.fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
+    assert (
+        kriging_tuning.evaluate_fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
+    )
 
 
 PEOPLE, TAKES = 4, 20
@@ -148,7 +154,7 @@ def people():
 
 def labelled(samples, people):
     who, takes = people
-    return Samples(np.hstack([samples, np.eye(PEOPLE)[who]]), 2, takes)
+    return SamplePoints(np.hstack([samples, np.eye(PEOPLE)[who]]), 2, takes)
 
 
 def own_ways(samples, people, rng, apart):
@@ -165,7 +171,7 @@ def test_groups_are_left_out_together(samples, people, rng):
     values = own_ways(samples, people, rng, 1.0)
     hyper = Hyper("matern52", (0, 1), np.array([1.0, 0.5]), 0.1, 0.8)
     laid = labelled(samples, people)
-    found = kriging_tuning.fixed(hyper, laid, values)
+    found = kriging_tuning.evaluate_fixed(hyper, laid, values)
     residuals, from_mean, variances = np.empty((50, 2)), np.empty((50, 2)), np.empty(50)
     for take in range(TAKES):
         own = people[1] == take
@@ -176,7 +182,9 @@ def test_groups_are_left_out_together(samples, people, rng):
     assert np.max(np.abs(found.residuals - residuals)) < 1e-9
     assert np.max(np.abs(found.variances - variances)) < 1e-9
     assert abs(found.unexplained - np.sum(residuals**2) / np.sum(from_mean**2)) < 1e-9
-    single = kriging_tuning.fixed(hyper, Samples(laid.points, 2, np.arange(50)), values)
+    single = kriging_tuning.evaluate_fixed(
+        hyper, SamplePoints(laid.points, 2, np.arange(50)), values
+    )
     assert np.max(np.abs(single.residuals - residuals)) > 1e-2
     assert abs(single.unexplained - found.unexplained) > 1e-3
 
@@ -185,9 +193,9 @@ def test_performers_who_move_differently_are_told_apart(samples, people, rng):
     values = own_ways(samples, people, rng, 1.0)
     apart = tuned_for(samples, people, values)
     # What counts is the label beside the nugget: this one is far above what alike ones get.
-    assert apart.hyper.label > 4.0 * LABELS[0]
+    assert apart.hyper.label > 4.0 * LABEL_BOUNDS[0]
     blind = kriging_tuning.tune(
-        guess(samples, values), Samples(samples, 2, people[1]), values, None
+        guess(samples, values), SamplePoints(samples, 2, people[1]), values, None
     )
     assert apart.unexplained < 0.5 * blind.unexplained
 
@@ -195,13 +203,13 @@ def test_performers_who_move_differently_are_told_apart(samples, people, rng):
 def test_performers_who_move_alike_are_not_told_apart(samples, people, rng):
     alike = tuned_for(samples, people, own_ways(samples, people, rng, 0.0))
     # At the bound, to which the simplex is clipped.
-    assert alike.hyper.label < 1.2 * LABELS[0]
+    assert alike.hyper.label < 1.2 * LABEL_BOUNDS[0]
 
 
 def test_label_keeps_within_its_bounds(samples, people, rng):
     for apart in (0.0, 0.3, 100.0):
         label = tuned_for(samples, people, own_ways(samples, people, rng, apart)).hyper.label
-        assert LABELS[0] * (1 - 1e-9) <= label <= LABELS[1] * (1 + 1e-9)
+        assert LABEL_BOUNDS[0] * (1 - 1e-9) <= label <= LABEL_BOUNDS[1] * (1 + 1e-9)
     assert tuned_at(samples, wave(samples)).hyper.label == 0.0
 
 
@@ -211,7 +219,9 @@ def test_tuning_with_labels_leaves_less_than_any_start(samples, people, rng):
     for scale in (0.2, 1.2):
         for label in (0.5, 2.0):
             start = Hyper("matern52", (1,), np.full(2, scale), 0.02, label)
-            found = kriging_tuning.fixed(start, labelled(samples, people), values).residuals
+            found = kriging_tuning.evaluate_fixed(
+                start, labelled(samples, people), values
+            ).residuals
             assert best <= np.sum(np.square(found))
 
 

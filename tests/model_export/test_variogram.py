@@ -6,7 +6,14 @@ from scipy.optimize import nnls
 
 from posefield_train.kriging import variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.variogram import CACHED, FAR, FEWEST_PAIRS, LAGS, RANGES, Experimental
+from posefield_train.kriging.variogram import (
+    BATCH_NUMBERS,
+    FEWEST_PAIRS,
+    LAGS,
+    LARGEST_LAG,
+    RANGES,
+    ExperimentalVariogram,
+)
 from posefield_train.tensor import hosvd
 
 TOLERANCE = 1e-9
@@ -28,13 +35,15 @@ def model(covariance, nugget, sill, reach, distances):
 
 def seen(values, distances=None, pairs=None):
     distances = np.linspace(0.1, 2.0, len(values)) if distances is None else distances
-    return Experimental(distances, values, np.full(len(values), 30.0) if pairs is None else pairs)
+    return ExperimentalVariogram(
+        distances, values, np.full(len(values), 30.0) if pairs is None else pairs
+    )
 
 
 def test_lags_hold_the_pairs_of_their_distance(samples, values):
-    found = variogram.experimental(samples, values)
+    found = variogram.experimental_variogram(samples, values)
     gaps = np.linalg.norm(samples[:, None] - samples, axis=-1)
-    width = FAR * gaps.max() / LAGS
+    width = LARGEST_LAG * gaps.max() / LAGS
     expected = []
     for lag in range(LAGS):
         pairs = [
@@ -52,21 +61,24 @@ def test_lags_hold_the_pairs_of_their_distance(samples, values):
 
 def test_batches_of_pairs_do_not_change_a_distance(samples, rng):
     # Three pairs at a time, and one at a time.
-    for width in (CACHED // 3, CACHED + 1):
+    for width in (BATCH_NUMBERS // 3, BATCH_NUMBERS + 1):
         wide = np.zeros((40, width))
         wide[:, [0, -1]] = rng.normal(size=(40, 2))
-        found = variogram.experimental(samples, wide)
-        narrow = variogram.experimental(samples, wide[:, [0, -1]])
+        found = variogram.experimental_variogram(samples, wide)
+        narrow = variogram.experimental_variogram(samples, wide[:, [0, -1]])
         assert np.max(np.abs(found.values - narrow.values)) < TOLERANCE
         assert (
-            np.max(np.abs(found.values - variogram.experimental(samples, wide[:, :1]).values)) > 0.1
+            np.max(
+                np.abs(found.values - variogram.experimental_variogram(samples, wide[:, :1]).values)
+            )
+            > 0.1
         )
 
 
 def test_order_of_samples_does_not_matter(samples, values, rng):
     order = rng.permutation(40)
-    a = variogram.experimental(samples, values)
-    b = variogram.experimental(samples[order], values[order])
+    a = variogram.experimental_variogram(samples, values)
+    b = variogram.experimental_variogram(samples[order], values[order])
     assert np.max(np.abs(a.values - b.values)) < TOLERANCE
     assert np.array_equal(a.pairs, b.pairs)
 
@@ -76,9 +88,12 @@ def test_dissimilarity_is_the_distance_of_slices_of_the_core_tensor(samples, rng
     full = hosvd.decompose(tensor)
     slices = hosvd.mode_dot(full.core, full.bases[2], 2).reshape(-1, 40).T
     rows = full.bases[2] * np.linalg.norm(hosvd.unfold(full.core, 2), axis=1)
-    by_slices = variogram.experimental(samples, slices).values
-    assert np.max(np.abs(variogram.experimental(samples, rows).values - by_slices)) < TOLERANCE
-    plain = variogram.experimental(samples, full.bases[2]).values
+    by_slices = variogram.experimental_variogram(samples, slices).values
+    assert (
+        np.max(np.abs(variogram.experimental_variogram(samples, rows).values - by_slices))
+        < TOLERANCE
+    )
+    plain = variogram.experimental_variogram(samples, full.bases[2]).values
     assert np.max(np.abs(plain - by_slices)) > 1.0
 
 
@@ -98,7 +113,7 @@ def test_residuals_of_a_linear_field_are_nothing(samples):
 @pytest.mark.parametrize("reach", RANGES[[12, 20, 25]])
 def test_fit_finds_the_model_that_was_put_in(covariance, reach):
     distances = np.linspace(0.05, 2.0, 15)
-    found = variogram.fit(
+    found = variogram.fit_by_grid(
         seen(model(covariance, 0.3, 2.0, reach, distances), distances), covariance
     )
     assert found.range == reach
@@ -107,7 +122,7 @@ def test_fit_finds_the_model_that_was_put_in(covariance, reach):
     other = "exponential" if covariance == "gaussian" else "gaussian"
     assert (
         abs(
-            variogram.fit(
+            variogram.fit_by_grid(
                 seen(model(other, 0.3, 2.0, reach, distances), distances), covariance
             ).nugget
             - 0.3
@@ -120,9 +135,9 @@ def test_fit_finds_the_model_that_was_put_in(covariance, reach):
 def test_without_a_lag_of_pairs_enough_there_is_no_sill(count, rng):
     """As with a control of two values: pairs are at no distance or at the largest."""
     samples = np.repeat([[-1.0], [1.0]], [1, count - 1], axis=0)
-    data = variogram.experimental(samples, rng.normal(size=(count, 2)))
+    data = variogram.experimental_variogram(samples, rng.normal(size=(count, 2)))
     assert len(data.pairs) == 0
-    found = variogram.fit(data, "matern52")
+    found = variogram.fit_by_grid(data, "matern52")
     assert (found.nugget, found.sill, found.range) == (0.0, 0.0, RANGES[-1])
 
 
@@ -146,18 +161,18 @@ def test_fit_is_the_least_weighted_square_over_the_ranges(shape, rng):
         nnls(np.stack([np.ones(15), rising], axis=1) * roots[:, None], values * roots)[1] ** 2
         for rising in 1.0 - COVARIANCES["matern52"].numpy(np.square(distances / RANGES[:, None]))
     )
-    found = variogram.fit(data, "matern52")
+    found = variogram.fit_by_grid(data, "matern52")
     assert found.nugget >= 0.0
     assert found.sill >= 0.0
     assert abs(misfit(found, data, "matern52") - least) < 1e-8 * max(least, 1.0)
-    unweighted = variogram.fit(seen(values, distances, data.values**2), "matern52")
+    unweighted = variogram.fit_by_grid(seen(values, distances, data.values**2), "matern52")
     assert misfit(unweighted, data, "matern52") > least * (1.0 + 1e-6)
 
 
 def test_search_finds_no_worse_a_fit_than_the_grid(samples, values):
-    data = variogram.experimental(samples, variogram.residuals(samples, values, 1))
+    data = variogram.experimental_variogram(samples, variogram.residuals(samples, values, 1))
     for covariance in ("gaussian", "exponential", "matern52"):
-        by_grid = misfit(variogram.fit(data, covariance), data, covariance)
+        by_grid = misfit(variogram.fit_by_grid(data, covariance), data, covariance)
         by_search = misfit(variogram.fit_by_search(data, covariance), data, covariance)
         # The grid's ranges are 10 % apart, which is what the search may gain.
         assert 0.9 * by_grid < by_search < 1.001 * by_grid
@@ -166,7 +181,9 @@ def test_search_finds_no_worse_a_fit_than_the_grid(samples, values):
 def test_trend_passes_for_range_unless_it_is_taken_out(samples, rng):
     trend = samples @ np.array([[3.0], [2.0], [1.0]])
     noise = 0.2 * rng.normal(size=(40, 1))
-    raw = variogram.fit(variogram.experimental(samples, trend + noise), "gaussian")
+    raw = variogram.fit_by_grid(
+        variogram.experimental_variogram(samples, trend + noise), "gaussian"
+    )
     left = variogram.residuals(samples, trend + noise, 1)
-    clean = variogram.fit(variogram.experimental(samples, left), "gaussian")
+    clean = variogram.fit_by_grid(variogram.experimental_variogram(samples, left), "gaussian")
     assert raw.sill > 10.0 * (clean.sill + clean.nugget)

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.interpolate import PchipInterpolator
 
-from posefield_train.align.warp import DENSE, FLOOR, WarpBasis
+from posefield_train.align.warp import FIT_TIMES, MINIMUM_INCREMENT, WarpBasis
 
 TOLERANCE = 1e-12
-EVEN = np.ones(len(DENSE))
+EVEN = np.ones(len(FIT_TIMES))
 ANY_LOGS = st.integers(3, 24).flatmap(
     lambda knots: arrays(float, knots, elements=st.floats(-40.0, 40.0))
 )
@@ -29,7 +29,7 @@ def logs(basis, rng):
 @settings(derandomize=True, database=None, max_examples=300, deadline=None)
 @given(ANY_LOGS)
 def test_any_logs_make_a_warp_of_the_unit_interval_onto_itself(logs):
-    s = WarpBasis(len(logs)).evaluate(logs, DENSE)
+    s = WarpBasis(len(logs)).evaluate(logs, FIT_TIMES)
     assert abs(s[0]) < TOLERANCE
     assert abs(s[-1] - 1.0) < TOLERANCE
     # Where increments of 1e-35 follow one another, a step is less than a rounding of s.
@@ -39,25 +39,25 @@ def test_any_logs_make_a_warp_of_the_unit_interval_onto_itself(logs):
 @settings(derandomize=True, database=None, max_examples=100, deadline=None)
 @given(st.integers(3, 24).flatmap(lambda k: arrays(float, k, elements=st.floats(-3.0, 3.0))))
 def test_warp_of_moderate_logs_rises_everywhere(logs):
-    assert np.diff(WarpBasis(len(logs)).evaluate(logs, DENSE)).min() > 0.0
+    assert np.diff(WarpBasis(len(logs)).evaluate(logs, FIT_TIMES)).min() > 0.0
 
 
 def test_zeros_do_nothing(basis):
-    assert np.max(np.abs(basis.evaluate(np.zeros(basis.knots), DENSE) - DENSE)) < TOLERANCE
+    assert np.max(np.abs(basis.evaluate(np.zeros(basis.knots), FIT_TIMES) - FIT_TIMES)) < TOLERANCE
     uneven = np.linspace(0.0, 0.1, basis.knots)
-    assert np.max(np.abs(basis.evaluate(uneven, DENSE) - DENSE)) > 1e-3
+    assert np.max(np.abs(basis.evaluate(uneven, FIT_TIMES) - FIT_TIMES)) > 1e-3
 
 
 def test_constant_added_to_the_logs_changes_nothing(basis, logs):
-    moved = basis.evaluate(logs + 7.0, DENSE)
-    assert np.max(np.abs(moved - basis.evaluate(logs, DENSE))) < TOLERANCE
+    moved = basis.evaluate(logs + 7.0, FIT_TIMES)
+    assert np.max(np.abs(moved - basis.evaluate(logs, FIT_TIMES))) < TOLERANCE
 
 
 def test_warps_of_a_batch_are_those_of_its_rows(basis, logs):
-    together = basis.evaluate(logs, DENSE)
-    assert together.shape == (20, len(DENSE))
+    together = basis.evaluate(logs, FIT_TIMES)
+    assert together.shape == (20, len(FIT_TIMES))
     for row, own in zip(together, logs, strict=True):
-        assert np.max(np.abs(row - basis.evaluate(own, DENSE))) < TOLERANCE
+        assert np.max(np.abs(row - basis.evaluate(own, FIT_TIMES))) < TOLERANCE
 
 
 def test_own_times_of_each_warp_are_its_own(basis, logs, rng):
@@ -69,19 +69,19 @@ def test_own_times_of_each_warp_are_its_own(basis, logs, rng):
 
 def test_power_form_is_the_same_basis(basis):
     # The hinges of 24 knots are nearly alike: their solution loses four digits.
-    found = basis.powers(DENSE) @ basis.power_form
-    assert np.max(np.abs(found - basis.design(DENSE))) < 1e-8
-    moved = basis.powers(np.minimum(DENSE + 1e-4, 1.0)) @ basis.power_form
-    assert np.max(np.abs(moved - basis.design(DENSE))) > 1e-5
+    found = basis.powers(FIT_TIMES) @ basis.power_form
+    assert np.max(np.abs(found - basis.design(FIT_TIMES))) < 1e-8
+    moved = basis.powers(np.minimum(FIT_TIMES + 1e-4, 1.0)) @ basis.power_form
+    assert np.max(np.abs(moved - basis.design(FIT_TIMES))) > 1e-5
 
 
 def test_inverse_leads_back(basis, logs):
     for own in logs:
-        back = basis.evaluate(own, basis.invert(own, DENSE))
+        back = basis.evaluate(own, basis.invert(own, FIT_TIMES))
         # Straight lines between 501 points.
-        assert np.max(np.abs(back - DENSE)) < 1e-4
-        coarse = np.interp(DENSE, basis.evaluate(own, DENSE[::50]), DENSE[::50])
-        assert np.max(np.abs(basis.evaluate(own, coarse) - DENSE)) > 1e-4
+        assert np.max(np.abs(back - FIT_TIMES)) < 1e-4
+        coarse = np.interp(FIT_TIMES, basis.evaluate(own, FIT_TIMES[::50]), FIT_TIMES[::50])
+        assert np.max(np.abs(basis.evaluate(own, coarse) - FIT_TIMES)) > 1e-4
 
 
 def jumps(warp, breaks, order):
@@ -112,42 +112,42 @@ def test_acceleration_is_continuous(knots, rng):
 
 def test_fit_recovers_the_increments_it_was_made_of(basis, logs):
     for own in logs:
-        fitted = basis.fit(basis.evaluate(own, DENSE), EVEN)
+        fitted = basis.fit(basis.evaluate(own, FIT_TIMES), EVEN)
         true = basis.increments(own)
-        if np.any(true < FLOOR * basis.still):
+        if np.any(true < MINIMUM_INCREMENT * basis.identity):
             continue
         assert np.max(np.abs(basis.increments(fitted) - true)) < 1e-9
         assert np.max(np.abs(basis.increments(np.zeros(basis.knots)) - true)) > 1e-3
 
 
 def test_fit_never_freezes_a_pose(basis):
-    frozen = np.clip(2.0 * DENSE - 0.5, 0.0, 1.0)
+    frozen = np.clip(2.0 * FIT_TIMES - 0.5, 0.0, 1.0)
     fitted = basis.increments(basis.fit(frozen, EVEN))
-    assert np.min(fitted / basis.still) > 0.99 * FLOOR
-    assert np.min(np.diff(basis.evaluate(basis.fit(frozen, EVEN), DENSE))) > 0.0
+    assert np.min(fitted / basis.identity) > 0.99 * MINIMUM_INCREMENT
+    assert np.min(np.diff(basis.evaluate(basis.fit(frozen, EVEN), FIT_TIMES))) > 0.0
     if basis.knots > 4:
-        assert np.min(fitted / basis.still) < 1.01 * FLOOR
+        assert np.min(fitted / basis.identity) < 1.01 * MINIMUM_INCREMENT
 
 
 def test_fit_of_a_noisy_warp_is_a_warp(basis, rng):
-    noisy = DENSE + 0.05 * rng.normal(size=len(DENSE))
-    s = basis.evaluate(basis.fit(noisy, EVEN), DENSE)
+    noisy = FIT_TIMES + 0.05 * rng.normal(size=len(FIT_TIMES))
+    s = basis.evaluate(basis.fit(noisy, EVEN), FIT_TIMES)
     assert np.diff(s).min() > 0.0
     assert np.diff(noisy).min() < 0.0
 
 
 def test_fit_meets_what_weighs_more():
-    basis, wanted = WarpBasis(6), np.clip(2.0 * DENSE - 0.5, 0.0, 1.0)
+    basis, wanted = WarpBasis(6), np.clip(2.0 * FIT_TIMES - 0.5, 0.0, 1.0)
     weights = EVEN.copy()
     weights[150] = 1e5
-    heavy = basis.evaluate(basis.fit(wanted, weights), DENSE)[150]
-    light = basis.evaluate(basis.fit(wanted, EVEN), DENSE)[150]
+    heavy = basis.evaluate(basis.fit(wanted, weights), FIT_TIMES)[150]
+    light = basis.evaluate(basis.fit(wanted, EVEN), FIT_TIMES)[150]
     assert abs(heavy - wanted[150]) < 1e-3 < abs(light - wanted[150])
 
 
 def test_fit_leaves_the_weights_as_they_were():
     weights = EVEN.copy()
-    WarpBasis(6).fit(DENSE, weights)
+    WarpBasis(6).fit(FIT_TIMES, weights)
     assert np.array_equal(weights, EVEN)
 
 

@@ -12,7 +12,7 @@ import posefield
 from posefield.common.errors import InvalidField
 from posefield.http.access import access_policy, api_keys
 from posefield.http.api import contract, settings
-from posefield.http.api.problems import RequestFault
+from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
 from posefield.http.middleware import request_head
 
@@ -130,7 +130,7 @@ def test_the_port_is_one(objects, container):
 
 
 def test_probes_ask_what_the_contract_has(container):
-    paths = {o.path for o in contract.load().operations if o.method == "GET"}
+    paths = {o.path for o in contract.load_contract().operations if o.method == "GET"}
     asked = {
         name: container[f"{name}Probe"]["httpGet"]["path"] for name in ("liveness", "readiness")
     }
@@ -155,17 +155,17 @@ def test_a_pod_that_goes_has_the_time_it_needs(pod, container):
 def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path):
     """As the service itself checks them before it listens; the address is the image's."""
     mounted = tmp_path / "keys"
-    mounted.write_text(api_keys.line("blender", ["read:*"], api_keys.make()) + "\n")
+    mounted.write_text(api_keys.line("blender", ["read:*"], api_keys.generate_key()) + "\n")
     given = environment(container) | {"POSEFIELD_HOST": "0.0.0.0"}
     assert given["POSEFIELD_KEYS_FILE"] == "/keys/keys"
     given["POSEFIELD_KEYS_FILE"] = str(mounted)
-    own = settings.read(environ=given)
-    access_policy.check_exposure(own, access_policy.of(own))
+    own = settings.read_settings(environ=given)
+    access_policy.check_exposure(own, access_policy.from_settings(own))
     # Negative control.
     del given["POSEFIELD_KEYS_FILE"]
-    open_to_all = settings.read(environ=given)
+    open_to_all = settings.read_settings(environ=given)
     with pytest.raises(InvalidField, match="POSEFIELD_KEYS_FILE"):
-        access_policy.check_exposure(open_to_all, access_policy.of(open_to_all))
+        access_policy.check_exposure(open_to_all, access_policy.from_settings(open_to_all))
 
 
 @pytest.mark.parametrize(
@@ -179,14 +179,14 @@ def test_pods_may_use_the_names_of_the_service(host, objects, container):
     scope = {"raw_path": b"/", "query_string": b"", "http_version": "1.1"}
     limits.check(scope | {"headers": [(b"host", host.encode())]})
     # Negative control.
-    with pytest.raises(RequestFault):
+    with pytest.raises(RequestError):
         limits.check(scope | {"headers": [(b"host", b"evil.example")]})
 
 
 def test_what_is_counted_can_be_read(pod, container):
     told = pod["metadata"]["annotations"]
     assert told["prometheus.io/port"] == environment(container)["POSEFIELD_PORT"]
-    (operation,) = (o for o in contract.load().operations if o.id == "getMetrics")
+    (operation,) = (o for o in contract.load_contract().operations if o.id == "getMetrics")
     assert told["prometheus.io/path"] == operation.path
 
 

@@ -12,72 +12,81 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield_train.adapt import canonical_clips, extended_models, tensor_extension
-from posefield_train.adapt.canonical_clips import Known, Moved
-from posefield_train.adapt.extended_models import Laid
-from posefield_train.adapt.tensor_extension import Extended
+from posefield_train.adapt.canonical_clips import AdaptableModel, CanonicalClips
+from posefield_train.adapt.extended_models import ExtendedSamples
+from posefield_train.adapt.tensor_extension import ExtendedTensor
 from posefield_train.align import travel as travels
-from posefield_train.graph.float_model import Model
+from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.kriging_bank import FieldBank
-from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.kriging.kriging_bank import KrigingBank
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
 from posefield_train.source.ingest import Example
 from posefield_train.tensor.decoder import Decoder
 
 
 @dataclass(frozen=True)
-class Adapted:
+class AdaptedModel:
     """A model with one more performer, and intermediate results.
 
-    missed: mean squared joint distance (k,), m², of each new clip from its leave-one-out
+    left_out_errors: mean squared joint distance (k,), m², of each new clip from its leave-one-out
     prediction.
     """
 
-    model: Model
-    moved: Moved
-    extended: Extended
-    missed: Floats
+    model: FloatModel
+    new_clips: CanonicalClips
+    extended: ExtendedTensor
+    left_out_errors: Floats
 
 
-def adapt(known: Known, examples: Sequence[Example], performer: str) -> Adapted:
+def adapt(known: AdaptableModel, examples: Sequence[Example], performer: str) -> AdaptedModel:
     """Return the model extended by a performer with an unused name and some examples."""
-    begun = canonical_clips.begin(known, examples)
-    return solve(known, canonical_clips.move(known, begun), performer)
+    begun = canonical_clips.align_phase(known, examples)
+    return solve(known, canonical_clips.to_canonical(known, begun), performer)
 
 
-def solve(known: Known, moved: Moved, performer: str) -> Adapted:
+def solve(known: AdaptableModel, moved: CanonicalClips, performer: str) -> AdaptedModel:
     """Return the adapted model for examples that are already in the model's canonical time."""
-    with single_thread.one():
+    with single_thread.single_threaded():
         parents, weights = known.skeleton.parents, known.joint_weights
         extended = tensor_extension.extend(
             known.model, parents, weights, moved.numbers, known.truncation
         )
-        laid = extended_models.lay(known.model.bank, known.groups, moved.examples, performer)
-        return _solved(known.model, moved, extended, laid)
+        laid = extended_models.extend_samples(
+            known.model.bank, known.groups, moved.examples, performer
+        )
+        return _solve(known.model, moved, extended, laid)
 
 
-def _solved(model: Model, moved: Moved, extended: Extended, laid: Laid) -> Adapted:
+def _solve(
+    model: FloatModel, moved: CanonicalClips, extended: ExtendedTensor, laid: ExtendedSamples
+) -> AdaptedModel:
     reduced = extended.full.truncated(extended.ranks)
     pose = universal_kriging.solve(
         laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2]
     )
-    bones, proportions = extended_models.bones(laid, model.bank, model.proportions, moved.offsets)
+    bones, proportions = extended_models.solve_bones(
+        laid, model.bank, model.proportions, moved.offsets
+    )
     durations = np.log(moved.aligned.durations)[:, None]
     new = {**moved.travels, "duration": durations, "warp": moved.aligned.logs}
     solved = {
-        name: extended_models.solve(laid, model.bank, name, values) for name, values in new.items()
+        name: extended_models.solve_extended(laid, model.bank, name, values)
+        for name, values in new.items()
     }
     # Keep the model's order of quantities.
     others = {name: solved.get(name, bones) for name in model.bank.others}
-    missed, sill = _missed(model.bank, laid, moved, extended)
-    bank = FieldBank(laid.low, laid.high, laid.performers, pose, others, sill)
+    missed, sill = _left_out_errors(model.bank, laid, moved, extended)
+    bank = KrigingBank(laid.low, laid.high, laid.performers, pose, others, sill)
     own = extended.tensor
     decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means)
-    adapted = Model(bank, model.timing, decoder, proportions, model.travel)
-    return Adapted(adapted, moved, extended, missed)
+    adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel)
+    return AdaptedModel(adapted, moved, extended, missed)
 
 
-def _missed(old: FieldBank, laid: Laid, moved: Moved, extended: Extended) -> tuple[Floats, float]:
+def _left_out_errors(
+    old: KrigingBank, laid: ExtendedSamples, moved: CanonicalClips, extended: ExtendedTensor
+) -> tuple[Floats, float]:
     """Return leave-one-out errors of the new clips, and the sill updated with them.
 
     The errors are mean squared joint distances (k,), m²; the sill is in m².
@@ -89,15 +98,15 @@ def _missed(old: FieldBank, laid: Laid, moved: Moved, extended: Extended) -> tup
     frames = extended.tensor.values.shape[1]
     missed = np.sum(np.square(residuals), axis=1) / (extended.tensor.weight * frames)
     for values in moved.travels.values():
-        missed += travels.spread(_travel_residuals(old, laid, values))
+        missed += travels.mean_squared_distance(_travel_residuals(old, laid, values))
     n = len(points) - k
     return missed, float((n * old.sill + np.sum(missed / variances)) / (n + k))
 
 
-def _travel_residuals(old: FieldBank, laid: Laid, new: Floats) -> Floats:
+def _travel_residuals(old: KrigingBank, laid: ExtendedSamples, new: Floats) -> Floats:
     """Return leave-one-out residuals (k, 3) of the new clips' travel, m."""
-    field, both = old.others["travel"], np.vstack([old.at_samples("travel"), new])
-    if isinstance(field, Kriging):
+    field, both = old.others["travel"], np.vstack([old.sample_values("travel"), new])
+    if isinstance(field, UniversalKriging):
         hyper, groups = laid.hyper(field.hyper), laid.samples.groups
         left_out = universal_kriging.leave_out(hyper, laid.samples.points, groups)
         return left_out[-len(new) :] @ both

@@ -12,22 +12,22 @@ from posefield.common.units import Floats
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import Control, ModelCard
 from posefield_train.adapt import adaptation, canonical_clips, new_clips
-from posefield_train.adapt.adaptation import Adapted
-from posefield_train.adapt.model_reconstruction import Reopened
+from posefield_train.adapt.adaptation import AdaptedModel
+from posefield_train.adapt.model_reconstruction import ReconstructedModel
 from posefield_train.graph import level_errors, onnx_export, truncation_cost
-from posefield_train.graph.level_errors import Exam
-from posefield_train.graph.levels import FINALS, QUESTIONS, Laddered, Workshop
-from posefield_train.graph.onnx_export import FEW_VALUES, Exported
+from posefield_train.graph.level_errors import LevelTest
+from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, ModelLevels
+from posefield_train.graph.onnx_export import MAX_LISTED_VALUES, ExportedModel
 from posefield_train.kriging import thinning
-from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
 from posefield_train.source.ingest import Example
 from posefield_train.tensor import truncation_error
-from posefield_train.tensor.truncation_error import Judge, Moment
+from posefield_train.tensor.truncation_error import EventFrame, TruncationReference
 
 
 @dataclass(frozen=True)
-class Newcomer:
+class NewPerformer:
     """Clips of a new performer.
 
     performer: name. examples: the clips. licence: of the clips. notes: findings of the import.
@@ -39,7 +39,7 @@ class Newcomer:
     notes: Sequence[str] = ()
 
 
-def refuse_name(card: ModelCard, performer: str) -> None:
+def check_name(card: ModelCard, performer: str) -> None:
     """Raise InvalidField for a model without performers, or for a known or invalid name."""
     if not card.performers:
         raise InvalidField(
@@ -55,46 +55,48 @@ def refuse_name(card: ModelCard, performer: str) -> None:
         )
 
 
-def make(reopened: Reopened, newcomer: Newcomer) -> Exported:
+def export_adapted(reopened: ReconstructedModel, newcomer: NewPerformer) -> ExportedModel:
     """Return the exported model with the new performer; equal inputs give equal bytes.
 
     Raises InvalidField for an invalid or known name, TrainingError for clips of another action, and
     ExportRefused as `export.finished` does.
     """
-    refuse_name(reopened.card, newcomer.performer)
-    with single_thread.one():
-        begun = canonical_clips.begin(reopened.known, newcomer.examples)
-        examples = new_clips.measured_again(reopened, newcomer.examples, begun)
-        moved = canonical_clips.move(reopened.known, examples)
-        canonical_clips.refuse_strangers(reopened.known, moved)
+    check_name(reopened.card, newcomer.performer)
+    with single_thread.single_threaded():
+        begun = canonical_clips.align_phase(reopened.known, newcomer.examples)
+        examples = new_clips.remeasure(reopened, newcomer.examples, begun)
+        moved = canonical_clips.to_canonical(reopened.known, examples)
+        canonical_clips.refuse_outliers(reopened.known, moved)
         adapted = adaptation.solve(reopened.known, moved, newcomer.performer)
-        laddered = _ladder(reopened, adapted)
-        return onnx_export.finished(
+        laddered = _build_levels(reopened, adapted)
+        return onnx_export.check_and_export(
             laddered.model,
             lambda parity: _card(reopened, adapted, newcomer, laddered.levels, parity),
         )
 
 
-def _ladder(reopened: Reopened, adapted: Adapted) -> Laddered:
+def _build_levels(reopened: ReconstructedModel, adapted: AdaptedModel) -> ModelLevels:
     """Build the levels of detail with the error bounds of the parent model's levels.
 
     Joints are compared with the finest level; the errors of the parent's finest level are added.
     """
-    shop = _workshop(reopened, adapted)
+    shop = _level_builder(reopened, adapted)
     finest, *coarser = reopened.card.levels
     model = shop.model
     for level in coarser:
         allowed = np.sqrt(max(level.rms**2 - finest.rms**2, finest.rms**2))
-        model = shop.lowered(model, level.joints, float(allowed))
-    every = range(len(model.decoder.rungs))
-    return Laddered(model, tuple(_as_lost(shop.level(model, n), finest) for n in every))
+        model = shop.with_coarser_level(model, level.joints, float(allowed))
+    every = range(len(model.decoder.level_sizes))
+    return ModelLevels(
+        model, tuple(_add_parent_errors(shop.level(model, n), finest) for n in every)
+    )
 
 
-def _as_lost(found: Level, finest: Level) -> Level:
+def _add_parent_errors(found: Level, finest: Level) -> Level:
     """Add the errors of the parent's finest level in quadrature; the two are independent."""
 
     def both(name: str) -> float:
-        return _short(np.hypot(getattr(found, name), getattr(finest, name)))
+        return _rounded(np.hypot(getattr(found, name), getattr(finest, name)))
 
     return replace(
         found,
@@ -106,38 +108,38 @@ def _as_lost(found: Level, finest: Level) -> Level:
     )
 
 
-def _workshop(reopened: Reopened, adapted: Adapted) -> Workshop:
+def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> LevelBuilder:
     known, extended = reopened.known, adapted.extended
-    parents, moment = known.skeleton.parents, _moment(reopened.card)
-    bank = thinning.ordered(adapted.model.bank)
-    offsets = adapted.model.proportions.numpy(adapted.model.bank.at_samples("offsets"))
+    parents, moment = known.skeleton.parents, _event_frame(reopened.card)
+    bank = thinning.sort_samples(adapted.model.bank)
+    offsets = adapted.model.proportions.numpy(adapted.model.bank.sample_values("offsets"))
     whole = truncation_error.positions(extended.tensor, extended.tensor.values, parents, offsets)
-    uncut = level_errors.uncut(adapted.model, extended.full)
+    uncut = level_errors.untruncated(adapted.model, extended.full)
 
-    def exam(questions: int) -> Exam:
-        return level_errors.against(uncut, parents, moment, questions)
+    def exam(questions: int) -> LevelTest:
+        return level_errors.level_test_against(uncut, parents, moment, questions)
 
-    return Workshop(
+    return LevelBuilder(
         extended.full,
         replace(adapted.model, bank=bank),
         {"rms": 1.0},
-        Judge(extended.tensor, parents, offsets, known.joint_weights, moment, whole),
-        exam(QUESTIONS),
+        TruncationReference(extended.tensor, parents, offsets, known.joint_weights, moment, whole),
+        exam(TEST_INPUTS),
         exam(FINALS),
-        thinning.lesson(bank),
+        thinning.thinning_data(bank),
     )
 
 
-def _moment(card: ModelCard) -> Moment | None:
+def _event_frame(card: ModelCard) -> EventFrame | None:
     if card.event is None:
         return None
-    return Moment(card.event.joint, round((card.frames - 1) * card.event.share))
+    return EventFrame(card.event.joint, round((card.frames - 1) * card.event.share))
 
 
 def _card(
-    reopened: Reopened,
-    adapted: Adapted,
-    newcomer: Newcomer,
+    reopened: ReconstructedModel,
+    adapted: AdaptedModel,
+    newcomer: NewPerformer,
     levels: tuple[Level, ...],
     parity: float,
 ) -> ModelCard:
@@ -145,12 +147,16 @@ def _card(
 
     The rest pose of the skeleton stays that of the parent, so bound characters stay valid.
     """
-    old, bank, clips = reopened.card, adapted.model.bank, adapted.moved.examples
+    old, bank, clips = reopened.card, adapted.model.bank, adapted.new_clips.examples
     own = tuple(tuple(map(float, clip.controls)) for clip in clips)
-    seconds = (*old.durations, *adapted.moved.aligned.durations.tolist())
-    left_out = (*old.left_out, *map(_short, np.sqrt(adapted.missed)))
+    seconds = (*old.durations, *adapted.new_clips.aligned.durations.tolist())
+    left_out = (*old.left_out, *map(_rounded, np.sqrt(adapted.left_out_errors)))
     fields = bank.others.items()
-    made = {n: onnx_export.solved_with(f.hyper) for n, f in fields if isinstance(f, Kriging)}
+    made = {
+        n: onnx_export.kriging_settings(f.hyper)
+        for n, f in fields
+        if isinstance(f, UniversalKriging)
+    }
     return replace(
         old,
         controls=_controls(old.controls, np.array([*old.examples, *own])),
@@ -162,7 +168,7 @@ def _card(
         moved_by=tuple(np.argmax(bank.pose.samples[:, len(bank.low) :], axis=1).tolist()),
         sources=(*old.sources, *(clip.row.source for clip in clips)),
         left_out=left_out,
-        kriging=onnx_export.plainly(bank.pose.hyper),
+        kriging=onnx_export.plain_parameters(bank.pose.hyper),
         making=replace(reopened.making, fields=made),
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
@@ -177,16 +183,18 @@ def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
             minimum=float(own.min()),
             maximum=float(own.max()),
             default=float(np.sort(own)[len(own) // 2]),
-            values=tuple(np.unique(own).tolist()) if len(np.unique(own)) <= FEW_VALUES else (),
+            values=tuple(np.unique(own).tolist())
+            if len(np.unique(own)) <= MAX_LISTED_VALUES
+            else (),
         )
         for control, own in zip(old, values.T, strict=True)
     )
 
 
 def _diagnostics(
-    reopened: Reopened,
-    adapted: Adapted,
-    newcomer: Newcomer,
+    reopened: ReconstructedModel,
+    adapted: AdaptedModel,
+    newcomer: NewPerformer,
     left_out: Sequence[float],
     parity: float,
 ) -> dict[str, Any]:
@@ -199,35 +207,41 @@ def _diagnostics(
     freedoms, frames, samples = old["tensor"]
     shape = freedoms, frames, samples + len(newcomer.examples)
     kept = model.decoder.reduced.core.shape
-    compression = asdict(truncation_cost.compressed(shape, kept, len(model.bank.low)))
+    compression = asdict(truncation_cost.shape_compression(shape, kept, len(model.bank.low)))
     return {
         **old,
-        "compression": {name: _short(ratio) for name, ratio in compression.items()},
-        "leave_one_out_rms_m": _short(np.sqrt(np.mean(np.square(left_out)))),
-        "scales": [_short(scale) for scale in model.bank.pose.hyper.scales],
+        "compression": {name: _rounded(ratio) for name, ratio in compression.items()},
+        "leave_one_out_rms_m": _rounded(np.sqrt(np.mean(np.square(left_out)))),
+        "scales": [_rounded(scale) for scale in model.bank.pose.hyper.scales],
         "tensor": list(shape),
         "parity_m": float(f"{parity:.1e}"),
         "notes": [*old["notes"], *_notes(reopened, adapted, newcomer)],
     }
 
 
-def _notes(reopened: Reopened, adapted: Adapted, newcomer: Newcomer) -> list[str]:
-    moved, names = adapted.moved, reopened.card.skeleton.names
+def _notes(
+    reopened: ReconstructedModel, adapted: AdaptedModel, newcomer: NewPerformer
+) -> list[str]:
+    moved, names = adapted.new_clips, reopened.card.skeleton.names
     listed = ", ".join(example.row.source for example in moved.examples)
     parent = f"{reopened.card.name}@{reopened.digest[:16]}"
     said = f"adapted from {parent} to {newcomer.performer!r} by {len(moved.examples)} clips"
     adapting = f"{said}: {listed}"
-    return [adapting, *newcomer.notes, *onnx_export.found(moved.findings, moved.examples, names)]
+    return [
+        adapting,
+        *newcomer.notes,
+        *onnx_export.finding_notes(moved.findings, moved.examples, names),
+    ]
 
 
-def _provenance(reopened: Reopened, newcomer: Newcomer) -> Mapping[str, Any]:
+def _provenance(reopened: ReconstructedModel, newcomer: NewPerformer) -> Mapping[str, Any]:
     """Return the parent's provenance with its digest and the source of the new clips appended."""
     old = reopened.card.provenance
     step = {
         "parent_sha256": reopened.digest,
         "performer": newcomer.performer,
         "clips": len(newcomer.examples),
-        "data_sha256": onnx_export.digest(
+        "data_sha256": onnx_export.data_digest(
             {f"{i} {e.row.place.name}": e for i, e in enumerate(newcomer.examples)}
         ),
         "licence": newcomer.licence,
@@ -241,5 +255,5 @@ def _provenance(reopened: Reopened, newcomer: Newcomer) -> Mapping[str, Any]:
     }
 
 
-def _short(value: Any) -> float:
+def _rounded(value: Any) -> float:
     return float(f"{float(value):.4g}")

@@ -11,9 +11,9 @@ from posefield.motion.clip import assemble
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment
 from posefield_train.align import travel as travels
-from posefield_train.align.time_alignment import FINE, Aligned, Canon
-from posefield_train.graph.float_model import Model
-from posefield_train.graph.trained_model import Trained
+from posefield_train.align.time_alignment import FINE, AlignedClips, CanonicalTime
+from posefield_train.graph.float_model import FloatModel
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.parallel import single_thread
 from posefield_train.source import bone_lengths, half_turns
@@ -21,16 +21,16 @@ from posefield_train.source.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
-from posefield_train.tensor.pose_vectors import Chart
+from posefield_train.tensor.pose_vectors import PoseChart
 
 # A clip farther from the prediction than this many times sigma of an unseen performer is taken for
 # another action. On three real families held-out performers lie within 1.1, 0.9 and 1.8 times
 # sigma, and clips of another family beyond 2.3 times.
-STRANGE = 2.0
+OUTLIER_SIGMAS = 2.0
 
 
 @dataclass(frozen=True)
-class Known:
+class AdaptableModel:
     """A model of one level with the training data that adaptation needs.
 
     skeleton: of the family. landmarks: their canonical times (M,). joint_weights: (J,). in_phase:
@@ -39,7 +39,7 @@ class Known:
     sample; a group is left out together.
     """
 
-    model: Model
+    model: FloatModel
     skeleton: Skeleton
     landmarks: Floats
     joint_weights: Floats
@@ -49,29 +49,29 @@ class Known:
     groups: Indices
 
     @property
-    def canon(self) -> Canon:
+    def canonical_time(self) -> CanonicalTime:
         """Return the model's canonical time."""
         timing = self.model.timing
-        return Canon(timing.frames, timing.basis, self.landmarks, self.joint_weights)
+        return CanonicalTime(timing.frames, timing.basis, self.landmarks, self.joint_weights)
 
 
-def known(recipe: Recipe, trained: Trained) -> Known:
+def adaptable(recipe: Recipe, trained: TrainedModel) -> AdaptableModel:
     """Return the data that adaptation needs of a model that has just been trained."""
     own, marks = trained.model, [example.landmarks for example in trained.examples]
-    return Known(
+    return AdaptableModel(
         own,
         trained.skeleton,
         np.array(marks).reshape(len(marks), -1).mean(axis=0),
         truncation_error.joint_weights(recipe, trained.examples),
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
         recipe.motion.root == "in_place",
-        trained.fidelity.rms,
-        trained.laid.groups,
+        trained.truncation_errors.rms,
+        trained.samples.groups,
     )
 
 
 @dataclass(frozen=True)
-class Moved:
+class CanonicalClips:
     """New clips in a model's canonical time and chart.
 
     examples: clips at the model's phase. numbers: pose vectors (k, T, D). offsets: (k, J, 3), m.
@@ -81,7 +81,7 @@ class Moved:
     """
 
     examples: tuple[Example, ...]
-    aligned: Aligned
+    aligned: AlignedClips
     numbers: Floats
     offsets: Floats
     travels: dict[str, Floats]
@@ -89,104 +89,110 @@ class Moved:
     distances: Floats
 
 
-def begin(known: Known, examples: Sequence[Example]) -> tuple[Example, ...]:
+def align_phase(adaptable: AdaptableModel, examples: Sequence[Example]) -> tuple[Example, ...]:
     """Shift examples to the phase of the model's cycles if those were aligned in phase."""
-    if not known.in_phase:
+    if not adaptable.in_phase:
         return tuple(examples)
-    with single_thread.one():
-        references = _references(known, examples)
-        return phase_alignment.in_phase_with(
-            examples, references, known.joint_weights, known.in_place
+    with single_thread.single_threaded():
+        references = _references(adaptable, examples)
+        return phase_alignment.align_phases_to(
+            examples, references, adaptable.joint_weights, adaptable.in_place
         )
 
 
-def move(known: Known, examples: Sequence[Example]) -> Moved:
+def to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> CanonicalClips:
     """Warp examples, already at the model's phase, to its canonical time and chart."""
-    with single_thread.one():
-        return _move(known, examples)
+    with single_thread.single_threaded():
+        return _to_canonical(adaptable, examples)
 
 
-def _move(known: Known, examples: Sequence[Example]) -> Moved:
-    references = _references(known, examples)
-    aligned = time_alignment.align_to(examples, references, known.canon)
-    distances = _distances(known, examples, aligned.logs, references)
+def _to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> CanonicalClips:
+    references = _references(adaptable, examples)
+    aligned = time_alignment.align_to(examples, references, adaptable.canonical_time)
+    distances = _distances(adaptable, examples, aligned.logs, references)
     gone = {}
-    if known.model.travel:
-        aligned, gone["travel"] = travels.take_out(aligned)
-    offsets, own_chart = np.stack([e.offsets for e in examples]), Chart(known.model.decoder.means)
-    small = half_turns.small_joints(known.skeleton.parents, offsets.mean(axis=0))
-    rotations, flipped = half_turns.without_flips_from(own_chart.means, aligned.rotations, small)
+    if adaptable.model.travel:
+        aligned, gone["travel"] = travels.remove_travel(aligned)
+    offsets, own_chart = (
+        np.stack([e.offsets for e in examples]),
+        PoseChart(adaptable.model.decoder.means),
+    )
+    small = half_turns.small_joints(adaptable.skeleton.parents, offsets.mean(axis=0))
+    rotations, flipped = half_turns.remove_flips_about(own_chart.means, aligned.rotations, small)
     jumps = [replace(jump, clip=i) for i, e in enumerate(examples) for jump in e.jumps]
-    findings = jumps + flipped + own_chart.far(rotations)
+    findings = jumps + flipped + own_chart.far_joints(rotations)
     numbers = own_chart.numbers(rotations, aligned.root_path)
-    return Moved(tuple(examples), aligned, numbers, offsets, gone, findings, distances)
+    return CanonicalClips(tuple(examples), aligned, numbers, offsets, gone, findings, distances)
 
 
-def _references(known: Known, examples: Sequence[Example]) -> Floats:
-    return np.stack([_expected(known, example) for example in examples])
+def _references(adaptable: AdaptableModel, examples: Sequence[Example]) -> Floats:
+    return np.stack([_predicted_trace(adaptable, example) for example in examples])
 
 
-def _expected(known: Known, example: Example) -> Floats:
+def _predicted_trace(adaptable: AdaptableModel, example: Example) -> Floats:
     """Return the trace (FINE, features) of the model's prediction with the example's bones."""
-    model = known.model
+    model = adaptable.model
     place = np.linspace(0.0, model.timing.frames - 1.0, FINE)[None]
     nobody = np.zeros((1, len(model.bank.performers)))
-    answer = model.posed(example.controls[None], place, nobody, 0)
+    answer = model.outputs_at_frames(example.controls[None], place, nobody, 0)
     motion = answer.rotations[0], answer.root_position[0], example.offsets
-    clip = assemble(known.skeleton, *motion, (FINE - 1) / example.clip.duration)
-    return time_alignment.trace(clip, np.sqrt(known.joint_weights))
+    clip = assemble(adaptable.skeleton, *motion, (FINE - 1) / example.clip.duration)
+    return time_alignment.trace(clip, np.sqrt(adaptable.joint_weights))
 
 
 def _distances(
-    known: Known, examples: Sequence[Example], logs: Floats, references: Floats
+    adaptable: AdaptableModel, examples: Sequence[Example], logs: Floats, references: Floats
 ) -> Floats:
     """Return RMS distances (k,), m, of clips from their references (k, FINE, features)."""
-    times, weights = np.linspace(0.0, 1.0, FINE), known.joint_weights
+    times, weights = np.linspace(0.0, 1.0, FINE), adaptable.joint_weights
     found = []
     for example, log, reference in zip(examples, logs, references, strict=True):
         trace = time_alignment.trace(example.clip, np.sqrt(weights))
-        warped = time_alignment.at(trace, known.canon.basis.invert(log, times))
+        warped = time_alignment.interpolate(
+            trace, adaptable.canonical_time.basis.invert(log, times)
+        )
         squares = np.sum(np.square(warped - reference), axis=1) / weights.sum()
         found.append(np.sqrt(squares.mean()))
     return np.array(found)
 
 
-def refuse_strangers(known: Known, moved: Moved) -> None:
+def refuse_outliers(adaptable: AdaptableModel, moved: CanonicalClips) -> None:
     """Raise TrainingError for the first clip that does not fit the family.
 
     Checked are the size of the bones, and the distance from the prediction, at most STRANGE times
     sigma.
     """
-    _refuse_sizes(known.model, moved.examples)
+    _refuse_other_sizes(adaptable.model, moved.examples)
     for example, distance, sigma in zip(
-        moved.examples, moved.distances, _sigmas(known.model, moved.examples), strict=True
+        moved.examples, moved.distances, _sigmas(adaptable.model, moved.examples), strict=True
     ):
-        if distance > STRANGE * sigma:
+        if distance > OUTLIER_SIGMAS * sigma:
             raise TrainingError(
                 f"{example.row.named}: lies {100 * distance:.1f} cm from what the model expects of "
                 f"somebody never seen, {distance / sigma:.1f} times the {100 * sigma:.1f} cm by "
-                f"which it expects them to differ, expected at most {STRANGE:g} times; is it of "
+                "which it expects them to differ, expected at most "
+                f"{OUTLIER_SIGMAS:g} times; is it of "
                 "another action, cut elsewhere, or in another unit?"
             )
 
 
-def _refuse_sizes(model: Model, examples: Sequence[Example]) -> None:
+def _refuse_other_sizes(model: FloatModel, examples: Sequence[Example]) -> None:
     """Raise TrainingError for bones of another size, which reveal another unit.
 
     Controls measured from the motion can hide a wrong unit.
     """
-    own = model.proportions.numpy(model.bank.at_samples("offsets"))
+    own = model.proportions.numpy(model.bank.sample_values("offsets"))
     usual = np.median(np.linalg.norm(own, axis=-1).sum(axis=-1))
     for example in examples:
         size = np.linalg.norm(example.offsets, axis=-1).sum() / usual
-        if not 1.0 / bone_lengths.SIZE <= size <= bone_lengths.SIZE:
+        if not 1.0 / bone_lengths.SIZE_LIMIT <= size <= bone_lengths.SIZE_LIMIT:
             raise TrainingError(
                 f"{example.row.named}: its bones are {size:.2g} times as long as is usual here, "
-                f"expected at most {bone_lengths.SIZE:g} times either way; in another unit?"
+                f"expected at most {bone_lengths.SIZE_LIMIT:g} times either way; in another unit?"
             )
 
 
-def _sigmas(model: Model, examples: Sequence[Example]) -> Floats:
+def _sigmas(model: FloatModel, examples: Sequence[Example]) -> Floats:
     """Return sigma (k,), m, of an unseen performer at the nearest sampled controls.
 
     Controls are clipped to the sampled range because sigma grows without bound outside it.

@@ -13,16 +13,16 @@ from posefield.common.units import Floats, Indices
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging import coefficient_models, sample_points, universal_kriging
 from posefield_train.kriging.coefficient_models import SAME_BONE
-from posefield_train.kriging.kriging_bank import Constant, Field, FieldBank
-from posefield_train.kriging.kriging_tuning import LABELS, NUGGETS, SCALES
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel, KrigingBank
+from posefield_train.kriging.kriging_tuning import LABEL_BOUNDS, NUGGET_BOUNDS, SCALE_BOUNDS
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.ingest import Example
 from posefield_train.tensor.decoder import Proportions
 
 
 @dataclass(frozen=True)
-class Laid:
+class ExtendedSamples:
     """Samples of a model followed by new ones.
 
     low, high: ends of the sampled ranges (d,). performers: names, in the order of their labels.
@@ -32,7 +32,7 @@ class Laid:
     low: Floats
     high: Floats
     performers: tuple[str, ...]
-    samples: Samples
+    samples: SamplePoints
     growth: Floats
 
     def hyper(self, old: Hyper) -> Hyper:
@@ -40,7 +40,9 @@ class Laid:
         return replace(old, scales=old.scales * self.growth)
 
 
-def lay(bank: FieldBank, old_groups: Indices, examples: Sequence[Example], performer: str) -> Laid:
+def extend_samples(
+    bank: KrigingBank, old_groups: Indices, examples: Sequence[Example], performer: str
+) -> ExtendedSamples:
     """Return the samples of a bank, with groups (n,), followed by examples of a new performer.
 
     New examples are grouped by take for leave-one-out.
@@ -51,46 +53,52 @@ def lay(bank: FieldBank, old_groups: Indices, examples: Sequence[Example], perfo
     low, high = np.minimum(bank.low, new.min(axis=0)), np.maximum(bank.high, new.max(axis=0))
     performers = tuple(sorted((*bank.performers, performer)))
     moved_by = [bank.performers[i] for i in np.argmax(bank.pose.samples[:, d:], axis=1)]
-    labels = sample_points.labels([*moved_by, *([performer] * len(new))], performers)
+    labels = sample_points.performer_labels([*moved_by, *([performer] * len(new))], performers)
     points = np.hstack([half_ranges(np.vstack([old, new]), low, high), labels])
-    groups = np.concatenate([old_groups, 1 + old_groups.max() + sample_points.takes(examples)])
+    groups = np.concatenate(
+        [old_groups, 1 + old_groups.max() + sample_points.take_numbers(examples)]
+    )
     growth = (high - low) / (bank.high - bank.low)
-    return Laid(low, high, performers, Samples(points, d, groups), growth)
+    return ExtendedSamples(low, high, performers, SamplePoints(points, d, groups), growth)
 
 
-def solve(laid: Laid, bank: FieldBank, name: str, new: Floats) -> Field:
+def solve_extended(
+    laid: ExtendedSamples, bank: KrigingBank, name: str, new: Floats
+) -> CoefficientModel:
     """Return one of a bank's other models solved with its old values and new ones (k, m)."""
-    field, old = bank.others[name], bank.at_samples(name)
-    if isinstance(field, Constant):
+    field, old = bank.others[name], bank.sample_values(name)
+    if isinstance(field, ConstantModel):
         # The controls did not explain the old values, so the model stays constant.
         n, k = len(old), len(new)
-        return Constant((n * field.mean + new.sum(axis=0)) / (n + k))
+        return ConstantModel((n * field.mean + new.sum(axis=0)) / (n + k))
     hyper = laid.hyper(field.hyper)
     return universal_kriging.solve(hyper, laid.samples.points, np.vstack([old, new]))
 
 
-def bones(
-    laid: Laid, bank: FieldBank, proportions: Proportions, offsets: Floats
-) -> tuple[Field, Proportions]:
+def solve_bones(
+    laid: ExtendedSamples, bank: KrigingBank, proportions: Proportions, offsets: Floats
+) -> tuple[CoefficientModel, Proportions]:
     """Return the model of bone offsets solved with new clips' (k, J, 3), m, and its directions."""
-    known = bank.at_samples("offsets")
-    old, new, longer = _spanned(proportions, known, offsets)
+    known = bank.sample_values("offsets")
+    old, new, longer = _extend_proportions(proportions, known, offsets)
     both, field = np.vstack([old, new]), bank.others["offsets"]
-    if not isinstance(field, Constant):
+    if not isinstance(field, ConstantModel):
         return universal_kriging.solve(laid.hyper(field.hyper), laid.samples.points, both), longer
     apart = longer.numpy(new) - longer.numpy(old[:1])
     if np.abs(apart).max() <= SAME_BONE:
-        return Constant(old[0]), longer
-    return universal_kriging.solve(_by_performer(laid, bank), laid.samples.points, both), longer
+        return ConstantModel(old[0]), longer
+    return universal_kriging.solve(
+        _performer_parameters(laid, bank), laid.samples.points, both
+    ), longer
 
 
-def _by_performer(laid: Laid, bank: FieldBank) -> Hyper:
+def _performer_parameters(laid: ExtendedSamples, bank: KrigingBank) -> Hyper:
     """Return parameters of a model that is constant for each performer."""
-    scales = SCALES[0] * laid.growth
-    return Hyper(bank.pose.hyper.covariance, (0,), scales, NUGGETS[0], LABELS[1])
+    scales = SCALE_BOUNDS[0] * laid.growth
+    return Hyper(bank.pose.hyper.covariance, (0,), scales, NUGGET_BOUNDS[0], LABEL_BOUNDS[1])
 
 
-def _spanned(
+def _extend_proportions(
     proportions: Proportions, known: Floats, offsets: Floats
 ) -> tuple[Floats, Floats, Proportions]:
     """Return coefficients of old (n, r) and new clips, with directions extended for the new."""
@@ -99,12 +107,12 @@ def _spanned(
     own = centred @ np.linalg.pinv(flat)
     left, values, right = np.linalg.svd(centred - own @ flat, full_matrices=False)
     rank = 0
-    while rank < len(values) and _worst(left, values, right, rank) > SAME_BONE:
+    while rank < len(values) and _largest_residual(left, values, right, rank) > SAME_BONE:
         rank += 1
-    more = right[:rank] * coefficient_models.signs(right[:rank])[:, None]
+    more = right[:rank] * coefficient_models.row_signs(right[:rank])[:, None]
     directions = np.vstack([flat, more]).reshape(-1, *proportions.mean.shape)
     directions[:, 0] = 0.0
-    beyond = left[:, :rank] * values[:rank] * coefficient_models.signs(right[:rank])
+    beyond = left[:, :rank] * values[:rank] * coefficient_models.row_signs(right[:rank])
     return (
         np.pad(known, ((0, 0), (0, rank))),
         np.hstack([own, beyond]),
@@ -112,6 +120,6 @@ def _spanned(
     )
 
 
-def _worst(left: Floats, values: Floats, right: Floats, rank: int) -> float:
+def _largest_residual(left: Floats, values: Floats, right: Floats, rank: int) -> float:
     """Return the largest absolute entry of the remainder of a truncated decomposition."""
     return float(np.abs((left[:, rank:] * values[rank:]) @ right[rank:]).max())

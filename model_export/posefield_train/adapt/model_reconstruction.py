@@ -17,39 +17,39 @@ from posefield.common.units import Floats, Indices
 from posefield.inference import reduced_motion, residual_covariance
 from posefield.kriging import kriging_model
 from posefield.model_file import checked_file, subgraph
-from posefield.model_file.model_card import Making, ModelCard
-from posefield_train.adapt.canonical_clips import Known
-from posefield_train.align.canonical_timing import Timing
+from posefield.model_file.model_card import ModelCard, TrainingParameters
+from posefield_train.adapt.canonical_clips import AdaptableModel
+from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
-from posefield_train.graph.float_model import Model
+from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.kriging_bank import POSE, Constant, Field, FieldBank
-from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.kriging.kriging_bank import POSE, CoefficientModel, ConstantModel, KrigingBank
+from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor.decoder import Decoder, Proportions
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.hosvd import TuckerTensor
 
 # Largest rounding error of sample controls in float32, in half-ranges.
-SAME = 1e-5
+SAMPLE_TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
-class Reopened:
+class ReconstructedModel:
     """A reconstructed model. digest: SHA-256 of the file's content."""
 
-    known: Known
+    known: AdaptableModel
     card: ModelCard
-    making: Making
+    making: TrainingParameters
     digest: str
 
 
 @dataclass(frozen=True)
-class _File:
+class _ModelFile:
     """Arrays of a model file by name, with its card. source: name of the file in errors."""
 
     numbers: Mapping[str, Floats]
     card: ModelCard
-    making: Making
+    making: TrainingParameters
     source: str
 
     def __getitem__(self, name: str) -> Floats:
@@ -61,32 +61,34 @@ class _File:
         return name in self.numbers
 
 
-def load(path: Path) -> Reopened:
+def load(path: Path) -> ReconstructedModel:
     """Return the model of a file; ModelError if it cannot be read."""
-    return reopen(checked_file.read(path), str(path))
+    return reconstruct(checked_file.read(path), str(path))
 
 
-def reopen(content: bytes, source: str) -> Reopened:
+def reconstruct(content: bytes, source: str) -> ReconstructedModel:
     """Return the model of one level, and its card, from the bytes of a file.
 
     source: name of the file in errors. Raises ModelError for an invalid checksum, graph or card.
     """
-    own_card = checked_file.checked(content, source)
-    numbers = {name: _plain(array) for name, array in subgraph.weights(content).items()}
-    file = _File(numbers, own_card, own_card.making, source)
-    return Reopened(_known(file), own_card, own_card.making, checked_file.sha256(content))
+    own_card = checked_file.load_card(content, source)
+    numbers = {name: _as_float64(array) for name, array in subgraph.initializers(content).items()}
+    file = _ModelFile(numbers, own_card, own_card.making, source)
+    return ReconstructedModel(
+        _adaptable(file), own_card, own_card.making, checked_file.sha256(content)
+    )
 
 
-def _plain(array: Any) -> Floats:
+def _as_float64(array: Any) -> Floats:
     return array if np.issubdtype(array.dtype, np.integer) else array.astype(np.float64)
 
 
-def _known(file: _File) -> Known:
+def _adaptable(file: _ModelFile) -> AdaptableModel:
     card, making = file.card, file.making
     bank = _bank(file)
-    model = Model(bank, _timing(file), _decoder(file, bank), _bones(file), _travel(card))
+    model = FloatModel(bank, _timing(file), _decoder(file, bank), _proportions(file), _travel(card))
     names = card.skeleton.names
-    return Known(
+    return AdaptableModel(
         model,
         card.skeleton,
         np.array(list(making.landmarks.values())),
@@ -94,7 +96,7 @@ def _known(file: _File) -> Known:
         making.in_phase,
         card.root == "in_place",
         float(card.diagnostics["truncation_rms_m"]),
-        residual_covariance.groups(card, bank.pose.samples),
+        residual_covariance.leave_out_groups(card, bank.pose.samples),
     )
 
 
@@ -102,47 +104,47 @@ def _travel(card: ModelCard) -> Travel | None:
     return Travel(card.frames) if card.cyclic else None
 
 
-def _timing(file: _File) -> Timing:
-    return Timing(WarpBasis(len(file["warp_still"])), file.card.frames)
+def _timing(file: _ModelFile) -> CanonicalTiming:
+    return CanonicalTiming(WarpBasis(len(file["warp_still"])), file.card.frames)
 
 
-def _bones(file: _File) -> Proportions:
+def _proportions(file: _ModelFile) -> Proportions:
     directions = file["offset_directions"]
     mean = file["offset_mean"].reshape(-1, 3)
     return Proportions(mean, directions.reshape(len(directions), -1, 3))
 
 
-def _bank(file: _File) -> FieldBank:
+def _bank(file: _ModelFile) -> KrigingBank:
     """Return the coefficient models over the samples in the order of the card."""
     card = file.card
     low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
     points = kriging_model.half_ranges(np.array(card.examples), low, high)
     points = np.hstack([points, card.labels])
     order = _order(file, points)
-    others = {name: _other(file, name, points, order) for name in _widths(file)}
-    pose = _solved(file, POSE, (card.kriging, points, order))
-    return FieldBank(low, high, card.performers, pose, others, float(file["sill"]))
+    others = {name: _coefficient_model(file, name, points, order) for name in _widths(file)}
+    pose = _solve_kriging(file, POSE, (card.kriging, points, order))
+    return KrigingBank(low, high, card.performers, pose, others, float(file["sill"]))
 
 
-def _order(file: _File, points: Floats) -> Indices:
+def _order(file: _ModelFile, points: Floats) -> Indices:
     """Return the index (n,) on the card of each sample of the graph."""
     order, held = (
-        residual_covariance.order_of(file.card, file.numbers, points),
+        residual_covariance.importance_order(file.card, file.numbers, points),
         file["samples"][0].T,
     )
-    if np.abs(points[order, : len(file.card.controls)] - held).max() > SAME:
+    if np.abs(points[order, : len(file.card.controls)] - held).max() > SAMPLE_TOLERANCE:
         raise ModelError(file.source, "its card lists other samples than its graph holds")
     return order
 
 
-def _widths(file: _File) -> dict[str, int]:
+def _widths(file: _ModelFile) -> dict[str, int]:
     """Return the number of values of each quantity besides the pose, in their order."""
     travel = {"travel": 3} if file.card.cyclic else {}
     bones, warp = len(file["offset_directions"]), len(file["warp_still"])
     return {**travel, "offsets": bones, "duration": 1, "warp": warp}
 
 
-def _columns(file: _File, name: str) -> slice:
+def _columns(file: _ModelFile, name: str) -> slice:
     """Return the columns of a quantity in the drift weights; the variance takes the first two."""
     start = 2
     for other, width in _widths(file).items():
@@ -152,9 +154,11 @@ def _columns(file: _File, name: str) -> slice:
     return slice(start, None)
 
 
-def _other(file: _File, name: str, points: Floats, order: Indices) -> Field:
+def _coefficient_model(
+    file: _ModelFile, name: str, points: Floats, order: Indices
+) -> CoefficientModel:
     if f"{name}_weights" not in file:
-        return Constant(file["drift_weights"][0, _columns(file, name)])
+        return ConstantModel(file["drift_weights"][0, _columns(file, name)])
     if name not in file.making.fields:
         raise ModelError(file.source, f"its card does not say what its field {name!r} is made with")
     nugget, *drifts = file.making.fields[name]
@@ -164,10 +168,12 @@ def _other(file: _File, name: str, points: Floats, order: Indices) -> Field:
     label = np.sqrt(file["squared_labels"][place].item()) if file.card.performers else 0.0
     scales = np.sqrt(file["squared_scales"][place, :, 0])
     hyper = Hyper(own.covariance, tuple(map(int, drifts)), scales, nugget, label)
-    return _solved(file, name, (hyper, points, order))
+    return _solve_kriging(file, name, (hyper, points, order))
 
 
-def _solved(file: _File, name: str, laid: tuple[Hyper, Floats, Indices]) -> Kriging:
+def _solve_kriging(
+    file: _ModelFile, name: str, laid: tuple[Hyper, Floats, Indices]
+) -> UniversalKriging:
     """Return one kriging model, solved for the sample values recovered from its dual weights."""
     hyper, points, order = laid
     near = np.empty_like(file[f"{name}_weights"])
@@ -177,9 +183,9 @@ def _solved(file: _File, name: str, laid: tuple[Hyper, Floats, Indices]) -> Krig
     return universal_kriging.solve(hyper, points, universal_kriging.values(hyper, points, dual))
 
 
-def _decoder(file: _File, bank: FieldBank) -> Decoder:
+def _decoder(file: _ModelFile, bank: KrigingBank) -> Decoder:
     """Return a decoder with the core's coordinates for the first mode."""
     held = reduced_motion.read(file.numbers, file.card.levels[0])
     core = held.core.transpose(1, 0, 2)
     bases = np.eye(len(core)), held.time, bank.pose.values
-    return Decoder(Multilinear(core, bases), held.mean, held.directions.T, held.rotations)
+    return Decoder(TuckerTensor(core, bases), held.mean, held.directions.T, held.rotations)

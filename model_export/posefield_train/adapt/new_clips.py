@@ -15,15 +15,15 @@ from posefield.model_file.model_card import Control
 from posefield.motion import measures
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.adapt.model_reconstruction import Reopened
+from posefield_train.adapt.model_reconstruction import ReconstructedModel
 from posefield_train.source import bvh, clip_table, data_folder, ingest, measured_controls
-from posefield_train.source.clip_table import Row, Table
+from posefield_train.source.clip_table import ClipRow, ClipTable
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Source
 
 
-def of_files(
-    reopened: Reopened, paths: Sequence[Path], source: Source, performer: str
+def examples_of_files(
+    reopened: ReconstructedModel, paths: Sequence[Path], source: Source, performer: str
 ) -> tuple[list[Example], list[str]]:
     """Return examples of whole files, with all controls measured, and notes on assumptions.
 
@@ -43,16 +43,16 @@ def of_files(
     return _examples(reopened, rows, source, [{} for _ in rows])
 
 
-def of_table(
-    reopened: Reopened, path: Path, source: Source, performer: str
+def examples_of_table(
+    reopened: ReconstructedModel, path: Path, source: Source, performer: str
 ) -> tuple[list[Example], list[str]]:
     """Return examples of a table's rows, and notes on assumptions.
 
     Columns: `file`, relative to the table; optionally `first_frame` and `last_frame`; landmarks;
     controls by name, optional for those that can be measured. Raises RecipeError, naming line and
-    column, for an invalid cell, and as `of_files`.
+    column, for an invalid cell, and as `examples_of_files`.
     """
-    own = clip_table.opened(path)
+    own = clip_table.open_table(path)
     landmarks, controls = reopened.making.landmarks, reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
     own.require(
@@ -65,20 +65,20 @@ def of_table(
     own.expect_only({"file", "first_frame", "last_frame", *landmarks, *(c.name for c in controls)})
     rows, given = [], []
     for line, record in own.records:
-        rows.append(_row_of(own, line, record, performer, tuple(landmarks)))
+        rows.append(_table_row(own, line, record, performer, tuple(landmarks)))
         names = [control.name for control in controls if control.name in record]
         given.append({name: own.number(line, record, name) for name in names})
     clip_table.refuse_repeats(rows)
     return _examples(reopened, rows, source, given)
 
 
-def _row(path: Path, performer: str) -> Row:
-    return Row(path, str(path), None, performer, 0, None, np.zeros(0), ())
+def _row(path: Path, performer: str) -> ClipRow:
+    return ClipRow(path, str(path), None, performer, 0, None, np.zeros(0), ())
 
 
-def _row_of(
-    own: Table, line: int, record: dict[str, str], performer: str, landmarks: tuple[str, ...]
-) -> Row:
+def _table_row(
+    own: ClipTable, line: int, record: dict[str, str], performer: str, landmarks: tuple[str, ...]
+) -> ClipRow:
     first = own.frame(line, record, "first_frame") if "first_frame" in record else 0
     last = own.frame(line, record, "last_frame") if "last_frame" in record else None
     if last is not None and last <= first:
@@ -88,13 +88,16 @@ def _row_of(
     except RecipeError as fault:
         raise RecipeError(own.name, f"column 'file': {fault.message}", line) from fault
     marks = tuple(own.frame(line, record, column) for column in landmarks)
-    return Row(place, own.name, line, performer, first, last, np.zeros(0), marks)
+    return ClipRow(place, own.name, line, performer, first, last, np.zeros(0), marks)
 
 
 def _examples(
-    reopened: Reopened, rows: Sequence[Row], source: Source, given: Sequence[Mapping[str, float]]
+    reopened: ReconstructedModel,
+    rows: Sequence[ClipRow],
+    source: Source,
+    given: Sequence[Mapping[str, float]],
 ) -> tuple[list[Example], list[str]]:
-    files = ingest.read(rows)
+    files = ingest.read_files(rows)
     examples, notes = [], []
     for row, values in zip(rows, given, strict=True):
         example, said = _example(reopened, row, source, files[str(row.place)])
@@ -105,20 +108,20 @@ def _examples(
 
 
 def _example(
-    reopened: Reopened, row: Row, source: Source, file: bvh.BvhFile
+    reopened: ReconstructedModel, row: ClipRow, source: Source, file: bvh.BvhFile
 ) -> tuple[Example, list[str]]:
     own = reopened.card
-    cut, last = ingest.cut(ingest.whole(file, source), row)
-    clip, notes = _of_skeleton(cut, own.skeleton, row)
+    cut, last = ingest.cut_frames(ingest.clip_of_file(file, source), row)
+    clip, notes = _reduce_to_skeleton(cut, own.skeleton, row)
     if source.root_offset is None:
         notes += ingest.offset_notes(file, row)
-    clip, jumps, said = ingest.canonical(clip, row, own.cyclic, own.root == "in_place")
+    clip, jumps, said = ingest.canonicalize(clip, row, own.cyclic, own.root == "in_place")
     marks = ingest.landmarks(row, last)
     nothing = np.full(len(own.controls), np.nan)
     return Example(row, clip, nothing, marks, jumps), notes + said
 
 
-def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str]]:
+def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Clip, list[str]]:
     """Return the clip of the family's joints alone, and a note on its other joints.
 
     Raises RecipeError if joints are missing or have other parents.
@@ -126,14 +129,14 @@ def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str
     own = clip.skeleton
     missing = [name for name in family.names if name not in own.names]
     if missing:
-        raise row.fault(
+        raise row.error(
             f"{row.place} has no joints {missing}, which the model has: expected a clip of the "
             "same skeleton"
         )
     kept = [joint for joint, name in enumerate(own.names) if name in family.names]
-    smaller = ingest.keep(clip, kept) if ingest.closed(own, kept) else None
+    smaller = ingest.keep_joints(clip, kept) if ingest.has_all_parents(own, kept) else None
     if smaller is None or not smaller.skeleton.same_tree(family):
-        raise row.fault(
+        raise row.error(
             f"{row.place} has the model's joints in another order or hierarchy: expected a clip of "
             "the same skeleton"
         )
@@ -142,8 +145,8 @@ def _of_skeleton(clip: Clip, family: Skeleton, row: Row) -> tuple[Clip, list[str
     return smaller, [said] if others else []
 
 
-def measured_again(
-    reopened: Reopened, before: Sequence[Example], after: Sequence[Example]
+def remeasure(
+    reopened: ReconstructedModel, before: Sequence[Example], after: Sequence[Example]
 ) -> list[Example]:
     """Return shifted examples with their measured controls measured again.
 
@@ -157,9 +160,9 @@ def measured_again(
     return found
 
 
-def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) -> Floats:
+def _controls(reopened: ReconstructedModel, example: Example, given: Mapping[str, float]) -> Floats:
     """Return the controls (d,) of an example: given, measured, or else unchanged."""
-    seen = measured_controls.seen(example.clip)
+    seen = measured_controls.measured_quantities(example.clip)
 
     def value(control: Control, own: float) -> float:
         if control.name in given:
@@ -167,14 +170,14 @@ def _controls(reopened: Reopened, example: Example, given: Mapping[str, float]) 
         if control.measure is None:
             return own
         at = _landmark(reopened, control, example) * (len(example.clip) - 1)
-        found = measures.value(control.measure, replace(seen, landmark=at))
+        found = measures.evaluate(control.measure, replace(seen, landmark=at))
         return round(found, measured_controls.DECIMALS) + 0.0
 
     pairs = zip(reopened.card.controls, example.controls.tolist(), strict=True)
     return np.array([value(control, own) for control, own in pairs])
 
 
-def _landmark(reopened: Reopened, control: Control, example: Example) -> float:
+def _landmark(reopened: ReconstructedModel, control: Control, example: Example) -> float:
     """Return the share of the clip at which a control is measured; 0 without landmark."""
     if control.measure is None or control.measure.share is None:
         return 0.0

@@ -10,31 +10,31 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.graph.float_model import Model
+from posefield_train.graph.float_model import FloatModel
 from posefield_train.tensor import hosvd, motion_tensor, pose_metric
 from posefield_train.tensor.decoder import Decoder
-from posefield_train.tensor.hosvd import Multilinear
-from posefield_train.tensor.motion_tensor import CONSTANT, MotionTensor
-from posefield_train.tensor.pose_vectors import Chart
+from posefield_train.tensor.hosvd import TuckerTensor
+from posefield_train.tensor.motion_tensor import CONSTANT_RANGE, MotionTensor
+from posefield_train.tensor.pose_vectors import PoseChart
 
 # Error allowed for a model that was not truncated, m: invisible.
-LEAST = 1e-4
+MINIMUM_NORM = 1e-4
 
 
 @dataclass(frozen=True)
-class Extended:
+class ExtendedTensor:
     """The motion tensor of existing samples followed by new clips.
 
     full: its decomposition at full rank. ranks: those that keep all of it.
     """
 
     tensor: MotionTensor
-    full: Multilinear
+    full: TuckerTensor
     ranks: tuple[int, int, int]
 
 
 @dataclass(frozen=True)
-class _Space:
+class _PoseSpace:
     """Metric of the model's poses, and a basis of its degrees of freedom.
 
     varies: mask (D,) of degrees of freedom that vary. root, inverse: (D', D'), to the metric's
@@ -50,30 +50,34 @@ class _Space:
 
 
 def extend(
-    model: Model, parents: tuple[int, ...], joint_weights: Floats, numbers: Floats, allowed: float
-) -> Extended:
+    model: FloatModel,
+    parents: tuple[int, ...],
+    joint_weights: Floats,
+    numbers: Floats,
+    allowed: float,
+) -> ExtendedTensor:
     """Return the tensor of a model's samples and new pose vectors (k, T, D).
 
     joint_weights: (J,). allowed: root mean square error, m, that truncation may add.
     """
     decoder, weight = model.decoder, float(joint_weights.sum())
     old = _reduced(decoder)
-    space = _space(model, parents, joint_weights, numbers, old)
+    space = _pose_space(model, parents, joint_weights, numbers, old)
     centred = (numbers - decoder.mean)[..., space.varies] @ space.root
     # Each of the two modes gets half of the squared error.
     clips, frames = numbers.shape[:2]
-    budget = max(allowed, LEAST) ** 2 * weight * clips * frames / 2.0
-    directions = _more(space.directions, centred, budget)
+    budget = max(allowed, MINIMUM_NORM) ** 2 * weight * clips * frames / 2.0
+    directions = _extra_directions(space.directions, centred, budget)
     coordinates = (centred @ directions).swapaxes(1, 2)
     times = np.linalg.qr(decoder.reduced.bases[1])[0]
-    longer = _more(times, coordinates, budget)
+    longer = _extra_directions(times, coordinates, budget)
     new = (coordinates @ longer @ longer.T).transpose(1, 2, 0)
     turned = hosvd.mode_dot(old, space.turn, 0)
     turned = np.pad(turned, ((0, len(new) - len(turned)), (0, 0), (0, 0)))
     whole = _tensor(np.concatenate([turned, new], axis=2), space, directions, decoder, weight)
     full = hosvd.decompose(whole.values)
     samples = min(decoder.reduced.core.shape[2] + clips, full.core.shape[2])
-    return Extended(whole, full, (len(new), longer.shape[1], samples))
+    return ExtendedTensor(whole, full, (len(new), longer.shape[1], samples))
 
 
 def _reduced(decoder: Decoder) -> Floats:
@@ -82,26 +86,26 @@ def _reduced(decoder: Decoder) -> Floats:
     return hosvd.mode_dot(hosvd.mode_dot(core, times, 1), samples, 2)
 
 
-def _space(
-    model: Model,
+def _pose_space(
+    model: FloatModel,
     parents: tuple[int, ...],
     joint_weights: Floats,
     numbers: Floats,
     old: Floats,
-) -> _Space:
-    decoder, own_chart = model.decoder, Chart(model.decoder.means)
+) -> _PoseSpace:
+    decoder, own_chart = model.decoder, PoseChart(model.decoder.means)
     known = decoder.mean + old.transpose(2, 1, 0) @ decoder.directions
-    offsets = model.proportions.numpy(model.bank.at_samples("offsets"))
-    gram = motion_tensor.gram(known, own_chart, parents, offsets, joint_weights)
-    moves = np.ptp(numbers.reshape(-1, numbers.shape[-1]), axis=0) > CONSTANT
+    offsets = model.proportions.numpy(model.bank.sample_values("offsets"))
+    gram = motion_tensor.sampled_gram(known, own_chart, parents, offsets, joint_weights)
+    moves = np.ptp(numbers.reshape(-1, numbers.shape[-1]), axis=0) > CONSTANT_RANGE
     varies = moves | np.any(decoder.directions != 0.0, axis=0)
     root, inverse = pose_metric.whitening(gram[np.ix_(varies, varies)])
     mixed = (decoder.directions[:, varies] @ root).T
     directions = hosvd.fix_signs(np.linalg.qr(mixed)[0])
-    return _Space(varies, root, inverse, directions, directions.T @ mixed)
+    return _PoseSpace(varies, root, inverse, directions, directions.T @ mixed)
 
 
-def _more(basis: Floats, rows: Floats, budget: float) -> Floats:
+def _extra_directions(basis: Floats, rows: Floats, budget: float) -> Floats:
     """Extend an orthonormal basis (D, r) by the fewest columns that fit rows (..., D).
 
     budget: largest squared distance of the rows from the extended basis.
@@ -117,10 +121,10 @@ def _more(basis: Floats, rows: Floats, budget: float) -> Floats:
 
 
 def _tensor(
-    values: Floats, space: _Space, directions: Floats, decoder: Decoder, weight: float
+    values: Floats, space: _PoseSpace, directions: Floats, decoder: Decoder, weight: float
 ) -> MotionTensor:
     whiten, unwhiten = np.zeros((2, len(values), len(decoder.mean)))
     whiten[:, space.varies] = directions.T @ space.root
     unwhiten[:, space.varies] = directions.T @ space.inverse
-    own_chart = Chart(decoder.means)
+    own_chart = PoseChart(decoder.means)
     return MotionTensor(values, decoder.mean, whiten, unwhiten.T, own_chart, weight)

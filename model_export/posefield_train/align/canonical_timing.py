@@ -6,11 +6,11 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield_train.align.warp import WarpBasis
-from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 
 @dataclass(frozen=True)
-class Timing:
+class CanonicalTiming:
     """Canonical frames 0 to frames - 1, and the basis of the warps to them."""
 
     basis: WarpBasis
@@ -25,7 +25,7 @@ class Timing:
         u = np.clip(time / durations[:, None], 0.0, 1.0)
         return durations, (self.frames - 1) * self.basis.evaluate(logs, u)
 
-    def onnx(self, net: Net, log_duration: str, logs: str, time: str) -> tuple[str, str]:
+    def onnx(self, net: GraphBuilder, log_duration: str, logs: str, time: str) -> tuple[str, str]:
         """Build durations (B,), s, and canonical frames (B, S, 1)."""
         duration = net("Exp", log_duration)
         share = net("Unsqueeze", net("Div", time, duration), net.indices(2))
@@ -34,7 +34,7 @@ class Timing:
         hinges = net("Relu", net("Sub", u, net.weights("warp_breaks", breaks)))
         cubes = net("Mul", net("Mul", hinges, hinges), hinges)
         powers = net("Concat", u, net("Mul", u, u), cubes, axis=2)
-        still = net.weights("warp_still", np.log(self.basis.still))
+        still = net.weights("warp_still", np.log(self.basis.identity))
         increments = net("Softmax", net("Add", logs, still), axis=1)
         # Scale to frames here, at no extra cost.
         form = (self.frames - 1) * self.basis.power_form.T

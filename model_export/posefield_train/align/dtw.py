@@ -8,7 +8,7 @@ from posefield.common.units import Floats, Indices
 
 # Frames of each step (in the sequence, in the reference). Every step advances in both, and the
 # slope stays between 1/3 and 3, so that no pose is frozen (Sakoe & Chiba 1978).
-STEPS = ((1, 1), (1, 2), (2, 1), (1, 3), (3, 1))
+STEP_PATTERN = ((1, 1), (1, 2), (2, 1), (1, 3), (3, 1))
 # Sequences per block: at 100 frames their tables take 10 MB.
 BATCH = 16
 
@@ -23,22 +23,24 @@ def warp(sequences: Floats, reference: Floats) -> Floats:
     """
     own = np.broadcast_to(reference, (len(sequences), *reference.shape[-2:]))
     starts = range(0, len(sequences), BATCH)
-    return np.concatenate([_warp(sequences[i : i + BATCH], own[i : i + BATCH]) for i in starts])
+    return np.concatenate(
+        [_batch_phases(sequences[i : i + BATCH], own[i : i + BATCH]) for i in starts]
+    )
 
 
-def _warp(sequences: Floats, references: Floats) -> Floats:
+def _batch_phases(sequences: Floats, references: Floats) -> Floats:
     costs = _distances(sequences, references)
-    best, choices = _start(costs), np.zeros(costs.shape, dtype=np.int64)
+    best, choices = _initial_costs(costs), np.zeros(costs.shape, dtype=np.int64)
     for row, reached in _accumulate(costs, best):
         choices[:, row] = np.argmin(reached, axis=0)
     assert np.isfinite(best[:, -1, -1]).all()
-    return np.stack([_phase(choice) for choice in choices])
+    return np.stack([_backtrack(choice) for choice in choices])
 
 
 def total_cost(sequences: Floats, reference: Floats) -> Floats:
     """Return the cost (N,) of the best warp of each sequence to the reference."""
     costs = _distances(sequences, reference)
-    best = _start(costs)
+    best = _initial_costs(costs)
     for _row, _reached in _accumulate(costs, best):
         continue
     return best[:, -1, -1]
@@ -52,7 +54,7 @@ def _distances(sequences: Floats, reference: Floats) -> Floats:
     return np.maximum(squares + own - 2.0 * cross, 0.0)
 
 
-def _start(costs: Floats) -> Floats:
+def _initial_costs(costs: Floats) -> Floats:
     """Return accumulated costs (N, F, F) before the first step, infinite but for the first cell."""
     best = np.full(costs.shape, np.inf)
     best[:, 0, 0] = costs[:, 0, 0]
@@ -66,10 +68,10 @@ def _accumulate(costs: Floats, best: Floats) -> Iterator[tuple[int, Floats]]:
     advances at least one row, so a row of all sequences is one array operation.
     """
     count, rows, columns = costs.shape
-    tolls = [_tolls(costs, down, right) for down, right in STEPS]
+    tolls = [_step_costs(costs, down, right) for down, right in STEP_PATTERN]
     for row in range(1, rows):
-        reached = np.full((len(STEPS), count, columns), np.inf)
-        for index, (down, right) in enumerate(STEPS):
+        reached = np.full((len(STEP_PATTERN), count, columns), np.inf)
+        for index, (down, right) in enumerate(STEP_PATTERN):
             if down <= row:
                 before = best[:, row - down, : columns - right]
                 np.add(before, tolls[index][:, row - down], out=reached[index, :, right:])
@@ -77,7 +79,7 @@ def _accumulate(costs: Floats, best: Floats) -> Iterator[tuple[int, Floats]]:
         yield row, reached
 
 
-def _tolls(costs: Floats, down: int, right: int) -> Floats:
+def _step_costs(costs: Floats, down: int, right: int) -> Floats:
     """Return costs (N, F - down, F - right) of one step into every cell that it can reach.
 
     The cells that the step skips count as part of the path. A step's cost is scaled by its length
@@ -94,12 +96,12 @@ def _tolls(costs: Floats, down: int, right: int) -> Floats:
     return tolls
 
 
-def _phase(choice: Indices) -> Floats:
+def _backtrack(choice: Indices) -> Floats:
     """Return the reference phase at every frame by backtracking the chosen steps."""
     row, column = choice.shape[0] - 1, choice.shape[1] - 1
     rows, columns = [row], [column]
     while row > 0:
-        down, right = STEPS[int(choice[row, column])]
+        down, right = STEP_PATTERN[int(choice[row, column])]
         row, column = row - down, column - right
         rows.append(row)
         columns.append(column)

@@ -21,15 +21,15 @@ from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
 # Steps of a cycle at which it is compared; shifts are interpolated between them.
-STEPS = 96
+PHASE_STEPS = 96
 # A cycle of two nearly equal halves also fits shifted by half. A shift beyond NEAR of the cycle
 # must reduce the squared distance below FAR_WORTH times the best within NEAR.
 NEAR, FAR_WORTH = 0.25, 0.5
 # A shift beyond this share of a cycle is noted.
-LARGE = 0.08
+NOTED_SHIFT = 0.08
 
 
-def in_phase(
+def align_phases(
     recipe: Recipe, examples: tuple[Example, ...], joint_weights: Floats
 ) -> tuple[Example, ...]:
     """Shift examples to the family's phase, if they are cycles and the recipe requests it.
@@ -40,25 +40,25 @@ def in_phase(
     if not recipe.motion.cyclic or recipe.alignment.begin == "as_cut":
         return examples
     traces = np.stack(
-        [_even(time_alignment.trace(e.clip, np.sqrt(joint_weights))) for e in examples]
+        [_resample(time_alignment.trace(e.clip, np.sqrt(joint_weights))) for e in examples]
     )
     found = shifts(traces, recipe.alignment.rounds)
     in_place = recipe.motion.root == "in_place"
     begun = tuple(
-        _measured(recipe, begin(example, share, in_place))
+        _remeasure(recipe, shift_start(example, share, in_place))
         for example, share in zip(examples, found, strict=True)
     )
-    _refuse_parted_landmarks(begun)
+    _refuse_split_landmarks(begun)
     return begun
 
 
-def _measured(recipe: Recipe, begun: Example) -> Example:
+def _remeasure(recipe: Recipe, begun: Example) -> Example:
     """Measure the controls of a shifted example again; travel on an arc depends on the phase."""
-    controls = measured_controls.controls(recipe, begun.row, begun.clip, begun.landmarks)
+    controls = measured_controls.control_values(recipe, begun.row, begun.clip, begun.landmarks)
     return replace(begun, controls=controls)
 
 
-def in_phase_with(
+def align_phases_to(
     examples: Sequence[Example], references: Floats, joint_weights: Floats, in_place: bool
 ) -> tuple[Example, ...]:
     """Shift cyclic examples to the phase of their references (N, F, features).
@@ -66,26 +66,26 @@ def in_phase_with(
     The references are traces of closed cycles at uniform steps.
     """
     traces = np.stack(
-        [_even(time_alignment.trace(e.clip, np.sqrt(joint_weights))) for e in examples]
+        [_resample(time_alignment.trace(e.clip, np.sqrt(joint_weights))) for e in examples]
     )
-    found = _to(traces, np.stack([_even(reference) for reference in references]))
-    return tuple(begin(e, share, in_place) for e, share in zip(examples, found, strict=True))
+    found = _shifts_to(traces, np.stack([_resample(reference) for reference in references]))
+    return tuple(shift_start(e, share, in_place) for e, share in zip(examples, found, strict=True))
 
 
 def shifts(traces: Floats, rounds: int) -> Floats:
     """Return shares of a cycle (N,) at which traces (N, STEPS, features) have a common phase."""
-    found = _gauge(_to(traces, traces[_medoid(traces)]))
+    found = _centre(_shifts_to(traces, traces[_medoid(traces)]))
     for _ in range(rounds):
-        turned = _turned(traces, found)
+        turned = _shift_traces(traces, found)
         others = (turned.sum(axis=0) - turned) / (len(turned) - 1)
-        found = _gauge(found + _to(turned, others))
+        found = _centre(found + _shifts_to(turned, others))
     return found
 
 
-def _even(trace: Floats) -> Floats:
+def _resample(trace: Floats) -> Floats:
     """Resample a closed trace (F, features) to (STEPS, features), without its repeated end."""
-    u = np.arange(STEPS) / STEPS
-    return time_alignment.at(trace, u)
+    u = np.arange(PHASE_STEPS) / PHASE_STEPS
+    return time_alignment.interpolate(trace, u)
 
 
 def _spectra(traces: Floats) -> npt.NDArray[np.complex128]:
@@ -99,7 +99,7 @@ def _costs(traces: Floats, references: Floats) -> Floats:
     """
     cross = np.sum(_spectra(traces) * np.conj(_spectra(references)), axis=-1)
     own = np.sum(np.square(traces), axis=(-2, -1)) + np.sum(np.square(references), axis=(-2, -1))
-    return np.maximum(own[..., None] - 2.0 * np.fft.irfft(cross, STEPS, axis=-1), 0.0)
+    return np.maximum(own[..., None] - 2.0 * np.fft.irfft(cross, PHASE_STEPS, axis=-1), 0.0)
 
 
 def _medoid(traces: Floats) -> int:
@@ -108,37 +108,37 @@ def _medoid(traces: Floats) -> int:
     return int(np.argmin(np.round(totals, 9)))
 
 
-def _to(traces: Floats, references: Floats) -> Floats:
+def _shifts_to(traces: Floats, references: Floats) -> Floats:
     """Return shares of a cycle (N,) in [-0.5, 0.5) that bring traces to their references' phase."""
     costs = _costs(traces, references)
-    shares = np.fft.fftfreq(STEPS)
+    shares = np.fft.fftfreq(PHASE_STEPS)
     near = np.where(np.abs(shares) <= NEAR, costs, np.inf)
     clear = costs.min(axis=1) < FAR_WORTH * near.min(axis=1)
     best = np.argmin(np.where(clear[:, None], costs, near), axis=1)
-    return shares[best] + _beside(costs, best) / STEPS
+    return shares[best] + _parabola_offsets(costs, best) / PHASE_STEPS
 
 
-def _beside(costs: Floats, best: Floats) -> Floats:
+def _parabola_offsets(costs: Floats, best: Floats) -> Floats:
     """Return offsets (N,), in steps, of the minima of parabolas through the best steps."""
     rows = np.arange(len(costs))
-    before, at, after = (costs[rows, (best + side) % STEPS] for side in (-1, 0, 1))
+    before, at, after = (costs[rows, (best + side) % PHASE_STEPS] for side in (-1, 0, 1))
     bend = before - 2.0 * at + after
     return np.where(bend > 0, 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
 
 
-def _turned(traces: Floats, shifts: Floats) -> Floats:
+def _shift_traces(traces: Floats, shifts: Floats) -> Floats:
     """Shift traces (N, STEPS, features) by shares (N,) of their cycles."""
-    turn = np.exp(2j * np.pi * np.arange(STEPS // 2 + 1) * shifts[:, None])
-    return np.fft.irfft(_spectra(traces) * turn[:, :, None], STEPS, axis=1)
+    turn = np.exp(2j * np.pi * np.arange(PHASE_STEPS // 2 + 1) * shifts[:, None])
+    return np.fft.irfft(_spectra(traces) * turn[:, :, None], PHASE_STEPS, axis=1)
 
 
-def _gauge(shifts: Floats) -> Floats:
+def _centre(shifts: Floats) -> Floats:
     """Return the shifts, in [-0.5, 0.5), minus their circular mean."""
     around = np.exp(2j * np.pi * shifts)
     return np.angle(around * np.conj(around.sum())) / (2 * np.pi)
 
 
-def begin(example: Example, share: float, in_place: bool = False) -> Example:
+def shift_start(example: Example, share: float, in_place: bool = False) -> Example:
     """Shift a cyclic example to begin a share of its cycle later, to the nearest frame.
 
     The frames cut off at the start are appended, moved and turned by the cycle's travel.
@@ -148,28 +148,28 @@ def begin(example: Example, share: float, in_place: bool = False) -> Example:
     if frames == 0:
         return example
     own = frames / cycle
-    clip = _rolled(example.clip, frames)
+    clip = _shift_clip(example.clip, frames)
     # The heading changes linearly over the cycle. A line fitted again to the shifted clip would
     # vary with the swing of the pelvis.
-    clip = ingest.place(clip, clip.root_path[0] * (1.0 - UP), _turned_by(example.clip) * own)
+    clip = ingest.place(clip, clip.root_path[0] * (1.0 - UP), _heading_change(example.clip) * own)
     return replace(
         example,
         # The appended frames are turned by the change of heading, which moves the root again.
-        clip=ingest.stay(clip) if in_place else clip,
+        clip=ingest.remove_drift(clip) if in_place else clip,
         landmarks=tuple((mark - own) % 1.0 for mark in example.landmarks),
         shift=own - np.rint(own),
     )
 
 
-def _turned_by(clip: Clip) -> Floats:
+def _heading_change(clip: Clip) -> Floats:
     """Return the change of heading over a closed cycle, rad."""
     first, last = clip.rotations[[0, -1], 0]
     return quat.twist(quat.mul(last, quat.conj(first)), UP)
 
 
-def _rolled(clip: Clip, frames: int) -> Clip:
+def _shift_clip(clip: Clip, frames: int) -> Clip:
     """Shift a closed cycle to begin some frames later."""
-    turn = np.broadcast_to(quat.about(UP, _turned_by(clip)), (frames, 4))
+    turn = np.broadcast_to(quat.from_axis_angle(UP, _heading_change(clip)), (frames, 4))
     rotations, translations = clip.rotations[1 : frames + 1], clip.translations[1 : frames + 1]
     rotations, translations = rotations.copy(), translations.copy()
     rotations[:, 0] = quat.mul(turn, rotations[:, 0])
@@ -182,17 +182,17 @@ def _rolled(clip: Clip, frames: int) -> Clip:
     )
 
 
-def notes(examples: Sequence[Example]) -> list[str]:
+def shift_notes(examples: Sequence[Example]) -> list[str]:
     """Return one note per clip that was shifted by a large share of its cycle."""
     return [
         f"{example.row.named}: begun {abs(example.shift):.0%} of its cycle "
         f"{'later' if example.shift > 0 else 'earlier'} than it was cut"
         for example in examples
-        if abs(example.shift) > LARGE
+        if abs(example.shift) > NOTED_SHIFT
     ]
 
 
-def _refuse_parted_landmarks(examples: Sequence[Example]) -> None:
+def _refuse_split_landmarks(examples: Sequence[Example]) -> None:
     """Raise RecipeError for landmarks that the shift moves across the end of some cycles."""
     marks = np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
     usual = np.median(marks, axis=0)
@@ -200,12 +200,13 @@ def _refuse_parted_landmarks(examples: Sequence[Example]) -> None:
         if np.any(np.diff(own) <= 0) or np.any(np.abs(own - usual) >= 0.5) or np.any(own == 0):
             raise RecipeError(
                 example.row.table,
-                f"landmarks lie at {_shares(own)} of the cycle once it begins at the family's "
-                f"phase ({example.shift:+.0%}), expected near {_shares(usual)} and in that order; "
+                f"landmarks lie at {_percentages(own)} of the cycle once it begins at the family's "
+                f"phase ({example.shift:+.0%}), expected near "
+                f"{_percentages(usual)} and in that order; "
                 "cut the cycles away from a landmark, or say alignment.begin = 'as_cut'",
                 example.row.line,
             )
 
 
-def _shares(marks: Floats) -> str:
+def _percentages(marks: Floats) -> str:
     return ", ".join(f"{mark:.0%}" for mark in marks)

@@ -13,7 +13,7 @@ from posefield.common.units import UP, Floats
 from posefield.motion import blend, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import dtw
-from posefield_train.align.warp import DENSE, WarpBasis
+from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.source.ingest import Example, heading
 
 # Numbers of frames for the medoid and for warps; more frames do not improve the result.
@@ -23,7 +23,7 @@ LANDMARK_WEIGHT = 200.0
 
 
 @dataclass(frozen=True)
-class Aligned:
+class AlignedClips:
     """Clips in canonical time.
 
     rotations: (N, T, J, 4). root_path: (N, T, 3), m. logs: log increments (N, knots) of each clip's
@@ -37,7 +37,7 @@ class Aligned:
     reference: int
 
 
-Predict = Callable[[Floats], Floats]
+Predictor = Callable[[Floats], Floats]
 """Map from values (N, m) of all clips to the prediction (N, m) of each of them."""
 
 
@@ -47,8 +47,8 @@ def align(
     basis: WarpBasis,
     rounds: int,
     joint_weights: Floats,
-    predict: Predict,
-) -> Aligned:
+    predict: Predictor,
+) -> AlignedClips:
     """Warp examples to one canonical time and resample them to `frames` frames.
 
     joint_weights: weights (J,) of the joints' positions in the comparison. predict: maps values (N,
@@ -56,21 +56,23 @@ def align(
     warps is the identity, so canonical time is the average timing of the family.
     """
     traces = [trace(example.clip, np.sqrt(joint_weights)) for example in examples]
-    marks = _marks(examples)
-    knees = _knees(marks, marks.mean(axis=0))
-    medoid = _medoid(_straight(traces, knees, COARSE))
-    fine = _straight(traces, knees, FINE)
-    logs = _gauge(_round(fine, fine[medoid], knees, basis), knees, basis)
+    marks = _landmark_times(examples)
+    knees = _breakpoints(marks, marks.mean(axis=0))
+    medoid = _medoid(_align_piecewise(traces, knees, COARSE))
+    fine = _align_piecewise(traces, knees, FINE)
+    logs = _centre(_warps_to(fine, fine[medoid], knees, basis), knees, basis)
     for _ in range(rounds):
         pairs = zip(traces, logs, strict=True)
-        warped = np.stack([at(trace, basis.invert(log, _even(FINE))) for trace, log in pairs])
+        warped = np.stack(
+            [interpolate(trace, basis.invert(log, _uniform_times(FINE))) for trace, log in pairs]
+        )
         predicted = predict(warped.reshape(len(warped), -1)).reshape(warped.shape)
-        logs = _gauge(_round(fine, predicted, knees, basis), knees, basis)
-    return _aligned(examples, frames, basis, logs, medoid)
+        logs = _centre(_warps_to(fine, predicted, knees, basis), knees, basis)
+    return _resample_all(examples, frames, basis, logs, medoid)
 
 
 @dataclass(frozen=True)
-class Canon:
+class CanonicalTime:
     """Canonical time of a trained model.
 
     frames: number of canonical frames. basis: basis of the warps. landmarks: their canonical times
@@ -83,29 +85,29 @@ class Canon:
     joint_weights: Floats
 
 
-def align_to(examples: Sequence[Example], references: Floats, canon: Canon) -> Aligned:
+def align_to(examples: Sequence[Example], references: Floats, canon: CanonicalTime) -> AlignedClips:
     """Warp examples to an existing canonical time, each to its own reference.
 
     references: traces (N, FINE, features) at uniform steps of canonical time.
     """
     traces = [trace(example.clip, np.sqrt(canon.joint_weights)) for example in examples]
-    knees = _knees(_marks(examples), canon.landmarks)
-    logs = _round(_straight(traces, knees, FINE), references, knees, canon.basis)
-    return _aligned(examples, canon.frames, canon.basis, logs, medoid=0)
+    knees = _breakpoints(_landmark_times(examples), canon.landmarks)
+    logs = _warps_to(_align_piecewise(traces, knees, FINE), references, knees, canon.basis)
+    return _resample_all(examples, canon.frames, canon.basis, logs, medoid=0)
 
 
-def _marks(examples: Sequence[Example]) -> Floats:
+def _landmark_times(examples: Sequence[Example]) -> Floats:
     return np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
 
 
-def _aligned(
+def _resample_all(
     examples: Sequence[Example], frames: int, basis: WarpBasis, logs: Floats, medoid: int
-) -> Aligned:
+) -> AlignedClips:
     resampled = [
-        resample(e.clip, basis.invert(log, _even(frames)))
+        resample(e.clip, basis.invert(log, _uniform_times(frames)))
         for e, log in zip(examples, logs, strict=True)
     ]
-    return Aligned(
+    return AlignedClips(
         np.stack([rotations for rotations, _ in resampled]),
         np.stack([path for _, path in resampled]),
         logs,
@@ -114,27 +116,27 @@ def _aligned(
     )
 
 
-def _even(frames: int) -> Floats:
+def _uniform_times(frames: int) -> Floats:
     return np.linspace(0.0, 1.0, frames)
 
 
 def trace(clip: Clip, weights: Floats) -> Floats:
     """Return joint positions (F, J * 3), m, relative to root and heading, times weights (J,)."""
-    positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
-    facing = quat.about(UP, -heading(clip))[:, None]
-    return (quat.rotate(facing, positions) * weights[:, None]).reshape(len(clip), -1)
+    joint_positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
+    facing = quat.from_axis_angle(UP, -heading(clip))[:, None]
+    return (quat.rotate(facing, joint_positions) * weights[:, None]).reshape(len(clip), -1)
 
 
-def at(values: Floats, u: Floats) -> Floats:
+def interpolate(values: Floats, u: Floats) -> Floats:
     """Interpolate rows of values (F, features) linearly at fractions u (S,) of their length.
 
     Returns (S, features).
     """
-    return blend.between(values, u * (len(values) - 1))
+    return blend.interpolate_rows(values, u * (len(values) - 1))
 
 
 @dataclass(frozen=True)
-class _Knees:
+class _Breakpoints:
     """Breakpoints of piecewise linear time maps.
 
     own: clip times (N, M + 2). canonical: canonical times (M + 2,).
@@ -146,22 +148,22 @@ class _Knees:
     @property
     def weights(self) -> Floats:
         """Return the weight (N, 501) of each sample in the fit of a warp."""
-        weights = np.ones((len(self.own), len(DENSE)))
+        weights = np.ones((len(self.own), len(FIT_TIMES)))
         for row, own in zip(weights, self.own[:, 1:-1], strict=True):
-            row[np.rint(own * (len(DENSE) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
+            row[np.rint(own * (len(FIT_TIMES) - 1)).astype(np.int64)] = LANDMARK_WEIGHT
         return weights
 
 
-def _knees(marks: Floats, canonical: Floats) -> _Knees:
+def _breakpoints(marks: Floats, canonical: Floats) -> _Breakpoints:
     """Return breakpoints for landmarks (N, M) with canonical times (M,)."""
     ends = np.zeros((len(marks), 1)), np.ones((len(marks), 1))
-    return _Knees(np.hstack([ends[0], marks, ends[1]]), np.array([0.0, *canonical, 1.0]))
+    return _Breakpoints(np.hstack([ends[0], marks, ends[1]]), np.array([0.0, *canonical, 1.0]))
 
 
-def _straight(traces: list[Floats], knees: _Knees, frames: int) -> Floats:
+def _align_piecewise(traces: list[Floats], knees: _Breakpoints, frames: int) -> Floats:
     """Resample traces to (N, frames, features), with landmarks aligned by piecewise linear maps."""
-    times = [np.interp(_even(frames), knees.canonical, own) for own in knees.own]
-    return np.stack([at(trace, u) for trace, u in zip(traces, times, strict=True)])
+    times = [np.interp(_uniform_times(frames), knees.canonical, own) for own in knees.own]
+    return np.stack([interpolate(trace, u) for trace, u in zip(traces, times, strict=True)])
 
 
 def _medoid(traces: Floats) -> int:
@@ -169,28 +171,30 @@ def _medoid(traces: Floats) -> int:
     return int(np.argmin(np.round(totals, 9)))
 
 
-def _round(traces: Floats, reference: Floats, knees: _Knees, basis: WarpBasis) -> Floats:
+def _warps_to(traces: Floats, reference: Floats, knees: _Breakpoints, basis: WarpBasis) -> Floats:
     """Return log increments (N, knots) of the warps to a reference.
 
     reference: (F, features), or one per clip (N, F, features).
     """
-    straight = np.stack([np.interp(DENSE, own, knees.canonical) for own in knees.own])
+    straight = np.stack([np.interp(FIT_TIMES, own, knees.canonical) for own in knees.own])
     # Time warping may shift a landmark: the phases are rescaled so that it returns to its time.
     phases = [
-        np.interp(phase, np.interp(knees.canonical, _even(FINE), phase), knees.canonical)
+        np.interp(phase, np.interp(knees.canonical, _uniform_times(FINE), phase), knees.canonical)
         for phase in dtw.warp(traces, reference)
     ]
-    warps = np.stack([np.interp(s, _even(FINE), p) for s, p in zip(straight, phases, strict=True)])
+    warps = np.stack(
+        [np.interp(s, _uniform_times(FINE), p) for s, p in zip(straight, phases, strict=True)]
+    )
     return np.stack([basis.fit(warp, w) for warp, w in zip(warps, knees.weights, strict=True)])
 
 
-def _gauge(logs: Floats, knees: _Knees, basis: WarpBasis) -> Floats:
+def _centre(logs: Floats, knees: _Breakpoints, basis: WarpBasis) -> Floats:
     """Return the warps composed with their mean inverse.
 
     The mean inverse of the results is the identity.
     """
-    mean_inverse = np.mean([basis.invert(log, DENSE) for log in logs], axis=0)
-    even = [np.interp(basis.evaluate(log, DENSE), DENSE, mean_inverse) for log in logs]
+    mean_inverse = np.mean([basis.invert(log, FIT_TIMES) for log in logs], axis=0)
+    even = [np.interp(basis.evaluate(log, FIT_TIMES), FIT_TIMES, mean_inverse) for log in logs]
     return np.stack([basis.fit(warp, w) for warp, w in zip(even, knees.weights, strict=True)])
 
 
@@ -200,10 +204,10 @@ def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
     before = np.minimum(place.astype(np.int64), len(clip) - 2)
     share = place - before
     rotations = quat.slerp(clip.rotations[before], clip.rotations[before + 1], share[:, None])
-    return rotations, at(clip.root_path, np.clip(u, 0.0, 1.0))
+    return rotations, interpolate(clip.root_path, np.clip(u, 0.0, 1.0))
 
 
-def positions(aligned: Aligned, parents: tuple[int, ...], offsets: Floats) -> Floats:
+def joint_positions(aligned: AlignedClips, parents: tuple[int, ...], offsets: Floats) -> Floats:
     """Return joint positions (N, T, J, 3), m, of aligned clips with bone offsets (N, J, 3), m."""
     translations = skeleton.translations(offsets, aligned.root_path)
     return skeleton.positions(parents, aligned.rotations, translations)

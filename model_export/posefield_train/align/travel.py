@@ -11,17 +11,17 @@ import numpy as np
 
 from posefield.common.units import UP, Floats
 from posefield.motion import quat, root_travel
-from posefield_train.align.time_alignment import Aligned
-from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.align.time_alignment import AlignedClips
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.source import measured_controls
 
 # A quaternion q turned about the vertical by an angle a is q cos a/2 + (q TURN) sin a/2.
-TURN = quat.mul(quat.about(UP, np.array(np.pi)), np.eye(4))
+HALF_TURN = quat.mul(quat.from_axis_angle(UP, np.array(np.pi)), np.eye(4))
 # A slice to the end, however long the axis is.
-END = 2**31 - 1
+SLICE_END = 2**31 - 1
 
 
-def take_out(aligned: Aligned) -> tuple[Aligned, Floats]:
+def remove_travel(aligned: AlignedClips) -> tuple[AlignedClips, Floats]:
     """Return clips (N) with their travel removed, and the travel (N, 3).
 
     Its components are left and forward, m, and the change of heading, rad.
@@ -41,10 +41,10 @@ def put_back(
 
     share: (..., S), share of the travel completed at each frame.
     """
-    return root_travel.put_back(rotations, root_path, share[..., None] * travel[:, None])
+    return root_travel.add_travel(rotations, root_path, share[..., None] * travel[:, None])
 
 
-def spread(residuals: Floats) -> Floats:
+def mean_squared_distance(residuals: Floats) -> Floats:
     """Return the mean squared distance (N,), m², of all joints due to travel errors (N, 3).
 
     The error grows linearly from zero, so its mean square is a third of the square at the end.
@@ -70,7 +70,7 @@ class Travel:
         return *put_back(rotations, root, travel, share), share[..., None] * travel[:, None]
 
     def onnx(
-        self, net: Net, rotations: str, root: str, travel: str, place: str
+        self, net: GraphBuilder, rotations: str, root: str, travel: str, place: str
     ) -> tuple[str, str, str]:
         """Build `numpy` in a graph; canonical frames are (B, S, 1)."""
         share = net("Mul", place, net.number(1.0 / (self.frames - 1)))
@@ -84,7 +84,7 @@ class Travel:
         cosine, sine = (net.unpadded(net(turn, row), shape) for turn in ("Cos", "Sin"))
         joints = net.indices(2)
         own = net("Slice", rotations, net.indices(0), net.indices(1), joints)
-        others = net("Slice", rotations, net.indices(1), net.indices(END), joints)
-        across = net("MatMul", own, net.weights("travel_quarter", TURN))
+        others = net("Slice", rotations, net.indices(1), net.indices(SLICE_END), joints)
+        across = net("MatMul", own, net.weights("travel_quarter", HALF_TURN))
         turned = net("Add", net("Mul", own, cosine), net("Mul", across, sine))
         return net("Concat", turned, others, axis=2), moved, gone

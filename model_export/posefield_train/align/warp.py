@@ -17,8 +17,8 @@ from posefield.common.units import Floats
 
 DEGREE = 3
 # Least increment as a share of the identity's, so that no pose is frozen.
-FLOOR = 0.15
-DENSE = np.linspace(0.0, 1.0, 501)
+MINIMUM_INCREMENT = 0.15
+FIT_TIMES = np.linspace(0.0, 1.0, 501)
 
 
 @dataclass(frozen=True)
@@ -37,22 +37,22 @@ class WarpBasis:
         return np.linspace(0.0, 1.0, self.knots - DEGREE + 2)[1:-1]
 
     @cached_property
-    def _vector(self) -> Floats:
+    def _knot_vector(self) -> Floats:
         return np.concatenate([np.zeros(DEGREE + 1), self.breaks, np.ones(DEGREE + 1)])
 
     @cached_property
-    def still(self) -> Floats:
+    def identity(self) -> Floats:
         """Return increments (knots,) of the identity: differences of the Greville abscissae."""
-        greville = [self._vector[i + 1 : i + 1 + DEGREE].mean() for i in range(self.knots + 1)]
+        greville = [self._knot_vector[i + 1 : i + 1 + DEGREE].mean() for i in range(self.knots + 1)]
         return np.diff(greville)
 
     @cached_property
-    def _dense(self) -> Floats:
-        return self.design(DENSE)
+    def _dense_design(self) -> Floats:
+        return self.design(FIT_TIMES)
 
     def design(self, u: Floats) -> Floats:
         """Return basis values (..., knots) that multiply increments to give s(u)."""
-        values = BSpline(self._vector, np.eye(self.knots + 1), DEGREE)(u)
+        values = BSpline(self._knot_vector, np.eye(self.knots + 1), DEGREE)(u)
         return np.cumsum(values[..., ::-1], axis=-1)[..., ::-1][..., 1:]
 
     @cached_property
@@ -72,18 +72,18 @@ class WarpBasis:
 
     def increments(self, logs: Floats) -> Floats:
         """Return increments (..., knots), with sum one, of log increments (..., knots)."""
-        raw = self.still * np.exp(logs - logs.max(axis=-1, keepdims=True))
+        raw = self.identity * np.exp(logs - logs.max(axis=-1, keepdims=True))
         return raw / raw.sum(axis=-1, keepdims=True)
 
     def evaluate(self, logs: Floats, u: Floats) -> Floats:
         """Return canonical time s (..., S) at clip times u (..., S) in [0, 1]."""
         # Training evaluates the times DENSE a thousand times.
-        design = self._dense if u is DENSE else self.design(u)
+        design = self._dense_design if u is FIT_TIMES else self.design(u)
         return np.einsum("...sk,...k->...s", design, self.increments(logs))
 
     def invert(self, logs: Floats, s: Floats) -> Floats:
         """Return clip times u (S,) at which one warp reaches canonical times s (S,)."""
-        return np.interp(s, self.evaluate(logs, DENSE), DENSE)
+        return np.interp(s, self.evaluate(logs, FIT_TIMES), FIT_TIMES)
 
     def fit(self, s: Floats, weights: Floats) -> Floats:
         """Return log increments (knots,) of the warp nearest to samples s (501,) at DENSE.
@@ -93,7 +93,7 @@ class WarpBasis:
         """
         worth = np.sqrt(weights)
         worth[-1] = 1e3
-        bounds = (FLOOR * self.still, np.ones(self.knots))
-        fitted = lsq_linear(self._dense * worth[:, None], s * worth, bounds, method="bvls")
+        bounds = (MINIMUM_INCREMENT * self.identity, np.ones(self.knots))
+        fitted = lsq_linear(self._dense_design * worth[:, None], s * worth, bounds, method="bvls")
         increments = fitted.x / fitted.x.sum()
-        return np.log(increments / self.still)
+        return np.log(increments / self.identity)

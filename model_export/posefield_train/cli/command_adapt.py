@@ -9,7 +9,7 @@ from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, ModelPath
 from posefield_train.cli import output_files
-from posefield_train.cli.progress_messages import Progress
+from posefield_train.cli.progress_messages import ProgressPrinter
 
 Up = Literal["y", "z"]
 RootOffset = Literal["replace", "add"]
@@ -49,7 +49,7 @@ def adapt(
 ) -> None:
     """Add a performer to a model from a few clips, without the model's training data."""
     from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
-    from posefield_train.adapt.adapted_file import Newcomer
+    from posefield_train.adapt.adapted_file import NewPerformer
     from posefield_train.source.recipe import Source
 
     output_files.expect_onnx(output)
@@ -59,18 +59,18 @@ def adapt(
         raise InvalidField("unit", f"{unit}, expected a length in metres")
     if not licence.strip():
         raise InvalidField("licence", "blank, expected a text")
-    progress = Progress()
+    progress = ProgressPrinter()
     progress(f"reading {model}")
     known = model_reconstruction.load(model)
-    adapted_file.refuse_name(known.card, performer)
+    adapted_file.check_name(known.card, performer)
     source = Source(metres_per_unit=unit, up=up, root_offset=root_offset)
     progress("reading clips")
     if table:
-        examples, notes = new_clips.of_table(known, table, source, performer)
+        examples, notes = new_clips.examples_of_table(known, table, source, performer)
     else:
-        examples, notes = new_clips.of_files(known, clips or [], source, performer)
+        examples, notes = new_clips.examples_of_files(known, clips or [], source, performer)
     progress("adapting, and comparing the graph with the reference")
-    made = adapted_file.make(known, Newcomer(performer, examples, licence, notes))
+    made = adapted_file.export_adapted(known, NewPerformer(performer, examples, licence, notes))
     atomic_files.write(made.content, output)
     progress("done")
-    typer.echo(output_files.wrote(made, output, json))
+    typer.echo(output_files.format_output(made, output, json))

@@ -16,8 +16,8 @@ from posefield_train.source import shipped_recipes
 
 if TYPE_CHECKING:
     from posefield_train.evaluate.learning_curves import Learning
-    from posefield_train.evaluate.protocol import Result
-    from posefield_train.evaluate.support_flags import Flags
+    from posefield_train.evaluate.protocol import EvaluationResult
+    from posefield_train.evaluate.support_flags import SupportFlags
     from posefield_train.source.ingest import Example
     from posefield_train.source.recipe import Recipe
 
@@ -73,13 +73,13 @@ def evaluate(
     """
     output_files.expect_html(report)
     asked = [one.value for one in protocol or []]
-    wanted = _Wanted(asked, report, json_file, scheduler, joined, learning)
+    wanted = _EvaluateOptions(asked, report, json_file, scheduler, joined, learning)
     recipe_file = shipped_recipes.file_of(recipe, data)
     _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _EvaluateOptions:
     """Options of the command. protocols: empty for all that the recipe allows."""
 
     protocols: list[str]
@@ -98,7 +98,7 @@ class _Family:
     examples: "list[Example]"
 
 
-def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
+def _evaluate(recipe_file: Path, data: Path, wanted: _EvaluateOptions) -> None:
     from posefield_train.evaluate import evaluation_summary
 
     # Errors in the arguments are reported before minutes of work.
@@ -107,7 +107,7 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
     results = _protocols(own, wanted)
     typer.echo(evaluation_summary.legend(results))
     curve = _learning(wanted)
-    more = _beside(own, other, results, curve)
+    more = _extra_results(own, other, results, curve)
     first, *others = map(evaluation_summary.facts, results)
     if wanted.json_file:
         atomic_files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
@@ -119,7 +119,7 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _Wanted) -> None:
         )
 
 
-def _family(recipe_file: Path, data: Path, wanted: _Wanted) -> _Family:
+def _family(recipe_file: Path, data: Path, wanted: _EvaluateOptions) -> _Family:
     """Read a recipe's family. Raises InvalidField for options that it does not allow."""
     from posefield_train.evaluate import protocol
     from posefield_train.source import ingest, recipe
@@ -136,14 +136,14 @@ def _family(recipe_file: Path, data: Path, wanted: _Wanted) -> _Family:
 
 
 @dataclass(frozen=True)
-class _Joined:
+class _JoinedFamily:
     """Name of a joined family, and the support flags of both families together."""
 
     name: str
-    flags: "Flags"
+    flags: "SupportFlags"
 
 
-def _joined(own: _Family, data: Path, wanted: _Wanted) -> _Joined | None:
+def _joined(own: _Family, data: Path, wanted: _EvaluateOptions) -> _JoinedFamily | None:
     """Return None if no other family is named."""
     from posefield_train.evaluate import support_flags
     from posefield_train.source import ingest, recipe
@@ -152,20 +152,24 @@ def _joined(own: _Family, data: Path, wanted: _Wanted) -> _Joined | None:
         return None
     other = recipe.read(wanted.joined)
     examples, _ = ingest.ingest(other, data)
-    return _Joined(other.name, support_flags.joined(own.recipe, own.examples, other, examples))
+    return _JoinedFamily(
+        other.name, support_flags.measure_joined(own.recipe, own.examples, other, examples)
+    )
 
 
-def _protocols(own: _Family, wanted: _Wanted) -> "list[Result]":
+def _protocols(own: _Family, wanted: _EvaluateOptions) -> "list[EvaluationResult]":
     """Run the protocols and print each result when it is complete."""
-    from posefield.console.progress import Bar
+    from posefield.console.progress import ProgressBar
     from posefield_train.evaluate import corrections, evaluation_summary, protocol
 
     can = protocol.protocols(own.recipe, own.examples)
     results = []
     with executors.jobs(wanted.scheduler) as jobs:
         for name in wanted.protocols or can:
-            with Bar(name) as bar:
-                results.append(protocol.run(own.recipe, own.examples, name, jobs, bar.update))
+            with ProgressBar(name) as bar:
+                results.append(
+                    protocol.run_protocol(own.recipe, own.examples, name, jobs, bar.update)
+                )
             trust = "\n".join(evaluation_summary.trust_text(results[-1]))
             typer.echo(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
             if results[-1].corrections:
@@ -175,8 +179,11 @@ def _protocols(own: _Family, wanted: _Wanted) -> "list[Result]":
     return results
 
 
-def _beside(
-    own: _Family, other: _Joined | None, results: "list[Result]", curve: "Learning | None"
+def _extra_results(
+    own: _Family,
+    other: _JoinedFamily | None,
+    results: "list[EvaluationResult]",
+    curve: "Learning | None",
 ) -> dict[str, Any]:
     """Print and return the results for a joined family, for performers and for suggested clips."""
     from posefield_train.evaluate import evaluation_summary, learning_curves
@@ -193,12 +200,12 @@ def _beside(
     return more
 
 
-def _learning(wanted: _Wanted) -> "Learning | None":
+def _learning(wanted: _EvaluateOptions) -> "Learning | None":
     """Measure the learning curves; None if they are not wanted."""
-    from posefield.console.progress import Bar
+    from posefield.console.progress import ProgressBar
     from posefield_train.evaluate import learning_curves
 
     if not wanted.learning:
         return None
-    with executors.jobs(wanted.scheduler) as jobs, Bar("learning") as bar:
-        return learning_curves.measure(jobs, bar.update)
+    with executors.jobs(wanted.scheduler) as jobs, ProgressBar("learning") as bar:
+        return learning_curves.measure_curves(jobs, bar.update)

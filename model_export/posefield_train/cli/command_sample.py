@@ -7,9 +7,9 @@ import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
-from posefield.console.arguments import Json, encoder
-from posefield.console.output import as_json, wrote
-from posefield.console.question_options import Controls, numbers
+from posefield.console.arguments import Json, encoder_for
+from posefield.console.output import as_json, written_message
+from posefield.console.question_options import Controls, parse_controls
 from posefield.question.results import ClipAnswer, Trust
 
 
@@ -32,14 +32,14 @@ def sample(
     if family != "reaching":
         raise InvalidField("family", f"{family!r}, expected reaching")
     if not truth:
-        path = sample_files.family(output)
+        path = sample_files.write_family(output)
         typer.echo(
             as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )
         return
-    encode = encoder(output).encode
-    controls = numbers(control or [])
-    clip = truths.clip(controls, fps)
+    encode = encoder_for(output).encode
+    controls = parse_controls(control or [])
+    clip = truths.truth_clip(controls, fps)
     answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))
     atomic_files.write(encode(answer), output)
-    typer.echo(wrote(output, answer, json))
+    typer.echo(written_message(output, answer, json))

@@ -10,13 +10,13 @@ from posefield.common.errors import InvalidField, TrainingError
 from posefield.console.arguments import Json
 from posefield.console.output import as_json
 from posefield_train.cli import executors, output_files
-from posefield_train.cli.executors import Place, Scheduler
-from posefield_train.cli.progress_messages import Progress
+from posefield_train.cli.executors import ExecutorOptions, Scheduler
+from posefield_train.cli.progress_messages import ProgressPrinter
 from posefield_train.source import shipped_recipes
 
 if TYPE_CHECKING:
-    from posefield_train.graph.onnx_export import Exported
-    from posefield_train.graph.trained_model import Trained
+    from posefield_train.graph.onnx_export import ExportedModel
+    from posefield_train.graph.trained_model import TrainedModel
     from posefield_train.source.recipe import Recipe
 
 
@@ -55,7 +55,7 @@ def train_command(
     elif report:
         raise InvalidField("report", "of several recipes or on a cluster, expected none")
     else:
-        _sweep(recipe_files, data, output, Place(jobs, scheduler), json)
+        _sweep(recipe_files, data, output, ExecutorOptions(jobs, scheduler), json)
 
 
 def _train(
@@ -67,39 +67,43 @@ def _train(
     from posefield_train.source import ingest, recipe
 
     output_files.expect_onnx(output)
-    progress = Progress()
+    progress = ProgressPrinter()
     progress(f"reading {recipe_file}")
     own = recipe.read(recipe_file)
     examples, notes = ingest.ingest(own, data or recipe_file.parent)
     trained = train.train(own, examples, progress)
     progress("writing the graph and comparing it with the reference")
-    exported = onnx_export.export(own, trained, notes)
+    exported = onnx_export.export_model(own, trained, notes)
     atomic_files.write(exported.content, output)
     if report:
         _write_report(own, trained, exported, progress, report)
     progress("done")
-    typer.echo(output_files.wrote(exported, output, json))
+    typer.echo(output_files.format_output(exported, output, json))
 
 
 def _write_report(
-    recipe: "Recipe", trained: "Trained", exported: "Exported", progress: Progress, path: Path
+    recipe: "Recipe",
+    trained: "TrainedModel",
+    exported: "ExportedModel",
+    progress: ProgressPrinter,
+    path: Path,
 ) -> None:
     # matplotlib takes a second to import, and only the report needs it.
     from posefield_train.report import levels_of_detail, training_report
-    from posefield_train.report.provenance import Step
+    from posefield_train.report.provenance import TrainingStep
 
     progress("measuring levels of detail")
-    others = levels_of_detail.alternatives(recipe, trained, exported.card)
-    levels = levels_of_detail.of(exported, others)
+    others = levels_of_detail.build_alternatives(recipe, trained, exported.card)
+    levels = levels_of_detail.time_levels(exported, others)
     progress("drawing the report")
-    steps = [Step(name, seconds) for name, seconds in progress.finished]
+    steps = [TrainingStep(name, seconds) for name, seconds in progress.finished]
     rendered = training_report.render(trained, exported, levels, steps)
     atomic_files.write(rendered.html, path)
     atomic_files.write(rendered.json, path.with_suffix(".json"))
 
 
 def _sweep(
-    recipe_files: list[Path], data: Path | None, folder: Path, place: Place, json: bool
+    recipe_files: list[Path], data: Path | None, folder: Path, place: ExecutorOptions, json: bool
 ) -> None:
     from posefield_train import sweep
 
@@ -107,7 +111,7 @@ def _sweep(
         raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
     found, failed = [], []
     with executors.jobs(place.scheduler, place.jobs) as jobs:
-        for made in sweep.models(recipe_files, data, jobs):
+        for made in sweep.train_models(recipe_files, data, jobs):
             if isinstance(made.found, TrainingError):
                 failed.append(made.name)
                 typer.echo(f"{made.name}: {made.found}", err=True)

@@ -21,7 +21,7 @@ Scheduler = Annotated[
 
 
 @dataclass(frozen=True)
-class Place:
+class ExecutorOptions:
     """Executor of the training of several models.
 
     jobs: number of processes; None for one per core. scheduler: address of a cluster's scheduler;
@@ -42,9 +42,9 @@ def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextMan
     count: number of processes; None for one per core.
     """
     if scheduler is None:
-        from posefield_train.parallel.jobs import Processes
+        from posefield_train.parallel.jobs import ProcessJobs
 
-        return nullcontext(Processes(count))
+        return nullcontext(ProcessJobs(count))
     from posefield_train.parallel import dask_jobs
 
     return dask_jobs.connect(scheduler)

@@ -7,7 +7,7 @@ from posefield.common.errors import InvalidField
 from posefield.console.output import as_json
 
 if TYPE_CHECKING:
-    from posefield_train.graph.onnx_export import Exported
+    from posefield_train.graph.onnx_export import ExportedModel
 
 
 def expect_onnx(output: Path) -> None:
@@ -22,12 +22,12 @@ def expect_html(report: Path | None) -> None:
         raise InvalidField("report", f"{report.name!r}, expected a name that ends in .html")
 
 
-def wrote(exported: "Exported", output: Path, json: bool) -> str:
+def format_output(exported: "ExportedModel", output: Path, json: bool) -> str:
     """Return the output of a command that wrote a model, as JSON or text."""
     return as_json(facts(exported, output)) if json else summary(exported, output)
 
 
-def facts(exported: "Exported", output: Path) -> dict[str, Any]:
+def facts(exported: "ExportedModel", output: Path) -> dict[str, Any]:
     """Return the summary of a written model as JSON values."""
     card = exported.card
     return {
@@ -39,7 +39,7 @@ def facts(exported: "Exported", output: Path) -> dict[str, Any]:
     }
 
 
-def summary(exported: "Exported", output: Path) -> str:
+def summary(exported: "ExportedModel", output: Path) -> str:
     """Return the summary of a written model as text."""
     found = facts(exported, output)
     notes = [f"note: {note}" for note in found["notes"]]

@@ -6,7 +6,7 @@ from itertools import pairwise
 import typer
 
 
-class Progress:
+class ProgressPrinter:
     """Callback that prints each step with its start time."""
 
     def __init__(self) -> None:

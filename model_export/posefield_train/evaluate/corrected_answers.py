@@ -11,33 +11,33 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.constraints import constrained_motion
-from posefield.constraints.constrained_motion import Bench, Held
-from posefield.constraints.constraint import Place
+from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints.constraint import PositionConstraint
 from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.inference.session import Session, State
+from posefield.inference.session import PredictionState, Session
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
 from posefield_train.evaluate import compared_motion, motion_errors
-from posefield_train.evaluate.compared_motion import EVEN, Event, Motion
-from posefield_train.evaluate.methods import Asked
-from posefield_train.graph.trained_model import Trained
+from posefield_train.evaluate.compared_motion import UNIFORM_SHARES, ComparedMotion, MotionEvent
+from posefield_train.evaluate.methods import Queries
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 
 # Distances beyond the captured position, away from the root, m: possibly and certainly unreachable.
-BEYOND, FAR = (0.1, 0.2, 0.3), 1.0
+BEYOND_DISTANCES, FAR = (0.1, 0.2, 0.3), 1.0
 
 
 @dataclass(frozen=True)
-class Goal:
+class EventTarget:
     """Captured positions at the event. joint: of the event's joint (3,), m. root: (3,), m."""
 
     joint: Floats
     root: Floats
 
-    def farther(self, metres: float) -> Floats:
+    def moved_outward(self, metres: float) -> Floats:
         """Return the joint's position moved away from the root (3,), m."""
         away = self.joint - self.root
         return np.asarray(self.joint + metres * away / np.linalg.norm(away), np.float64)
@@ -78,93 +78,105 @@ class Far:
 
 
 @dataclass(frozen=True)
-class Exact:
+class CorrectedMotions:
     """Corrected motions and their corrections."""
 
-    motions: list[Motion]
+    motions: list[ComparedMotion]
     corrections: list[Correction]
 
 
 @dataclass(frozen=True)
-class _Desk:
+class _MotionCorrector:
     """An opened model, its constraint solver, and the event."""
 
     opened: Session
-    bench: Bench
-    event: truncation_error.Moment
+    bench: LevelCorrector
+    event: truncation_error.EventFrame
 
-    def state(self, controls: Floats, labels: Floats) -> State:
+    def state(self, controls: Floats, labels: Floats) -> PredictionState:
         """Return the state at even shares of the duration."""
         durations = self.opened.durations(controls, labels)
-        return self.opened.state(controls, EVEN * durations, labels)
+        return self.opened.state(controls, UNIFORM_SHARES * durations, labels)
 
-    def held(self, begun: Held, place: Floats) -> Held:
+    def held(self, begun: ConstrainedMotion, place: Floats) -> ConstrainedMotion:
         """Return the motion with the event's joint at a position (3,) at the event."""
         own = Measure("height", (self.event.joint,), "landmark")
-        return self.bench.held(begun, [Place(("event",), own, (0, 1, 2), place, self.event.frame)])
+        return self.bench.solve(
+            begun, [PositionConstraint(("event",), own, (0, 1, 2), place, self.event.frame)]
+        )
 
-    def motion(self, held: Held) -> Motion:
+    def motion(self, held: ConstrainedMotion) -> ComparedMotion:
         """Return a corrected motion as it is compared."""
         state, parents = held.state, self.opened.card.skeleton.parents
         rotations, path = held.poses(state.frames)
         translations = skeleton.translations(state.bones, path)
-        share = float(np.interp(self.event.frame, state.frames, EVEN))
-        own = Event(self.event.joint, share)
-        return compared_motion.posed(parents, rotations, translations, held.duration, own)
+        share = float(np.interp(self.event.frame, state.frames, UNIFORM_SHARES))
+        own = MotionEvent(self.event.joint, share)
+        return compared_motion.motion_of_poses(parents, rotations, translations, held.duration, own)
 
 
-def goal(captured: Motion, event: Event) -> Goal:
+def event_target(captured: ComparedMotion, event: MotionEvent) -> EventTarget:
     """Return the target that a captured motion gives."""
-    return Goal(event.of(captured.joints), Event(0, event.share).of(captured.joints))
+    return EventTarget(
+        event.position_of(captured.joints), MotionEvent(0, event.share).position_of(captured.joints)
+    )
 
 
-def answers(
-    recipe: Recipe, trained: Trained, file: bytes, asked: Asked, wanted: Sequence[Goal]
-) -> Exact:
+def correct_motions(
+    recipe: Recipe,
+    trained: TrainedModel,
+    file: bytes,
+    asked: Queries,
+    wanted: Sequence[EventTarget],
+) -> CorrectedMotions:
     """Return the answers of a model file, each corrected to its target."""
-    event = truncation_error.moment(recipe, trained.examples)
+    event = truncation_error.event_frame(recipe, trained.examples)
     assert event is not None
     opened = session.open_bytes(file, recipe.name)
-    desk = _Desk(opened, constrained_motion.bench(opened, 0), event)
-    labels = sample_points.labels(asked.performers, opened.card.performers)
+    desk = _MotionCorrector(opened, constrained_motion.build_corrector(opened, 0), event)
+    labels = sample_points.performer_labels(asked.performers, opened.card.performers)
     clips = zip(asked.controls[:, None], labels[:, None], wanted, strict=True)
-    motions, corrections = zip(*(_corrected(desk, *clip) for clip in clips), strict=True)
-    return Exact(list(motions), list(corrections))
+    motions, corrections = zip(*(_correct(desk, *clip) for clip in clips), strict=True)
+    return CorrectedMotions(list(motions), list(corrections))
 
 
-def _corrected(
-    desk: _Desk, controls: Floats, labels: Floats, wanted: Goal
-) -> tuple[Motion, Correction]:
-    begun = desk.bench.begun(desk.state(controls, labels))
+def _correct(
+    desk: _MotionCorrector, controls: Floats, labels: Floats, wanted: EventTarget
+) -> tuple[ComparedMotion, Correction]:
+    begun = desk.bench.predict(desk.state(controls, labels))
     held = desk.held(begun, wanted.joint)
     before, after = desk.motion(begun), desk.motion(held)
     # The root cannot be moved away from itself.
     outward = desk.event.joint != 0
-    beyond = [desk.held(begun, wanted.farther(metres)) for metres in BEYOND if outward]
+    beyond = [
+        desk.held(begun, wanted.moved_outward(metres)) for metres in BEYOND_DISTANCES if outward
+    ]
     correction = Correction(
         held.steps,
         held.distance,
-        _reached(held),
-        tuple(map(_reached, beyond)),
-        _rougher(after, before),
-        _seconds(lambda: _clip(desk, controls, labels, wanted)),
-        _seconds(lambda: _plain(desk, controls, labels)),
-        _far(desk, begun, before, wanted) if outward else None,
+        _is_reachable(held),
+        tuple(map(_is_reachable, beyond)),
+        _acceleration_ratio(after, before),
+        _thread_seconds(lambda: _run_corrected(desk, controls, labels, wanted)),
+        _thread_seconds(lambda: _run_uncorrected(desk, controls, labels)),
+        _correct_far(desk, begun, before, wanted) if outward else None,
     )
     return after, correction
 
 
-def _clip(desk: _Desk, controls: Floats, labels: Floats, wanted: Goal) -> None:
+def _run_corrected(
+    desk: _MotionCorrector, controls: Floats, labels: Floats, wanted: EventTarget
+) -> None:
     state = desk.state(controls, labels)
-    desk.held(desk.bench.begun(state), wanted.joint).poses(state.frames)
+    desk.held(desk.bench.predict(state), wanted.joint).poses(state.frames)
 
 
-def _plain(desk: _Desk, controls: Floats, labels: Floats) -> None:
-    times = EVEN * desk.opened.durations(controls, labels)[:, None]
+def _run_uncorrected(desk: _MotionCorrector, controls: Floats, labels: Floats) -> None:
+    times = UNIFORM_SHARES * desk.opened.durations(controls, labels)[:, None]
     desk.opened.run(controls, times, *OUTPUTS, labels=labels)
 
 
-def _seconds(run: Callable[[], None]) -> float:
+def _thread_seconds(run: Callable[[], None]) -> float:
     # The first call includes one-time work; thread time excludes other work of the machine.
     run()
     start = time.thread_time()
@@ -172,16 +184,20 @@ def _seconds(run: Callable[[], None]) -> float:
     return time.thread_time() - start
 
 
-def _far(desk: _Desk, begun: Held, before: Motion, wanted: Goal) -> Far:
-    held = desk.held(begun, wanted.farther(FAR))
+def _correct_far(
+    desk: _MotionCorrector, begun: ConstrainedMotion, before: ComparedMotion, wanted: EventTarget
+) -> Far:
+    held = desk.held(begun, wanted.moved_outward(FAR))
     after = desk.motion(held)
     moved = np.linalg.norm(after.joints[:, 0] - before.joints[:, 0], axis=-1)
-    return Far(_reached(held), _rougher(after, before), float(moved.max()), held.steps)
+    return Far(
+        _is_reachable(held), _acceleration_ratio(after, before), float(moved.max()), held.steps
+    )
 
 
-def _rougher(after: Motion, before: Motion) -> float:
+def _acceleration_ratio(after: ComparedMotion, before: ComparedMotion) -> float:
     return motion_errors.acceleration(after.points) / motion_errors.acceleration(before.points)
 
 
-def _reached(held: Held) -> bool:
-    return all(met.reached for met in held.met)
+def _is_reachable(held: ConstrainedMotion) -> bool:
+    return all(met.reached for met in held.results)

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.evaluate.corrected_answers import BEYOND, Correction, Far
+from posefield_train.evaluate.corrected_answers import BEYOND_DISTANCES, Correction, Far
 from posefield_train.evaluate.methods import EXACT, OURS
-from posefield_train.evaluate.motion_errors import Errors
-from posefield_train.evaluate.protocol import Result
+from posefield_train.evaluate.motion_errors import MotionErrors
+from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.report.drawing import markdown_table, significant_digits
 
-HEAD = ("correction to the captured event", "mean", "worst")
+TABLE_HEADER = ("correction to the captured event", "mean", "worst")
 
 
 @dataclass(frozen=True)
-class Figure:
+class CorrectionStatistic:
     """One figure of every clip.
 
     key: name in the JSON. words: title of its row. values: (C,). shown: format of its cells. worst:
@@ -37,12 +37,12 @@ class Figure:
 
     def facts(self) -> dict[str, float]:
         """Return mean and worst by name."""
-        own = {self.key: significant_digits.number(float(self.values.mean()))}
-        worst = {f"{self.key}_worst": significant_digits.number(float(self.values.max()))}
+        own = {self.key: significant_digits.round_number(float(self.values.mean()))}
+        worst = {f"{self.key}_worst": significant_digits.round_number(float(self.values.max()))}
         return {**own, **worst} if self.worst else own
 
 
-def figures(result: Result) -> list[Figure]:
+def correction_statistics(result: EvaluationResult) -> list[CorrectionStatistic]:
     """Return all figures of a result; none if no answer was corrected."""
     found = result.corrections
     if not found:
@@ -52,46 +52,50 @@ def figures(result: Result) -> list[Figure]:
         return np.array([float(value(correction)) for correction in found])
 
     return [
-        Figure(
+        CorrectionStatistic(
             "effector_cm",
             "remaining distance of the effector (cm)",
-            100.0 * _effector(result),
+            100.0 * _effector_errors(result),
             "{:.4f}",
         ),
-        Figure("steps", "solver steps", of(lambda c: c.steps), "{:.1f}"),
-        Figure("acceleration", "acceleration, after over before", of(lambda c: c.acceleration)),
-        *_changes(result),
-        _time("ms", "time per clip, median (ms)", of(lambda c: c.seconds)),
-        _time(
+        CorrectionStatistic("steps", "solver steps", of(lambda c: c.steps), "{:.1f}"),
+        CorrectionStatistic(
+            "acceleration", "acceleration, after over before", of(lambda c: c.acceleration)
+        ),
+        *_distance_changes(result),
+        _time_statistic("ms", "time per clip, median (ms)", of(lambda c: c.seconds)),
+        _time_statistic(
             "plain_ms",
             "time per clip without correction, median (ms)",
             of(lambda c: c.plain_seconds),
         ),
-        Figure(
+        CorrectionStatistic(
             "distance",
             "distance of the target from the prediction (sigma)",
             of(lambda c: c.distance),
         ),
-        Figure("out_of_reach", UNREACHABLE, of(lambda c: not c.reached), **SHARE),
-        *_beyond(found),
-        *_far([correction.far for correction in found if correction.far]),
+        CorrectionStatistic(
+            "out_of_reach", UNREACHABLE, of(lambda c: not c.reached), **SHARE_FORMAT
+        ),
+        *_beyond_statistics(found),
+        *_far_statistics([correction.far for correction in found if correction.far]),
     ]
 
 
-SHARE: dict[str, Any] = {"shown": "{:.1%}", "worst": False}
+SHARE_FORMAT: dict[str, Any] = {"shown": "{:.1%}", "worst": False}
 UNREACHABLE = "reported as unreachable"
 
 
-def _time(key: str, words: str, seconds: Floats) -> Figure:
+def _time_statistic(key: str, words: str, seconds: Floats) -> CorrectionStatistic:
     # A median, because single clips are delayed by other work of the machine.
-    return Figure(key, words, 1e3 * np.full(1, np.median(seconds)), worst=False)
+    return CorrectionStatistic(key, words, 1e3 * np.full(1, np.median(seconds)), worst=False)
 
 
-def _effector(result: Result) -> Floats:
+def _effector_errors(result: EvaluationResult) -> Floats:
     return np.array([error.effector for error in result.of(EXACT, result.asked(EXACT))])
 
 
-def _changes(result: Result) -> Iterator[Figure]:
+def _distance_changes(result: EvaluationResult) -> Iterator[CorrectionStatistic]:
     """Return the changes of the mean distances, as shares of those without correction."""
 
     def means(name: str, distance: str) -> Floats:
@@ -101,49 +105,55 @@ def _changes(result: Result) -> Iterator[Figure]:
         before, after = means(OURS, distance), means(EXACT, distance)
         change = np.full(1, after.mean() / before.mean() - 1.0)
         words = f"change of the mean {word} error"
-        yield Figure(f"{word}_change", words, change, "{:+.1%}", worst=False)
+        yield CorrectionStatistic(f"{word}_change", words, change, "{:+.1%}", worst=False)
 
 
-def _mean(error: Errors, distance: str) -> float:
+def _mean(error: MotionErrors, distance: str) -> float:
     return float(getattr(error, distance).mean)
 
 
-def _beyond(found: tuple[Correction, ...]) -> Iterator[Figure]:
-    for place, metres in enumerate(BEYOND[: len(found[0].beyond)]):
+def _beyond_statistics(found: tuple[Correction, ...]) -> Iterator[CorrectionStatistic]:
+    for place, metres in enumerate(BEYOND_DISTANCES[: len(found[0].beyond)]):
         told = np.array([float(not correction.beyond[place]) for correction in found])
         centimetres = round(100 * metres)
         key, words = (
             f"out_of_reach_{centimetres}cm",
             f"{UNREACHABLE}, target {centimetres} cm farther",
         )
-        yield Figure(key, words, told, **SHARE)
+        yield CorrectionStatistic(key, words, told, **SHARE_FORMAT)
 
 
-def _far(found: list[Far]) -> list[Figure]:
+def _far_statistics(found: list[Far]) -> list[CorrectionStatistic]:
     if not found:
         return []
     told, acceleration, root, steps = np.array(
         [(not far.reached, far.acceleration, far.root, far.steps) for far in found], np.float64
     ).T
     return [
-        Figure("far_out_of_reach", f"{UNREACHABLE}, target 1 m farther", told, **SHARE),
-        Figure("far_acceleration", "acceleration, target 1 m farther", acceleration),
-        Figure("far_root_cm", "movement of the root, target 1 m farther (cm)", 100.0 * root),
-        Figure("far_steps", "solver steps, target 1 m farther", steps, "{:.1f}"),
+        CorrectionStatistic(
+            "far_out_of_reach", f"{UNREACHABLE}, target 1 m farther", told, **SHARE_FORMAT
+        ),
+        CorrectionStatistic("far_acceleration", "acceleration, target 1 m farther", acceleration),
+        CorrectionStatistic(
+            "far_root_cm", "movement of the root, target 1 m farther (cm)", 100.0 * root
+        ),
+        CorrectionStatistic("far_steps", "solver steps, target 1 m farther", steps, "{:.1f}"),
     ]
 
 
-def facts(result: Result) -> dict[str, Any]:
+def facts(result: EvaluationResult) -> dict[str, Any]:
     """Return the figures by name: centimetres, milliseconds, shares."""
-    return {key: value for own in figures(result) for key, value in own.facts().items()}
+    return {
+        key: value for own in correction_statistics(result) for key, value in own.facts().items()
+    }
 
 
-def rows(result: Result) -> tuple[tuple[str, ...], ...]:
+def rows(result: EvaluationResult) -> tuple[tuple[str, ...], ...]:
     """Return the rows of the table under HEAD."""
-    return tuple(own.cells() for own in figures(result))
+    return tuple(own.cells() for own in correction_statistics(result))
 
 
-def table(result: Result) -> str:
+def table(result: EvaluationResult) -> str:
     """Return the table in Markdown; empty if no answer was corrected."""
     found = rows(result)
-    return markdown_table.table(HEAD, found) if found else ""
+    return markdown_table.markdown_table(TABLE_HEADER, found) if found else ""

@@ -9,9 +9,9 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield_train.evaluate import corrections, motion_errors
 from posefield_train.evaluate.methods import DEFINITIONS, EXACT, OURS
-from posefield_train.evaluate.motion_errors import Errors
-from posefield_train.evaluate.new_performers import NOBODY, SHOWN
-from posefield_train.evaluate.protocol import Result
+from posefield_train.evaluate.motion_errors import MotionErrors
+from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS, NO_PERFORMER
+from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.report.drawing import markdown_table, significant_digits
 
 DISTANCES = {
@@ -44,7 +44,7 @@ UNITS = (
 
 
 @dataclass(frozen=True)
-class Summary:
+class MethodSummary:
     """Errors of one method over all clips that it predicted.
 
     clips: number of those. left_out: number of all others. mean: its errors. standard_error: of the
@@ -55,7 +55,7 @@ class Summary:
     name: str
     clips: int
     left_out: int
-    mean: Errors
+    mean: MotionErrors
     standard_error: float
     worse: float
     worse_error: float
@@ -80,9 +80,11 @@ class Summary:
             "standard_error_cm": centimetres(self.standard_error),
             "difference_cm": centimetres(self.worse),
             "difference_standard_error_cm": centimetres(self.worse_error),
-            "duration_error": significant_digits.number(mean.duration),
-            "acceleration_ratio": significant_digits.number(mean.acceleration),
-            "skate_ratio": significant_digits.number(self.skate) if mean.skate_captured else None,
+            "duration_error": significant_digits.round_number(mean.duration),
+            "acceleration_ratio": significant_digits.round_number(mean.acceleration),
+            "skate_ratio": significant_digits.round_number(self.skate)
+            if mean.skate_captured
+            else None,
             "skate_cm_per_s": centimetres(mean.skate),
             "distances_cm": {
                 name: {
@@ -99,44 +101,44 @@ class Summary:
         ours = self.name == OURS
         return (
             f"{self.name} ({self.clips} clips)" if self.left_out else self.name,
-            _two(mean.relative.mean),
-            _two(self.standard_error),
+            _centimetre_text(mean.relative.mean),
+            _centimetre_text(self.standard_error),
             "" if ours else f"{100 * self.worse:+.2f}",
-            "" if ours else _two(self.worse_error),
-            _two(mean.absolute.mean),
-            "" if np.isnan(mean.effector) else _two(mean.effector),
-            _two(mean.plain_relative.mean),
-            _two(mean.plain_absolute.mean),
+            "" if ours else _centimetre_text(self.worse_error),
+            _centimetre_text(mean.absolute.mean),
+            "" if np.isnan(mean.effector) else _centimetre_text(mean.effector),
+            _centimetre_text(mean.plain_relative.mean),
+            _centimetre_text(mean.plain_absolute.mean),
             f"{100 * mean.duration:.1f} %",
             f"{mean.acceleration:.2f}",
             f"{self.skate:.2f}" if mean.skate_captured else "",
         )
 
 
-def _two(metres: float) -> str:
+def _centimetre_text(metres: float) -> str:
     return f"{100 * metres:.2f}"
 
 
 def centimetres(metres: float) -> float | None:
     """Return a rounded length in centimetres; None for NaN."""
-    return None if np.isnan(metres) else significant_digits.number(100.0 * metres)
+    return None if np.isnan(metres) else significant_digits.round_number(100.0 * metres)
 
 
-def relative(found: Sequence[Errors]) -> Floats:
+def relative_distances(found: Sequence[MotionErrors]) -> Floats:
     """Return the mean relative distance (C,) of each clip, m."""
     return np.array([error.relative.mean for error in found])
 
 
-def of(result: Result) -> list[Summary]:
+def summarize(result: EvaluationResult) -> list[MethodSummary]:
     """Return the summary of each method, posefield's first."""
     return [_summary(result, name) for name in result.errors if result.asked(name)]
 
 
-def _summary(result: Result, name: str) -> Summary:
+def _summary(result: EvaluationResult, name: str) -> MethodSummary:
     places = result.asked(name)
     found = result.of(name, places)
-    own, ours = relative(found), relative(result.of(OURS, places))
-    return Summary(
+    own, ours = relative_distances(found), relative_distances(result.of(OURS, places))
+    return MethodSummary(
         name,
         len(found),
         len(result.clips) - len(found),
@@ -151,50 +153,51 @@ def _standard_error(values: Floats) -> float:
     return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
 
 
-def sigma_ratio(result: Result) -> float:
+def sigma_ratio(result: EvaluationResult) -> float:
     """Return the mean of squared error over squared sigma."""
-    squared = np.array([error.squared for error in result.of(OURS, result.asked(OURS))])
+    squared = np.array([error.mean_squared_error for error in result.of(OURS, result.asked(OURS))])
     return float(np.mean(squared / np.square(result.sigma)))
 
 
-def joint_sigma_ratios(result: Result) -> dict[str, float]:
+def joint_sigma_ratios(result: EvaluationResult) -> dict[str, float]:
     """Return the mean of squared error over squared sigma of each joint."""
     squared = np.stack([error.joints for error in result.of(OURS, result.asked(OURS))])
     ratios = np.mean(squared / np.square(result.joint_sigma), axis=0)
     return dict(zip(result.joints, ratios.tolist(), strict=True))
 
 
-def facts(result: Result) -> dict[str, Any]:
+def facts(result: EvaluationResult) -> dict[str, Any]:
     """Return the figures of a result as JSON values."""
     held = {} if result.flags is None else {"support": result.flags.facts()}
     by_joint = joint_sigma_ratios(result)
-    methods = {summary.name: summary.facts() for summary in of(result)}
+    methods = {summary.name: summary.facts() for summary in summarize(result)}
     if EXACT in methods:
         methods[EXACT]["exact"] = corrections.facts(result)
     return {
         "family": result.family,
         "protocol": result.protocol,
         "clips": len(result.clips),
-        "sigma_ratio": significant_digits.number(sigma_ratio(result)),
+        "sigma_ratio": significant_digits.round_number(sigma_ratio(result)),
         "joint_sigma_ratio": {
-            name: significant_digits.number(ratio) for name, ratio in by_joint.items()
+            name: significant_digits.round_number(ratio) for name, ratio in by_joint.items()
         },
         **held,
         "methods": methods,
     }
 
 
-def table(result: Result) -> str:
+def table(result: EvaluationResult) -> str:
     """Return a result as a table in Markdown under a title."""
     title = (
         f"{result.family}, {result.protocol.replace('_', ' ')}: {len(result.clips)} motions, "
         f"sigma ratio {sigma_ratio(result):.2f}"
     )
     head = [title for title, _ in COLUMNS]
-    return f"{title}\n\n{markdown_table.table(head, [summary.cells() for summary in of(result)])}"
+    rows = [summary.cells() for summary in summarize(result)]
+    return f"{title}\n\n{markdown_table.markdown_table(head, rows)}"
 
 
-def trust_text(result: Result) -> list[str]:
+def trust_text(result: EvaluationResult) -> list[str]:
     """Return a sentence on sigma by joint, and one on the support flag."""
     ratios = joint_sigma_ratios(result)
     least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
@@ -205,7 +208,7 @@ def trust_text(result: Result) -> list[str]:
     return [joints] + ([result.flags.text()] if result.flags else [])
 
 
-def legend(results: Sequence[Result]) -> str:
+def legend(results: Sequence[EvaluationResult]) -> str:
     """Return units, columns and methods of the tables of some results, one per line."""
     meanings = [f"  {title}: {meaning}" for title, meaning in COLUMNS if title != "±"]
     names = dict.fromkeys(name for result in results for name in result.errors)
@@ -213,22 +216,28 @@ def legend(results: Sequence[Result]) -> str:
     return "\n".join([UNITS, *meanings, "  ±: standard error over clips", "Methods:", *definitions])
 
 
-def performer_facts(results: Sequence[Result]) -> dict[str, Any]:
+def performer_facts(results: Sequence[EvaluationResult]) -> dict[str, Any]:
     """Return the error reduction by performer names and by clips of new performers.
 
     Empty unless both protocols were run on a model that distinguishes performers.
     """
     by_name = {result.protocol: result for result in results}
     clips, others = (by_name.get(f"leave_one_{held}_out") for held in ("clip", "performer"))
-    if not clips or not others or NOBODY not in clips.errors:
+    if not clips or not others or NO_PERFORMER not in clips.errors:
         return {}
-    everyone = clips.asked(NOBODY)
-    named, unnamed = (_mean_relative(clips, name, everyone) for name in (OURS, NOBODY))
-    adapted = {name: _adapted(clips, others, name) for name in SHOWN if others.asked(name)}
-    return {"named_nearer": significant_digits.number(1.0 - named / unnamed), **adapted}
+    everyone = clips.asked(NO_PERFORMER)
+    named, unnamed = (_mean_relative(clips, name, everyone) for name in (OURS, NO_PERFORMER))
+    adapted = {
+        name: _adaptation_facts(clips, others, name)
+        for name in ADAPTATION_COUNTS
+        if others.asked(name)
+    }
+    return {"named_nearer": significant_digits.round_number(1.0 - named / unnamed), **adapted}
 
 
-def _adapted(clips: Result, others: Result, name: str) -> dict[str, Any]:
+def _adaptation_facts(
+    clips: EvaluationResult, others: EvaluationResult, name: str
+) -> dict[str, Any]:
     """Compare an adapted model with models of none, and of the other clips of the performer."""
     places = others.asked(name)
     own, none = (_mean_relative(others, one, places) for one in (name, OURS))
@@ -238,15 +247,15 @@ def _adapted(clips: Result, others: Result, name: str) -> dict[str, Any]:
         "relative_cm": centimetres(own),
         "shown_none_cm": centimetres(none),
         "shown_all_cm": centimetres(whole),
-        "farther_than_all": significant_digits.number(own / whole - 1.0),
+        "farther_than_all": significant_digits.round_number(own / whole - 1.0),
     }
 
 
-def _mean_relative(result: Result, name: str, places: Sequence[int]) -> float:
-    return float(relative(result.of(name, places)).mean())
+def _mean_relative(result: EvaluationResult, name: str, places: Sequence[int]) -> float:
+    return float(relative_distances(result.of(name, places)).mean())
 
 
-def performer_text(results: Sequence[Result]) -> list[str]:
+def performer_text(results: Sequence[EvaluationResult]) -> list[str]:
     """Return the performer facts, a sentence each."""
     found = performer_facts(results)
     if not found:
@@ -257,7 +266,7 @@ def performer_text(results: Sequence[Result]) -> list[str]:
             f"{name}: {one['relative_cm']:.2f} cm on {one['clips']} clips; without clips of the "
             f"performer {one['shown_none_cm']:.2f} cm; trained with all other clips "
             f"{one['shown_all_cm']:.2f} cm ({100 * one['farther_than_all']:+.1f} %)"
-            for name in SHOWN
+            for name in ADAPTATION_COUNTS
             if (one := found.get(name))
         ),
     ]

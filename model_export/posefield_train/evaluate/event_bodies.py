@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.evaluate.compared_motion import Motion
+from posefield_train.evaluate.compared_motion import ComparedMotion
 
 CAPTURED = "captured"
 
 
 @dataclass(frozen=True)
-class Still:
+class EventBody:
     """Body at the frame where the event's joint is nearest to its position at the event, m.
 
     joints: (J, 3). path: of the event's joint (F, 3). event: its position at the event (3,).
@@ -23,20 +23,20 @@ class Still:
     event: Floats
 
 
-Stills = Mapping[str, Sequence[Still | None]]
+EventBodies = Mapping[str, Sequence[EventBody | None]]
 """Bodies of each method, clip by clip; None for clips that it did not predict."""
 
 
-def still(motion: Motion | None, joint: int) -> Still | None:
+def event_body(motion: ComparedMotion | None, joint: int) -> EventBody | None:
     """Return a motion's body at its event; None without motion or event."""
     if motion is None or motion.event is None:
         return None
     path = motion.joints[:, joint]
     nearest = int(np.argmin(np.linalg.norm(path - motion.event, axis=-1)))
-    return Still(motion.joints[nearest], path, motion.event)
+    return EventBody(motion.joints[nearest], path, motion.event)
 
 
-def chosen(stills: Stills, methods: Sequence[str]) -> int | None:
+def median_clip(stills: EventBodies, methods: Sequence[str]) -> int | None:
     """Return the index of the clip of median effector error of the first method, or None.
 
     Only clips that all methods predicted count.
@@ -48,10 +48,12 @@ def chosen(stills: Stills, methods: Sequence[str]) -> int | None:
     ]
     if not there:
         return None
-    return sorted(there, key=lambda place: _off(stills, methods[0], place))[len(there) // 2]
+    return sorted(there, key=lambda place: _effector_error(stills, methods[0], place))[
+        len(there) // 2
+    ]
 
 
-def _off(stills: Stills, name: str, place: int) -> float:
+def _effector_error(stills: EventBodies, name: str, place: int) -> float:
     truth, own = stills[CAPTURED][place], stills[name][place]
     assert truth and own
     return float(np.linalg.norm(own.event - truth.event))

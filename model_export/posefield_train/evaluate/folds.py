@@ -24,7 +24,7 @@ class Fold:
         return rest, [examples[i] for i in self.held]
 
 
-def clips(examples: Sequence[Example]) -> list[Fold]:
+def clip_folds(examples: Sequence[Example]) -> list[Fold]:
     """Return folds that hold out every take once, with all clips cut from it.
 
     Strides of one take are nearly equal; held out one by one, they would predict each other.
@@ -35,7 +35,7 @@ def clips(examples: Sequence[Example]) -> list[Fold]:
     return [Fold(take) for take in takes]
 
 
-def performers(examples: Sequence[Example]) -> list[Fold]:
+def performer_folds(examples: Sequence[Example]) -> list[Fold]:
     """Return folds that hold out every performer once, with all of their clips."""
     return [Fold(own) for own in _groups([example.row.performer for example in examples])]
 

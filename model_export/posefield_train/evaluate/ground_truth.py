@@ -6,7 +6,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield_train.evaluate import compared_motion
-from posefield_train.evaluate.compared_motion import Event, Motion
+from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
 from posefield_train.sample import noise_free, sample_controls
 
 POINTS, SEED = 2_000, 2006
@@ -14,7 +14,7 @@ RATE = 120.0
 """Frames per second of the noise-free motions."""
 
 
-def points(count: int = POINTS) -> Floats:
+def truth_points(count: int = POINTS) -> Floats:
     """Return control points (count, 4), seeded, spread evenly over the possible range."""
     rng = np.random.Generator(np.random.PCG64(SEED))
     return np.array([_point(rng) for _ in range(count)])
@@ -29,6 +29,9 @@ def _point(rng: np.random.Generator) -> list[float]:
     return [float(stature), float(hip), *map(float, rest)]
 
 
-def motions(points: Floats, event: Event | None) -> Sequence[Motion]:
+def truth_motions(truth_points: Floats, event: MotionEvent | None) -> Sequence[ComparedMotion]:
     """Return the noise-free motions at control points (Q, 4)."""
-    return [compared_motion.of_clip(noise_free.clip(list(point), RATE), event) for point in points]
+    return [
+        compared_motion.motion_of_clip(noise_free.truth_clip(list(point), RATE), event)
+        for point in truth_points
+    ]

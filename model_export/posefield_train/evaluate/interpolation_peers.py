@@ -20,34 +20,38 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures
 
 from posefield.common.units import Floats
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.sample_points import SamplePoints
 
-Peer = Callable[[Samples, Floats, Floats], Floats]
+Interpolator = Callable[[SamplePoints, Floats, Floats], Floats]
 """Function of samples, their values (n, m) and queries (q, d + p) that returns values (q, m)."""
 
 SMOOTHINGS = (0.0, *np.geomspace(1e-3, 1e2, 11))
 
 
-def _controls(samples: Samples, queries: Floats) -> tuple[Floats, Floats]:
+def _controls(samples: SamplePoints, queries: Floats) -> tuple[Floats, Floats]:
     return samples.half_ranges, queries[:, : samples.controls]
 
 
 Kernel = Literal["thin_plate_spline", "linear", "cubic"]
 
 
-def _rbf(kernel: Kernel) -> Peer:
-    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def _rbf(kernel: Kernel) -> Interpolator:
+    def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
         known, asked = _controls(samples, queries)
-        return _through(known, values, kernel, 0.0)(asked)
+        return _rbf_interpolator(known, values, kernel, 0.0)(asked)
 
     return predict
 
 
-def _through(known: Floats, values: Floats, kernel: Kernel, smoothing: float) -> RBFInterpolator:
-    return RBFInterpolator(*_merged(known, values), kernel=kernel, degree=1, smoothing=smoothing)
+def _rbf_interpolator(
+    known: Floats, values: Floats, kernel: Kernel, smoothing: float
+) -> RBFInterpolator:
+    return RBFInterpolator(
+        *_distinct_points(known, values), kernel=kernel, degree=1, smoothing=smoothing
+    )
 
 
-def _merged(known: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _distinct_points(known: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Return distinct points and the mean value at each: an interpolator needs distinct points."""
     points, place, counts = np.unique(known, axis=0, return_inverse=True, return_counts=True)
     sums = np.zeros((len(points), values.shape[1]))
@@ -55,24 +59,28 @@ def _merged(known: Floats, values: Floats) -> tuple[Floats, Floats]:
     return points, sums / counts[:, None]
 
 
-def thin_plate_smoothed(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def thin_plate_smoothed(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Return thin-plate predictions with the smoothing of the least leave-one-out error."""
     known, asked = _controls(samples, queries)
-    losses = [_left_out(samples, known, values, smoothing) for smoothing in SMOOTHINGS]
+    losses = [_leave_one_out_error(samples, known, values, smoothing) for smoothing in SMOOTHINGS]
     best = SMOOTHINGS[int(np.argmin(losses))]
-    return _through(known, values, "thin_plate_spline", best)(asked)
+    return _rbf_interpolator(known, values, "thin_plate_spline", best)(asked)
 
 
-def _left_out(samples: Samples, known: Floats, values: Floats, smoothing: float) -> float:
+def _leave_one_out_error(
+    samples: SamplePoints, known: Floats, values: Floats, smoothing: float
+) -> float:
     total = 0.0
     for group in np.unique(samples.groups):
         out = samples.groups == group
-        found = _through(known[~out], values[~out], "thin_plate_spline", smoothing)(known[out])
+        found = _rbf_interpolator(known[~out], values[~out], "thin_plate_spline", smoothing)(
+            known[out]
+        )
         total += float(np.sum(np.square(found - values[out])))
     return total
 
 
-def gp(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def gp_with_performers(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Return predictions of a Gaussian process with a length scale for each control and performer.
 
     Length scales, amplitude and noise maximise the marginal likelihood.
@@ -88,14 +96,14 @@ def gp(samples: Samples, values: Floats, queries: Floats) -> Floats:
     return centre + size * found.reshape(len(queries), -1)
 
 
-def gp_controls(samples: Samples, values: Floats, queries: Floats) -> Floats:
-    """Return the predictions of `gp` from the controls alone."""
+def gp_without_performers(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
+    """Return the predictions of `gp_with_performers` from the controls alone."""
     known, asked = _controls(samples, queries)
-    return gp(Samples(known, samples.controls, samples.groups), values, asked)
+    return gp_with_performers(SamplePoints(known, samples.controls, samples.groups), values, asked)
 
 
-def _regression(degree: int) -> Peer:
-    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def _regression(degree: int) -> Interpolator:
+    def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
         known, asked = _controls(samples, queries)
         model = make_pipeline(PolynomialFeatures(degree), LinearRegression())
         return model.fit(known, values).predict(asked)
@@ -103,8 +111,8 @@ def _regression(degree: int) -> Peer:
     return predict
 
 
-def _neighbours(count: int | None, weights: str | Callable[[Floats], Floats]) -> Peer:
-    def predict(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def _neighbours(count: int | None, weights: str | Callable[[Floats], Floats]) -> Interpolator:
+    def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
         known, asked = _controls(samples, queries)
         model = KNeighborsRegressor(min(count or len(known), len(known)), weights=weights)
         return model.fit(known, values).predict(asked)
@@ -117,7 +125,7 @@ def _inverse_square(distances: Floats) -> Floats:
     return 1.0 / np.maximum(np.square(distances), 1e-12)
 
 
-def nearest_same(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def nearest_of_performer(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Return the nearest example of the same performer, or of any if that performer has none."""
     found = np.empty((len(queries), values.shape[1]))
     for row, query in enumerate(queries):
@@ -129,7 +137,7 @@ def nearest_same(samples: Samples, values: Floats, queries: Floats) -> Floats:
     return found
 
 
-def linear_coefficients(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def linear_coefficients(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Interpolate linearly over simplices of the samples; outside their hull, take the nearest."""
     known, asked = _controls(samples, queries)
     if samples.controls == 1:
@@ -141,12 +149,12 @@ def linear_coefficients(samples: Samples, values: Floats, queries: Floats) -> Fl
     return np.where(np.isnan(inside), outside, inside)
 
 
-def mean(samples: Samples, values: Floats, queries: Floats) -> Floats:
+def sample_mean(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Return the mean of all samples for each query."""
     return DummyRegressor().fit(samples.points, values).predict(queries).reshape(len(queries), -1)
 
 
-PEERS: dict[str, tuple[Peer, str]] = {
+INTERPOLATORS: dict[str, tuple[Interpolator, str]] = {
     "thin_plate": (_rbf("thin_plate_spline"), "scipy RBFInterpolator, thin plate, degree 1"),
     "thin_plate_smoothed": (
         thin_plate_smoothed,
@@ -154,12 +162,15 @@ PEERS: dict[str, tuple[Peer, str]] = {
     ),
     "linear_rbf": (_rbf("linear"), "scipy RBFInterpolator, linear kernel, degree 1"),
     "cubic_rbf": (_rbf("cubic"), "scipy RBFInterpolator, cubic kernel, degree 1"),
-    "gp": (gp, "scikit-learn GaussianProcessRegressor, ARD RBF + white noise, label as columns"),
-    "gp_controls": (gp_controls, "the same without the performer's label"),
+    "gp": (
+        gp_with_performers,
+        "scikit-learn GaussianProcessRegressor, ARD RBF + white noise, label as columns",
+    ),
+    "gp_controls": (gp_without_performers, "the same without the performer's label"),
     "inverse_distance": (_neighbours(None, _inverse_square), "scikit-learn, weights 1 / distance²"),
     "k_nearest": (_neighbours(5, "distance"), "scikit-learn, 5 nearest, weights 1 / distance"),
     "nearest": (_neighbours(1, "uniform"), "scikit-learn, nearest example"),
-    "nearest_same_performer": (nearest_same, "scikit-learn, nearest of the same performer"),
+    "nearest_same_performer": (nearest_of_performer, "scikit-learn, nearest of the same performer"),
     "linear_regression": (_regression(1), "scikit-learn LinearRegression"),
     "quadratic_regression": (_regression(2), "scikit-learn, quadratic polynomial"),
     "linear_coefficients": (
@@ -167,6 +178,6 @@ PEERS: dict[str, tuple[Peer, str]] = {
         "multilinear model, coefficients interpolated linearly (scipy LinearNDInterpolator; "
         "nearest outside the hull)",
     ),
-    "mean": (mean, "the mean motion"),
+    "mean": (sample_mean, "the mean motion"),
 }
 """Peers by name, each with its definition."""

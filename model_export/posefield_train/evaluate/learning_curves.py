@@ -16,14 +16,14 @@ import numpy as np
 from posefield.common.units import Floats, Indices
 from posefield.kriging import acquisition, support
 from posefield_train.evaluate import ground_truth, methods, motion_errors, protocol
-from posefield_train.evaluate.methods import Asked
-from posefield_train.evaluate.protocol import Report
+from posefield_train.evaluate.methods import Queries
+from posefield_train.evaluate.protocol import ProgressCallback
 from posefield_train.parallel import single_thread
 from posefield_train.parallel.jobs import Jobs
 from posefield_train.report.drawing import markdown_table
 from posefield_train.sample import sample_family, sample_files
-from posefield_train.sample.sample_controls import Controls
-from posefield_train.sample.sample_family import Sample
+from posefield_train.sample.sample_controls import SampleControls
+from posefield_train.sample.sample_family import SampleTrial
 from posefield_train.source import ingest, recipe
 from posefield_train.train import train
 
@@ -51,13 +51,13 @@ class Learning:
         return {way: own.mean(axis=0) for way, own in self.trials.items()}
 
     @cached_property
-    def doubts(self) -> dict[str, Floats]:
+    def standard_errors(self) -> dict[str, Floats]:
         """Return the standard error of that mean (2, S), m."""
         shares = {way: own.std(axis=0, ddof=1) for way, own in self.trials.items()}
         return {way: own / np.sqrt(len(self.trials[way])) for way, own in shares.items()}
 
     @property
-    def reached(self) -> float:
+    def equivalent_samples(self) -> float:
         """Return the interpolated number of suggested samples with the error of all random ones."""
         own, aim = self.errors[SUGGESTED][0], self.errors[CHANCE][0, -1]
         below = int(np.argmax(own <= aim)) if np.any(own <= aim) else len(own)
@@ -68,34 +68,34 @@ class Learning:
         return float(np.interp(share, (0, 1), self.sizes[below - 1 : below + 1]))
 
     @property
-    def faster(self) -> float | None:
+    def speedup(self) -> float | None:
         """Return the random samples added per suggested sample for the same error.
 
         None if random samples do not reduce the error.
         """
-        added = self.reached - self.sizes[0]
+        added = self.equivalent_samples - self.sizes[0]
         return (self.sizes[-1] - self.sizes[0]) / added if added > 0.0 else None
 
     def text(self) -> str:
         """Return the comparison in a sentence."""
-        if self.faster is None:
+        if self.speedup is None:
             return "Random samples do not reduce the error; there is nothing to compare with."
         return (
-            f"Suggested samples reach at {self.reached:.0f} the error of random ones at "
-            f"{self.sizes[-1]}: {self.faster:.1f} times as fast."
+            f"Suggested samples reach at {self.equivalent_samples:.0f} the error of random ones at "
+            f"{self.sizes[-1]}: {self.speedup:.1f} times as fast."
         )
 
 
-def measure(
-    jobs: Jobs, report: Report, sizes: Sequence[int] = SIZES, seeds: Sequence[int] = SEEDS
+def measure_curves(
+    jobs: Jobs, report: ProgressCallback, sizes: Sequence[int] = SIZES, seeds: Sequence[int] = SEEDS
 ) -> Learning:
     """Measure the curves at some sizes, in ascending order, with a trial for each seed."""
     # Both curves of a trial start from the same samples, which are trained from once.
     steps = [(SUGGESTED, size) for size in sizes] + [(CHANCE, size) for size in sizes[1:]]
     parts = [(seed, way, size) for seed in seeds for way, size in steps]
-    trials = {seed: _trial(seed) for seed in seeds}
+    trials = {seed: _sample_orders(seed) for seed in seeds}
     each = [(part, trials[part[0]][part[1]][: part[2]]) for part in parts]
-    found = dict(protocol.completed(jobs.run(_error, each), len(each), report))
+    found = dict(protocol.with_progress(jobs.run(_trained_error, each), len(each), report))
     for seed in seeds:
         found[seed, CHANCE, sizes[0]] = found[seed, SUGGESTED, sizes[0]]
     rows = {
@@ -105,14 +105,17 @@ def measure(
     return Learning(tuple(sizes), {way: np.stack(own) for way, own in rows.items()})
 
 
-def _trial(seed: int) -> dict[str, list[Sample]]:
+def _sample_orders(seed: int) -> dict[str, list[SampleTrial]]:
     """Return the samples in the order of both ways; the first START are the same."""
     rng = np.random.Generator(np.random.PCG64(seed))
     known = list(sample_family.samples())
     first = [known[i] for i in sorted(rng.choice(len(known), START, replace=False).tolist())]
     # Disjoint from the points at which models are compared.
-    candidates = ground_truth.points(ground_truth.POINTS + CANDIDATES)[ground_truth.POINTS :]
-    ways = {SUGGESTED: _suggested(first, candidates), CHANCE: rng.permutation(len(candidates))}
+    candidates = ground_truth.truth_points(ground_truth.POINTS + CANDIDATES)[ground_truth.POINTS :]
+    ways = {
+        SUGGESTED: _rank_candidates(first, candidates),
+        CHANCE: rng.permutation(len(candidates)),
+    }
     added = {
         way: [candidates[i].tolist() for i in order[: END - START]] for way, order in ways.items()
     }
@@ -121,36 +124,38 @@ def _trial(seed: int) -> dict[str, list[Sample]]:
     }
 
 
-def _suggested(first: Sequence[Sample], candidates: Floats) -> Indices:
+def _rank_candidates(first: Sequence[SampleTrial], candidates: Floats) -> Indices:
     """Return the candidates ranked highest given the first samples."""
-    own = support.of(np.array([_row(sample.controls) for sample in first]))
-    ranked = acquisition.rank(own.scaled(candidates), own.samples, END - START)
+    own = support.fit_support(np.array([_control_row(sample.controls) for sample in first]))
+    ranked = acquisition.rank_candidates(own.scaled(candidates), own.samples, END - START)
     return np.array([at for at, _ in ranked])
 
 
-def _row(own: Controls) -> list[float]:
+def _control_row(own: SampleControls) -> list[float]:
     return [own.stature, own.hip_height, own.turn, own.target_height]
 
 
-def _sample(point: list[float], rng: np.random.Generator) -> Sample:
-    rounded = Controls(*(round(value, 4) for value in point))
-    return Sample("somebody", rounded, sample_family.trial(rounded, rng))
+def _sample(point: list[float], rng: np.random.Generator) -> SampleTrial:
+    rounded = SampleControls(*(round(value, 4) for value in point))
+    return SampleTrial("somebody", rounded, sample_family.noisy_trial(rounded, rng))
 
 
-def _error(
-    part: tuple[int, str, int], samples: Sequence[Sample]
+def _trained_error(
+    part: tuple[int, str, int], samples: Sequence[SampleTrial]
 ) -> tuple[tuple[int, str, int], tuple[float, float]]:
     """Return the part, and global and root-relative distance of its trained model, m."""
     with tempfile.TemporaryDirectory() as scratch:
-        file = sample_files.family(Path(scratch) / "family", samples)
+        file = sample_files.write_family(Path(scratch) / "family", samples)
         own = recipe.read(file)
         examples, _ = ingest.ingest(own, file.parent)
-    with single_thread.one():
+    with single_thread.single_threaded():
         trained = train(own, examples, lambda _: None)
-        points = ground_truth.points(ASKED)
-        found = methods.ours(own, trained, Asked(points, [""] * len(points)))
-        pairs = zip(found, ground_truth.motions(points, None), strict=True)
-        mean = motion_errors.mean([motion_errors.compare(made, true, ()) for made, true in pairs])
+        points = ground_truth.truth_points(ASKED)
+        found = methods.predict_posefield(own, trained, Queries(points, [""] * len(points)))
+        pairs = zip(found, ground_truth.truth_motions(points, None), strict=True)
+        mean = motion_errors.mean(
+            [motion_errors.compare_motions(made, true, ()) for made, true in pairs]
+        )
     return part, (mean.absolute.mean, mean.relative.mean)
 
 
@@ -163,12 +168,12 @@ def facts(found: Learning) -> dict[str, object]:
             way.replace(" ", "_"): {
                 "global_cm": _centimetres(own[0]),
                 "relative_cm": _centimetres(own[1]),
-                "global_standard_error_cm": _centimetres(found.doubts[way][0]),
+                "global_standard_error_cm": _centimetres(found.standard_errors[way][0]),
             }
             for way, own in found.errors.items()
         },
-        "reached": round(found.reached, 1),
-        "faster": None if found.faster is None else round(found.faster, 2),
+        "reached": round(found.equivalent_samples, 1),
+        "faster": None if found.speedup is None else round(found.speedup, 2),
     }
 
 
@@ -181,9 +186,9 @@ def table(found: Learning) -> str:
     rows = [
         (f"{way}, {name}", *(f"{100 * e:.2f} ± {100 * o:.2f}" for e, o in zip(*row, strict=True)))
         for way, own in found.errors.items()
-        for name, *row in zip(("global", "relative"), own, found.doubts[way], strict=True)
+        for name, *row in zip(("global", "relative"), own, found.standard_errors[way], strict=True)
     ]
-    table = markdown_table.table(("samples", *map(str, found.sizes)), rows)
+    table = markdown_table.markdown_table(("samples", *map(str, found.sizes)), rows)
     return (
         f"{table}\n\nCentimetres from the "
         f"truth, mean of {len(found.trials[CHANCE])} trials and its standard error. {found.text()}"

@@ -9,18 +9,18 @@ from posefield.common.units import Floats
 from posefield.motion import skeleton
 from posefield_train.align import time_alignment, travel
 from posefield_train.evaluate import compared_motion
-from posefield_train.evaluate.compared_motion import EVEN, Event, Motion
-from posefield_train.evaluate.interpolation_peers import PEERS, Peer
-from posefield_train.graph.trained_model import Trained
+from posefield_train.evaluate.compared_motion import UNIFORM_SHARES, ComparedMotion, MotionEvent
+from posefield_train.evaluate.interpolation_peers import INTERPOLATORS, Interpolator
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import naive_kriging, sample_points, variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 
 OURS, EXACT, NAIVE = "posefield", "posefield_exact", "naive"
 # Methods that repeat another row where the model does not distinguish performers.
-LABELLED = ("gp_controls", "nearest_same_performer")
+PERFORMER_METHODS = ("gp_controls", "nearest_same_performer")
 DEFINITIONS = {
     OURS: "the model as exported: truncated, with its own bone lengths and timing",
     EXACT: "the same, with the event's joint moved by the service's constraint solver to its "
@@ -34,13 +34,13 @@ DEFINITIONS = {
     },
     NAIVE: "kriging of each frame on its own, isotropic, variogram fitted by weighted least "
     "squares (Mukai & Kuriyama 2005); posefield's own code, checked against GSTools",
-    **{name: words for name, (_, words) in PEERS.items()},
+    **{name: words for name, (_, words) in INTERPOLATORS.items()},
 }
 """Definition of each method."""
 
 
 @dataclass(frozen=True)
-class Asked:
+class Queries:
     """Queries. controls: (Q, d). performers: Q names; an empty name for no performer."""
 
     controls: Floats
@@ -48,20 +48,20 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Answers:
+class Predictions:
     """Predictions of all methods.
 
     motions: by method; None for queries that a method does not predict. sigma: standard deviation
     (Q,) that posefield predicts, m. joint_sigma: of each joint (Q, J), m.
     """
 
-    motions: Mapping[str, Sequence[Motion | None]]
+    motions: Mapping[str, Sequence[ComparedMotion | None]]
     sigma: Floats
     joint_sigma: Floats
 
 
 @dataclass(frozen=True)
-class _Values:
+class _PredictedValues:
     """Predicted values.
 
     numbers: pose vectors (Q, T, D) on canonical time. beside: the other quantities by name.
@@ -71,92 +71,96 @@ class _Values:
     beside: dict[str, Floats]
 
 
-def answers(recipe: Recipe, trained: Trained, asked: Asked) -> Answers:
+def predict_all(recipe: Recipe, trained: TrainedModel, asked: Queries) -> Predictions:
     """Return the answers of every method, posefield's first."""
-    event = truncation_error.moment(recipe, trained.examples)
+    event = truncation_error.event_frame(recipe, trained.examples)
     bank = trained.model.bank
     points = bank.points(asked.controls, _labels(trained, asked))
-    motions: dict[str, list[Motion]] = {OURS: ours(recipe, trained, asked)}
+    motions: dict[str, list[ComparedMotion]] = {OURS: predict_posefield(recipe, trained, asked)}
     for name, predict in _methods(trained).items():
-        motions[name] = _restore(trained, predict(points), event)
+        motions[name] = _motions_of_values(trained, predict(points), event)
     sigma = bank.sigma(bank.numpy(points)[VARIANCE])
-    return Answers(motions, sigma, sigma[:, None] * trained.joints)
+    return Predictions(motions, sigma, sigma[:, None] * trained.joints)
 
 
-def captured_event(recipe: Recipe, trained: Trained, landmarks: Sequence[float]) -> Event | None:
+def captured_event(
+    recipe: Recipe, trained: TrainedModel, landmarks: Sequence[float]
+) -> MotionEvent | None:
     """Return the event of a captured clip from its landmarks; None if the recipe names none."""
-    found = truncation_error.moment(recipe, trained.examples)
+    found = truncation_error.event_frame(recipe, trained.examples)
     if found is None or recipe.event is None:
         return None
     if recipe.event.at == "end":
-        return Event(found.joint, 1.0)
-    return Event(found.joint, landmarks[recipe.clips.landmarks.index(recipe.event.at)])
+        return MotionEvent(found.joint, 1.0)
+    return MotionEvent(found.joint, landmarks[recipe.clips.landmarks.index(recipe.event.at)])
 
 
-def _labels(trained: Trained, asked: Asked) -> Floats:
-    return sample_points.labels(asked.performers, trained.model.bank.performers)
+def _labels(trained: TrainedModel, asked: Queries) -> Floats:
+    return sample_points.performer_labels(asked.performers, trained.model.bank.performers)
 
 
-def ours(recipe: Recipe, trained: Trained, asked: Asked) -> list[Motion]:
+def predict_posefield(
+    recipe: Recipe, trained: TrainedModel, asked: Queries
+) -> list[ComparedMotion]:
     """Return the answers of the exported model."""
-    event = truncation_error.moment(recipe, trained.examples)
+    event = truncation_error.event_frame(recipe, trained.examples)
     labels, model = _labels(trained, asked), trained.model
     fields = model.bank.numpy(model.bank.points(asked.controls, labels))
-    times = np.exp(fields["duration"]) * EVEN
+    times = np.exp(fields["duration"]) * UNIFORM_SHARES
     found = model.evaluate(asked.controls, times, labels)
     places = found.rotations, found.root_position, found.bone_offsets
     return _motions(trained, *places, found.duration, fields["warp"], event)
 
 
 def _motions(
-    trained: Trained,
+    trained: TrainedModel,
     rotations: Floats,
     path: Floats,
     offsets: Floats,
     durations: Floats,
     logs: Floats,
-    event: truncation_error.Moment | None,
-) -> list[Motion]:
+    event: truncation_error.EventFrame | None,
+) -> list[ComparedMotion]:
     """Return motions of rotations (Q, S, J, 4), root paths (Q, S, 3), bone offsets (Q, J, 3)."""
     translations = skeleton.translations(offsets, path)
     events = [_synthesised_event(trained, log, event) for log in logs]
     parts = zip(rotations, translations, map(float, durations), events, strict=True)
-    return [compared_motion.posed(trained.skeleton.parents, *part) for part in parts]
+    return [compared_motion.motion_of_poses(trained.skeleton.parents, *part) for part in parts]
 
 
 def _synthesised_event(
-    trained: Trained, logs: Floats, event: truncation_error.Moment | None
-) -> Event | None:
+    trained: TrainedModel, logs: Floats, event: truncation_error.EventFrame | None
+) -> MotionEvent | None:
     """Return the event at the share of the duration that the predicted timing gives it."""
     if event is None:
         return None
     timing = trained.model.timing
     place = np.array([event.frame / (timing.frames - 1)])
-    return Event(event.joint, float(timing.basis.invert(logs, place)[0]))
+    return MotionEvent(event.joint, float(timing.basis.invert(logs, place)[0]))
 
 
-def _methods(trained: Trained) -> dict[str, Callable[[Floats], _Values]]:
+def _methods(trained: TrainedModel) -> dict[str, Callable[[Floats], _PredictedValues]]:
     """Return functions from points (Q, d + p) to predicted values, by method."""
-    laid = trained.laid
+    laid = trained.samples
 
-    def of_peer(peer: Peer) -> Callable[[Floats], _Values]:
-        def predict(points: Floats) -> _Values:
+    def of_peer(peer: Interpolator) -> Callable[[Floats], _PredictedValues]:
+        def predict(points: Floats) -> _PredictedValues:
             found = {name: peer(laid, v, points) for name, v in trained.values.items()}
-            return _Values(_numbers(trained, found.pop("pose")), found)
+            return _PredictedValues(_pose_vectors(trained, found.pop("pose")), found)
 
         return predict
 
-    left = () if laid.labelled else LABELLED
-    peers = {name: of_peer(peer) for name, (peer, _) in PEERS.items() if name not in left}
-    return {NAIVE: lambda points: _naive(trained, laid, points), **peers}
+    left = () if laid.labelled else PERFORMER_METHODS
+    peers = {name: of_peer(peer) for name, (peer, _) in INTERPOLATORS.items() if name not in left}
+    return {NAIVE: lambda points: _predict_naive(trained, laid, points), **peers}
 
 
-def _numbers(trained: Trained, coefficients: Floats) -> Floats:
+def _pose_vectors(trained: TrainedModel, coefficients: Floats) -> Floats:
     """Return pose vectors (Q, T, D) of motions (Q, N) in coordinates of the sample mode."""
     return trained.tensor.numbers(trained.full.slices(coefficients))
 
 
-def _naive(trained: Trained, laid: Samples, points: Floats) -> _Values:
+def _predict_naive(trained: TrainedModel, laid: SamplePoints, points: Floats) -> _PredictedValues:
     """Krige each frame on its own, and the other quantities in the same way as one frame."""
     whole, parents = trained.tensor, trained.skeleton.parents
     offsets = np.stack([example.offsets for example in trained.examples])
@@ -164,24 +168,26 @@ def _naive(trained: Trained, laid: Samples, points: Floats) -> _Values:
     known, asked = laid.half_ranges, points[:, : laid.controls]
 
     def krige(shown: Floats, values: Floats) -> Floats:
-        return naive_kriging.fit(known, shown, values, "matern52", variogram.fit).numpy(asked)
+        return naive_kriging.fit_naive(
+            known, shown, values, "matern52", variogram.fit_by_grid
+        ).numpy(asked)
 
     rest = {name: values for name, values in trained.values.items() if name != "pose"}
     found = {n: krige(v[:, None, :, None], v[:, None])[:, 0] for n, v in rest.items()}
-    return _Values(krige(positions, whole.numbers(whole.values)), found)
+    return _PredictedValues(krige(positions, whole.numbers(whole.values)), found)
 
 
-def _restore(
-    trained: Trained, values: _Values, event: truncation_error.Moment | None
-) -> list[Motion]:
+def _motions_of_values(
+    trained: TrainedModel, values: _PredictedValues, event: truncation_error.EventFrame | None
+) -> list[ComparedMotion]:
     """Return motions of predicted values, with the model's timing, travel, chart and bones."""
     timing, beside = trained.model.timing, values.beside
-    steps = np.tile(EVEN, (len(values.numbers), 1))
+    steps = np.tile(UNIFORM_SHARES, (len(values.numbers), 1))
     _, place = timing.numpy(np.zeros((len(steps), 1)), beside["warp"], steps)
     share = place / (timing.frames - 1)
     pairs = zip(values.numbers, share, strict=True)
     rotations, path = trained.tensor.chart.poses(
-        np.stack([time_alignment.at(*pair) for pair in pairs])
+        np.stack([time_alignment.interpolate(*pair) for pair in pairs])
     )
     if "travel" in beside:
         rotations, path = travel.put_back(rotations, path, beside["travel"], share)

@@ -9,11 +9,11 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import foot_skate
 from posefield_train.align import dtw, time_alignment
-from posefield_train.evaluate.compared_motion import FRAMES, Motion
+from posefield_train.evaluate.compared_motion import FRAMES, ComparedMotion
 
 
 @dataclass(frozen=True)
-class Distances:
+class DistanceStatistics:
     """Statistics of distances over joints and frames, m.
 
     mean, rms: root mean square, p95, p99: percentiles, largest.
@@ -27,7 +27,7 @@ class Distances:
 
 
 @dataclass(frozen=True)
-class Errors:
+class MotionErrors:
     """Errors of one synthesized motion relative to the captured one.
 
     relative, absolute: after time warping, without and with the root's position; plain_…: at equal
@@ -38,11 +38,11 @@ class Errors:
     captured. joints: mean squared absolute distance (J,) of each joint, m².
     """
 
-    relative: Distances
-    absolute: Distances
-    plain_relative: Distances
-    plain_absolute: Distances
-    shell: Distances
+    relative: DistanceStatistics
+    absolute: DistanceStatistics
+    plain_relative: DistanceStatistics
+    plain_absolute: DistanceStatistics
+    shell: DistanceStatistics
     effector: float
     acceleration: float
     skate: float
@@ -51,28 +51,34 @@ class Errors:
     joints: Floats
 
     @property
-    def squared(self) -> float:
+    def mean_squared_error(self) -> float:
         """Return the mean squared absolute distance, m², which sigma predicts."""
         return self.absolute.rms**2
 
 
-def compare(made: Motion, captured: Motion, feet: tuple[int, ...]) -> Errors:
+def compare_motions(
+    made: ComparedMotion, captured: ComparedMotion, feet: tuple[int, ...]
+) -> MotionErrors:
     """Return the errors of a synthesized motion. feet: joint indices."""
     own, true = made.points, captured.points
-    phase = dtw.warp(_around(true)[None], _around(own))[0]
-    warped = _at(own, phase)
-    return Errors(
-        _distances(_apart(_rooted(warped), _rooted(true))),
-        _distances(_apart(warped, true)),
-        _distances(_apart(_rooted(own), _rooted(true))),
-        _distances(_apart(own, true)),
-        _distances(np.linalg.norm(_rooted(warped) - _rooted(true), axis=-1)[:, :, 1:].max(axis=2)),
+    phase = dtw.warp(_warping_features(true)[None], _warping_features(own))[0]
+    warped = _resample(own, phase)
+    return MotionErrors(
+        _distances(_joint_distances(_root_relative(warped), _root_relative(true))),
+        _distances(_joint_distances(warped, true)),
+        _distances(_joint_distances(_root_relative(own), _root_relative(true))),
+        _distances(_joint_distances(own, true)),
+        _distances(
+            np.linalg.norm(_root_relative(warped) - _root_relative(true), axis=-1)[:, :, 1:].max(
+                axis=2
+            )
+        ),
         _effector(made.event, captured.event),
         acceleration(own) / acceleration(true),
         skate(made, feet),
         skate(captured, feet),
         float(np.log(made.duration / captured.duration)),
-        np.mean(np.square(_apart(warped, true)), axis=0),
+        np.mean(np.square(_joint_distances(warped, true)), axis=0),
     )
 
 
@@ -82,53 +88,55 @@ def _effector(made: Floats | None, captured: Floats | None) -> float:
     return float(np.linalg.norm(made - captured))
 
 
-def _rooted(points: Floats) -> Floats:
+def _root_relative(points: Floats) -> Floats:
     return points - points[:, :1, :1]
 
 
-def _around(points: Floats) -> Floats:
+def _warping_features(points: Floats) -> Floats:
     """Return joint positions (FRAMES, J * 3) relative to the root, for time warping."""
-    return _rooted(points)[:, :, 0].reshape(FRAMES, -1)
+    return _root_relative(points)[:, :, 0].reshape(FRAMES, -1)
 
 
-def _at(points: Floats, phase: Floats) -> Floats:
-    return time_alignment.at(points.reshape(FRAMES, -1), phase).reshape(points.shape)
+def _resample(points: Floats, phase: Floats) -> Floats:
+    return time_alignment.interpolate(points.reshape(FRAMES, -1), phase).reshape(points.shape)
 
 
-def _apart(a: Floats, b: Floats) -> Floats:
+def _joint_distances(a: Floats, b: Floats) -> Floats:
     return np.linalg.norm(a[:, :, 0] - b[:, :, 0], axis=-1)
 
 
-def _distances(apart: Floats) -> Distances:
+def _distances(apart: Floats) -> DistanceStatistics:
     p95, p99 = np.percentile(apart, [95, 99])
     rms = np.sqrt(np.mean(np.square(apart)))
-    return Distances(*map(float, (apart.mean(), rms, p95, p99, apart.max())))
+    return DistanceStatistics(*map(float, (apart.mean(), rms, p95, p99, apart.max())))
 
 
 def acceleration(points: Floats) -> float:
     """Return the mean size of second differences of points (FRAMES, J, 4, 3), root-relative, m."""
-    joints = _rooted(points)[:, 1:, 0]
+    joints = _root_relative(points)[:, 1:, 0]
     return float(np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).mean())
 
 
-def skate(motion: Motion, feet: tuple[int, ...]) -> float:
+def skate(motion: ComparedMotion, feet: tuple[int, ...]) -> float:
     """Return the mean horizontal speed of feet on the ground, m/s; 0 without feet."""
-    return float(foot_skate.skate(motion.joints[:, list(feet)], (FRAMES - 1) / motion.duration))
+    return float(
+        foot_skate.mean_skate_speed(motion.joints[:, list(feet)], (FRAMES - 1) / motion.duration)
+    )
 
 
-def mean(errors: Sequence[Errors]) -> Errors:
+def mean(errors: Sequence[MotionErrors]) -> MotionErrors:
     """Return the means over clips.
 
     RMS distances are pooled, the largest is the largest of all, and the duration's error is an RMS.
     """
 
-    def pooled(name: str) -> Distances:
+    def pooled(name: str) -> DistanceStatistics:
         return _pool([getattr(error, name) for error in errors])
 
     def average(name: str) -> float:
         return float(np.mean([getattr(error, name) for error in errors]))
 
-    return Errors(
+    return MotionErrors(
         relative=pooled("relative"),
         absolute=pooled("absolute"),
         plain_relative=pooled("plain_relative"),
@@ -143,8 +151,10 @@ def mean(errors: Sequence[Errors]) -> Errors:
     )
 
 
-def _pool(parts: Sequence[Distances]) -> Distances:
+def _pool(parts: Sequence[DistanceStatistics]) -> DistanceStatistics:
     listed = np.array([[d.mean, d.rms, d.p95, d.p99, d.largest] for d in parts])
     average = listed.mean(axis=0)
     rms = np.sqrt(np.mean(np.square(listed[:, 1])))
-    return Distances(*map(float, (average[0], rms, average[2], average[3], listed[:, 4].max())))
+    return DistanceStatistics(
+        *map(float, (average[0], rms, average[2], average[3], listed[:, 4].max()))
+    )

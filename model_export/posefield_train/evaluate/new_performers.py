@@ -9,72 +9,79 @@ from posefield.common.units import Floats, Indices
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.evaluate import methods
-from posefield_train.evaluate.compared_motion import Motion
-from posefield_train.evaluate.methods import Asked
-from posefield_train.graph.trained_model import Trained
+from posefield_train.evaluate.compared_motion import ComparedMotion
+from posefield_train.evaluate.methods import Queries
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
-NOBODY = "posefield_no_performer"
-SHOWN = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
+NO_PERFORMER = "posefield_no_performer"
+ADAPTATION_COUNTS = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
 """Number of clips that each method adapts with."""
-FEWEST = 3
+MIN_OTHER_TAKES = 3
 """Fewest other takes of the performer for which a clip is predicted."""
 
 
-def unnamed(recipe: Recipe, trained: Trained, asked: Asked) -> dict[str, list[Motion]]:
+def predict_unnamed(
+    recipe: Recipe, trained: TrainedModel, asked: Queries
+) -> dict[str, list[ComparedMotion]]:
     """Return the answers without performers; empty if the model does not distinguish them."""
     if not trained.model.bank.performers:
         return {}
     nobody = [""] * len(asked.performers)
-    return {NOBODY: methods.ours(recipe, trained, replace(asked, performers=nobody))}
+    return {
+        NO_PERFORMER: methods.predict_posefield(recipe, trained, replace(asked, performers=nobody))
+    }
 
 
-def adapted(
-    recipe: Recipe, trained: Trained, held: Sequence[Example]
-) -> dict[str, list[Motion | None]]:
+def predict_adapted(
+    recipe: Recipe, trained: TrainedModel, held: Sequence[Example]
+) -> dict[str, list[ComparedMotion | None]]:
     """Return the motions of held-out clips by models adapted with some of the others.
 
     None if there are too few others. Empty if the model does not distinguish performers.
     """
     if not trained.model.bank.performers:
         return {}
-    if len(np.unique(sample_points.takes(held))) <= FEWEST:
-        return {name: [None] * len(held) for name in SHOWN}
-    known = canonical_clips.known(recipe, trained)
-    return {name: _motions(recipe, trained, known, held, count) for name, count in SHOWN.items()}
+    if len(np.unique(sample_points.take_numbers(held))) <= MIN_OTHER_TAKES:
+        return {name: [None] * len(held) for name in ADAPTATION_COUNTS}
+    known = canonical_clips.adaptable(recipe, trained)
+    return {
+        name: _motions(recipe, trained, known, held, count)
+        for name, count in ADAPTATION_COUNTS.items()
+    }
 
 
 def _motions(
     recipe: Recipe,
-    trained: Trained,
-    known: canonical_clips.Known,
+    trained: TrainedModel,
+    known: canonical_clips.AdaptableModel,
     held: Sequence[Example],
     count: int,
-) -> list[Motion | None]:
-    models: dict[tuple[int, ...], Trained] = {}
-    found: list[Motion | None] = []
+) -> list[ComparedMotion | None]:
+    models: dict[tuple[int, ...], TrainedModel] = {}
+    found: list[ComparedMotion | None] = []
     for place, example in enumerate(held):
-        shown = choose(held, place, count)
+        shown = choose_clips(held, place, count)
         if shown not in models:
             own = adaptation.adapt(known, [held[i] for i in shown], example.row.performer)
             models[shown] = replace(trained, model=own.model)
-        asked = Asked(example.controls[None], [example.row.performer])
-        found += methods.ours(recipe, models[shown], asked)
+        asked = Queries(example.controls[None], [example.row.performer])
+        found += methods.predict_posefield(recipe, models[shown], asked)
     return found
 
 
-def choose(held: Sequence[Example], asked: int, count: int) -> tuple[int, ...]:
+def choose_clips(held: Sequence[Example], asked: int, count: int) -> tuple[int, ...]:
     """Return the indices of `count` clips to adapt with, from different takes than the asked one.
 
     The first is the nearest to the mean of the controls; each further one is the farthest from
     those before it. Fewer if there are fewer takes.
     """
-    takes, points = sample_points.takes(held), _points(held)
+    takes, points = sample_points.take_numbers(held), _points(held)
     chosen: list[int] = []
     while len(chosen) < count:
-        left = _others(takes, [asked, *chosen])
+        left = _other_takes(takes, [asked, *chosen])
         if not len(left):
             break
         if chosen:
@@ -86,7 +93,7 @@ def choose(held: Sequence[Example], asked: int, count: int) -> tuple[int, ...]:
     return tuple(sorted(chosen))
 
 
-def _others(takes: Indices, taken: list[int]) -> Indices:
+def _other_takes(takes: Indices, taken: list[int]) -> Indices:
     return np.flatnonzero(~np.isin(takes, takes[taken]))
 
 

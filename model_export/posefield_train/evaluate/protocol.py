@@ -19,15 +19,15 @@ from posefield_train.evaluate import (
     new_performers,
     support_flags,
 )
-from posefield_train.evaluate.compared_motion import Event, Motion
+from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
 from posefield_train.evaluate.corrected_answers import Correction
-from posefield_train.evaluate.event_bodies import CAPTURED, Stills
+from posefield_train.evaluate.event_bodies import CAPTURED, EventBodies
 from posefield_train.evaluate.folds import Fold
-from posefield_train.evaluate.methods import EXACT, OURS, Asked
-from posefield_train.evaluate.motion_errors import Errors
-from posefield_train.evaluate.support_flags import Flags
+from posefield_train.evaluate.methods import EXACT, OURS, Queries
+from posefield_train.evaluate.motion_errors import MotionErrors
+from posefield_train.evaluate.support_flags import SupportFlags
 from posefield_train.graph import onnx_export
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.parallel import single_thread
 from posefield_train.parallel.jobs import Jobs
 from posefield_train.source.ingest import Example
@@ -38,14 +38,14 @@ from posefield_train.train import train
 # Noise-free motions evaluated together: progress is shown, and memory is bounded.
 BATCH = 50
 # Methods whose bodies are kept for the charts.
-OWN = (OURS, EXACT, *new_performers.SHOWN)
+CHARTED_METHODS = (OURS, EXACT, *new_performers.ADAPTATION_COUNTS)
 
-Report = Callable[[int, int], None]
+ProgressCallback = Callable[[int, int], None]
 """Callback with the number of parts that are done, and of all parts."""
 
 
 @dataclass(frozen=True)
-class Result:
+class EvaluationResult:
     """Result of one protocol over C clips.
 
     clips: names. errors: of each method by clip; None for clips that a method did not predict.
@@ -59,47 +59,47 @@ class Result:
     family: str
     protocol: str
     clips: tuple[str, ...]
-    errors: dict[str, tuple[Errors | None, ...]]
+    errors: dict[str, tuple[MotionErrors | None, ...]]
     sigma: Floats
     joint_sigma: Floats
     joints: tuple[str, ...]
     corrections: tuple[Correction, ...]
-    flags: Flags | None = None
-    stills: Stills = field(default_factory=dict)
+    flags: SupportFlags | None = None
+    bodies: EventBodies = field(default_factory=dict)
     parents: tuple[int, ...] = ()
 
     def asked(self, name: str) -> list[int]:
         """Return the indices of the clips that a method predicted."""
         return [place for place, error in enumerate(self.errors[name]) if error is not None]
 
-    def of(self, name: str, places: Sequence[int]) -> list[Errors]:
+    def of(self, name: str, places: Sequence[int]) -> list[MotionErrors]:
         """Return the errors of a method at some of the clips that it predicted."""
         return [error for place in places if (error := self.errors[name][place]) is not None]
 
 
 @dataclass(frozen=True)
-class _Part:
+class _PartialResult:
     """Result for some of the clips. places: their indices."""
 
     places: tuple[int, ...]
-    errors: dict[str, list[Errors | None]]
+    errors: dict[str, list[MotionErrors | None]]
     sigma: Floats
     joint_sigma: Floats
     corrections: list[Correction]
-    stills: Stills
+    bodies: EventBodies
     parents: tuple[int, ...]
 
-    def of(self, name: str) -> Sequence[Errors | None]:
+    def of(self, name: str) -> Sequence[MotionErrors | None]:
         """Return the errors of a method, None for each clip if it predicted none."""
         return self.errors.get(name, [None] * len(self.places))
 
 
 @dataclass(frozen=True)
-class _Made:
+class _EvaluatedModel:
     """A recipe, its trained model, and the model file."""
 
     recipe: Recipe
-    trained: Trained
+    trained: TrainedModel
     file: bytes
 
 
@@ -110,126 +110,141 @@ def protocols(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     return known + ["clip"] + (["performer"] if several else [])
 
 
-def run(
-    recipe: Recipe, examples: Sequence[Example], protocol: str, jobs: Jobs, report: Report
-) -> Result:
+def run_protocol(
+    recipe: Recipe, examples: Sequence[Example], protocol: str, jobs: Jobs, report: ProgressCallback
+) -> EvaluationResult:
     """Run a protocol: "clip" or "performer", held out one by one, or "truth".
 
     Raises TrainingError if the examples that remain are too few to train from.
     """
     if protocol == "truth":
-        return against_truth(recipe, examples, ground_truth.points(), jobs, report)
-    own = folds.clips(examples) if protocol == "clip" else folds.performers(examples)
+        return run_against_truth(recipe, examples, ground_truth.truth_points(), jobs, report)
+    own = folds.clip_folds(examples) if protocol == "clip" else folds.performer_folds(examples)
     each = [(fold, protocol) for fold in own]
     names = [f"{e.row.place.name} (line {e.row.line})" for e in examples]
     controls = np.stack([example.controls for example in examples])
-    found = support_flags.measure(controls, [control.name for control in recipe.controls], own)
-    asked = _Asked(f"leave_one_{protocol}_out", names, examples[0].clip.skeleton.names)
-    parts = completed(jobs.run(_held_out, each, (recipe, examples)), len(each), report)
-    return replace(_result(recipe, asked, parts), flags=found)
+    found = support_flags.measure_flags(
+        controls, [control.name for control in recipe.controls], own
+    )
+    asked = _ResultNames(f"leave_one_{protocol}_out", names, examples[0].clip.skeleton.names)
+    parts = with_progress(jobs.run(_run_fold, each, (recipe, examples)), len(each), report)
+    return replace(_merge_parts(recipe, asked, parts), flags=found)
 
 
-def against_truth(
-    recipe: Recipe, examples: Sequence[Example], points: Floats, jobs: Jobs, report: Report
-) -> Result:
+def run_against_truth(
+    recipe: Recipe,
+    examples: Sequence[Example],
+    points: Floats,
+    jobs: Jobs,
+    report: ProgressCallback,
+) -> EvaluationResult:
     """Return the result at control points (C, d) of the procedural family."""
-    made = _made(recipe, examples)
+    made = _evaluated_model(recipe, examples)
     each = [(points[at : at + BATCH], at) for at in range(0, len(points), BATCH)]
     names = [", ".join(f"{value:.4g}" for value in point) for point in points]
-    asked = _Asked("truth", names, made.trained.skeleton.names)
-    return _result(recipe, asked, completed(jobs.run(_true, each, (made,)), len(each), report))
+    asked = _ResultNames("truth", names, made.trained.skeleton.names)
+    return _merge_parts(
+        recipe, asked, with_progress(jobs.run(_run_truth_batch, each, (made,)), len(each), report)
+    )
 
 
-def completed(results: Iterator[Any], count: int, report: Report) -> Iterator[Any]:
+def with_progress(results: Iterator[Any], count: int, report: ProgressCallback) -> Iterator[Any]:
     """Yield the results of jobs and report each. count: number of the jobs."""
     for done, result in enumerate(results, start=1):
         report(done, count)
         yield result
 
 
-@single_thread.one()
-def _held_out(recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol: str) -> _Part:
+@single_thread.single_threaded()
+def _run_fold(
+    recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol: str
+) -> _PartialResult:
     rest, held = fold.split(examples)
     try:
-        made = _made(recipe, rest)
+        made = _evaluated_model(recipe, rest)
     except TrainingError as error:
         named = ", ".join(sorted({example.row.place.name for example in held}))
         raise TrainingError(f"with {named} held out: {error}") from error
-    asked = Asked(np.stack([e.controls for e in held]), [e.row.performer for e in held])
+    asked = Queries(np.stack([e.controls for e in held]), [e.row.performer for e in held])
     events = [methods.captured_event(recipe, made.trained, e.landmarks) for e in held]
     pairs = zip(held, events, strict=True)
-    captured = [compared_motion.of_clip(example.clip, event) for example, event in pairs]
+    captured = [compared_motion.motion_of_clip(example.clip, event) for example, event in pairs]
     if protocol == "clip":
-        more: More = new_performers.unnamed(recipe, made.trained, asked)
+        more: ExtraPredictions = new_performers.predict_unnamed(recipe, made.trained, asked)
     else:
-        more = new_performers.adapted(recipe, made.trained, held)
-    return _compared(made, fold.held, asked, _Truth(captured, events, more))
+        more = new_performers.predict_adapted(recipe, made.trained, held)
+    return _compare_methods(made, fold.held, asked, _ReferenceMotions(captured, events, more))
 
 
-More = Mapping[str, Sequence[Motion | None]]
+ExtraPredictions = Mapping[str, Sequence[ComparedMotion | None]]
 """Answers of methods that only one protocol has; None for clips that they did not predict."""
 
 
 @dataclass(frozen=True)
-class _Truth:
+class _ReferenceMotions:
     """Captured motions, their events, and predictions of additional methods."""
 
-    captured: Sequence[Motion]
-    events: Sequence[Event | None]
-    more: More
+    captured: Sequence[ComparedMotion]
+    events: Sequence[MotionEvent | None]
+    more: ExtraPredictions
 
 
-@single_thread.one()
-def _true(made: _Made, points: Floats, start: int) -> _Part:
+@single_thread.single_threaded()
+def _run_truth_batch(made: _EvaluatedModel, points: Floats, start: int) -> _PartialResult:
     event = methods.captured_event(made.recipe, made.trained, ())
-    captured = ground_truth.motions(points, event)
+    captured = ground_truth.truth_motions(points, event)
     places = tuple(range(start, start + len(points)))
-    asked = Asked(points, [""] * len(points))
-    return _compared(made, places, asked, _Truth(captured, [event] * len(points), {}))
+    asked = Queries(points, [""] * len(points))
+    return _compare_methods(
+        made, places, asked, _ReferenceMotions(captured, [event] * len(points), {})
+    )
 
 
-def _made(recipe: Recipe, examples: Sequence[Example]) -> _Made:
+def _evaluated_model(recipe: Recipe, examples: Sequence[Example]) -> _EvaluatedModel:
     trained = train(recipe, examples, lambda _: None)
-    return _Made(recipe, trained, onnx_export.finest(recipe, trained))
+    return _EvaluatedModel(recipe, trained, onnx_export.export_finest(recipe, trained))
 
 
-def _compared(
-    made: _Made,
+def _compare_methods(
+    made: _EvaluatedModel,
     places: tuple[int, ...],
-    asked: Asked,
-    held: _Truth,
-) -> _Part:
+    asked: Queries,
+    held: _ReferenceMotions,
+) -> _PartialResult:
     recipe, trained = made.recipe, made.trained
     feet = tuple(map(trained.skeleton.names.index, recipe.motion.feet))
-    found = methods.answers(recipe, trained, asked)
+    found = methods.predict_all(recipe, trained, asked)
     rest = {name: own for name, own in found.motions.items() if name != OURS}
     ours, corrections = {OURS: found.motions[OURS]}, list[Correction]()
     pairs = zip(held.captured, held.events, strict=True)
-    wanted = [corrected_answers.goal(own, event) for own, event in pairs if event]
+    wanted = [corrected_answers.event_target(own, event) for own, event in pairs if event]
     if wanted:
-        corrected = corrected_answers.answers(recipe, trained, made.file, asked, wanted)
+        corrected = corrected_answers.correct_motions(recipe, trained, made.file, asked, wanted)
         ours[EXACT], corrections = corrected.motions, corrected.corrections
     motions = {**ours, **held.more, **rest}
     compared = {
         name: [
-            None if own is None else motion_errors.compare(own, true, feet)
+            None if own is None else motion_errors.compare_motions(own, true, feet)
             for own, true in zip(named, held.captured, strict=True)
         ]
         for name, named in motions.items()
     }
-    named = {CAPTURED: held.captured, **{name: motions[name] for name in motions if name in OWN}}
-    moment = truncation_error.moment(recipe, trained.examples)
+    named = {
+        CAPTURED: held.captured,
+        **{name: motions[name] for name in motions if name in CHARTED_METHODS},
+    }
+    moment = truncation_error.event_frame(recipe, trained.examples)
     looks = {
-        name: [event_bodies.still(own, moment.joint) if moment else None for own in made_of]
+        name: [event_bodies.event_body(own, moment.joint) if moment else None for own in made_of]
         for name, made_of in named.items()
     }
     parents = trained.skeleton.parents
     trust = found.sigma, found.joint_sigma
-    return _Part(places, compared, *trust, corrections, looks, parents)
+    return _PartialResult(places, compared, *trust, corrections, looks, parents)
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _ResultNames:
     """Names of the protocol, of the clips and of the joints."""
 
     protocol: str
@@ -237,7 +252,9 @@ class _Asked:
     joints: tuple[str, ...]
 
 
-def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
+def _merge_parts(
+    recipe: Recipe, asked: _ResultNames, parts: Iterator[_PartialResult]
+) -> EvaluationResult:
     """Merge parts into one result, in the order of the clips."""
     listed = sorted(parts, key=lambda part: part.places)
     order = np.argsort([place for part in listed for place in part.places])
@@ -246,11 +263,11 @@ def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
     methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
     gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
     looks = {
-        name: [s for part in listed for s in part.stills.get(name, [None] * len(part.places))]
-        for name in (CAPTURED, *OWN)
-        if any(name in part.stills for part in listed)
+        name: [s for part in listed for s in part.bodies.get(name, [None] * len(part.places))]
+        for name in (CAPTURED, *CHARTED_METHODS)
+        if any(name in part.bodies for part in listed)
     }
-    return Result(
+    return EvaluationResult(
         recipe.name,
         asked.protocol,
         tuple(asked.clips),
@@ -259,6 +276,6 @@ def _result(recipe: Recipe, asked: _Asked, parts: Iterator[_Part]) -> Result:
         np.concatenate([part.joint_sigma for part in listed])[order],
         asked.joints,
         tuple(corrections[i] for i in order if corrections),
-        stills={name: [own[i] for i in order] for name, own in looks.items()},
+        bodies={name: [own[i] for i in order] for name, own in looks.items()},
         parents=listed[0].parents,
     )

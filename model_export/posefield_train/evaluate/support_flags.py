@@ -19,14 +19,14 @@ from posefield_train.report.drawing import significant_digits
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
-BEYOND = 0.25
+BEYOND_SHARE = 0.25
 """Share of a control's range by which clips are moved beyond it."""
-ACROSS = (0.25, 0.5, 0.75)
+GAP_POSITIONS = (0.25, 0.5, 0.75)
 """Positions in a gap to which clips are moved, as shares of it."""
 
 
 @dataclass(frozen=True)
-class Flags:
+class SupportFlags:
     """Shares of clips that were flagged as unsupported.
 
     alarms: of held-out clips. beyond: of clips moved beyond the range of a control, by control.
@@ -41,14 +41,14 @@ class Flags:
     def facts(self) -> dict[str, Any]:
         """Return the shares as JSON values."""
         facts: dict[str, Any] = {
-            "false_alarms": significant_digits.number(self.alarms),
+            "false_alarms": significant_digits.round_number(self.alarms),
             "beyond": {
-                name: significant_digits.number(share) for name, share in self.beyond.items()
+                name: significant_digits.round_number(share) for name, share in self.beyond.items()
             },
         }
         if self.gap:
             control, share = self.gap
-            facts["gap"] = {"control": control, "flagged": significant_digits.number(share)}
+            facts["gap"] = {"control": control, "flagged": significant_digits.round_number(share)}
         return facts
 
     def text(self) -> str:
@@ -56,7 +56,7 @@ class Flags:
         beyond = ", ".join(f"{name} {100 * share:.0f} %" for name, share in self.beyond.items())
         text = (
             f"support: {100 * self.alarms:.1f} % of held-out clips are flagged; of clips moved "
-            f"{100 * BEYOND:.0f} % of the range beyond a control: {beyond}"
+            f"{100 * BEYOND_SHARE:.0f} % of the range beyond a control: {beyond}"
         )
         if self.gap is None:
             return text
@@ -64,25 +64,29 @@ class Flags:
         return f"{text}; of clips moved into the gap of {control}: {100 * share:.0f} %"
 
 
-def measure(controls: Floats, names: Sequence[str], parts: Sequence[Fold]) -> Flags:
+def measure_flags(controls: Floats, names: Sequence[str], parts: Sequence[Fold]) -> SupportFlags:
     """Return the flags over controls (N, d) of clips held out by folds."""
     alarms, beyond = [], []
-    for held, own in _held(controls, parts):
-        alarms.append(~own.holds(held))
-        beyond.append(np.stack([_beyond(own, held, c) for c in range(len(names))], axis=1))
+    for held, own in _held_out_supports(controls, parts):
+        alarms.append(~own.supported(held))
+        beyond.append(np.stack([_flagged_beyond(own, held, c) for c in range(len(names))], axis=1))
     shares = np.concatenate(beyond).mean(axis=0).tolist()
-    return Flags(float(np.concatenate(alarms).mean()), dict(zip(names, shares, strict=True)))
+    return SupportFlags(float(np.concatenate(alarms).mean()), dict(zip(names, shares, strict=True)))
 
 
-def joined(recipe: Recipe, one: list[Example], other_recipe: Recipe, other: list[Example]) -> Flags:
+def measure_joined(
+    recipe: Recipe, one: list[Example], other_recipe: Recipe, other: list[Example]
+) -> SupportFlags:
     """Return the flags over two families joined, by the controls that both have.
 
     Raises InvalidField if they have none in common, or overlap in all of them.
     """
     known = [[control.name for control in each.controls] for each in (recipe, other_recipe)]
-    names = _shared(*known)
-    both = [_columns(each, own, names) for each, own in zip((one, other), known, strict=True)]
-    found = measure(np.vstack(both), names, folds.clips([*one, *other]))
+    names = _common_controls(*known)
+    both = [
+        _control_columns(each, own, names) for each, own in zip((one, other), known, strict=True)
+    ]
+    found = measure_flags(np.vstack(both), names, folds.clip_folds([*one, *other]))
     return replace(found, gap=_flagged_between(names, *both))
 
 
@@ -92,17 +96,17 @@ def _flagged_between(names: Sequence[str], one: Floats, other: Floats) -> tuple[
     one, other: controls (N, d) and (M, d). The share is of all clips, moved into the gap.
     """
     both = np.vstack([one, other])
-    control, low, high = _gap(names, one, other, np.ptp(both, axis=0))
-    own = support.of(both)
+    control, low, high = _widest_gap(names, one, other, np.ptp(both, axis=0))
+    own = support.fit_support(both)
     flagged = []
-    for share in ACROSS:
+    for share in GAP_POSITIONS:
         moved = both.copy()
         moved[:, control] = low + share * (high - low)
-        flagged.append(~own.holds(moved))
+        flagged.append(~own.supported(moved))
     return names[control], float(np.mean(flagged))
 
 
-def _shared(one: Sequence[str], other: Sequence[str]) -> list[str]:
+def _common_controls(one: Sequence[str], other: Sequence[str]) -> list[str]:
     """Return the controls that two families have in common, in the order of the first.
 
     Raises InvalidField if there are none.
@@ -114,30 +118,34 @@ def _shared(one: Sequence[str], other: Sequence[str]) -> list[str]:
     return both
 
 
-def _columns(examples: Sequence[Example], names: Sequence[str], wanted: Sequence[str]) -> Floats:
+def _control_columns(
+    examples: Sequence[Example], names: Sequence[str], wanted: Sequence[str]
+) -> Floats:
     """Return the wanted controls (N, d) of examples."""
     return np.stack([example.controls for example in examples])[:, [names.index(n) for n in wanted]]
 
 
-def _held(controls: Floats, parts: Sequence[Fold]) -> Iterator[tuple[Floats, support.Support]]:
+def _held_out_supports(
+    controls: Floats, parts: Sequence[Fold]
+) -> Iterator[tuple[Floats, support.Support]]:
     """Yield the controls that a fold holds out, and the support of all others."""
     for fold in parts:
         held = np.isin(np.arange(len(controls)), fold.held)
-        yield controls[held], support.of(controls[~held])
+        yield controls[held], support.fit_support(controls[~held])
 
 
-def _beyond(own: support.Support, held: Floats, control: int) -> Floats:
+def _flagged_beyond(own: support.Support, held: Floats, control: int) -> Floats:
     """Return the share (H,) of both ends of a control beyond which each held clip is flagged."""
-    room = BEYOND * (own.high - own.low)[control]
+    room = BEYOND_SHARE * (own.high - own.low)[control]
     flagged = []
     for end in (own.low[control] - room, own.high[control] + room):
         moved = held.copy()
         moved[:, control] = end
-        flagged.append(~own.holds(moved))
+        flagged.append(~own.supported(moved))
     return np.asarray(np.mean(flagged, axis=0))
 
 
-def _gap(
+def _widest_gap(
     names: Sequence[str], one: Floats, other: Floats, widths: Floats
 ) -> tuple[int, float, float]:
     """Return the control with the widest gap, and the ends of the gap."""

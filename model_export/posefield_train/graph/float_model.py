@@ -8,17 +8,17 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.model_file import checksum
 from posefield.motion import skeleton
-from posefield_train.align.canonical_timing import Timing
+from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
 from posefield_train.kriging import kriging_graph
-from posefield_train.kriging.kriging_bank import POSE, VARIANCE, FieldBank
-from posefield_train.onnx_graph.graph_builder import Net, Shapes
-from posefield_train.onnx_graph.level_tables import Ladder
+from posefield_train.kriging.kriging_bank import POSE, VARIANCE, KrigingBank
+from posefield_train.onnx_graph.graph_builder import GraphBuilder, Shapes
+from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.tensor.decoder import Decoder, Proportions
 
 
 @dataclass(frozen=True)
-class Outputs:
+class ModelOutputs:
     """Outputs of a model.
 
     rotations: (B, S, J, 4). root_position: (B, S, 3), m. bone_offsets: (B, J, 3), m. duration:
@@ -39,43 +39,45 @@ class Outputs:
 
 
 @dataclass(frozen=True)
-class Model:
+class FloatModel:
     """Stages of a trained model. travel: None if it is not cyclic."""
 
-    bank: FieldBank
-    timing: Timing
+    bank: KrigingBank
+    timing: CanonicalTiming
     decoder: Decoder
     proportions: Proportions
     travel: Travel | None
 
     def evaluate(
         self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
-    ) -> Outputs:
+    ) -> ModelOutputs:
         """Return outputs at controls (B, d) in their own units and times (B, S), s, of a level.
 
         labels: performers (B, p), by default an unseen performer.
         """
         nobody = np.zeros((len(controls), len(self.bank.performers)))
         fields = self.fields(controls, nobody if labels is None else labels, level)
-        return self.timed(fields, time, level)
+        return self.outputs_at_times(fields, time, level)
 
     def fields(self, controls: Floats, labels: Floats, level: int) -> dict[str, Floats]:
         """Return the values (B, m) of all kriged quantities by name."""
         return self.bank.numpy(self.bank.points(controls, labels), level)
 
-    def timed(self, fields: dict[str, Floats], time: Floats, level: int) -> Outputs:
+    def outputs_at_times(self, fields: dict[str, Floats], time: Floats, level: int) -> ModelOutputs:
         """Return the outputs for `fields` at times (B, S), s."""
         _, place = self.timing.numpy(fields["duration"], fields["warp"], time)
-        return self._decoded(fields, place, level)
+        return self._decode(fields, place, level)
 
     def durations(self, controls: Floats, labels: Floats) -> Floats:
         """Return the durations (B,), s, at the finest level."""
         logs = self.bank.others["duration"].predict(self.bank.points(controls, labels))
         return np.exp(logs[:, 0])
 
-    def posed(self, controls: Floats, place: Floats, labels: Floats, level: int) -> Outputs:
+    def outputs_at_frames(
+        self, controls: Floats, place: Floats, labels: Floats, level: int
+    ) -> ModelOutputs:
         """Return outputs at canonical frames (B, S)."""
-        return self._decoded(self.fields(controls, labels, level), place, level)
+        return self._decode(self.fields(controls, labels, level), place, level)
 
     def joint_at_frame(
         self, fields: dict[str, Floats], chain: Sequence[int], frame: int, level: int
@@ -84,7 +86,7 @@ class Model:
 
         chain: joints from the root on, each the parent of the next.
         """
-        decoder = self.decoder.at(level).of_joints(chain)
+        decoder = self.decoder.at_level(level).select_joints(chain)
         rotations, root = (found[:, None] for found in decoder.at_frame(fields[POSE], frame))
         if self.travel:
             place = np.full((len(root), 1), float(frame))
@@ -94,38 +96,38 @@ class Model:
         parents = tuple(range(-1, len(chain) - 1))
         return skeleton.positions(parents, rotations, translations)[:, 0, -1]
 
-    def _decoded(self, fields: dict[str, Floats], place: Floats, level: int) -> Outputs:
-        rotations, root = self.decoder.at(level).numpy(fields[POSE], place)
+    def _decode(self, fields: dict[str, Floats], place: Floats, level: int) -> ModelOutputs:
+        rotations, root = self.decoder.at_level(level).numpy(fields[POSE], place)
         gone, duration = np.zeros((*place.shape, 3)), np.exp(fields["duration"][:, 0])
         if self.travel:
             rotations, root, gone = self.travel.numpy(rotations, root, fields["travel"], place)
         offsets = self.proportions.numpy(fields["offsets"])
         sigma = self.bank.sigma(fields[VARIANCE])
-        return Outputs(rotations, root, offsets, duration, sigma, gone)
+        return ModelOutputs(rotations, root, offsets, duration, sigma, gone)
 
     def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
         """Return the file of the model: one graph with metadata, producer fields and a checksum."""
-        net = Net()
-        ranks = [rung.ranks[2] for rung in self.decoder.rungs]
-        ladder = Ladder({**kriging_graph.entries(self.bank, ranks), **self.decoder.entries()})
+        net = GraphBuilder()
+        ranks = [rung.ranks[2] for rung in self.decoder.level_sizes]
+        ladder = LevelTables({**kriging_graph.entries(self.bank, ranks), **self.decoder.entries()})
         ends = ladder.onnx(net)
         fields = kriging_graph.onnx(self.bank, net, "controls", ends)
         # service/posefield/constraints reads the coefficients by this name.
-        fields[POSE] = net.called("coefficients", fields[POSE])
+        fields[POSE] = net.rename_value("coefficients", fields[POSE])
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
-        place = net.called("frame", place)
+        place = net.rename_value("frame", place)
         rotations, root = self.decoder.onnx(net, fields[POSE], place, ends)
         if self.travel:
-            way = net.called("way", fields["travel"])
+            way = net.rename_value("way", fields["travel"])
             rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)
         else:
             gone = net("Mul", place, net.weights("no_travel", np.zeros(3)))
-        net.named("rotations", rotations)
-        net.named("root_position", root)
-        net.named("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
-        net.named("duration", duration)
-        net.named("sigma", fields["sigma"])
-        net.named("travel", gone)
+        net.add_output("rotations", rotations)
+        net.add_output("root_position", root)
+        net.add_output("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
+        net.add_output("duration", duration)
+        net.add_output("sigma", fields["sigma"])
+        net.add_output("travel", gone)
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.performers:
@@ -140,4 +142,4 @@ class Model:
             "sigma": ["batch"],
             "travel": ["batch", "steps", 3],
         }
-        return checksum.sealed(net.model(inputs, outputs, metadata, about))
+        return checksum.append_checksum(net.model(inputs, outputs, metadata, about))

@@ -8,20 +8,20 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import skeleton
-from posefield_train.graph.float_model import Model
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.float_model import FloatModel
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
-from posefield_train.tensor.hosvd import Multilinear
-from posefield_train.tensor.truncation_error import Moment
+from posefield_train.tensor.hosvd import TuckerTensor
+from posefield_train.tensor.truncation_error import EventFrame
 
 # Largest ratio of the worst pose's error to the allowed root mean square, when a level is chosen.
-TAIL = 5.0
+TAIL_RATIO = 5.0
 
 
 @dataclass(frozen=True)
-class Errors:
+class LevelErrors:
     """Errors of joints relative to the model before truncation; statistics are computed on access.
 
     gaps: distances (Q, J), m.
@@ -55,7 +55,7 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class Exam:
+class LevelTest:
     """Random test inputs with the output of the model before truncation.
 
     controls: (Q, d). labels: (Q, p). times: (Q, 1), s. whole: joint positions (Q, J, 3), m.
@@ -66,23 +66,23 @@ class Exam:
     labels: Floats
     times: Floats
     parents: tuple[int, ...]
-    moment: Moment | None
+    moment: EventFrame | None
     whole: Floats
     at_event: Floats
 
-    def answers(self, model: Model, level: int) -> "Answers":
+    def outputs(self, model: FloatModel, level: int) -> "LevelOutputs":
         """Return a level's outputs at the test inputs."""
-        return Answers(self, model, level, model.fields(self.controls, self.labels, level))
+        return LevelOutputs(self, model, level, model.fields(self.controls, self.labels, level))
 
-    def keeps(self, model: Model, allowed: dict[str, float]) -> bool:
+    def keeps(self, model: FloatModel, allowed: dict[str, float]) -> bool:
         """Return True if the last level stays within the allowed errors over its moving joints.
 
-        allowed: errors, m, by name in `Errors`, and of the effector.
+        allowed: errors, m, by name in `LevelErrors`, and of the effector.
         """
         last = len(model.decoder.coarse)
-        answers = self.answers(model, last)
-        found = answers.errors(model.decoder.rungs[last].joints)
-        if "rms" in allowed and found.pose > TAIL * allowed["rms"]:
+        answers = self.outputs(model, last)
+        found = answers.errors(model.decoder.level_sizes[last].joints)
+        if "rms" in allowed and found.pose > TAIL_RATIO * allowed["rms"]:
             return False
         joints = {name: most for name, most in allowed.items() if name != "effector"}
         if any(getattr(found, name) > most for name, most in joints.items()):
@@ -92,64 +92,70 @@ class Exam:
 
 
 @dataclass(frozen=True)
-class Answers:
+class LevelOutputs:
     """Outputs of a level at the test inputs. fields: kriged values (Q, m) by name."""
 
-    exam: Exam
-    model: Model
+    test: LevelTest
+    model: FloatModel
     level: int
     fields: dict[str, Floats]
 
-    def errors(self, joints: Sequence[int]) -> Errors:
+    def errors(self, joints: Sequence[int]) -> LevelErrors:
         """Return the errors over some joints."""
-        found = self.model.timed(self.fields, self.exam.times, self.level)
-        gaps = np.linalg.norm(found.positions(self.exam.parents)[:, 0] - self.exam.whole, axis=-1)
-        return Errors(gaps[:, list(joints)])
+        found = self.model.outputs_at_times(self.fields, self.test.times, self.level)
+        gaps = np.linalg.norm(found.positions(self.test.parents)[:, 0] - self.test.whole, axis=-1)
+        return LevelErrors(gaps[:, list(joints)])
 
     @property
     def effector(self) -> float | None:
         """Return the RMS distance, m, of the event's joint at the event; None without event."""
-        exam = self.exam
+        exam = self.test
         if exam.moment is None:
             return None
-        found = _event(self.model, self.fields, self.level, exam.moment, exam.parents)
+        found = _event_positions(self.model, self.fields, self.level, exam.moment, exam.parents)
         return float(np.sqrt(np.mean(np.sum(np.square(found - exam.at_event), axis=-1))))
 
 
-def of(recipe: Recipe, trained: Trained, questions: int) -> Exam:
+def level_test(recipe: Recipe, trained: TrainedModel, questions: int) -> LevelTest:
     """Return an exam of a trained model's levels with the given number of inputs."""
-    moment = truncation_error.moment(recipe, trained.examples)
-    whole = uncut(trained.model, trained.full)
-    return against(whole, trained.skeleton.parents, moment, questions)
+    moment = truncation_error.event_frame(recipe, trained.examples)
+    whole = untruncated(trained.model, trained.full)
+    return level_test_against(whole, trained.skeleton.parents, moment, questions)
 
 
-def against(whole: Model, parents: tuple[int, ...], moment: Moment | None, questions: int) -> Exam:
+def level_test_against(
+    whole: FloatModel, parents: tuple[int, ...], moment: EventFrame | None, questions: int
+) -> LevelTest:
     """Return an exam with outputs of a model before truncation."""
     bank = whole.bank
-    points, d = thinning.questions(bank, 1.0, questions), len(bank.low)
+    points, d = thinning.random_points(bank, 1.0, questions), len(bank.low)
     controls = (points[:, :d] * (bank.high - bank.low) + bank.high + bank.low) / 2.0
     labels = points[:, d:]
     rng = np.random.Generator(np.random.PCG64(len(points)))
     fields = whole.fields(controls, labels, 0)
     times = rng.uniform(0.0, 1.0, (len(points), 1)) * np.exp(fields["duration"])
-    joints = whole.timed(fields, times, 0).positions(parents)[:, 0]
-    event = _event(whole, fields, 0, moment, parents) if moment else np.zeros((len(points), 3))
-    return Exam(controls, labels, times, parents, moment, joints, event)
+    joints = whole.outputs_at_times(fields, times, 0).positions(parents)[:, 0]
+    event = (
+        _event_positions(whole, fields, 0, moment, parents)
+        if moment
+        else np.zeros((len(points), 3))
+    )
+    return LevelTest(controls, labels, times, parents, moment, joints, event)
 
 
-def _event(
-    model: Model,
+def _event_positions(
+    model: FloatModel,
     fields: dict[str, Floats],
     level: int,
-    moment: Moment,
+    moment: EventFrame,
     parents: tuple[int, ...],
 ) -> Floats:
     """Return positions (Q, 3), m, of the event's joint at its canonical frame."""
-    chain = skeleton.chain(parents, moment.joint)
+    chain = skeleton.joint_chain(parents, moment.joint)
     return model.joint_at_frame(fields, chain, moment.frame, level)
 
 
-def uncut(model: Model, full: Multilinear) -> Model:
+def untruncated(model: FloatModel, full: TuckerTensor) -> FloatModel:
     """Return the model with the tensor before truncation."""
     bank = model.bank
     pose = universal_kriging.solve(bank.pose.hyper, bank.pose.samples, full.bases[2])

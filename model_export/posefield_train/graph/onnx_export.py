@@ -21,13 +21,13 @@ from posefield.inference.session import Session
 from posefield.kriging.kriging_model import Hyper
 from posefield.model_file import model_card
 from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import Control, Making, ModelCard
+from posefield.model_file.model_card import Control, ModelCard, TrainingParameters
 from posefield_train.align import phase_alignment
 from posefield_train.graph import levels, truncation_cost
-from posefield_train.graph.float_model import Model, Outputs
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.float_model import FloatModel, ModelOutputs
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
-from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
 from posefield_train.source import measured_controls
 from posefield_train.source.half_turns import Finding
@@ -37,66 +37,67 @@ from posefield_train.tensor import truncation_error
 
 POINTS, BATCH = 10_000, 1_000
 # Largest distance of a joint of the graph from the reference's, m.
-ALLOWED = 1e-4
+PARITY_LIMIT = 1e-4
 # A control with more distinct values than this is continuous, and they are not listed.
-FEW_VALUES = 10
+MAX_LISTED_VALUES = 10
 
 
 @dataclass(frozen=True)
-class Exported:
+class ExportedModel:
     """An exported model.
 
     model: of all levels. content: bytes of its file. card: its model card. parity: largest joint
     error of the parity check, m.
     """
 
-    model: Model
+    model: FloatModel
     content: bytes
     card: ModelCard
     parity: float
 
 
-@single_thread.one()
-def export(recipe: Recipe, trained: Trained, notes: list[str]) -> Exported:
+@single_thread.single_threaded()
+def export_model(recipe: Recipe, trained: TrainedModel, notes: list[str]) -> ExportedModel:
     """Return the exported model with all its levels; equal data give equal bytes.
 
     Raises TrainingError for levels of detail that cannot be made, and ExportRefused if the parity
     check fails.
     """
-    notes = [*notes, *sample_points.notes(recipe, trained.examples)]
-    laddered = levels.build(recipe, trained)
-    return finished(
+    notes = [*notes, *sample_points.data_notes(recipe, trained.examples)]
+    laddered = levels.build_levels(recipe, trained)
+    return check_and_export(
         laddered.model, lambda parity: _card(recipe, trained, laddered.levels, notes, parity)
     )
 
 
-def finished(model: Model, own_card: Callable[[float], ModelCard]) -> Exported:
+def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) -> ExportedModel:
     """Check a model of all its levels and return it with its file.
 
-    own_card: makes the model card from the parity error, m. Raises ExportRefused as `gate` does.
+    own_card: makes the model card from the parity error, m. Raises ExportRefused as `check_parity`
+    does.
     """
-    about = _about()
+    about = _producer()
     # The card contains the parity error, so the weights are checked with a draft of the card.
     draft = own_card(0.0)
-    parity = gate(model, model.onnx(model_card.dump(draft), about), draft)
+    parity = check_parity(model, model.onnx(model_card.dump(draft), about), draft)
     written = own_card(parity)
-    return Exported(model, model.onnx(model_card.dump(written), about), written, parity)
+    return ExportedModel(model, model.onnx(model_card.dump(written), about), written, parity)
 
 
-@single_thread.one()
-def finest(recipe: Recipe, trained: Trained) -> bytes:
+@single_thread.single_threaded()
+def export_finest(recipe: Recipe, trained: TrainedModel) -> bytes:
     """Return an unchecked file of the finest level alone, for measurements only."""
     alone = recipe.model_copy(update={"size": recipe.size.model_copy(update={"levels": []})})
-    laddered = levels.build(alone, trained)
+    laddered = levels.build_levels(alone, trained)
     own_card = _card(recipe, trained, laddered.levels, [], parity=0.0)
-    return laddered.model.onnx(model_card.dump(own_card), _about())
+    return laddered.model.onnx(model_card.dump(own_card), _producer())
 
 
-def _about() -> dict[str, str]:
+def _producer() -> dict[str, str]:
     return {"producer_name": "posefield", "producer_version": __version__}
 
 
-def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
+def check_parity(model: FloatModel, content: bytes, own_card: ModelCard) -> float:
     """Return the largest joint distance, m, between file and reference at random inputs.
 
     Every level is checked. Raises ExportRefused, naming the joint and the input, if the distance
@@ -106,14 +107,14 @@ def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
     rng = np.random.Generator(np.random.PCG64(10_000))
     worst = 0.0
     for question in range(POINTS // BATCH):
-        asked = _draw(rng, model, own_card, question % len(own_card.levels))
-        gaps = _gaps(model, opened, asked)
+        asked = _draw_inputs(rng, model, own_card, question % len(own_card.levels))
+        gaps = _joint_distances(model, opened, asked)
         at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         worst = max(worst, float(gaps[at]))
-        if worst > ALLOWED:
+        if worst > PARITY_LIMIT:
             raise ExportRefused(
                 f"the graph puts {own_card.skeleton.names[at[2]]} {100 * worst:.4f} cm from where "
-                f"the reference does, expected at most {100 * ALLOWED:g} cm; at "
+                f"the reference does, expected at most {100 * PARITY_LIMIT:g} cm; at "
                 f"{asked.said(own_card, int(at[0]))}. Fewer controls, or a larger nugget, "
                 "condition it better"
             )
@@ -121,7 +122,7 @@ def gate(model: Model, content: bytes, own_card: ModelCard) -> float:
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _ParityInputs:
     """Inputs of the parity check.
 
     points: controls (B, d) in their own units. times: (B, 1), s. labels: (B, p). level: of detail.
@@ -142,7 +143,9 @@ class _Asked:
         return f"{who}{point}, {self.times[row, 0]:.3f} s, level {self.level}"
 
 
-def _draw(rng: np.random.Generator, model: Model, own_card: ModelCard, level: int) -> _Asked:
+def _draw_inputs(
+    rng: np.random.Generator, model: FloatModel, own_card: ModelCard, level: int
+) -> _ParityInputs:
     """Draw random controls, performers and times of their clips.
 
     No performer is as likely as each of the performers.
@@ -153,21 +156,21 @@ def _draw(rng: np.random.Generator, model: Model, own_card: ModelCard, level: in
     labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, BATCH)]
     durations = model.durations(points, labels)
     times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
-    return _Asked(points, times.astype(np.float32).astype(np.float64), labels, level)
+    return _ParityInputs(points, times.astype(np.float32).astype(np.float64), labels, level)
 
 
-def _gaps(model: Model, opened: Session, asked: _Asked) -> Floats:
+def _joint_distances(model: FloatModel, opened: Session, asked: _ParityInputs) -> Floats:
     """Return distances (B, 1, J), m, between the joints of graph and reference."""
     question, parents = (asked.points, asked.times), opened.card.skeleton.parents
     expected = model.evaluate(*question, asked.labels, asked.level).positions(parents)
     answers = opened.run(*question, *OUTPUTS, labels=asked.labels, level=asked.level)
-    found = Outputs(*answers).positions(parents)
-    return np.asarray(np.linalg.norm(found - expected, axis=-1))
+    finding_notes = ModelOutputs(*answers).positions(parents)
+    return np.asarray(np.linalg.norm(finding_notes - expected, axis=-1))
 
 
 def _card(
     recipe: Recipe,
-    trained: Trained,
+    trained: TrainedModel,
     ladder: tuple[Level, ...],
     notes: list[str],
     parity: float,
@@ -187,22 +190,22 @@ def _card(
         durations=(float(durations.min()), float(durations.max())),
         performers=trained.model.bank.performers,
         examples=tuple(tuple(map(float, example.controls)) for example in examples),
-        moved_by=tuple(map(int, trained.laid.moved_by)),
+        moved_by=tuple(map(int, trained.samples.moved_by)),
         feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
         sources=tuple(example.row.source for example in examples),
-        kriging=plainly(trained.pose.hyper),
+        kriging=plain_parameters(trained.pose.hyper),
         roles={str(role): joint for role, joint in recipe.roles.items()},
-        left_out=tuple(map(_round, np.sqrt(trained.missed))),
+        left_out=tuple(map(_rounded, np.sqrt(trained.left_out_errors))),
         event=truncation_error.event(recipe, examples),
-        beside=_beside(trained),
+        beside=_covariance_root(trained),
         joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
         making=_making(recipe, trained),
     )
 
 
-def _beside(trained: Trained) -> tuple[tuple[float, ...], ...]:
+def _covariance_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
     """Return the root of the covariance of log duration and travel residuals.
 
     The residuals are scaled to a sigma of one metre.
@@ -215,27 +218,31 @@ def _beside(trained: Trained) -> tuple[tuple[float, ...], ...]:
     covariance = standard.T @ standard / len(standard)
     # The covariance is singular for clips of one duration or without turns.
     root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(covariance)))
-    return tuple(tuple(map(_round, row)) for row in root)
+    return tuple(tuple(map(_rounded, row)) for row in root)
 
 
-def _making(recipe: Recipe, trained: Trained) -> Making:
+def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
     marks = [example.landmarks for example in trained.examples]
     times = np.array(marks).reshape(len(marks), -1).mean(axis=0)
     fields = trained.model.bank.others.items()
-    return Making(
-        {name: solved_with(field.hyper) for name, field in fields if isinstance(field, Kriging)},
+    return TrainingParameters(
+        {
+            name: kriging_settings(field.hyper)
+            for name, field in fields
+            if isinstance(field, UniversalKriging)
+        },
         dict(zip(recipe.clips.landmarks, map(float, times), strict=True)),
         {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
     )
 
 
-def solved_with(hyper: Hyper) -> tuple[float, ...]:
+def kriging_settings(hyper: Hyper) -> tuple[float, ...]:
     """Return nugget and drifts; the nugget is rounded to six digits, as adaptation reads it."""
     return (float(f"{hyper.nugget:.6g}"), *hyper.drifts)
 
 
-def _controls(recipe: Recipe, trained: Trained) -> tuple[Control, ...]:
+def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
     values = np.stack([example.controls for example in trained.examples])
     landmarks = np.array([example.landmarks for example in trained.examples])
     controls = []
@@ -249,49 +256,53 @@ def _controls(recipe: Recipe, trained: Trained) -> tuple[Control, ...]:
                 float(distinct[0]),
                 float(distinct[-1]),
                 float(np.sort(own)[len(own) // 2]),
-                tuple(map(float, distinct)) if len(distinct) <= FEW_VALUES else (),
-                measured_controls.on_the_card(recipe, asked, trained.skeleton, landmarks),
+                tuple(map(float, distinct)) if len(distinct) <= MAX_LISTED_VALUES else (),
+                measured_controls.card_measure(recipe, asked, trained.skeleton, landmarks),
             )
         )
     return tuple(controls)
 
 
-def _diagnostics(trained: Trained, notes: list[str], parity: float) -> dict[str, Any]:
+def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict[str, Any]:
     """Return training statistics, in metres and shares, rounded."""
-    cut = {f"truncation_{k}_m": v for k, v in asdict(trained.fidelity).items() if v is not None}
+    cut = {
+        f"truncation_{k}_m": v
+        for k, v in asdict(trained.truncation_errors).items()
+        if v is not None
+    }
     kept, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
-    compression = asdict(truncation_cost.compression(trained.tensor, kept, controls))
+    compression = asdict(truncation_cost.tensor_compression(trained.tensor, kept, controls))
     hyper = trained.pose.hyper
     return {
-        **{name: _round(distance) for name, distance in cut.items()},
-        "compression": {name: _round(ratio) for name, ratio in compression.items()},
-        "leave_one_out_rms_m": _round(np.sqrt(trained.missed.mean())),
-        "explained": {name: _round(share) for name, share in trained.explained.items()},
+        **{name: _rounded(distance) for name, distance in cut.items()},
+        "compression": {name: _rounded(ratio) for name, ratio in compression.items()},
+        "leave_one_out_rms_m": _rounded(np.sqrt(trained.left_out_errors.mean())),
+        "explained": {name: _rounded(share) for name, share in trained.explained.items()},
         "covariance": hyper.covariance,
         "drift": list(hyper.drifts),
-        "scales": [_round(scale) for scale in hyper.scales],
-        "nugget": _round(hyper.nugget),
+        "scales": [_rounded(scale) for scale in hyper.scales],
+        "nugget": _rounded(hyper.nugget),
         "tensor": list(trained.tensor.values.shape),
         "parity_m": float(f"{parity:.1e}"),
         "notes": [
             *notes,
             *trained.outlier_notes(),
-            *phase_alignment.notes(trained.examples),
-            *found(trained.findings, trained.examples, trained.skeleton.names),
+            *phase_alignment.shift_notes(trained.examples),
+            *finding_notes(trained.findings, trained.examples, trained.skeleton.names),
         ],
     }
 
 
-def plainly(hyper: Hyper) -> Hyper:
+def plain_parameters(hyper: Hyper) -> Hyper:
     """Return the parameters with Python floats, which a model card can hold."""
     return replace(hyper, nugget=float(hyper.nugget), label=float(hyper.label))
 
 
-def _round(value: Any) -> float:
+def _rounded(value: Any) -> float:
     return float(f"{float(value):.4g}")
 
 
-def found(
+def finding_notes(
     findings: Sequence[Finding], examples: Sequence[Example], names: Sequence[str]
 ) -> list[str]:
     """Return one note per clip and kind of finding."""
@@ -317,13 +328,13 @@ def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
     return {
         "licence": recipe.licence,
         "recipe_sha256": hashlib.sha256(recipe.model_dump_json().encode()).hexdigest(),
-        "data_sha256": digest({str(e.row.place.name): e for e in examples}),
+        "data_sha256": data_digest({str(e.row.place.name): e for e in examples}),
         "clips": len(examples),
         "versions": {name: version(name) for name in ("posefield", "numpy", "scipy", "onnx")},
     }
 
 
-def digest(files: Mapping[str, Example]) -> str:
+def data_digest(files: Mapping[str, Example]) -> str:
     """Return one SHA-256 digest over the names and contents of motion files, sorted by name."""
     total = hashlib.sha256()
     for name in sorted(files):

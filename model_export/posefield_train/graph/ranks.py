@@ -8,19 +8,19 @@ import numpy.typing as npt
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
-from posefield_train.graph.truncation_cost import Price
+from posefield_train.graph.truncation_cost import RankCost
 from posefield_train.source.recipe import Size
 from posefield_train.tensor import hosvd
-from posefield_train.tensor.hosvd import Multilinear
-from posefield_train.tensor.truncation_error import Judge
+from posefield_train.tensor.hosvd import TuckerTensor
+from posefield_train.tensor.truncation_error import TruncationReference
 
-Triple = tuple[int, int, int]
-Strain = Callable[[Triple], float]
+RankTriple = tuple[int, int, int]
+BudgetRatio = Callable[[RankTriple], float]
 """Largest ratio of a true error to its budget at some ranks; at most one within all budgets."""
 
 
 @dataclass(frozen=True)
-class Front:
+class ParetoFront:
     """Pareto front of rank triples (F, 3) by cost and error, the cheapest first.
 
     errors: squared error (F,) of each in the tensor's metric, decreasing.
@@ -29,7 +29,7 @@ class Front:
     triples: npt.NDArray[np.int64]
     errors: Floats
 
-    def __getitem__(self, place: int) -> Triple:
+    def __getitem__(self, place: int) -> RankTriple:
         r1, r2, r3 = (int(rank) for rank in self.triples[place])
         return r1, r2, r3
 
@@ -39,20 +39,22 @@ class Front:
         return min(max(place, low + 1), high - 1)
 
 
-def choose(size: Size, full: Multilinear, price: Price, judge: Judge) -> Triple:
+def choose_ranks(
+    size: Size, full: TuckerTensor, price: RankCost, judge: TruncationReference
+) -> RankTriple:
     """Return the ranks of a recipe, or the cheapest whose true errors stay within its budgets."""
     if size.ranks is not None:
-        return given(full.core, size.ranks)
+        return recipe_ranks(full.core, size.ranks)
 
-    def strain(triple: Triple) -> float:
+    def strain(triple: RankTriple) -> float:
         return judge.strain(full.truncated(triple), size.budgets)
 
     places = judge.own_tensor.weight * np.prod(judge.whole.shape[:2])
     aim = min(size.budgets.values()) ** 2 * float(places)
-    return cheapest(front(full.core, price), strain, aim)
+    return cheapest_within(pareto_front(full.core, price), strain, aim)
 
 
-def front(core: Floats, price: Price, within: Triple | None = None) -> Front:
+def pareto_front(core: Floats, price: RankCost, within: RankTriple | None = None) -> ParetoFront:
     """Return the Pareto front of rank triples by cost and exact squared error.
 
     within: largest ranks; None for all. All triples are evaluated from one cumulative sum of the
@@ -61,31 +63,31 @@ def front(core: Floats, price: Price, within: Triple | None = None) -> Front:
     errors = hosvd.squared_errors(core)[tuple(map(slice, within or core.shape))]
     # Rounding errors of the sum must not add a rank.
     errors[errors <= 1e-12 * float(np.sum(np.square(core)))] = 0.0
-    costs = price.of(*np.ix_(*(np.arange(1, size + 1) for size in errors.shape)))
+    costs = price.evaluate(*np.ix_(*(np.arange(1, size + 1) for size in errors.shape)))
     order = np.lexsort((errors.ravel(), costs.ravel()))
     ordered = errors.ravel()[order]
     best_before = np.minimum.accumulate(np.concatenate([[np.inf], ordered[:-1]]))
     places = order[ordered < best_before]
     triples = np.stack(np.unravel_index(places, errors.shape), axis=1) + 1
-    return Front(triples, errors.ravel()[places])
+    return ParetoFront(triples, errors.ravel()[places])
 
 
-def cheapest(front: Front, strain: Strain, aim: float) -> Triple:
+def cheapest_within(pareto_front: ParetoFront, strain: BudgetRatio, aim: float) -> RankTriple:
     """Return the first triple of a front within every budget, if true errors decrease along it.
 
     The triple returned is within the budgets in any case. aim: squared error of the first guess.
     Bisection alternates with a guess from the last strain, which grows as the root of the error.
     """
-    low, high, guess = -1, len(front.errors) - 1, True
+    low, high, guess = -1, len(pareto_front.errors) - 1, True
     while high - low > 1:
-        tried = front.near(aim, low, high) if guess else (low + high) // 2
-        found = strain(front[tried])
+        tried = pareto_front.near(aim, low, high) if guess else (low + high) // 2
+        found = strain(pareto_front[tried])
         low, high = (low, tried) if found <= 1.0 else (tried, high)
-        aim, guess = front.errors[tried] / found**2, not guess
-    return front[high]
+        aim, guess = pareto_front.errors[tried] / found**2, not guess
+    return pareto_front[high]
 
 
-def given(core: Floats, ranks: list[int]) -> Triple:
+def recipe_ranks(core: Floats, ranks: list[int]) -> RankTriple:
     """Return the recipe's own ranks; raise TrainingError if they exceed the tensor's size."""
     if any(rank > size for rank, size in zip(ranks, core.shape, strict=True)):
         raise TrainingError(

@@ -4,15 +4,15 @@ from dataclasses import dataclass
 
 from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton
-from posefield_train.align.time_alignment import Aligned
-from posefield_train.graph.float_model import Model
-from posefield_train.kriging.kriging_tuning import Tuned
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.align.time_alignment import AlignedClips
+from posefield_train.graph.float_model import FloatModel
+from posefield_train.kriging.kriging_tuning import TunedKriging
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.ingest import Example
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
-from posefield_train.tensor.truncation_error import Fidelity
+from posefield_train.tensor.truncation_error import TruncationErrors
 
 
 @dataclass(frozen=True)
@@ -24,38 +24,38 @@ class Outlier:
 
     clip: int
     kind: str
-    said: str
+    evidence: str
 
 
 @dataclass(frozen=True)
-class Trained:
+class TrainedModel:
     """A trained model with its training data and diagnostics.
 
     examples: sorted by their content, so that the model does not depend on the order of the table.
-    laid: sample points. pose: tuned kriging model of the pose. values: sample values (N, m) of each
-    quantity, the pose's full motions in the coordinates of the sample mode. missed: mean squared
-    joint distance (N,), m², of each clip from its leave-one-out prediction. explained: share of the
-    variation between clips that leave-one-out predicts from the controls, by quantity; without a
-    significant gain the quantity is constant. residuals: leave-one-out residuals (N, m) of each
-    quantity but the pose. fidelity: truncation errors. joints: leave-one-out error (J,) of each
-    joint as a share of the root mean square of all. outliers: evidence against clips that do not
-    fit.
+    samples: sample points. pose: tuned kriging model of the pose. values: sample values (N, m) of
+    each quantity, the pose's full motions in the coordinates of the sample mode. missed: mean
+    squared joint distance (N,), m², of each clip from its leave-one-out prediction. explained:
+    share of the variation between clips that leave-one-out predicts from the controls, by quantity;
+    without a significant gain the quantity is constant. residuals: leave-one-out residuals (N, m)
+    of each quantity but the pose. fidelity: truncation errors. joints: leave-one-out error (J,) of
+    each joint as a share of the root mean square of all. outliers: evidence against clips that do
+    not fit.
     """
 
-    model: Model
+    model: FloatModel
     examples: tuple[Example, ...]
-    laid: Samples
+    samples: SamplePoints
     skeleton: Skeleton
-    aligned: Aligned
+    aligned: AlignedClips
     tensor: MotionTensor
-    full: Multilinear
-    pose: Tuned
+    full: TuckerTensor
+    pose: TunedKriging
     values: dict[str, Floats]
-    missed: Floats
+    left_out_errors: Floats
     explained: dict[str, float]
     findings: list[Finding]
     residuals: dict[str, Floats]
-    fidelity: Fidelity
+    truncation_errors: TruncationErrors
     joints: Floats
     outliers: tuple[Outlier, ...] = ()
 
@@ -63,5 +63,5 @@ class Trained:
         """Return one note per clip with evidence against it."""
         said: dict[int, list[str]] = {}
         for one in self.outliers:
-            said.setdefault(one.clip, []).append(one.said)
+            said.setdefault(one.clip, []).append(one.evidence)
         return [f"{self.examples[i].row.named}: {'; '.join(parts)}" for i, parts in said.items()]

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from posefield_train.graph.float_model import Model
-from posefield_train.kriging.kriging_bank import FieldBank
+from posefield_train.graph.float_model import FloatModel
+from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.tensor.motion_tensor import MotionTensor
 
 
 @dataclass(frozen=True)
-class Price:
+class RankCost:
     """Cost of ranks (r1, r2, r3): the core's r1 r2 r3 plus linear terms.
 
     ranks: cost per rank of each mode. pair: cost per pair of ranks of the first two modes.
@@ -21,13 +21,13 @@ class Price:
     ranks: tuple[int, int, int]
     pair: int = 0
 
-    def of(self, r1: Any, r2: Any, r3: Any) -> Any:
+    def evaluate(self, r1: Any, r2: Any, r3: Any) -> Any:
         """Return the cost of ranks, integers or arrays that broadcast against each other."""
         alone = sum(price * rank for price, rank in zip(self.ranks, (r1, r2, r3), strict=True))
         return r1 * r2 * r3 + self.pair * r1 * r2 + alone
 
 
-def numbers(own_tensor: MotionTensor, controls: int) -> Price:
+def storage_cost(own_tensor: MotionTensor, controls: int) -> RankCost:
     """Return the price in numbers stored for the motion: core, bases and kriging weights.
 
     A rank of the first mode is a direction of the D' degrees of freedom that vary, one of the
@@ -38,53 +38,56 @@ def numbers(own_tensor: MotionTensor, controls: int) -> Price:
     return stored(own_tensor.values.shape, controls)
 
 
-def stored(shape: Sequence[int], controls: int) -> Price:
+def stored(shape: Sequence[int], controls: int) -> RankCost:
     """Return the price in stored numbers for a tensor shape (D', T, N)."""
     freedoms, frames, samples = shape
-    return Price((freedoms, frames, samples + controls + 1))
+    return RankCost((freedoms, frames, samples + controls + 1))
 
 
-def operations(own_tensor: MotionTensor, controls: int) -> Price:
+def operation_cost(own_tensor: MotionTensor, controls: int) -> RankCost:
     """Return the price in multiply-adds of one pose, counting terms that grow with the ranks.
 
     Counted are the kriging weights, the core, the interpolation between two frames, its product
     with the motion, and directions of three numbers for the root and a quaternion for each joint.
     """
     joints, samples = len(own_tensor.chart.means), own_tensor.values.shape[2]
-    return Price((4 * joints + 3, 1, samples + controls + 1), pair=1)
+    return RankCost((4 * joints + 3, 1, samples + controls + 1), pair=1)
 
 
-def read(model: Model, level: int) -> int:
+def count_numbers(model: FloatModel, level: int) -> int:
     """Return how many numbers a level reads: core, bases, kriging weights and samples."""
-    bank, rung = model.bank, model.decoder.rungs[level]
+    bank, rung = model.bank, model.decoder.level_sizes[level]
     r1, r2, r3 = rung.ranks
-    samples, varies = bank.samples(level), np.any(model.decoder.at(level).unwhiten != 0.0, axis=1)
+    samples, varies = (
+        bank.samples(level),
+        np.any(model.decoder.at_level(level).unwhiten != 0.0, axis=1),
+    )
     bases = r1 * np.count_nonzero(varies) + r2 * len(model.decoder.reduced.bases[1])
-    asked = samples * len(bank.low) + _precision(bank, level)
-    return int(r1 * r2 * r3 + bases + asked + _weights(bank, level))
+    asked = samples * len(bank.low) + _precision_size(bank, level)
+    return int(r1 * r2 * r3 + bases + asked + _weights_size(bank, level))
 
 
-def _precision(bank: FieldBank, level: int) -> int:
+def _precision_size(bank: KrigingBank, level: int) -> int:
     return 0 if level else (bank.drift + len(bank.pose.samples)) ** 2
 
 
-def _weights(bank: FieldBank, level: int) -> int:
+def _weights_size(bank: KrigingBank, level: int) -> int:
     if level:
         return bank.coarse[level - 1].size
     return sum(field.dual.size for field in bank.kriged)
 
 
-def work(model: Model, level: int) -> int:
+def count_operations(model: FloatModel, level: int) -> int:
     """Return the multiply-adds of one pose of a level, from controls to quaternions."""
-    bank, rung = model.bank, model.decoder.rungs[level]
+    bank, rung = model.bank, model.decoder.level_sizes[level]
     (r1, r2, r3), columns = rung.ranks, bank.columns(level)
     distances = columns * (2 + 2 * len(bank.low) + len(bank.performers))
     values = (bank.linear + columns) * sum(bank.sizes(r3))
     decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3)
-    return distances + values + _precision(bank, level) + decoding
+    return distances + values + _precision_size(bank, level) + decoding
 
 
-PRICES = {"numbers": numbers, "operations": operations}
+RANK_COSTS = {"numbers": storage_cost, "operations": operation_cost}
 
 
 @dataclass(frozen=True)
@@ -98,12 +101,17 @@ class Compression:
     stored: float
 
 
-def compression(own_tensor: MotionTensor, ranks: Sequence[int], controls: int) -> Compression:
-    """Return the compression at ranks (r1, r2, r3); `numbers` defines what counts as stored."""
-    return compressed(own_tensor.values.shape, ranks, controls)
+def tensor_compression(
+    own_tensor: MotionTensor, ranks: Sequence[int], controls: int
+) -> Compression:
+    """Return the compression at ranks (r1, r2, r3).
+
+    `storage_cost` defines what counts as stored.
+    """
+    return shape_compression(own_tensor.values.shape, ranks, controls)
 
 
-def compressed(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
+def shape_compression(shape: Sequence[int], ranks: Sequence[int], controls: int) -> Compression:
     """Return the compression of a tensor of shape (D', T, N) at ranks (r1, r2, r3)."""
-    raw, held = float(np.prod(shape)), stored(shape, controls).of(*ranks)
+    raw, held = float(np.prod(shape)), stored(shape, controls).evaluate(*ranks)
     return Compression(raw / float(np.prod(ranks)), raw / float(held))

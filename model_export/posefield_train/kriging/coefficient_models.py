@@ -6,117 +6,124 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
-from posefield_train.kriging.kriging_bank import Constant, Field
-from posefield_train.kriging.kriging_tuning import Tuned
-from posefield_train.kriging.sample_points import Samples
-from posefield_train.kriging.variogram import Experimental
+from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel
+from posefield_train.kriging.kriging_tuning import TunedKriging
+from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.variogram import ExperimentalVariogram
 from posefield_train.source.recipe import Kriging
 from posefield_train.tensor.decoder import Proportions
 
 # Largest error of bone offsets that a model may make, m.
 SAME_BONE = 5e-4
 # A Gaussian covariance is conditioned worse than Matérn's; it must reduce the error to this share.
-CLEARLY = 0.95
+CLEAR_IMPROVEMENT = 0.95
 # Standard errors by which a model of the controls must beat the constant.
-SURE = 2.0
+SIGNIFICANCE = 2.0
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedModel:
     """A fitted coefficient model.
 
     explained: share of the variation that it explains. residuals: leave-one-out residuals (N, m).
     """
 
-    field: Field
+    field: CoefficientModel
     explained: float
     residuals: Floats
 
 
-def chosen(settings: Kriging, samples: Samples, values: Floats) -> Tuned:
+def choose_covariance(settings: Kriging, samples: SamplePoints, values: Floats) -> TunedKriging:
     """Return the model of values (N, m) with the first covariance, or a clearly better one.
 
     A covariance is clearly better if its leave-one-out error is below CLEARLY times the first's.
     """
     seen = _variograms(settings, samples, values)
     first, *others = (
-        _tuned(settings, name, samples, values, seen) for name in settings.covariances
+        _best_drift(settings, name, samples, values, seen) for name in settings.covariances
     )
     best = min(others, key=lambda field: field.unexplained, default=first)
-    return best if best.unexplained < CLEARLY * first.unexplained else first
+    return best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
 
 
-def tuned(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Tuned:
+def tune_drift(
+    settings: Kriging, covariance: str, samples: SamplePoints, values: Floats
+) -> TunedKriging:
     """Return the model of values (N, m) with the drift of the least leave-one-out error."""
-    return _tuned(settings, covariance, samples, values, _variograms(settings, samples, values))
+    return _best_drift(
+        settings, covariance, samples, values, _variograms(settings, samples, values)
+    )
 
 
-def _variograms(settings: Kriging, samples: Samples, values: Floats) -> dict[int, Experimental]:
+def _variograms(
+    settings: Kriging, samples: SamplePoints, values: Floats
+) -> dict[int, ExperimentalVariogram]:
     """Return the variogram of the residuals for each degree of drift; covariances share it."""
     degrees = {max(drifts) for drifts in settings.drifts}
     return {
-        degree: variogram.of_residuals(samples.half_ranges, values, degree) for degree in degrees
+        degree: variogram.residual_variogram(samples.half_ranges, values, degree)
+        for degree in degrees
     }
 
 
-def _tuned(
+def _best_drift(
     settings: Kriging,
     covariance: str,
-    samples: Samples,
+    samples: SamplePoints,
     values: Floats,
-    seen: dict[int, Experimental],
-) -> Tuned:
+    seen: dict[int, ExperimentalVariogram],
+) -> TunedKriging:
     guesses = [
-        kriging_tuning.first_guess(seen[max(drifts)], samples.controls, covariance, drifts)
+        kriging_tuning.initial_guess(seen[max(drifts)], samples.controls, covariance, drifts)
         for drifts in settings.drifts
     ]
     found = [kriging_tuning.tune(guess, samples, values, settings.nugget) for guess in guesses]
     return min(found, key=lambda field: field.unexplained)
 
 
-def fit(settings: Kriging, covariance: str, samples: Samples, values: Floats) -> Fitted:
+def fit(settings: Kriging, covariance: str, samples: SamplePoints, values: Floats) -> FittedModel:
     """Return a model of values (N, m) in the controls.
 
     It is their mean if the controls do not explain them.
     """
     if np.ptp(values, axis=0).max() == 0.0:
-        return Fitted(Constant(values[0]), 0.0, np.zeros_like(values))
-    found = tuned(settings, covariance, samples, values)
+        return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
+    found = tune_drift(settings, covariance, samples, values)
     explained = 1.0 - found.unexplained
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.
-    if not _sure(found, samples, values) and settings.nugget is None:
-        return Fitted(Constant(values.mean(axis=0)), explained, samples.from_mean(values))
-    return Fitted(
+    if not _is_significant(found, samples, values) and settings.nugget is None:
+        return FittedModel(ConstantModel(values.mean(axis=0)), explained, samples.from_mean(values))
+    return FittedModel(
         universal_kriging.solve(found.hyper, samples.points, values), explained, found.residuals
     )
 
 
-def _sure(found: Tuned, samples: Samples, values: Floats) -> bool:
+def _is_significant(found: TunedKriging, samples: SamplePoints, values: Floats) -> bool:
     """Return True if the gain over the mean of the other samples exceeds SURE standard errors.
 
     Scales and nugget were chosen to maximize this gain, so that a small one can be chance.
     """
     from_mean = np.sum(np.square(samples.from_mean(values)), axis=1)
     gains = from_mean - np.sum(np.square(found.residuals), axis=1)
-    return bool(gains.mean() > SURE * gains.std(ddof=1) / np.sqrt(len(gains)))
+    return bool(gains.mean() > SIGNIFICANCE * gains.std(ddof=1) / np.sqrt(len(gains)))
 
 
-def proportions(offsets: Floats) -> tuple[Proportions, Floats]:
+def fit_proportions(offsets: Floats) -> tuple[Proportions, Floats]:
     """Return mean and directions of bone offsets (N, J, 3), and each clip's coefficients (N, r)."""
     mean = offsets.mean(axis=0)
     centred = (offsets - mean).reshape(len(offsets), -1)
     left, values, right = np.linalg.svd(centred, full_matrices=False)
     rank = 1
-    while rank < len(values) and _worst(centred, left, values, right, rank) > SAME_BONE:
+    while rank < len(values) and _largest_residual(centred, left, values, right, rank) > SAME_BONE:
         rank += 1
-    turned = signs(right[:rank])
+    turned = row_signs(right[:rank])
     directions = (turned[:, None] * right[:rank]).reshape(rank, -1, 3)
     # The root has no bone; clear the rounding error of the decomposition.
     directions[:, 0] = 0.0
     return Proportions(mean, directions), left[:, :rank] * values[:rank] * turned
 
 
-def signs(rows: Floats) -> Floats:
+def row_signs(rows: Floats) -> Floats:
     """Return the sign (r,) of the largest entry of each row, 1 for a zero row.
 
     Multiplying by it makes the rows independent of the machine.
@@ -125,6 +132,8 @@ def signs(rows: Floats) -> Floats:
     return np.where(rows[np.arange(len(rows)), largest] < 0, -1.0, 1.0)
 
 
-def _worst(centred: Floats, left: Floats, values: Floats, right: Floats, rank: int) -> float:
+def _largest_residual(
+    centred: Floats, left: Floats, values: Floats, right: Floats, rank: int
+) -> float:
     kept = (left[:, :rank] * values[:rank]) @ right[:rank]
     return float(np.abs(centred - kept).max())

@@ -15,11 +15,11 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.kriging.universal_kriging import UniversalKriging
 
 
 @dataclass(frozen=True)
-class Constant:
+class ConstantModel:
     """A coefficient model (m,) that does not depend on the controls."""
 
     mean: Floats
@@ -29,18 +29,18 @@ class Constant:
         return np.repeat(self.mean[None], len(points), axis=0)
 
 
-Field = Kriging | Constant
+CoefficientModel = UniversalKriging | ConstantModel
 
 VARIANCE, POSE = "variance", "pose"
 
 
-def width(field: Field) -> int:
+def width(field: CoefficientModel) -> int:
     """Return the number of values of a coefficient model."""
-    return len(field.mean) if isinstance(field, Constant) else field.dual.shape[1]
+    return len(field.mean) if isinstance(field, ConstantModel) else field.dual.shape[1]
 
 
 @dataclass(frozen=True)
-class FieldBank:
+class KrigingBank:
     """Coefficient models by name over controls sampled in the ranges low to high (d,).
 
     performers: names, in the order of their labels. sill: of the pose model, m² per joint and
@@ -52,16 +52,16 @@ class FieldBank:
     low: Floats
     high: Floats
     performers: tuple[str, ...]
-    pose: Kriging
-    others: dict[str, Field]
+    pose: UniversalKriging
+    others: dict[str, CoefficientModel]
     sill: float
     coarse: tuple[Floats, ...] = ()
 
     @property
-    def kriged(self) -> list[Kriging]:
+    def kriged(self) -> list[UniversalKriging]:
         """Return the models that depend on the controls, the pose's first."""
         fields = [self.pose, *self.others.values()]
-        return [field for field in fields if isinstance(field, Kriging)]
+        return [field for field in fields if isinstance(field, UniversalKriging)]
 
     @property
     def linear(self) -> int:
@@ -85,10 +85,10 @@ class FieldBank:
         """Return the number of samples that a level evaluates."""
         return min(self.columns(level), len(self.pose.samples))
 
-    def at_samples(self, name: str) -> Floats:
+    def sample_values(self, name: str) -> Floats:
         """Return the values (n, m) that a model interpolates, or its mean in every row."""
         field = self.others[name]
-        if isinstance(field, Constant):
+        if isinstance(field, ConstantModel):
             return field.predict(self.pose.samples)
         return field.values
 

@@ -5,13 +5,19 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_bank
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.kriging_bank import POSE, VARIANCE, Constant, Field, FieldBank
-from posefield_train.kriging.universal_kriging import Kriging
-from posefield_train.onnx_graph.graph_builder import Net
-from posefield_train.onnx_graph.level_tables import Numbers
+from posefield_train.kriging.kriging_bank import (
+    POSE,
+    VARIANCE,
+    CoefficientModel,
+    ConstantModel,
+    KrigingBank,
+)
+from posefield_train.kriging.universal_kriging import UniversalKriging
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph.level_tables import Integers
 
 
-def entries(bank: FieldBank, ranks: list[int]) -> dict[str, list[Numbers]]:
+def entries(bank: KrigingBank, ranks: list[int]) -> dict[str, list[Integers]]:
     """Return the level-dependent slice ends and shapes of the bank's graph, by name.
 
     ranks: number of pose coefficients of each level.
@@ -33,7 +39,9 @@ def entries(bank: FieldBank, ranks: list[int]) -> dict[str, list[Numbers]]:
     }
 
 
-def onnx(bank: FieldBank, net: Net, controls: str, ends: dict[str, str]) -> dict[str, str]:
+def onnx(
+    bank: KrigingBank, net: GraphBuilder, controls: str, ends: dict[str, str]
+) -> dict[str, str]:
     """Build values (B, m) of each quantity by name, with `sigma` (B,) in place of the variance.
 
     With performers, the graph has the optional input `performer` (B or 1, p) of labels. Its default
@@ -47,7 +55,7 @@ def onnx(bank: FieldBank, net: Net, controls: str, ends: dict[str, str]) -> dict
     weights = net("Slice", _weights(bank, net), start, ends["to"], net.indices(0))
     values = net("MatMul", basis, net("Reshape", weights, shape))
     names = ["straight", VARIANCE, *bank.others, POSE]
-    parts = net.many("Split", len(names), values, ends["sizes"], axis=1)
+    parts = net.multi_output("Split", len(names), values, ends["sizes"], axis=1)
     fields = dict(zip(names, parts, strict=True))
     variance = _variance(bank, net, basis, fields.pop("straight"), ends)
     variance = net("Mul", variance, net("Exp", fields.pop(VARIANCE)))
@@ -58,7 +66,7 @@ def onnx(bank: FieldBank, net: Net, controls: str, ends: dict[str, str]) -> dict
     return {**fields, "sigma": sigma}
 
 
-def _points(bank: FieldBank, net: Net, controls: str) -> str:
+def _points(bank: KrigingBank, net: GraphBuilder, controls: str) -> str:
     """Build one and the controls (B, 1 + d), scaled so that their sampled range is -1 to 1."""
     low, high = bank.low, bank.high
     gain = np.hstack([np.zeros((len(low), 1)), np.diag(2.0 / (high - low))])
@@ -68,7 +76,7 @@ def _points(bank: FieldBank, net: Net, controls: str) -> str:
     )
 
 
-def _linear(bank: FieldBank, net: Net, controls: str, points: str) -> str:
+def _linear(bank: KrigingBank, net: GraphBuilder, controls: str, points: str) -> str:
     """Build the points with labels in front (B, p + 1 + d), if there are performers."""
     if not bank.performers:
         return points
@@ -79,7 +87,9 @@ def _linear(bank: FieldBank, net: Net, controls: str, points: str) -> str:
     return net("Concat", net("Expand", performer, shape), points, axis=1)
 
 
-def _covariances(bank: FieldBank, net: Net, points: str, linear: str, columns: str) -> str:
+def _covariances(
+    bank: KrigingBank, net: GraphBuilder, points: str, linear: str, columns: str
+) -> str:
     """Build the covariances of every model at every sample (B, F n), or their first columns.
 
     Squared distances come from one product with [p², q, 1, p], without an array (B, n, d). Its
@@ -94,7 +104,7 @@ def _covariances(bank: FieldBank, net: Net, points: str, linear: str, columns: s
     return COVARIANCES[bank.pose.hyper.covariance].onnx(net, squared)
 
 
-def _factors(bank: FieldBank, net: Net) -> str:
+def _factors(bank: KrigingBank, net: GraphBuilder) -> str:
     """Build factors (1 + d + p + 1 + d, F n) that map [1, p², q, 1, p] to squared distances."""
     d, n = len(bank.low), len(bank.pose.samples)
     scales = np.stack([field.hyper.scales for field in bank.kriged])
@@ -114,7 +124,7 @@ def _factors(bank: FieldBank, net: Net) -> str:
     )
 
 
-def _labels(bank: FieldBank, net: Net, own: str) -> list[str]:
+def _labels(bank: KrigingBank, net: GraphBuilder, own: str) -> list[str]:
     """Build the factors of labels (F, p, n) and of one (F, 1, n) in the squared distances.
 
     They add label² (1 - q·e) for each model, for labels q of the input and e of a sample. own:
@@ -129,15 +139,15 @@ def _labels(bank: FieldBank, net: Net, own: str) -> list[str]:
     return [net("Mul", apart, same), net("Add", own, apart)]
 
 
-def _weights(bank: FieldBank, net: Net) -> str:
+def _weights(bank: KrigingBank, net: GraphBuilder) -> str:
     """Build the concatenated weights of all levels, the finest from parts at session load."""
-    finest = net("Concat", _top(bank, net), *_duals(bank, net), axis=0)
-    coarse = [_coarse(bank, net, level) for level in range(1, 1 + len(bank.coarse))]
+    finest = net("Concat", _linear_weights(bank, net), *_duals(bank, net), axis=0)
+    coarse = [_coarse_weights(bank, net, level) for level in range(1, 1 + len(bank.coarse))]
     flat = net("Reshape", finest, net.indices(-1))
     return net("Concat", flat, *coarse, axis=0) if coarse else flat
 
 
-def _coarse(bank: FieldBank, net: Net, level: int) -> str:
+def _coarse_weights(bank: KrigingBank, net: GraphBuilder, level: int) -> str:
     """Build the flat weights of a coarser level, preceded by those of a constant one."""
     stored = net.weights(f"weights_{level}", bank.coarse[level - 1])
     one = np.zeros((len(bank.coarse[level - 1]), 1))
@@ -146,7 +156,7 @@ def _coarse(bank: FieldBank, net: Net, level: int) -> str:
     return net("Reshape", both, net.indices(-1))
 
 
-def _top(bank: FieldBank, net: Net) -> str:
+def _linear_weights(bank: KrigingBank, net: GraphBuilder) -> str:
     """Build weights (p + 1 + d, M) of labels, one and controls; those of labels are zero."""
     d, slope, constant = len(bank.low), *bank.slope
     variance = np.concatenate([[constant], np.zeros(d - bank.drift), slope[: bank.drift]])
@@ -159,38 +169,40 @@ def _top(bank: FieldBank, net: Net) -> str:
     return net("Pad", stored, net.indices(len(bank.performers), 0, 0, 0))
 
 
-def _duals(bank: FieldBank, net: Net) -> list[str]:
+def _duals(bank: KrigingBank, net: GraphBuilder) -> list[str]:
     """Build weights (n, M) of each model's covariances.
 
     Those of the pose come first; the variance uses them too.
     """
     total = 2 + sum(map(kriging_bank.width, bank.others.values()))
-    pose = net.weights("pose_weights", _dual(bank.pose))
+    pose = net.weights("pose_weights", _dual_part(bank.pose))
     beside = net("Pad", pose, net.indices(0, total - 1, 0, 0))
     slope = net.weights("variance_weights", bank.slope[0][bank.drift :, None])
     blocks, start = [net("Concat", slope, beside, axis=1)], 2
     for name, field in bank.others.items():
         after = total - start - kriging_bank.width(field) + kriging_bank.width(bank.pose)
-        if isinstance(field, Kriging):
-            own = net.weights(f"{name}_weights", _dual(field))
+        if isinstance(field, UniversalKriging):
+            own = net.weights(f"{name}_weights", _dual_part(field))
             blocks.append(net("Pad", own, net.indices(0, start, 0, after)))
         start += kriging_bank.width(field)
     return blocks
 
 
-def _dual(field: Kriging) -> Floats:
+def _dual_part(field: UniversalKriging) -> Floats:
     return field.dual[: len(field.samples)]
 
 
-def _linear_part(field: Field, controls: int) -> Floats:
+def _linear_part(field: CoefficientModel, controls: int) -> Floats:
     """Return weights (1 + d, m) of one and the controls, zero for terms outside the drift."""
-    if isinstance(field, Constant):
+    if isinstance(field, ConstantModel):
         return np.vstack([field.mean, np.zeros((controls, len(field.mean)))])
     drift = field.dual[len(field.samples) :]
     return np.vstack([drift, np.zeros((1 + controls - len(drift), drift.shape[1]))])
 
 
-def _variance(bank: FieldBank, net: Net, basis: str, straight: str, ends: dict[str, str]) -> str:
+def _variance(
+    bank: KrigingBank, net: GraphBuilder, basis: str, straight: str, ends: dict[str, str]
+) -> str:
     """Build the finest level's variance (B, 1), a quadratic form of one, controls, covariances."""
     start, one = net.indices(len(bank.performers)), net.indices(1)
     own = net("Slice", basis, start, ends["own"], one)

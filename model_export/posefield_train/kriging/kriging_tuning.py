@@ -8,25 +8,25 @@ from scipy.optimize import minimize
 
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging, variogram
-from posefield_train.kriging.sample_points import Samples
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper, LeaveOneOut
-from posefield_train.kriging.variogram import Experimental
+from posefield_train.kriging.variogram import ExperimentalVariogram
 
 # Bounds of scales, per half-range of a control. The lower bound means "linear in this control"; in
 # float32 samples would coincide beyond the bounds.
-SCALES = (0.15, 3.0)
+SCALE_BOUNDS = (0.15, 3.0)
 # Bounds of the nugget, as a share of the sill. Repeated trials can differ by several sills.
-NUGGETS = (1e-4, 10.0)
+NUGGET_BOUNDS = (1e-4, 10.0)
 # Bounds of label distances: from similar performers to independent ones.
-LABELS = (0.05, 4.0)
-DESCENTS = 2
-STEP = 0.7
+LABEL_BOUNDS = (0.05, 4.0)
+DESCENT_COUNT = 2
+SIMPLEX_STEP = 0.7
 # Stopping criteria: size of the simplex in logarithms, relative difference of losses, evaluations.
-CLOSE, EVEN, MOST = 1e-2, 1e-5, 400
+SIMPLEX_TOLERANCE, EVEN, MOST = 1e-2, 1e-5, 400
 
 
 @dataclass(frozen=True)
-class Tuned:
+class TunedKriging:
     """A tuned kriging model.
 
     residuals: leave-one-out residuals (n, m). unexplained: their squared sum relative to that of
@@ -41,27 +41,27 @@ class Tuned:
     sill: float
 
 
-def first_guess(
-    experimental: Experimental, controls: int, covariance: str, drifts: tuple[int, ...]
+def initial_guess(
+    experimental: ExperimentalVariogram, controls: int, covariance: str, drifts: tuple[int, ...]
 ) -> Hyper:
     """Return parameters of the isotropic variogram fit, within the bounds.
 
     experimental: variogram of the residuals from the highest degree in `drifts`. controls:
     their number.
     """
-    fit = variogram.fit(experimental, covariance)
-    share = fit.nugget / fit.sill if fit.sill > 0 else NUGGETS[1]
-    scales = np.full(controls, np.clip(1.0 / fit.range, *SCALES))
-    return Hyper(covariance, drifts, scales, float(np.clip(share, *NUGGETS)), 0.0)
+    fit = variogram.fit_by_grid(experimental, covariance)
+    share = fit.nugget / fit.sill if fit.sill > 0 else NUGGET_BOUNDS[1]
+    scales = np.full(controls, np.clip(1.0 / fit.range, *SCALE_BOUNDS))
+    return Hyper(covariance, drifts, scales, float(np.clip(share, *NUGGET_BOUNDS)), 0.0)
 
 
-def fixed(hyper: Hyper, samples: Samples, values: Floats) -> Tuned:
+def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: Floats) -> TunedKriging:
     """Return the model of given parameters with its leave-one-out residuals."""
     left_out = universal_kriging.leave_out(hyper, samples.points, samples.groups)
     variances = universal_kriging.left_out_variances(hyper, samples.points, left_out)
     residuals, from_mean = left_out @ values, samples.from_mean(values)
     total = float(np.sum(np.square(from_mean)))
-    return Tuned(
+    return TunedKriging(
         hyper,
         residuals,
         float(np.sum(np.square(residuals))) / total if total > 0 else 1.0,
@@ -70,7 +70,7 @@ def fixed(hyper: Hyper, samples: Samples, values: Floats) -> Tuned:
     )
 
 
-def tune(guess: Hyper, samples: Samples, values: Floats, nugget: float | None) -> Tuned:
+def tune(guess: Hyper, samples: SamplePoints, values: Floats, nugget: float | None) -> TunedKriging:
     """Return the model with scales, label distance and nugget that minimize the squared residuals.
 
     values: (n, m), in a Euclidean metric. nugget: fixed value; None to tune it. Nelder and Mead's
@@ -78,7 +78,7 @@ def tune(guess: Hyper, samples: Samples, values: Floats, nugget: float | None) -
     minima, between a smooth model and one of independent samples.
     """
     d, labelled = samples.controls, samples.labelled
-    bounds = [SCALES] * d + [LABELS] * labelled + [NUGGETS]
+    bounds = [SCALE_BOUNDS] * d + [LABEL_BOUNDS] * labelled + [NUGGET_BOUNDS]
     low, high = np.log(bounds).T
 
     def read(x: Floats) -> Hyper:
@@ -95,12 +95,12 @@ def tune(guess: Hyper, samples: Samples, values: Floats, nugget: float | None) -
     leave_one_out = LeaveOneOut(samples.points, samples.controls, samples.groups)
 
     def loss(x: Floats) -> float:
-        left_out = leave_one_out.matrix(read(x))
+        left_out = leave_one_out.residual_matrix(read(x))
         return float(np.sum((left_out @ products) * left_out))
 
     starts = [np.clip(x, low, high) for x in _starts(guess, labelled)]
-    best = min(_descend(loss, x, low, high) for x in sorted(starts, key=loss)[:DESCENTS])
-    return fixed(read(np.array(best[1])), samples, values)
+    best = min(_descend(loss, x, low, high) for x in sorted(starts, key=loss)[:DESCENT_COUNT])
+    return evaluate_fixed(read(np.array(best[1])), samples, values)
 
 
 def _starts(guess: Hyper, labelled: bool) -> list[Floats]:
@@ -117,7 +117,7 @@ def _descend(
 ) -> tuple[float, list[float]]:
     """Return the least loss found from a start within bounds, and its location."""
     # Steps of a factor of two: SciPy's default simplex is degenerate if a logarithm is near zero.
-    inward = np.where(start + STEP > high, -STEP, STEP)
+    inward = np.where(start + SIMPLEX_STEP > high, -SIMPLEX_STEP, SIMPLEX_STEP)
     simplex = np.vstack([start, start + np.diag(inward)])
     found = minimize(
         loss,
@@ -126,7 +126,7 @@ def _descend(
         bounds=list(zip(low, high, strict=True)),
         options={
             "initial_simplex": simplex,
-            "xatol": CLOSE,
+            "xatol": SIMPLEX_TOLERANCE,
             "fatol": EVEN * loss(start),
             "maxfev": MOST,
         },

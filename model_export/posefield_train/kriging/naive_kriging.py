@@ -13,21 +13,21 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.universal_kriging import Hyper, Kriging
-from posefield_train.kriging.variogram import Experimental, Fit
-from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.kriging.variogram import ExperimentalVariogram, VariogramModel
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
-Fitter = Callable[[Experimental, str], Fit]
+VariogramFitter = Callable[[ExperimentalVariogram, str], VariogramModel]
 
 
 @dataclass(frozen=True)
-class Naive:
+class NaiveKriging:
     """One isotropic kriging model per frame over the same samples.
 
     values: pose vectors (N, T, D).
     """
 
-    fields: tuple[Kriging, ...]
+    fields: tuple[UniversalKriging, ...]
     values: Floats
 
     def numpy(self, points: Floats) -> Floats:
@@ -35,7 +35,7 @@ class Naive:
         weights = np.stack([field.weights(points) for field in self.fields], axis=1)
         return np.einsum("btn,ntd->btd", weights, self.values, optimize=True)
 
-    def onnx(self, net: Net, points: str) -> str:
+    def onnx(self, net: GraphBuilder, points: str) -> str:
         """Build pose vectors (T, D) at one point (1, d) by weighted averages of the samples.
 
         The weights come from the inverse of each frame's system, as in the paper.
@@ -46,7 +46,7 @@ class Naive:
         samples = net.weights("values", self.values.transpose(1, 0, 2))
         return net("Squeeze", net("MatMul", weights, samples), net.indices(1))
 
-    def onnx_dual(self, net: Net, points: str) -> str:
+    def onnx_dual(self, net: GraphBuilder, points: str) -> str:
         """Build `onnx` with premultiplied weights and samples, which halves the numbers read."""
         duals = np.stack(
             [
@@ -57,7 +57,7 @@ class Naive:
         product = net("MatMul", self.basis(net, points), net.weights("duals", duals))
         return net("Squeeze", product, net.indices(1))
 
-    def basis(self, net: Net, points: str) -> str:
+    def basis(self, net: GraphBuilder, points: str) -> str:
         """Build covariances and drift (T, 1, n + k) of one point for every frame's model."""
         samples = self.fields[0].samples
         gaps = net("Sub", points, net.weights("naive_samples", samples))
@@ -72,9 +72,9 @@ class Naive:
         return net("Unsqueeze", both, net.indices(1))
 
 
-def fit(
-    points: Floats, positions: Floats, values: Floats, covariance: str, fitter: Fitter
-) -> Naive:
+def fit_naive(
+    points: Floats, positions: Floats, values: Floats, covariance: str, fitter: VariogramFitter
+) -> NaiveKriging:
     """Fit naive kriging to pose vectors (N, T, D), joint positions (N, T, J, 3) at points (N, d).
 
     fitter: fits a variogram model to each frame's experimental variogram.
@@ -83,9 +83,9 @@ def fit(
     for frame in range(values.shape[1]):
         poses = positions[:, frame].reshape(len(points), -1)
         left = variogram.residuals(points, poses, 1)
-        found = fitter(variogram.experimental(points, left), covariance)
+        found = fitter(variogram.experimental_variogram(points, left), covariance)
         nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
         scales = np.full(points.shape[1], 1.0 / found.range)
         hyper = Hyper(covariance, (1,), scales, float(nugget), 0.0)
         fields.append(universal_kriging.solve(hyper, points, values[:, frame]))
-    return Naive(tuple(fields), values)
+    return NaiveKriging(tuple(fields), values)

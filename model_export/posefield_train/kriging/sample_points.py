@@ -12,11 +12,11 @@ from posefield.kriging.kriging_model import half_ranges
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
-EMPTY = np.zeros(0, dtype=np.int64)
+NO_SAMPLES = np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
-class Samples:
+class SamplePoints:
     """Sample points of a kriging model.
 
     points: (n, d + p), controls in half-ranges, then the performers' labels. controls: d. groups:
@@ -40,7 +40,7 @@ class Samples:
     @property
     def moved_by(self) -> Indices:
         """Return the index (n,) of each sample's performer; empty without labels."""
-        return np.argmax(self.points[:, self.controls :], axis=1) if self.labelled else EMPTY
+        return np.argmax(self.points[:, self.controls :], axis=1) if self.labelled else NO_SAMPLES
 
     def from_mean(self, values: Floats) -> Floats:
         """Return the differences of values (n, m) from the mean of all other groups."""
@@ -52,13 +52,15 @@ class Samples:
         return values - others
 
 
-def labels(names: Sequence[str], performers: Sequence[str]) -> Floats:
+def performer_labels(names: Sequence[str], performers: Sequence[str]) -> Floats:
     """Return one-hot labels (N, p) of performers, zeros for an unknown name."""
     own = [[float(name == performer) for performer in performers] for name in names]
     return np.array(own).reshape(len(names), len(performers))
 
 
-def lay(recipe: Recipe, examples: Sequence[Example]) -> tuple[Samples, tuple[str, ...]]:
+def make_samples(
+    recipe: Recipe, examples: Sequence[Example]
+) -> tuple[SamplePoints, tuple[str, ...]]:
     """Return the samples of a recipe's examples, and the labelled performers sorted by name.
 
     Raises TrainingError if a drift depends on a single example.
@@ -68,18 +70,18 @@ def lay(recipe: Recipe, examples: Sequence[Example]) -> tuple[Samples, tuple[str
     # A single performer needs no label.
     apart = recipe.kriging.label is not None and len(set(names)) > 1
     performers = tuple(sorted(set(names))) if apart else ()
-    both = np.hstack([points, labels(names, performers)])
-    return Samples(both, points.shape[1], _groups(recipe, examples, points)), performers
+    both = np.hstack([points, performer_labels(names, performers)])
+    return SamplePoints(both, points.shape[1], _groups(recipe, examples, points)), performers
 
 
-def notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
+def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     """Return one note per setting of the recipe that the examples are too few for."""
     said = []
-    laid, performers = lay(recipe, examples)
+    laid, performers = make_samples(recipe, examples)
     if recipe.kriging.label and not performers:
         name = examples[0].row.performer
         said.append(f"all clips are of one performer, {name!r}: kriging.label tells nobody apart")
-    if len(np.unique(laid.groups)) > len(np.unique(takes(examples))):
+    if len(np.unique(laid.groups)) > len(np.unique(take_numbers(examples))):
         said.append(
             "clips of one file are not left out together: those of the other files alone could "
             "not carry the drift"
@@ -92,7 +94,7 @@ def _points(examples: Sequence[Example]) -> Floats:
     return half_ranges(controls, controls.min(axis=0), controls.max(axis=0))
 
 
-def takes(examples: Sequence[Example]) -> Indices:
+def take_numbers(examples: Sequence[Example]) -> Indices:
     """Return the number (N,) of the file that each example was cut from."""
     return np.unique([str(e.row.place) for e in examples], return_inverse=True)[1]
 
@@ -103,10 +105,10 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
     Raises TrainingError if the drift is undetermined without a single example.
     """
     degree = recipe.kriging.degree
-    by_file, alone = takes(examples), np.arange(len(examples))
-    if _needed(by_file, points, degree) is None:
+    by_file, alone = take_numbers(examples), np.arange(len(examples))
+    if _indispensable_group(by_file, points, degree) is None:
         return by_file
-    needed = _needed(alone, points, degree)
+    needed = _indispensable_group(alone, points, degree)
     if needed is not None:
         raise TrainingError(
             f"without the clip of line {examples[needed].row.line} the controls of all others "
@@ -116,6 +118,8 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
     return alone
 
 
-def _needed(groups: Indices, points: Floats, degree: int) -> int | None:
+def _indispensable_group(groups: Indices, points: Floats, degree: int) -> int | None:
     """Return the first group without which points (N, d) do not determine the drift, or None."""
-    return kriging_model.needed(groups, kriging_model.drift(points, points.shape[1], degree))
+    return kriging_model.find_required_group(
+        groups, kriging_model.drift(points, points.shape[1], degree)
+    )

@@ -11,25 +11,30 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.kriging_bank import VARIANCE, Constant, Field, FieldBank
-from posefield_train.kriging.universal_kriging import Kriging
+from posefield_train.kriging.kriging_bank import (
+    VARIANCE,
+    CoefficientModel,
+    ConstantModel,
+    KrigingBank,
+)
+from posefield_train.kriging.universal_kriging import UniversalKriging
 
-QUESTIONS = 2_000
+FIT_POINTS = 2_000
 # Range of the fit in half-ranges: beyond the samples, so that the weights hold there too.
-BEYOND = 1.25
+FIT_RANGE = 1.25
 # Directions of the basis below this share of the largest are dropped: their large weights would
 # lose precision in float32.
-FAINTEST = 1e-5
+RELATIVE_CUTOFF = 1e-5
 
 
-def ordered(bank: FieldBank) -> FieldBank:
+def sort_samples(bank: KrigingBank) -> KrigingBank:
     """Return the bank with its samples sorted by how much they explain of the pose."""
-    order = spread_order(bank.pose)
-    others = {name: _reordered(field, order) for name, field in bank.others.items()}
-    return replace(bank, pose=_permuted(bank.pose, order), others=others)
+    order = pivoted_order(bank.pose)
+    others = {name: _permute(field, order) for name, field in bank.others.items()}
+    return replace(bank, pose=_permute_kriging(bank.pose, order), others=others)
 
 
-def spread_order(pose: Kriging) -> Indices:
+def pivoted_order(pose: UniversalKriging) -> Indices:
     """Return samples (n,), each the least determined by the previous ones (pivoted Cholesky)."""
     left = universal_kriging.covariances(pose.hyper, pose.samples, pose.samples)
     taken: list[int] = []
@@ -39,18 +44,18 @@ def spread_order(pose: Kriging) -> Indices:
         # Rounded, so that rounding errors do not break ties.
         chosen = int(np.argmax(np.round(unknown, 9)))
         taken.append(chosen)
-        if unknown[chosen] > FAINTEST:
+        if unknown[chosen] > RELATIVE_CUTOFF:
             left = left - np.outer(left[chosen], left[chosen]) / unknown[chosen]
     return np.array(taken)
 
 
-def _reordered(field: Field, order: Indices) -> Field:
-    return field if isinstance(field, Constant) else _permuted(field, order)
+def _permute(field: CoefficientModel, order: Indices) -> CoefficientModel:
+    return field if isinstance(field, ConstantModel) else _permute_kriging(field, order)
 
 
-def _permuted(field: Kriging, order: Indices) -> Kriging:
+def _permute_kriging(field: UniversalKriging, order: Indices) -> UniversalKriging:
     rows = np.concatenate([order, np.arange(len(order), len(field.dual))])
-    return Kriging(
+    return UniversalKriging(
         field.hyper,
         field.samples[order],
         field.dual[rows],
@@ -59,7 +64,7 @@ def _permuted(field: Kriging, order: Indices) -> Kriging:
     )
 
 
-def questions(bank: FieldBank, reach: float, count: int) -> Floats:
+def random_points(bank: KrigingBank, reach: float, count: int) -> Floats:
     """Return random points (Q, d + p) within `reach` half-ranges.
 
     No performer is as likely as each of the performers.
@@ -72,7 +77,7 @@ def questions(bank: FieldBank, reach: float, count: int) -> Floats:
 
 
 @dataclass(frozen=True)
-class Lesson:
+class ThinningData:
     """Fit data of coarser levels: values of a bank's models at points beyond its samples.
 
     basis: labels, one, controls and all covariances (P, p + 1 + d + m). said: values (P, m) by
@@ -80,23 +85,23 @@ class Lesson:
     """
 
     basis: Floats
-    said: dict[str, Floats]
-    bank: FieldBank
+    values: dict[str, Floats]
+    bank: KrigingBank
 
     def weights(self, columns: int, rank: int, error: float) -> Floats:
         """Return weights (p + 1 + d + m, M) of the first m covariances.
 
         rank: number of pose coefficients. error: of the level, m, added to its variance.
         """
-        own = np.log(self.said[VARIANCE] + error**2 / self.bank.sill)
-        values = np.hstack(list({**self.said, VARIANCE: own}.values()))
+        own = np.log(self.values[VARIANCE] + error**2 / self.bank.sill)
+        values = np.hstack(list({**self.values, VARIANCE: own}.values()))
         kept = values.shape[1] - (self.bank.pose.dual.shape[1] - rank)
         known = self.basis[:, : self.bank.linear + columns]
-        found = np.linalg.lstsq(known, values[:, :kept], rcond=FAINTEST)
+        found = np.linalg.lstsq(known, values[:, :kept], rcond=RELATIVE_CUTOFF)
         return np.asarray(found[0], np.float64)
 
 
-def lesson(bank: FieldBank) -> Lesson:
+def thinning_data(bank: KrigingBank) -> ThinningData:
     """Return the fit data of a bank of one level."""
-    points = np.vstack([questions(bank, BEYOND, QUESTIONS), bank.pose.samples])
-    return Lesson(bank.basis(points, bank.columns(0)), bank.numpy(points), bank)
+    points = np.vstack([random_points(bank, FIT_RANGE, FIT_POINTS), bank.pose.samples])
+    return ThinningData(bank.basis(points, bank.columns(0)), bank.numpy(points), bank)

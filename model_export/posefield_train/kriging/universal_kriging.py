@@ -26,7 +26,7 @@ from posefield.kriging.leave_one_out import left_out_variances as left_out_varia
 
 
 @dataclass(frozen=True)
-class Kriging:
+class UniversalKriging:
     """A solved kriging model.
 
     samples: (n, d + p). dual: weights (n + k, m) of the values. weighing: (n + k, n), maps values
@@ -60,19 +60,21 @@ class Kriging:
         return values(self.hyper, self.samples, self.dual)
 
     def _basis(self, points: Floats) -> Floats:
-        return kriging_model.basis(self.hyper, points, self.samples)
+        return kriging_model.basis_functions(self.hyper, points, self.samples)
 
 
-def solve(hyper: Hyper, samples: Floats, values: Floats) -> Kriging:
-    """Return the kriging model of values (n, m) at samples (n, d + p); `check` the samples first.
+def solve(hyper: Hyper, samples: Floats, values: Floats) -> UniversalKriging:
+    """Return the kriging model of values (n, m) at samples (n, d + p).
+
+    `check_samples` the samples first.
 
     With more than one drift the weights are averaged, and the variance is that of their average.
     """
     n, functions = len(samples), 1 + max(hyper.drifts) * len(hyper.scales)
-    weighing = kriging_model.weighing(hyper, samples)
+    weighing = kriging_model.weight_matrix(hyper, samples)
     toward = np.vstack([np.eye(n), np.zeros((functions, n))]) @ weighing.T
     form = toward + toward.T - weighing @ noisy(hyper, samples) @ weighing.T
-    return Kriging(hyper, samples, weighing @ values, weighing, form)
+    return UniversalKriging(hyper, samples, weighing @ values, weighing, form)
 
 
 def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
@@ -82,7 +84,9 @@ def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
     return noisy(hyper, samples) @ dual[:n] + functions @ dual[n:]
 
 
-def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool) -> None:
+def check_samples(
+    samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool
+) -> None:
     """Raise TrainingError for samples that make the kriging system singular.
 
     These are fewer samples than drift functions plus one, a control with a single value, linearly
@@ -103,10 +107,10 @@ def check(samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: 
     if np.linalg.matrix_rank(drift(samples, len(names), degree)) < 1 + len(names) * degree:
         raise TrainingError(f"controls {names}: one of them follows linearly from the others")
     if nugget_is_zero:
-        _refuse_twins(samples)
+        _refuse_duplicates(samples)
 
 
-def _refuse_twins(samples: Floats) -> None:
+def _refuse_duplicates(samples: Floats) -> None:
     _, first, inverse = np.unique(samples, axis=0, return_index=True, return_inverse=True)
     for row, group in enumerate(np.ravel(inverse)):
         if first[group] != row:

@@ -17,15 +17,15 @@ from posefield_train.kriging.covariance_graph import COVARIANCES
 
 LAGS = 15
 # Largest lag as a share of the largest distance; farther pairs are few.
-FAR = 0.7
+LARGEST_LAG = 0.7
 FEWEST_PAIRS = 3
 RANGES = np.geomspace(0.2, 8.0, 40)
 # Numbers per batch of pairs: half a megabyte.
-CACHED = 65_536
+BATCH_NUMBERS = 65_536
 
 
 @dataclass(frozen=True)
-class Experimental:
+class ExperimentalVariogram:
     """Mean distance, semivariance and number of pairs of each lag (L,)."""
 
     distances: Floats
@@ -34,7 +34,7 @@ class Experimental:
 
 
 @dataclass(frozen=True)
-class Fit:
+class VariogramModel:
     """Isotropic variogram model: nugget, partial sill above the nugget, and practical range."""
 
     nugget: float
@@ -49,28 +49,28 @@ def residuals(samples: Floats, values: Floats, drift: int) -> Floats:
     return values - functions @ coefficients
 
 
-def of_residuals(samples: Floats, values: Floats, drift: int) -> Experimental:
+def residual_variogram(samples: Floats, values: Floats, drift: int) -> ExperimentalVariogram:
     """Return the experimental variogram of the residuals of values (n, m) from a drift."""
-    return experimental(samples, residuals(samples, values, drift))
+    return experimental_variogram(samples, residuals(samples, values, drift))
 
 
-def lags(samples: Floats) -> tuple[Indices, Indices, Floats, Indices]:
+def pairs_by_lag(samples: Floats) -> tuple[Indices, Indices, Floats, Indices]:
     """Return pairs of samples (n, d) by lag: indices of both, their distances, and their lag."""
     first, second = np.triu_indices(len(samples), k=1)
     distances = np.linalg.norm(samples[first] - samples[second], axis=1)
-    edges = np.linspace(0.0, FAR * distances.max(), LAGS + 1)
+    edges = np.linspace(0.0, LARGEST_LAG * distances.max(), LAGS + 1)
     lag = np.searchsorted(edges, distances, side="left") - 1
     near = (lag >= 0) & (lag < LAGS)
     return first[near], second[near], distances[near], lag[near]
 
 
-def experimental(samples: Floats, values: Floats) -> Experimental:
+def experimental_variogram(samples: Floats, values: Floats) -> ExperimentalVariogram:
     """Return Matheron's estimate over lags with enough pairs."""
-    first, second, distances, lag = lags(samples)
+    first, second, distances, lag = pairs_by_lag(samples)
     halves = 0.5 * _squared_distances(values, first, second)
     pairs = np.bincount(lag, minlength=LAGS)
     enough = pairs >= FEWEST_PAIRS
-    return Experimental(
+    return ExperimentalVariogram(
         (np.bincount(lag, distances, LAGS)[enough] / pairs[enough]),
         (np.bincount(lag, halves, LAGS)[enough] / pairs[enough]),
         pairs[enough].astype(np.float64),
@@ -84,7 +84,7 @@ def _squared_distances(values: Floats, first: Indices, second: Indices) -> Float
     would take as much memory as n / 2 copies of the values.
     """
     squared = np.empty(len(first))
-    step = max(1, CACHED // values.shape[1])
+    step = max(1, BATCH_NUMBERS // values.shape[1])
     for start in range(0, len(first), step):
         batch = slice(start, start + step)
         gaps = values[first[batch]] - values[second[batch]]
@@ -92,24 +92,26 @@ def _squared_distances(values: Floats, first: Indices, second: Indices) -> Float
     return squared
 
 
-def fit(experimental: Experimental, covariance: str) -> Fit:
+def fit_by_grid(experimental_variogram: ExperimentalVariogram, covariance: str) -> VariogramModel:
     """Fit by weighted least squares with Cressie's weights N / γ² (1985), over a grid of ranges.
 
     Nugget and sill enter linearly and are solved for at each range. If no lag has enough pairs, as
     for a control of two values, the sill is zero.
     """
-    if not len(experimental.pairs):
-        return Fit(0.0, 0.0, float(RANGES[-1]))
-    squared = np.square(experimental.distances[None] / RANGES[:, None])
+    if not len(experimental_variogram.pairs):
+        return VariogramModel(0.0, 0.0, float(RANGES[-1]))
+    squared = np.square(experimental_variogram.distances[None] / RANGES[:, None])
     rising = 1.0 - COVARIANCES[covariance].numpy(squared)
-    weights = experimental.pairs / np.maximum(experimental.values, 1e-30) ** 2
-    nuggets, sills = _lines(rising, experimental.values, weights)
-    misfit = (nuggets[:, None] + sills[:, None] * rising - experimental.values) ** 2 @ weights
+    weights = experimental_variogram.pairs / np.maximum(experimental_variogram.values, 1e-30) ** 2
+    nuggets, sills = _nonnegative_lines(rising, experimental_variogram.values, weights)
+    misfit = (
+        nuggets[:, None] + sills[:, None] * rising - experimental_variogram.values
+    ) ** 2 @ weights
     best = int(np.argmin(misfit))
-    return Fit(float(nuggets[best]), float(sills[best]), float(RANGES[best]))
+    return VariogramModel(float(nuggets[best]), float(sills[best]), float(RANGES[best]))
 
 
-def _lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
+def _nonnegative_lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
     """Return intercepts and slopes (R,), not negative, of values (L,) over rising (R, L)."""
     mean_x, mean_y = rising @ weights / weights.sum(), values @ weights / weights.sum()
     spread = (rising - mean_x[:, None]) ** 2 @ weights
@@ -121,22 +123,27 @@ def _lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Flo
     return np.maximum(nuggets, 0.0), slopes
 
 
-def fit_by_search(experimental: Experimental, covariance: str) -> Fit:
+def fit_by_search(experimental_variogram: ExperimentalVariogram, covariance: str) -> VariogramModel:
     """Fit nugget, sill and range together by a general least-squares solver.
 
     This is the common method; the naive baseline is timed with it.
     """
-    top, far = float(experimental.values.max()), float(experimental.distances.max())
-    roots = np.sqrt(experimental.pairs) / np.maximum(experimental.values, 1e-30)
+    top, far = (
+        float(experimental_variogram.values.max()),
+        float(experimental_variogram.distances.max()),
+    )
+    roots = np.sqrt(experimental_variogram.pairs) / np.maximum(experimental_variogram.values, 1e-30)
 
     def misfit(x: Floats) -> Floats:
-        squared = np.square(experimental.distances / x[2])
+        squared = np.square(experimental_variogram.distances / x[2])
         return roots * (
-            x[0] + x[1] * (1.0 - COVARIANCES[covariance].numpy(squared)) - experimental.values
+            x[0]
+            + x[1] * (1.0 - COVARIANCES[covariance].numpy(squared))
+            - experimental_variogram.values
         )
 
     low, high = [0.0, 0.0, RANGES[0]], [2.0 * top, 10.0 * top, RANGES[-1]]
     found = least_squares(
         misfit, [0.1 * top, 0.9 * top, 0.5 * far], bounds=(low, high), x_scale=[top, top, far]
     )
-    return Fit(*map(float, found.x))
+    return VariogramModel(*map(float, found.x))

@@ -17,7 +17,7 @@ REGISTER = 16
 """Largest number of float32 values in a vector register."""
 
 
-class Net:
+class GraphBuilder:
     """A graph under construction; equal calls in equal order give equal bytes."""
 
     def __init__(self) -> None:
@@ -26,22 +26,24 @@ class Net:
 
     def __call__(self, operator: str, *inputs: str, **attributes: Any) -> str:
         """Add a node and return the name of its first output."""
-        return self.many(operator, 1, *inputs, **attributes)[0]
+        return self.multi_output(operator, 1, *inputs, **attributes)[0]
 
-    def many(self, operator: str, outputs: int, *inputs: str, **attributes: Any) -> list[str]:
+    def multi_output(
+        self, operator: str, outputs: int, *inputs: str, **attributes: Any
+    ) -> list[str]:
         """Add a node and return the names of all its outputs."""
         stem = f"{operator.lower()}_{len(self._nodes)}"
         names = [stem] if outputs == 1 else [f"{stem}_{i}" for i in range(outputs)]
         self._nodes.append(helper.make_node(operator, inputs, names, **attributes))
         return names
 
-    def called(self, name: str, value: str) -> str:
+    def rename_value(self, name: str, value: str) -> str:
         """Rename a value that no other node uses yet."""
         for node in self._nodes:
             node.output[:] = [name if own == value else own for own in node.output]
         return name
 
-    def named(self, name: str, value: str) -> None:
+    def add_output(self, name: str, value: str) -> None:
         """Make a value an output of the graph under a name."""
         self._nodes.append(helper.make_node("Identity", [value], [name]))
 

@@ -6,22 +6,22 @@ from itertools import chain
 
 import numpy as np
 
-from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
-Numbers = Sequence[int]
+Integers = Sequence[int]
 
 
 @dataclass(frozen=True)
-class Ladder:
+class LevelTables:
     """Lists of integers by name, one list per level, the finest first.
 
     They are slice ends and shapes: every weight of a coarser level is a leading part of the finest
     one's, except for the thinned kriging weights.
     """
 
-    entries: dict[str, list[Numbers]]
+    entries: dict[str, list[Integers]]
 
-    def onnx(self, net: Net) -> dict[str, str]:
+    def onnx(self, net: GraphBuilder) -> dict[str, str]:
         """Build the chosen level's lists by name.
 
         `level` is an optional input of the graph; its default is zero, the finest level.
@@ -30,5 +30,7 @@ class Ladder:
         rows = [list(chain(*lists)) for lists in zip(*self.entries.values(), strict=True)]
         table = net.weights("ladder", np.array(rows))
         sizes = [len(lists[0]) for lists in self.entries.values()]
-        parts = net.many("Split", len(sizes), net("Gather", table, level), net.indices(*sizes))
+        parts = net.multi_output(
+            "Split", len(sizes), net("Gather", table, level), net.indices(*sizes)
+        )
         return dict(zip(self.entries, parts, strict=True))

@@ -13,51 +13,53 @@ from posefield.common.units import UP, Floats
 from posefield_train.source.bone_lengths import apart
 
 # A transform is reported if undoing it reduces the distance below this share.
-BETTER = 0.5
+MAX_DISTANCE_RATIO = 0.5
 # Prefixes of the names of left and right joints.
 SIDES = (("Left", "Right"), ("left", "right"), ("L", "R"), ("l", "r"))
 
 
 @dataclass(frozen=True)
-class Disguise:
+class ClipTransform:
     """A transform of a clip and its effect.
 
-    said: the transform in words. before, after: distance from the prediction without and with the
-    transform undone, m.
+    description: the transform in words. before, after: distance from the prediction without and
+    with the transform undone, m.
     """
 
-    said: str
+    description: str
     before: float
     after: float
 
 
-def found(own: Floats, expected: Floats, names: tuple[str, ...], left: Floats) -> Disguise | None:
+def find_transform(
+    own: Floats, expected: Floats, names: tuple[str, ...], left: Floats
+) -> ClipTransform | None:
     """Return the transform that explains a clip's distance from its prediction; None if none does.
 
     own, expected: joint positions (T, J, 3), m. left: unit vector (3,) to the family's left.
     """
     before = apart(own, expected)
     undone = [
-        Disguise(said, before, apart(other, expected))
-        for said, other in _without(own, expected, names, left)
+        ClipTransform(said, before, apart(other, expected))
+        for said, other in _transformed(own, expected, names, left)
     ]
     best = min(undone, key=lambda disguise: disguise.after)
-    return best if best.after < BETTER * before else None
+    return best if best.after < MAX_DISTANCE_RATIO * before else None
 
 
-def _without(
+def _transformed(
     own: Floats, expected: Floats, names: tuple[str, ...], left: Floats
 ) -> Iterator[tuple[str, Floats]]:
-    swapped, flipped = others(names), own - 2.0 * (own @ left)[..., None] * left
-    turn = _turn(own, expected)
-    yield _told(turn), own @ turn.T
+    swapped, flipped = mirrored_joints(names), own - 2.0 * (own @ left)[..., None] * left
+    turn = _best_rotation(own, expected)
+    yield _describe_rotation(turn), own @ turn.T
     if swapped != tuple(range(len(names))):
         yield "mirrored left to right", flipped[:, swapped]
         yield "with the names of left and right joints exchanged", own[:, swapped]
         yield "with the axis from left to right reversed", flipped
 
 
-def others(names: tuple[str, ...]) -> tuple[int, ...]:
+def mirrored_joints(names: tuple[str, ...]) -> tuple[int, ...]:
     """Return the index (J,) of each joint's counterpart on the other side, or its own."""
     counterparts: dict[str, str] = {}
     for a, b in SIDES:
@@ -68,12 +70,12 @@ def others(names: tuple[str, ...]) -> tuple[int, ...]:
     return tuple(names.index(counterparts.get(name, name)) for name in names)
 
 
-def leftwards(joints: Floats, names: tuple[str, ...]) -> Floats:
+def left_direction(joints: Floats, names: tuple[str, ...]) -> Floats:
     """Return the horizontal unit vector (3,) to the left of joints (N, T, J, 3).
 
     It is x if no joint names contain sides.
     """
-    swapped = np.array(others(names))
+    swapped = np.array(mirrored_joints(names))
     rights = [i for i, other in enumerate(swapped) if names[i][0] in "Rr" and other != i]
     if not rights:
         return np.array([1.0, 0.0, 0.0])
@@ -83,14 +85,14 @@ def leftwards(joints: Floats, names: tuple[str, ...]) -> Floats:
     return np.asarray(level / np.linalg.norm(level))
 
 
-def _turn(own: Floats, expected: Floats) -> Floats:
+def _best_rotation(own: Floats, expected: Floats) -> Floats:
     """Return the rotation matrix that best aligns own with expected (Kabsch 1976)."""
     u, _, v = np.linalg.svd(np.einsum("tjk,tjl->kl", expected, own))
     sign = np.sign(np.linalg.det(u @ v))
     return np.asarray(u @ np.diag([1.0, 1.0, sign]) @ v)
 
 
-def _told(turn: Floats) -> str:
+def _describe_rotation(turn: Floats) -> str:
     """Describe a rotation in words: the wrong up axis, or the angle about the vertical."""
     tilt = np.degrees(np.arccos(np.clip(UP @ turn @ UP, -1.0, 1.0)))
     if tilt > 45.0:

@@ -12,24 +12,24 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import skeleton
 from posefield.motion.clip import Clip
-from posefield_train.graph.trained_model import Outlier, Trained
+from posefield_train.graph.trained_model import Outlier, TrainedModel
 from posefield_train.outliers import mirrored_clips, outlier_distances
-from posefield_train.outliers.mirrored_clips import Disguise
-from posefield_train.outliers.outlier_distances import Judged
+from posefield_train.outliers.mirrored_clips import ClipTransform
+from posefield_train.outliers.outlier_distances import OutlierDistances
 from posefield_train.source import bone_lengths
-from posefield_train.source.bone_lengths import Foreign
+from posefield_train.source.bone_lengths import ForeignBones
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
 # The speed around a frame is the median over this time to either side, s. A jump, or a jump and its
 # return, does not change the median; the start of a motion does.
-AROUND = 0.035
+MEDIAN_SPAN = 0.035
 # A step is a jump if it exceeds the median by the factor TIMES and by FARTHER, m.
-TIMES, FARTHER = 8.0, 0.03
+JUMP_FACTOR, FARTHER = 8.0, 0.03
 
 
 @dataclass(frozen=True)
-class Leap:
+class JointJump:
     """The largest jump of a clip, from frame to frame + 1.
 
     distance: of the joint, m. times: ratio to the median step around it. whole: True if more than
@@ -43,20 +43,24 @@ class Leap:
     whole: bool
 
 
-def worst(clip: Clip) -> Leap | None:
+def largest_jump(clip: Clip) -> JointJump | None:
     """Return the largest jump of a clip; None if there is none."""
     steps = np.linalg.norm(np.diff(clip.positions(), axis=0), axis=-1)
-    pace = np.maximum(_pace(steps, max(2, round(AROUND * clip.rate))), FARTHER / TIMES / 4)
+    pace = np.maximum(
+        _median_steps(steps, max(2, round(MEDIAN_SPAN * clip.rate))), FARTHER / JUMP_FACTOR / 4
+    )
     beyond = steps - pace
-    leaping = (beyond > FARTHER) & (steps > TIMES * pace)
+    leaping = (beyond > FARTHER) & (steps > JUMP_FACTOR * pace)
     if not leaping.any():
         return None
     frame, joint = np.unravel_index(int(np.argmax(np.where(leaping, beyond, 0.0))), steps.shape)
     found, usual = float(steps[frame, joint]), float(pace[frame, joint])
-    return Leap(int(frame), int(joint), found, found / usual, bool(leaping[frame].mean() > 0.5))
+    return JointJump(
+        int(frame), int(joint), found, found / usual, bool(leaping[frame].mean() > 0.5)
+    )
 
 
-def _pace(steps: Floats, reach: int) -> Floats:
+def _median_steps(steps: Floats, reach: int) -> Floats:
     """Return the median (F - 1, J) of steps over `reach` frames to either side."""
     padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0)
@@ -64,27 +68,36 @@ def _pace(steps: Floats, reach: int) -> Floats:
 
 
 # Multiple of the median distance above which a clip is tested for mirroring, turns and swaps.
-SUSPECT = 1.5
+SUSPECT_FACTOR = 1.5
 # A duration or travel is an outlier beyond STRANGE robust standard deviations, and by at least the
 # factor FACTOR, or WAY, m.
-STRANGE, FACTOR, WAY = 8.0, 1.5, 0.3
+OUTLIER_DEVIATIONS, FACTOR, WAY = 8.0, 1.5, 0.3
 
 
-def find(recipe: Recipe, trained: Trained) -> tuple[Outlier, ...]:
+def find_outliers(recipe: Recipe, trained: TrainedModel) -> tuple[Outlier, ...]:
     """Return the evidence against the clips of a trained family, sorted by clip."""
-    own = _Family(recipe, trained)
-    parts = (own.sized(), own.far(), own.disguised(), own.leaping(), own.late(), own.astray())
+    own = _OutlierSearch(recipe, trained)
+    parts = (
+        own.resized_clips(),
+        own.distant_clips(),
+        own.transformed_clips(),
+        own.jumping_clips(),
+        own.unusual_durations(),
+        own.unusual_travel(),
+    )
     return tuple(sorted((one for part in parts for one in part), key=lambda one: one.clip))
 
 
 @dataclass(frozen=True)
-class _Family:
+class _OutlierSearch:
     recipe: Recipe
-    trained: Trained
+    trained: TrainedModel
 
     @cached_property
-    def judged(self) -> Judged:
-        return outlier_distances.judge(self.trained.pose.hyper, self.trained.laid, self.motions)
+    def leave_one_out(self) -> OutlierDistances:
+        return outlier_distances.measure_outliers(
+            self.trained.pose.hyper, self.trained.samples, self.motions
+        )
 
     @cached_property
     def motions(self) -> Floats:
@@ -92,12 +105,12 @@ class _Family:
         whole = self.trained.tensor
         return self.trained.values["pose"] / np.sqrt(whole.weight * whole.values.shape[1])
 
-    def far(self) -> Iterator[Outlier]:
-        for clip in self.judged.outside:
+    def distant_clips(self) -> Iterator[Outlier]:
+        for clip in self.leave_one_out.outside:
             said = (
-                f"lies {_cm(self.judged.distances[clip])} from what the others predict, "
-                f"{self.judged.times[clip]:.0f} times as far as is usual "
-                f"({_cm(self.judged.usual)}); {self._nearest(clip)}"
+                f"lies {_cm(self.leave_one_out.distances[clip])} from what the others predict, "
+                f"{self.leave_one_out.times[clip]:.0f} times as far as is usual "
+                f"({_cm(self.leave_one_out.usual)}); {self._nearest(clip)}"
             )
             yield Outlier(clip, "far", said)
 
@@ -108,24 +121,26 @@ class _Family:
         named = self.trained.examples[nearest].row.named
         return f"most like it is {named}, {_cm(apart[nearest])} away"
 
-    def disguised(self) -> Iterator[Outlier]:
+    def transformed_clips(self) -> Iterator[Outlier]:
         """Yield clips that would fit better mirrored, turned or with sides exchanged."""
-        suspects = np.flatnonzero(self.judged.times > SUSPECT)
+        suspects = np.flatnonzero(self.leave_one_out.times > SUSPECT_FACTOR)
         if not len(suspects):
             return
         names, whole = self.trained.skeleton.names, self.trained.tensor.values
         offsets = np.stack([example.offsets for example in self.trained.examples])
         usual = np.median(offsets, axis=0)
-        left = mirrored_clips.leftwards(self._around(whole, usual), names)
-        for clip, size in zip(suspects, bone_lengths.sizes(offsets)[suspects], strict=True):
-            expected = whole[:, :, clip] - whole @ self.judged.left_out[clip]
-            own = self._around(whole[:, :, [clip]], offsets[clip] / size)[0]
-            there = self._around(expected[:, :, None], usual)[0]
-            worn = mirrored_clips.found(own, there, names, left)
+        left = mirrored_clips.left_direction(self._root_relative_positions(whole, usual), names)
+        for clip, size in zip(
+            suspects, bone_lengths.relative_sizes(offsets)[suspects], strict=True
+        ):
+            expected = whole[:, :, clip] - whole @ self.leave_one_out.left_out[clip]
+            own = self._root_relative_positions(whole[:, :, [clip]], offsets[clip] / size)[0]
+            there = self._root_relative_positions(expected[:, :, None], usual)[0]
+            worn = mirrored_clips.find_transform(own, there, names, left)
             if worn:
-                yield Outlier(int(clip), "disguise", _worn(worn))
+                yield Outlier(int(clip), "disguise", _transform_text(worn))
 
-    def _around(self, values: Floats, offsets: Floats) -> Floats:
+    def _root_relative_positions(self, values: Floats, offsets: Floats) -> Floats:
         """Return joint positions (B, T, J, 3), m, relative to the root, of slices (D', T, B).
 
         offsets: bone offsets (J, 3), m.
@@ -135,42 +150,42 @@ class _Family:
         translations = np.broadcast_to(offsets, (*rotations.shape[:-1], 3))
         return skeleton.positions(self.trained.skeleton.parents, rotations, translations)
 
-    def leaping(self) -> Iterator[Outlier]:
+    def jumping_clips(self) -> Iterator[Outlier]:
         for clip, example in enumerate(self.trained.examples):
-            leap = worst(example.clip)
+            leap = largest_jump(example.clip)
             if leap:
-                yield Outlier(clip, "leap", _leapt(leap, example))
+                yield Outlier(clip, "leap", _jump_text(leap, example))
 
-    def sized(self) -> Iterator[Outlier]:
+    def resized_clips(self) -> Iterator[Outlier]:
         """Yield clips with bones of another size, or another performer's."""
         offsets = np.stack([example.offsets for example in self.trained.examples])
         performers = tuple(example.row.performer for example in self.trained.examples)
-        for clip, size in enumerate(bone_lengths.sizes(offsets)):
-            other = bone_lengths.foreign(offsets, performers, clip)
-            if not 1.0 / bone_lengths.SIZE < size < bone_lengths.SIZE:
-                yield Outlier(clip, "size", _sized(size, self.recipe.source.metres_per_unit))
+        for clip, size in enumerate(bone_lengths.relative_sizes(offsets)):
+            other = bone_lengths.find_foreign_bones(offsets, performers, clip)
+            if not 1.0 / bone_lengths.SIZE_LIMIT < size < bone_lengths.SIZE_LIMIT:
+                yield Outlier(clip, "size", _size_text(size, self.recipe.source.metres_per_unit))
             elif other:
-                yield Outlier(clip, "bones", _boned(other, performers[clip]))
+                yield Outlier(clip, "bones", _bones_text(other, performers[clip]))
 
-    def late(self) -> Iterator[Outlier]:
+    def unusual_durations(self) -> Iterator[Outlier]:
         """Yield clips with a duration far from the prediction."""
         gaps = self.trained.residuals["duration"][:, 0]
-        for clip in _strange(np.abs(gaps), np.log(FACTOR)):
+        for clip in _beyond_limits(np.abs(gaps), np.log(FACTOR)):
             lasts = self.trained.aligned.durations[clip]
             said = f"lasts {lasts:.2f} s, expected about {lasts / np.exp(gaps[clip]):.2f} s"
             yield Outlier(clip, "duration", said)
 
-    def astray(self) -> Iterator[Outlier]:
+    def unusual_travel(self) -> Iterator[Outlier]:
         """Yield cycles with travel far from the prediction."""
         gaps = self.trained.residuals.get("travel", np.zeros((1, 2)))[:, :2]
         lost = np.linalg.norm(gaps, axis=1)
-        for clip in _strange(lost, WAY):
+        for clip in _beyond_limits(lost, WAY):
             said = f"its cycle ends {lost[clip]:.2f} m from where the others predict"
             yield Outlier(clip, "travel", said)
 
 
-def _strange(gaps: Floats, least: float) -> list[int]:
-    strange = (outlier_distances.deviations(gaps) > STRANGE) & (gaps > least)
+def _beyond_limits(gaps: Floats, least: float) -> list[int]:
+    strange = (outlier_distances.robust_deviations(gaps) > OUTLIER_DEVIATIONS) & (gaps > least)
     return [int(clip) for clip in np.flatnonzero(strange)]
 
 
@@ -178,14 +193,15 @@ def _cm(metres: float) -> str:
     return f"{100 * metres:.1f} cm" if metres < 0.1 else f"{100 * metres:.0f} cm"
 
 
-def _worn(worn: Disguise) -> str:
+def _transform_text(worn: ClipTransform) -> str:
     return (
-        f"{worn.said} its joints would lie {_cm(worn.after)} from what is expected, seen from the "
+        f"{worn.description} its joints would lie {_cm(worn.after)} from what is "
+        "expected, seen from the "
         f"root, not {_cm(worn.before)}"
     )
 
 
-def _leapt(leap: Leap, example: Example) -> str:
+def _jump_text(leap: JointJump, example: Example) -> str:
     cycle = len(example.clip) - 1
     frame = example.row.first_frame + (leap.frame + round(example.shift * cycle)) % cycle
     what = "its whole body" if leap.whole else example.clip.skeleton.names[leap.joint]
@@ -195,14 +211,18 @@ def _leapt(leap: Leap, example: Example) -> str:
     )
 
 
-def _sized(size: float, given: float) -> str:
-    unit = bone_lengths.unit(given, size)
+def _size_text(size: float, given: float) -> str:
+    unit = bone_lengths.guess_unit(given, size)
     guess = f": is the file in {unit}, not in units of {given:g} m?" if unit else ""
     return f"its bones are {size:.3g} times as long as the family's, expected about 1{guess}"
 
 
-def _boned(other: Foreign, performer: str) -> str:
-    alike = f", and by {_cm(other.within)} from those of {other.alike}" if other.alike else ""
+def _bones_text(other: ForeignBones, performer: str) -> str:
+    alike = (
+        f", and by {_cm(other.nearest_distance)} from those of {other.nearest_performer}"
+        if other.nearest_performer
+        else ""
+    )
     return (
         f"its bones differ by {_cm(other.apart)} from those of {performer} elsewhere "
         f"({other.others} clips){alike}"

@@ -18,26 +18,26 @@ from posefield.common import dask_scheduler
 from posefield.common.errors import ClusterError
 from posefield_train.parallel.jobs import Arguments
 
-KIT = dask_scheduler.Kit(
+KIT = dask_scheduler.RequiredSoftware(
     ("posefield", "posefield_train"),
     ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn"),
 )
 """Packages whose versions determine a result."""
-AHEAD = 2
+QUEUED_PER_THREAD = 2
 """Jobs submitted per thread of the workers, so that a worker need not wait for its next one."""
-POLL = 1.0
+POLL_SECONDS = 1.0
 """Seconds without a finished job after which the workers are counted."""
-PATIENCE = 60.0
+WORKER_TIMEOUT = 60.0
 """Seconds without any worker, or for fetching one result."""
 
 
 @dataclass(frozen=True)
-class Cluster:
+class DaskJobs:
     """Workers of a Dask scheduler. patience: seconds without any worker until ClusterError."""
 
     client: Client
     address: str
-    patience: float = PATIENCE
+    timeout: float = WORKER_TIMEOUT
 
     def run(
         self,
@@ -50,40 +50,40 @@ class Cluster:
         Raises ClusterError if a job killed every worker that ran it, if no worker is left, if the
         scheduler stops, and if a worker that joined later has other packages.
         """
-        given = _Given(function, shared, dask_scheduler.installed(KIT))
+        given = _SharedJob(function, shared, dask_scheduler.installed_versions(KIT))
         waiting = iter(arguments)
-        with _reported(self.address):
-            data = self.client.submit(_same, given, pure=False)
-            running = self._submitted(data, islice(waiting, self._room(0)))
+        with _cluster_errors(self.address):
+            data = self.client.submit(_identity, given, pure=False)
+            running = self._submit(data, islice(waiting, self._free_slots(0)))
             while running:
-                for future in self._done(running):
-                    yield from self._fetched(future, running)
-                running |= self._submitted(data, islice(waiting, self._room(len(running))))
+                for future in self._wait(running):
+                    yield from self._fetch(future, running)
+                running |= self._submit(data, islice(waiting, self._free_slots(len(running))))
 
-    def _room(self, running: int) -> int:
+    def _free_slots(self, running: int) -> int:
         """Return the number of jobs to submit.
 
         At least one thread is assumed, because a worker can connect later.
         """
         threads = sum(self.client.nthreads().values())
-        return max(AHEAD * max(threads, 1) - running, 0)
+        return max(QUEUED_PER_THREAD * max(threads, 1) - running, 0)
 
-    def _submitted(self, data: Future, arguments: Iterable[Arguments]) -> set[Future]:
-        return {self.client.submit(_job, data, own, pure=False) for own in arguments}
+    def _submit(self, data: Future, arguments: Iterable[Arguments]) -> set[Future]:
+        return {self.client.submit(_run_job, data, own, pure=False) for own in arguments}
 
-    def _done(self, running: set[Future]) -> set[Future]:
+    def _wait(self, running: set[Future]) -> set[Future]:
         """Return the futures of finished jobs; empty if none finishes within POLL."""
         try:
             with self.client.as_current():
-                return set(wait(running, timeout=POLL, return_when="FIRST_COMPLETED").done)
+                return set(wait(running, timeout=POLL_SECONDS, return_when="FIRST_COMPLETED").done)
         except TimeoutError:
             self._expect_workers()
             return set()
 
-    def _fetched(self, future: Future, running: set[Future]) -> Iterator[Any]:
+    def _fetch(self, future: Future, running: set[Future]) -> Iterator[Any]:
         """Yield a job's result; nothing if it was lost with its worker, and the job runs again."""
         try:
-            result = future.result(timeout=self.patience)
+            result = future.result(timeout=self.timeout)
         except TimeoutError:
             if future.status == "error":
                 raise
@@ -94,14 +94,14 @@ class Cluster:
 
     def _expect_workers(self) -> None:
         try:
-            self.client.wait_for_workers(1, timeout=self.patience)
+            self.client.wait_for_workers(1, timeout=self.timeout)
         except TimeoutError as error:
-            message = f"has had no workers for {self.patience:g} s"
+            message = f"has had no workers for {self.timeout:g} s"
             raise ClusterError(self.address, message) from error
 
 
 @contextmanager
-def connect(address: str, patience: float = PATIENCE) -> Iterator[Cluster]:
+def connect(address: str, patience: float = WORKER_TIMEOUT) -> Iterator[DaskJobs]:
     """Connect to the scheduler at an address such as tcp://host:8786.
 
     Raises ClusterError if it cannot be used.
@@ -109,11 +109,11 @@ def connect(address: str, patience: float = PATIENCE) -> Iterator[Cluster]:
     # The size of a job's arguments is known; the warning is meant for authors of Dask programs.
     quiet = {"distributed.admin.large-graph-warning-threshold": "1 TiB"}
     with dask.config.set(quiet), dask_scheduler.connect(address, KIT) as client:
-        yield Cluster(client, address, patience)
+        yield DaskJobs(client, address, patience)
 
 
 @dataclass(frozen=True)
-class _Given:
+class _SharedJob:
     """Common part of the jobs of a run. kit: versions that every worker must have."""
 
     function: Callable[..., Any]
@@ -121,23 +121,25 @@ class _Given:
     kit: Mapping[str, str]
 
 
-def _same(given: _Given) -> _Given:
+def _identity(given: _SharedJob) -> _SharedJob:
     return given
 
 
-def _job(given: _Given, own: Arguments) -> Any:
+def _run_job(given: _SharedJob, own: Arguments) -> Any:
     # Workers that joined later have not been checked.
-    if unlike := dask_scheduler.differences(dask_scheduler.installed(KIT), given.kit):
+    if unlike := dask_scheduler.describe_differences(
+        dask_scheduler.installed_versions(KIT), given.kit
+    ):
         raise ClusterError(get_worker().address, unlike)
     return given.function(*given.shared, *own)
 
 
 @contextmanager
-def _reported(address: str) -> Iterator[None]:
+def _cluster_errors(address: str) -> Iterator[None]:
     """Raise the errors of Dask as ClusterError."""
     try:
         yield
     except KilledWorker as error:
-        raise ClusterError(address, dask_scheduler.killed(error)) from error
+        raise ClusterError(address, dask_scheduler.killed_message(error)) from error
     except (CancelledError, CommClosedError) as error:
         raise ClusterError(address, "the scheduler has gone") from error

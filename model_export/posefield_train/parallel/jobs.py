@@ -29,7 +29,7 @@ class Jobs(Protocol):
 
 
 @dataclass(frozen=True)
-class Processes:
+class ProcessJobs:
     """Processes of this machine, by joblib. count: the most; None for one per core."""
 
     count: int | None = None

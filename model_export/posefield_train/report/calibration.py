@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from scipy.stats import spearmanr
 
 from posefield.common.units import Floats
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report.drawing import significant_digits, svg_chart
 from posefield_train.report.drawing.html_page import Section, Table
 
@@ -39,9 +39,12 @@ class Calibration:
     def facts(self) -> dict[str, Any]:
         """Return the statistics, and every clip in the order of training."""
         return {
-            **{name: significant_digits.number(value) for name, value in self.measures.items()},
-            "predicted_m": significant_digits.numbers(self.predicted),
-            "actual_m": significant_digits.numbers(self.actual),
+            **{
+                name: significant_digits.round_number(value)
+                for name, value in self.measures.items()
+            },
+            "predicted_m": significant_digits.round_numbers(self.predicted),
+            "actual_m": significant_digits.round_numbers(self.actual),
         }
 
     def section(self) -> Section:
@@ -94,7 +97,7 @@ def _rank_correlation(a: Floats, b: Floats) -> float:
     return float(spearmanr(a, b).statistic)
 
 
-def of(trained: Trained) -> Calibration:
+def measure_calibration(trained: TrainedModel) -> Calibration:
     """Return the calibration of a trained model's sigma."""
     predicted = np.sqrt(trained.model.bank.sill * trained.pose.variances)
-    return Calibration(predicted, np.sqrt(trained.missed))
+    return Calibration(predicted, np.sqrt(trained.left_out_errors))

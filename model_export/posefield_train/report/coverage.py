@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Control
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report.drawing import significant_digits, svg_chart
 from posefield_train.report.drawing.html_page import Section, Table
 
@@ -25,7 +25,7 @@ class Coverage:
 
     controls: tuple[Control, ...]
     values: Floats
-    missed: Floats
+    left_out_errors: Floats
     performers: tuple[str, ...]
 
     def labels(self) -> tuple[str, ...]:
@@ -45,16 +45,16 @@ class Coverage:
                 {
                     "name": control.name,
                     "unit": control.unit,
-                    "minimum": significant_digits.number(control.minimum),
-                    "maximum": significant_digits.number(control.maximum),
+                    "minimum": significant_digits.round_number(control.minimum),
+                    "maximum": significant_digits.round_number(control.maximum),
                     "distinct": len(np.unique(own)),
-                    "values": significant_digits.numbers(control.values),
-                    "widest_gap": significant_digits.numbers(_gap(own)),
+                    "values": significant_digits.round_numbers(control.values),
+                    "widest_gap": significant_digits.round_numbers(_gap(own)),
                 }
                 for control, own in zip(self.controls, self.values.T, strict=True)
             ],
             "one_value_a_performer": list(self.labels()),
-            "correlation": significant_digits.numbers(self._correlation()),
+            "correlation": significant_digits.round_numbers(self._correlation()),
         }
 
     def _correlation(self) -> Floats:
@@ -116,7 +116,7 @@ class Coverage:
                 ax.set_axis_off()
             elif row > column:
                 x, y = self.values[:, [column, row]].T
-                seen = ax.scatter(x, y, c=100 * self.missed, s=16, cmap="viridis_r")
+                seen = ax.scatter(x, y, c=100 * self.left_out_errors, s=16, cmap="viridis_r")
             else:
                 ax.hist(self.values[:, row], bins=BINS, color=svg_chart.BLUE)
                 ax.grid(visible=False, axis="x")
@@ -136,8 +136,8 @@ def _gap(values: Floats) -> tuple[float, float]:
     return float(distinct[at]), float(distinct[at + 1])
 
 
-def of(trained: Trained, controls: tuple[Control, ...]) -> Coverage:
+def measure_coverage(trained: TrainedModel, controls: tuple[Control, ...]) -> Coverage:
     """Return the coverage of a trained model's controls."""
     values = np.stack([example.controls for example in trained.examples])
     performers = tuple(example.row.performer for example in trained.examples)
-    return Coverage(controls, values, np.sqrt(trained.missed), performers)
+    return Coverage(controls, values, np.sqrt(trained.left_out_errors), performers)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report.drawing import (
     left_out_clips,
     significant_digits,
@@ -17,14 +17,14 @@ from posefield_train.report.drawing import (
     svg_chart,
 )
 from posefield_train.report.drawing.html_page import Section
-from posefield_train.report.drawing.left_out_clips import Body
+from posefield_train.report.drawing.left_out_clips import BodyMotion
 from posefield_train.report.drawing.svg_chart import Chart
 
 NAMED_JOINTS = 3
 
 
 @dataclass(frozen=True)
-class Neighbour:
+class NearestClip:
     """The clip with the nearest controls.
 
     distance: half-ranges. differs: RMS difference of the motions, m.
@@ -36,7 +36,7 @@ class Neighbour:
 
 
 @dataclass(frozen=True)
-class Compared:
+class DrawnClip:
     """A clip as captured and as predicted.
 
     bones: indices of parent and child, the tips last. joints: joint names. nearest: the clip with
@@ -45,11 +45,11 @@ class Compared:
 
     label: str
     performer: str
-    captured: Body
-    predicted: Body
+    captured: BodyMotion
+    predicted: BodyMotion
     bones: tuple[tuple[int, int], ...]
     joints: tuple[str, ...]
-    nearest: Neighbour
+    nearest: NearestClip
 
     @property
     def gaps(self) -> Floats:
@@ -73,14 +73,14 @@ class Compared:
         return {
             "clip": self.label,
             "performer": self.performer,
-            "drawn_rms_m": significant_digits.number(self.apart),
-            "root_rms_m": significant_digits.number(self.gaps[0]),
+            "drawn_rms_m": significant_digits.round_number(self.apart),
+            "root_rms_m": significant_digits.round_number(self.gaps[0]),
             "farthest_joints_m": {
-                k: significant_digits.number(v) for k, v in self.farthest.items()
+                k: significant_digits.round_number(v) for k, v in self.farthest.items()
             },
             "nearest_clip": self.nearest.label,
-            "nearest_half_ranges": significant_digits.number(self.nearest.distance),
-            "nearest_differs_m": significant_digits.number(self.nearest.differs),
+            "nearest_half_ranges": significant_digits.round_number(self.nearest.distance),
+            "nearest_differs_m": significant_digits.round_number(self.nearest.differs),
         }
 
     def chart(self) -> Chart:
@@ -95,7 +95,7 @@ class Compared:
             f"{100 * nearest.differs:.1f} cm."
         )
         alt = f"Stick figures of {self.label}: as captured, and as predicted from other clips."
-        strip = stick_figures.strip(self.captured, self.predicted, self.bones)
+        strip = stick_figures.pose_strip(self.captured, self.predicted, self.bones)
         height = min(3.4, svg_chart.WIDTH * strip.size[1] / strip.size[0] + 0.5)
         return svg_chart.draw(height, strip.paint, alt, caption)
 
@@ -104,8 +104,8 @@ class Compared:
 class DrawnClips:
     """The clips with the largest error and, for comparison, the clip of median error."""
 
-    worst: tuple[Compared, ...]
-    typical: Compared
+    worst: tuple[DrawnClip, ...]
+    typical: DrawnClip
 
     def facts(self) -> dict[str, Any]:
         """Return the figures of each drawn clip."""
@@ -131,38 +131,42 @@ class DrawnClips:
         return Section("figures", "Clips with the largest error, drawn", paragraphs, charts=charts)
 
 
-def of(trained: Trained, worst: tuple[int, ...]) -> DrawnClips:
+def draw_clips(trained: TrainedModel, worst: tuple[int, ...]) -> DrawnClips:
     """Return drawings of the given clips and of the clip of median error."""
-    middle = int(np.argsort(trained.missed, kind="stable")[len(trained.missed) // 2])
-    return DrawnClips(tuple(compare(trained, clip) for clip in worst), compare(trained, middle))
+    middle = int(
+        np.argsort(trained.left_out_errors, kind="stable")[len(trained.left_out_errors) // 2]
+    )
+    return DrawnClips(
+        tuple(compare_clip(trained, clip) for clip in worst), compare_clip(trained, middle)
+    )
 
 
-def compare(trained: Trained, clip: int) -> Compared:
+def compare_clip(trained: TrainedModel, clip: int) -> DrawnClip:
     """Return a clip beside its prediction from all other clips."""
     example = trained.examples[clip]
     own = example.clip.skeleton
     bones = [(parent, child) for child, parent in enumerate(own.parents) if parent >= 0]
     bones += [(joint, len(own) + tip) for tip, joint in enumerate(own.tip_joints)]
-    return Compared(
-        left_out_clips.label(example),
+    return DrawnClip(
+        left_out_clips.clip_label(example),
         example.row.performer,
-        left_out_clips.body(trained, clip, trained.tensor.values[:, :, clip]),
-        left_out_clips.body(trained, clip, left_out_clips.motion(trained, clip)),
+        left_out_clips.body_motion(trained, clip, trained.tensor.values[:, :, clip]),
+        left_out_clips.body_motion(trained, clip, left_out_clips.predicted_motion(trained, clip)),
         tuple(bones),
         own.names,
         _nearest(trained, clip),
     )
 
 
-def _nearest(trained: Trained, clip: int) -> Neighbour:
-    points, values = trained.laid.half_ranges, trained.values["pose"]
+def _nearest(trained: TrainedModel, clip: int) -> NearestClip:
+    points, values = trained.samples.half_ranges, trained.values["pose"]
     distances = np.linalg.norm(points - points[clip], axis=1)
     distances[clip] = np.inf
     other = int(np.argmin(distances))
     shared = trained.tensor.weight * trained.tensor.values.shape[1]
     squared = float(np.sum(np.square(values[clip] - values[other]))) / shared
-    return Neighbour(
-        left_out_clips.label(trained.examples[other]),
+    return NearestClip(
+        left_out_clips.clip_label(trained.examples[other]),
         float(distances[other]),
         float(np.sqrt(squared)),
     )

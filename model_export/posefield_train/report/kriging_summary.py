@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from posefield.model_file.model_card import Control
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import kriging_tuning
 from posefield_train.kriging.kriging_bank import POSE
-from posefield_train.kriging.universal_kriging import Hyper, Kriging
+from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.report.drawing import significant_digits
 from posefield_train.report.drawing.html_page import Section, Table
 
@@ -21,7 +21,7 @@ _MEANING = {
 
 
 @dataclass(frozen=True)
-class Quantity:
+class KrigedQuantity:
     """A kriged quantity. explained: share of its variation. hyper: None for a constant."""
 
     name: str
@@ -33,24 +33,31 @@ class Quantity:
 class KrigingSummary:
     """All quantities of a model. controls: names."""
 
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[KrigedQuantity, ...]
     controls: tuple[str, ...]
 
     def facts(self) -> dict[str, Any]:
         """Return the explained share and the parameters of each quantity."""
         return {quantity.name: self._facts(quantity) for quantity in self.quantities}
 
-    def _facts(self, quantity: Quantity) -> dict[str, Any]:
+    def _facts(self, quantity: KrigedQuantity) -> dict[str, Any]:
         own: dict[str, Any] = {
-            "explained": significant_digits.number(quantity.explained),
+            "explained": significant_digits.round_number(quantity.explained),
             "answered_with": "kriging" if quantity.hyper else "mean",
         }
         if quantity.hyper:
             scales = dict(
-                zip(self.controls, significant_digits.numbers(quantity.hyper.scales), strict=True)
+                zip(
+                    self.controls,
+                    significant_digits.round_numbers(quantity.hyper.scales),
+                    strict=True,
+                )
             )
-            own |= {"nugget": significant_digits.number(quantity.hyper.nugget), "scales": scales}
-            own |= {"performers": significant_digits.number(quantity.hyper.label)}
+            own |= {
+                "nugget": significant_digits.round_number(quantity.hyper.nugget),
+                "scales": scales,
+            }
+            own |= {"performers": significant_digits.round_number(quantity.hyper.label)}
             own |= {"drifts": list(quantity.hyper.drifts)}
         return own
 
@@ -61,7 +68,8 @@ class KrigingSummary:
             "controls, with each clip left out in turn. A quantity that is not predicted better "
             "than by the mean of the clips (by two standard errors) gets that mean.",
             "The scale of a control is its weight in the distance between clips, per half-range. "
-            f"At the lower bound of {kriging_tuning.SCALES[0]:g} the quantity is nearly linear in "
+            f"At the lower bound of {kriging_tuning.SCALE_BOUNDS[0]:g} the "
+            "quantity is nearly linear in "
             "the control. The nugget is the share of the variance that remains between clips with "
             "equal controls. The performer distance is the distance between two performers with "
             "equal controls; it is 0 where the model does not distinguish performers.",
@@ -69,10 +77,10 @@ class KrigingSummary:
         heading = ("quantity", "meaning", "explained", "predicted by", "nugget")
         scales = tuple(f"scale of {name}" for name in self.controls)
         titles = (*heading, "performer distance", *scales)
-        table = Table("Kriging models", titles, tuple(map(self._row, self.quantities)))
+        table = Table("UniversalKriging models", titles, tuple(map(self._row, self.quantities)))
         return Section("fields", "What the controls explain", paragraphs, (table,))
 
-    def _row(self, quantity: Quantity) -> tuple[str, ...]:
+    def _row(self, quantity: KrigedQuantity) -> tuple[str, ...]:
         meaning, share = _MEANING.get(quantity.name, ""), f"{100 * quantity.explained:.0f} %"
         if quantity.hyper is None:
             return (quantity.name, meaning, share, "mean", "", "", *("" for _ in self.controls))
@@ -81,11 +89,13 @@ class KrigingSummary:
         return (quantity.name, meaning, share, "kriging", *two, *scales)
 
 
-def of(trained: Trained, controls: tuple[Control, ...]) -> KrigingSummary:
+def summarize_kriging(trained: TrainedModel, controls: tuple[Control, ...]) -> KrigingSummary:
     """Return the quantities of a trained model, the pose first."""
     bank = {POSE: trained.model.bank.pose, **trained.model.bank.others}
     found = [
-        Quantity(name, share, own.hyper if isinstance(own := bank[name], Kriging) else None)
+        KrigedQuantity(
+            name, share, own.hyper if isinstance(own := bank[name], UniversalKriging) else None
+        )
         for name, share in trained.explained.items()
     ]
     return KrigingSummary(tuple(found), tuple(control.name for control in controls))

@@ -22,9 +22,9 @@ from posefield.model_file import model_card
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import ModelCard
 from posefield_train.graph import levels
-from posefield_train.graph.float_model import Model
-from posefield_train.graph.onnx_export import Exported
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.float_model import FloatModel
+from posefield_train.graph.onnx_export import ExportedModel
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report.drawing import significant_digits, svg_chart
 from posefield_train.report.drawing.html_page import Section, Table
 from posefield_train.source.recipe import Recipe
@@ -32,9 +32,9 @@ from posefield_train.source.recipe import Recipe
 # Common resolution and field of view of games: 1080 lines, 60 degrees vertically.
 CAMERA = Camera(np.zeros(3), math.radians(60.0), 1080.0)
 # Measurements of one level differ by a few per cent, as some levels do, so take the median of many.
-ROUNDS = 51
+TIMING_ROUNDS = 51
 # Alternative levels are built for 1 to FARTHEST times the error limits of the finest level.
-POINTS, FARTHEST = 7, 16.0
+TIMED_POINTS, FARTHEST = 7, 16.0
 
 _EXPLANATION = (
     "Errors are distances of joints from the model before truncation, over random controls, "
@@ -96,9 +96,9 @@ class LevelCosts:
         return {
             "poses_a_call": cost_model.BATCH,
             "image_lines": CAMERA.height,
-            "field_of_view_rad": significant_digits.number(CAMERA.fov),
+            "field_of_view_rad": significant_digits.round_number(CAMERA.fov),
             "levels": [
-                {**facts, "one_pixel_from_m": significant_digits.number(distance)}
+                {**facts, "one_pixel_from_m": significant_digits.round_number(distance)}
                 for facts, distance in chosen
             ],
             "others": [{**facts, "times_budget": times} for facts, times in others],
@@ -163,8 +163,8 @@ class LevelCosts:
             drawn: dict[str, Any] = {"color": colour, "label": label, "zorder": 4}
             left.loglog([own.numbers for own in timed.levels], timed.centimetres, style, **drawn)
             right.semilogy(timed.microseconds, timed.centimetres, style, **drawn)
-        _name(left, [own.numbers for own in self.chosen.levels], self.chosen.centimetres)
-        _name(right, self.chosen.microseconds, self.chosen.centimetres)
+        _label_levels(left, [own.numbers for own in self.chosen.levels], self.chosen.centimetres)
+        _label_levels(right, self.chosen.microseconds, self.chosen.centimetres)
         left.set(xlabel="numbers read", ylabel="error (cm, RMS)", title="size")
         right.set(xlabel="time (µs per pose)", title="time", xlim=(0.0, None))
         left.margins(y=0.12)
@@ -174,7 +174,7 @@ class LevelCosts:
         left.legend(loc="upper right")
 
 
-def _name(ax: Axes, across: Sequence[float], errors: Sequence[float]) -> None:
+def _label_levels(ax: Axes, across: Sequence[float], errors: Sequence[float]) -> None:
     """Write the levels' names to the lower left, where a falling curve leaves space."""
     paper = {"boxstyle": "square,pad=0.1", "color": "white", "alpha": 0.8}
     for number, at in enumerate(zip(across, errors, strict=True)):
@@ -218,12 +218,12 @@ def _facts(level: Level, seconds: float) -> dict[str, Any]:
         "bytes": level.bytes,
         "operations": level.operations,
         **lengths,
-        "seconds_per_pose": significant_digits.number(seconds),
+        "seconds_per_pose": significant_digits.round_number(seconds),
     }
 
 
 @dataclass(frozen=True)
-class Alternatives:
+class AlternativeLevels:
     """Levels below a model's own size, the finest first.
 
     times: multiples of the error limits that they were built for. opened: session with the model's
@@ -235,19 +235,21 @@ class Alternatives:
     opened: Session
 
 
-def alternatives(recipe: Recipe, trained: Trained, own_card: ModelCard) -> Alternatives:
+def build_alternatives(
+    recipe: Recipe, trained: TrainedModel, own_card: ModelCard
+) -> AlternativeLevels:
     """Build each alternative level on its own, and combine all of them in one graph."""
-    shop = levels.workshop(recipe, trained)
+    shop = levels.level_builder(recipe, trained)
     farthest = max([FARTHEST, *(detail.times for detail in recipe.size.details)])
-    times = tuple(float(f"{times:.3g}") for times in np.geomspace(1.0, farthest, POINTS))
-    joints = shop.model.decoder.rungs[0].joints
-    model = _together([shop.lowered(shop.model, joints, one) for one in times])
+    times = tuple(float(f"{times:.3g}") for times in np.geomspace(1.0, farthest, TIMED_POINTS))
+    joints = shop.model.decoder.level_sizes[0].joints
+    model = _combine_levels([shop.with_coarser_level(shop.model, joints, one) for one in times])
     found = tuple(shop.level(model, number) for number in range(len(times) + 1))
     content = model.onnx(model_card.dump(replace(own_card, levels=found)), {})
-    return Alternatives(times, found[1:], session.open_bytes(content, "alternative levels"))
+    return AlternativeLevels(times, found[1:], session.open_bytes(content, "alternative levels"))
 
 
-def _together(models: list[Model]) -> Model:
+def _combine_levels(models: list[FloatModel]) -> FloatModel:
     """Return the model with the levels of several models of one size."""
     bank, decoder = models[0].bank, models[0].decoder
     return replace(
@@ -257,15 +259,15 @@ def _together(models: list[Model]) -> Model:
     )
 
 
-def of(exported: Exported, others: Alternatives) -> LevelCosts:
+def time_levels(exported: ExportedModel, others: AlternativeLevels) -> LevelCosts:
     """Measure the times of the levels of an exported model and of the alternatives."""
     own = session.open_bytes(exported.content, f"{exported.card.name}.onnx")
     chosen = exported.card.levels
     asked = [(own, number) for number in range(len(chosen))]
     asked += [(others.opened, 1 + number) for number in range(len(others.levels))]
-    seconds = cost_model.in_turn(asked, ROUNDS)
+    seconds = cost_model.benchmark_levels(asked, TIMING_ROUNDS)
     return LevelCosts(
-        TimedLevels(chosen, cost_model.falling(seconds[: len(chosen)])),
-        TimedLevels(others.levels, cost_model.falling(seconds[len(chosen) :])),
+        TimedLevels(chosen, cost_model.monotone_costs(seconds[: len(chosen)])),
+        TimedLevels(others.levels, cost_model.monotone_costs(seconds[len(chosen) :])),
         others.times,
     )

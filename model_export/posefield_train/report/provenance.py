@@ -4,13 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from posefield_train.graph.onnx_export import Exported
+from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.report.drawing import significant_digits
 from posefield_train.report.drawing.html_page import Section, Table
 
 
 @dataclass(frozen=True)
-class Step:
+class TrainingStep:
     """A step of the training and its duration, s."""
 
     name: str
@@ -21,8 +21,8 @@ class Step:
 class Provenance:
     """An exported model and the steps that made it."""
 
-    exported: Exported
-    steps: tuple[Step, ...]
+    exported: ExportedModel
+    steps: tuple[TrainingStep, ...]
 
     @property
     def seconds(self) -> float:
@@ -42,11 +42,11 @@ class Provenance:
             "root": card.root,
             "rate": card.rate,
             "frames": card.frames,
-            "durations_s": significant_digits.numbers(card.durations),
+            "durations_s": significant_digits.round_numbers(card.durations),
             "provenance": dict(card.provenance),
             "diagnostics": dict(card.diagnostics),
             "steps": [
-                {"step": step.name, "seconds": significant_digits.number(step.seconds)}
+                {"step": step.name, "seconds": significant_digits.round_number(step.seconds)}
                 for step in self.steps
             ],
         }

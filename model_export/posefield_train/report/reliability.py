@@ -13,12 +13,12 @@ from posefield.question.model_question import SuggestQuestion
 from posefield.question.results import Suggestion
 from posefield.synthesis import capture_suggestions
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.graph.onnx_export import Exported
+from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.report.drawing import significant_digits
 from posefield_train.report.drawing.html_page import Section, Table
 
 # Joints named, and captures suggested.
-JOINTS, POINTS = 8, 8
+LISTED_JOINTS, POINTS = 8, 8
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Reliability:
         """Return the controls that are measured on the motion, and their measures in words."""
         names = self.card.skeleton.names
         controls = [c for c in self.card.controls if c.measure]
-        return {c.name: measures.words(c.measure, names) for c in controls if c.measure}
+        return {c.name: measures.describe(c.measure, names) for c in controls if c.measure}
 
     @property
     def joints(self) -> dict[str, float]:
@@ -50,14 +50,14 @@ class Reliability:
         """Return the limits as JSON values."""
         return {
             "measured": self.measured,
-            "support_limit": significant_digits.number(self.limit),
+            "support_limit": significant_digits.round_number(self.limit),
             "joint_sigma": self.joints,
             "suggestions": [
                 {
                     "controls": {
-                        k: significant_digits.number(v) for k, v in point.controls.items()
+                        k: significant_digits.round_number(v) for k, v in point.controls.items()
                     },
-                    "gain": significant_digits.number(point.gain),
+                    "gain": significant_digits.round_number(point.gain),
                     "lacking": point.lacking,
                 }
                 for point in self.points
@@ -72,13 +72,15 @@ class Reliability:
             if names
             else "No control is measured on the motion: answers match exactly only the targets of "
             "a request.",
-            f"Controls count as supported up to {100 * support.BEYOND:g} % of a range beyond the "
+            f"Controls count as supported up to {100 * support.RANGE_MARGIN:g} % "
+            "of a range beyond the "
             f"captured clips, where the variance of the support model is at most {self.limit:.2f}. "
-            f"Of the captured clips, each left out in turn, {100 * support.QUANTILE:g} % are "
+            "Of the captured clips, each left out in turn, "
+            f"{100 * support.SUPPORT_QUANTILE:g} % are "
             "within that limit.",
             "Each suggested capture assumes that those above it were captured.",
         )
-        shares = list(self.joints.items())[:JOINTS]
+        shares = list(self.joints.items())[:LISTED_JOINTS]
         rows = tuple((name, f"{share:.2f}") for name, share in shares)
         joints = Table("Joints with the largest error", ("joint", "sigma relative to pose"), rows)
         return Section("trust", "Limits of the answers", paragraphs, (self._suggested(), joints))
@@ -97,11 +99,11 @@ class Reliability:
         return Table("Suggested captures", heading, rows)
 
 
-def of(exported: Exported) -> Reliability:
+def measure_reliability(exported: ExportedModel) -> Reliability:
     """Return the limits of an exported model."""
     card = exported.card
     opened = session.open_bytes(exported.content, card.name)
     found = capture_suggestions.suggest(
         Synthesizer(card.name, opened), SuggestQuestion(count=POINTS)
     )
-    return Reliability(card, support.of(np.array(card.examples)).limit, found.suggestions)
+    return Reliability(card, support.fit_support(np.array(card.examples)).limit, found.suggestions)

@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from posefield.common.units import Floats
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report.drawing import significant_digits, svg_chart
 from posefield_train.report.drawing.html_page import Section
 from posefield_train.tensor import hosvd
 
 MODES = ("degrees of freedom", "frames", "samples")
 # Lower end of the logarithmic axis, m: invisible in an animation.
-SMALLEST = 1e-6
+SMALLEST_DISTANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Spectra:
     def facts(self) -> dict[str, Any]:
         """Return the distance of each direction, m, and the rank, by mode."""
         return {
-            mode: {"kept": rank, "carried_m": significant_digits.numbers(carried)}
+            mode: {"kept": rank, "carried_m": significant_digits.round_numbers(carried)}
             for mode, rank, carried in zip(MODES, self.ranks, self.carried, strict=True)
         }
 
@@ -58,7 +58,7 @@ class Spectra:
         axes = figure.subplots(1, 3, sharey=True)
         for ax, mode, rank, carried in zip(axes, MODES, self.ranks, self.carried, strict=True):
             at = np.arange(1, len(carried) + 1)
-            seen = carried > SMALLEST
+            seen = carried > SMALLEST_DISTANCE
             kept = seen & (at <= rank)
             ax.semilogy(at[seen & ~kept], 100 * carried[seen & ~kept], ".", color=svg_chart.FAINT)
             ax.semilogy(at[kept], 100 * carried[kept], ".", color=svg_chart.BLUE)
@@ -68,7 +68,7 @@ class Spectra:
         svg_chart.plain_logarithm(axes[0].yaxis)
 
 
-def of(trained: Trained) -> Spectra:
+def measure_spectra(trained: TrainedModel) -> Spectra:
     """Return the spectra of a trained model's tensor."""
     core = trained.full.core
     energies = [np.sum(np.square(hosvd.unfold(core, mode)), axis=1) for mode in range(3)]

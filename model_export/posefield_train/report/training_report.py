@@ -4,8 +4,8 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from posefield_train.graph.onnx_export import Exported
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.onnx_export import ExportedModel
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report import (
     calibration,
     clip_errors,
@@ -18,14 +18,14 @@ from posefield_train.report import (
     variograms,
     warps,
 )
-from posefield_train.report.drawing.html_page import Chapter, Page, Section, Table
+from posefield_train.report.drawing.html_page import Page, ReportChapter, Section, Table
 from posefield_train.report.levels_of_detail import LevelCosts
-from posefield_train.report.provenance import Provenance, Step
+from posefield_train.report.provenance import Provenance, TrainingStep
 
-FORMAT = 1
+REPORT_VERSION = 1
 """Version of the JSON: increased when a name or a unit changes."""
 
-TERMS = Section(
+TERMS_SECTION = Section(
     "terms",
     "Terms",
     (),
@@ -75,7 +75,7 @@ TERMS = Section(
 
 
 @dataclass(frozen=True)
-class Rendered:
+class RenderedReport:
     """Contents of the two files."""
 
     html: bytes
@@ -83,34 +83,39 @@ class Rendered:
 
 
 def render(
-    trained: Trained, exported: Exported, levels: LevelCosts, steps: Sequence[Step]
-) -> Rendered:
+    trained: TrainedModel,
+    exported: ExportedModel,
+    levels: LevelCosts,
+    steps: Sequence[TrainingStep],
+) -> RenderedReport:
     """Return the report of a model; equal arguments give equal bytes."""
     provenance = Provenance(exported, tuple(steps))
     chapters = _chapters(trained, levels, provenance)
-    facts = {"report": FORMAT, **{name: part.facts() for name, part in chapters.items()}}
+    facts = {"report": REPORT_VERSION, **{name: part.facts() for name, part in chapters.items()}}
     card = exported.card
-    sections = [*(part.section() for part in chapters.values()), TERMS]
+    sections = [*(part.section() for part in chapters.values()), TERMS_SECTION]
     page = Page("training report", card.name, card.description, provenance.figures(), sections)
     text = json.dumps(facts, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
-    return Rendered(page.html(), f"{text}\n".encode())
+    return RenderedReport(page.html(), f"{text}\n".encode())
 
 
-def _chapters(trained: Trained, levels: LevelCosts, provenance: Provenance) -> dict[str, Chapter]:
+def _chapters(
+    trained: TrainedModel, levels: LevelCosts, provenance: Provenance
+) -> dict[str, ReportChapter]:
     """Return the parts of the report by their names in the JSON, in the order of the page."""
     controls = provenance.exported.card.controls
-    errors = clip_errors.of(trained, controls)
+    errors = clip_errors.collect_clip_errors(trained, controls)
     return {
-        "fields": kriging_summary.of(trained, controls),
+        "fields": kriging_summary.summarize_kriging(trained, controls),
         "clips": errors,
-        "figures": drawn_clips.of(trained, errors.worst),
-        "calibration": calibration.of(trained),
-        "coverage": coverage.of(trained, controls),
-        "trust": reliability.of(provenance.exported),
-        "variograms": variograms.of(trained, controls),
-        "spectra": spectra.of(trained),
-        "sizes": truncation.of(trained),
+        "figures": drawn_clips.draw_clips(trained, errors.worst),
+        "calibration": calibration.measure_calibration(trained),
+        "coverage": coverage.measure_coverage(trained, controls),
+        "trust": reliability.measure_reliability(provenance.exported),
+        "variograms": variograms.measure_variograms(trained, controls),
+        "spectra": spectra.measure_spectra(trained),
+        "sizes": truncation.measure_truncation(trained),
         "levels": levels,
-        "warps": warps.of(trained),
+        "warps": warps.collect_warps(trained),
         "about": provenance,
     }

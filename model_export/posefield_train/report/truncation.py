@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from posefield.common.units import Floats
 from posefield_train.graph import truncation_cost
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report.drawing import significant_digits, svg_chart
 from posefield_train.report.drawing.html_page import Section, Table
 from posefield_train.tensor import hosvd
@@ -29,7 +29,7 @@ class Truncation:
     errors: Floats
     stored: Floats
     chosen: tuple[int, int, int]
-    missed: float
+    left_out_errors: float
 
     def smallest(self, allowed: float) -> tuple[int, ...]:
         """Return the ranks of fewest numbers stored within an error, m."""
@@ -73,11 +73,11 @@ class Truncation:
         all_stored, core_only = self.ratios(ranks)
         return {
             "ranks": list(ranks),
-            "rms_m": significant_digits.number(self.error(ranks)),
+            "rms_m": significant_digits.round_number(self.error(ranks)),
             "numbers_stored": self.numbers(ranks),
             "core_numbers": int(np.prod(ranks)),
-            "compression_all_in": significant_digits.number(all_stored),
-            "compression_core_only": significant_digits.number(core_only),
+            "compression_all_in": significant_digits.round_number(all_stored),
+            "compression_core_only": significant_digits.round_number(core_only),
         }
 
     def section(self) -> Section:
@@ -122,8 +122,10 @@ class Truncation:
         left.loglog(marks, 100 * errors, color=svg_chart.BLUE, label="smallest error at this size")
         at = self.numbers(self.chosen), 100 * self.error(self.chosen)
         left.plot(*at, "o", color=svg_chart.ORANGE, label="chosen", zorder=3)
-        missed = f"error of a left-out clip: {100 * self.missed:.1f} cm"
-        left.axhline(100 * self.missed, color=svg_chart.FAINT, linestyle="--", label=missed)
+        missed = f"error of a left-out clip: {100 * self.left_out_errors:.1f} cm"
+        left.axhline(
+            100 * self.left_out_errors, color=svg_chart.FAINT, linestyle="--", label=missed
+        )
         left.set(xlabel="numbers stored", ylabel="error (cm)", title="size")
         svg_chart.plain_logarithm(left.xaxis)
         svg_chart.plain_logarithm(left.yaxis)
@@ -155,11 +157,11 @@ def _ratio(value: float) -> str:
     return f"{value:,.0f}" if value >= 100 else f"{value:.1f}"
 
 
-def of(trained: Trained) -> Truncation:
+def measure_truncation(trained: TrainedModel) -> Truncation:
     """Return every truncation of a trained model's tensor."""
     core, reduced = trained.full.core, trained.model.decoder.reduced.core
-    price = truncation_cost.numbers(trained.tensor, len(trained.model.bank.low))
-    stored = price.of(*np.ix_(*(np.arange(1, size + 1) for size in core.shape)))
+    price = truncation_cost.storage_cost(trained.tensor, len(trained.model.bank.low))
+    stored = price.evaluate(*np.ix_(*(np.arange(1, size + 1) for size in core.shape)))
     errors = trained.tensor.rms(hosvd.squared_errors(core))
     r1, r2, r3 = reduced.shape
-    return Truncation(errors, stored, (r1, r2, r3), float(np.sqrt(trained.missed.mean())))
+    return Truncation(errors, stored, (r1, r2, r3), float(np.sqrt(trained.left_out_errors.mean())))

@@ -9,21 +9,21 @@ from matplotlib.figure import Figure
 
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Control
-from posefield_train.graph.trained_model import Trained
+from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.variogram import Experimental, Fit
+from posefield_train.kriging.variogram import ExperimentalVariogram, VariogramModel
 from posefield_train.report.drawing import significant_digits, svg_chart
 from posefield_train.report.drawing.html_page import Section
 
 # A pair counts for a control that contributes this share of its distance: within 45 degrees.
-ALONG = np.sqrt(0.5)
+MIN_DIRECTION_SHARE = np.sqrt(0.5)
 # Fewer lags do not determine a curve.
 FEWEST_LAGS = 3
 
 
 @dataclass(frozen=True)
-class Direction:
+class DirectionalVariogram:
     """Pairs (P,) of clips along one control, or by the scaled distance of all controls.
 
     distances: in `unit`. semivariances: m². mean: by lag. fit: None with fewer than FEWEST_LAGS
@@ -34,8 +34,8 @@ class Direction:
     unit: str
     distances: Floats
     semivariances: Floats
-    mean: Experimental
-    fit: Fit | None
+    mean: ExperimentalVariogram
+    fit: VariogramModel | None
     scale: float
 
     def facts(self) -> dict[str, Any]:
@@ -44,12 +44,12 @@ class Direction:
             "name": self.name,
             "distance_unit": self.unit,
             "pairs": len(self.distances),
-            "lag_distances": significant_digits.numbers(self.mean.distances),
-            "lag_semivariances_m2": significant_digits.numbers(self.mean.values),
+            "lag_distances": significant_digits.round_numbers(self.mean.distances),
+            "lag_semivariances_m2": significant_digits.round_numbers(self.mean.values),
             "lag_pairs": [int(count) for count in self.mean.pairs],
             "fit": self.fit
-            and {name: significant_digits.number(x) for name, x in vars(self.fit).items()},
-            "field_scale": significant_digits.number(self.scale),
+            and {name: significant_digits.round_number(x) for name, x in vars(self.fit).items()},
+            "field_scale": significant_digits.round_number(self.scale),
         }
 
 
@@ -60,7 +60,7 @@ class Variograms:
     nugget: share of the sill. sill: m².
     """
 
-    directions: tuple[Direction, ...]
+    directions: tuple[DirectionalVariogram, ...]
     covariance: str
     nugget: float
     sill: float
@@ -75,8 +75,8 @@ class Variograms:
         """Return the parameters of the kriging model, and every direction."""
         return {
             "covariance": self.covariance,
-            "nugget": significant_digits.number(self.nugget),
-            "sill_m2": significant_digits.number(self.sill),
+            "nugget": significant_digits.round_number(self.nugget),
+            "sill_m2": significant_digits.round_number(self.sill),
             "directions": [direction.facts() for direction in self.directions],
         }
 
@@ -113,7 +113,7 @@ class Variograms:
         tops = [np.quantile(d.semivariances, 0.99) for d in self.directions if len(d.distances)]
         axes[0, 0].set_ylim(0.0, 1.15e4 * max(tops))
 
-    def _panel(self, ax: Axes, direction: Direction) -> None:
+    def _panel(self, ax: Axes, direction: DirectionalVariogram) -> None:
         # Thousands of points take less space as a bitmap.
         (cloud,) = ax.plot(direction.distances, 1e4 * direction.semivariances, ".", markersize=4)
         cloud.set(color=svg_chart.GREY, alpha=0.45, rasterized=True, markeredgewidth=0)
@@ -135,9 +135,9 @@ class Variograms:
         return 1.0 - COVARIANCES[self.covariance].numpy(np.square(distances))
 
 
-def of(trained: Trained, controls: tuple[Control, ...]) -> Variograms:
+def measure_variograms(trained: TrainedModel, controls: tuple[Control, ...]) -> Variograms:
     """Return the variograms of a trained model's poses over its controls."""
-    hyper, points = trained.pose.hyper, trained.laid.half_ranges
+    hyper, points = trained.pose.hyper, trained.samples.half_ranges
     left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
     first, second = np.triu_indices(len(points), k=1)
     # The tensor sums over joints and frames; the chart shows a mean.
@@ -147,26 +147,26 @@ def of(trained: Trained, controls: tuple[Control, ...]) -> Variograms:
     ways = np.linalg.norm(gaps, axis=1)
     directions = []
     for control, gap, scale in zip(controls, gaps.T, hyper.scales, strict=True):
-        along = (gap >= ALONG * ways) & (ways > 0.0)
+        along = (gap >= MIN_DIRECTION_SHARE * ways) & (ways > 0.0)
         pairs = gap[along], halves[along]
         mean = by_lag(*pairs)
         fit = _fit(mean, hyper.covariance)
-        own = Direction(control.name, "half-ranges", *pairs, mean, fit, float(scale))
+        own = DirectionalVariogram(control.name, "half-ranges", *pairs, mean, fit, float(scale))
         directions.append(own)
     performers = np.array([example.row.performer for example in trained.examples])
     others = performers[first] != performers[second]
     scaled = np.sqrt(np.sum(np.square(gaps * hyper.scales), axis=1) + hyper.label**2 * others)
     mean = by_lag(scaled, halves)
     fit = _fit(mean, hyper.covariance)
-    every = Direction("all controls", "scaled distance", scaled, halves, mean, fit, 1.0)
+    every = DirectionalVariogram("all controls", "scaled distance", scaled, halves, mean, fit, 1.0)
     return Variograms(
         (*directions, every), hyper.covariance, hyper.nugget, trained.pose.sill / shared
     )
 
 
-def by_lag(distances: Floats, semivariances: Floats) -> Experimental:
+def by_lag(distances: Floats, semivariances: Floats) -> ExperimentalVariogram:
     """Return the means (L,) of pairs (P,) over the variogram's lags that have enough pairs."""
-    far = variogram.FAR * distances.max(initial=0.0)
+    far = variogram.LARGEST_LAG * distances.max(initial=0.0)
     edges = np.linspace(0.0, far, variogram.LAGS + 1)
     lag = np.searchsorted(edges, distances, side="left") - 1
     near = (lag >= 0) & (lag < variogram.LAGS)
@@ -176,8 +176,8 @@ def by_lag(distances: Floats, semivariances: Floats) -> Experimental:
         np.bincount(lag[near], x[near], variogram.LAGS)[enough] for x in (distances, semivariances)
     )
     mean_distances, means = (total / pairs[enough] for total in sums)
-    return Experimental(mean_distances, means, pairs[enough].astype(np.float64))
+    return ExperimentalVariogram(mean_distances, means, pairs[enough].astype(np.float64))
 
 
-def _fit(mean: Experimental, covariance: str) -> Fit | None:
-    return variogram.fit(mean, covariance) if len(mean.pairs) >= FEWEST_LAGS else None
+def _fit(mean: ExperimentalVariogram, covariance: str) -> VariogramModel | None:
+    return variogram.fit_by_grid(mean, covariance) if len(mean.pairs) >= FEWEST_LAGS else None

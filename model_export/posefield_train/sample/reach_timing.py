@@ -16,7 +16,7 @@ def minimum_jerk(u: Floats, onset: float, finish: float) -> Floats:
     return t**3 * (10.0 + t * (6.0 * t - 15.0))
 
 
-def swell(u: Floats) -> Floats:
+def bell_curve(u: Floats) -> Floats:
     """Return a bump that rises to 1 at u = 0.5, with two zero derivatives at both ends."""
     return 64.0 * (u * (1.0 - u)) ** 3
 
@@ -41,13 +41,13 @@ def elbow(u: Floats) -> Floats:
     return minimum_jerk(u, 0.18, 1.0)
 
 
-def fitts(distance: float) -> float:
+def fitts_duration(distance: float) -> float:
     """Return the duration, s, of a reach of a distance, m, to a 0.1 m wide target (Fitts 1954)."""
     return 0.3 + 0.42 * float(np.log2(1.0 + distance / 0.1))
 
 
 @dataclass(frozen=True)
-class Warp:
+class TimingWarp:
     """Strictly monotone map of the elapsed fraction of a clip to phase.
 
     (a, b) lies inside the unit circle, else ValueError. a above zero: fast start and end. b above

@@ -34,7 +34,7 @@ The limits of the body reduce the ranges of hip_height and target_height, see `l
 
 
 @dataclass(frozen=True)
-class Controls:
+class SampleControls:
     """One point of the control space, in the units of RANGES: `turn` is in degrees."""
 
     stature: float
@@ -65,28 +65,28 @@ def limits(name: str, stature: float, hip_height: float) -> tuple[float, float]:
     return low, high
 
 
-def parse(controls: Mapping[str, float] | Sequence[float]) -> Controls:
+def parse_controls(controls: Mapping[str, float] | Sequence[float]) -> SampleControls:
     """Return controls from a mapping by name or from four values in the order of RANGES.
 
     Raises InvalidField for a missing or unknown control, and for one outside the body's limits.
     """
-    values = controls if isinstance(controls, Mapping) else _named(controls)
+    values = controls if isinstance(controls, Mapping) else _by_name(controls)
     for name in values:
         if name not in RANGES:
             raise InvalidField(name, f"unknown control, expected one of {', '.join(RANGES)}")
     for name in RANGES:
         if name not in values:
             raise InvalidField(name, "missing control")
-    return _checked(Controls(*(float(values[name]) for name in RANGES)))
+    return _check(SampleControls(*(float(values[name]) for name in RANGES)))
 
 
-def _named(values: Sequence[float]) -> dict[str, float]:
+def _by_name(values: Sequence[float]) -> dict[str, float]:
     if len(values) != len(RANGES):
         raise InvalidField("controls", f"{len(values)} values, expected {len(RANGES)}")
     return dict(zip(RANGES, values, strict=True))
 
 
-def _checked(controls: Controls) -> Controls:
+def _check(controls: SampleControls) -> SampleControls:
     for (name, (_, _, unit, _)), value in zip(RANGES.items(), astuple(controls), strict=True):
         low, high = limits(name, controls.stature, controls.hip_height)
         # Tolerance for limits that were printed and read again.

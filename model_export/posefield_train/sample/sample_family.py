@@ -11,8 +11,8 @@ from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield_train.sample import noise_free, sample_body, sample_controls
-from posefield_train.sample.reach_timing import Warp
-from posefield_train.sample.sample_controls import STATURES, Controls
+from posefield_train.sample.reach_timing import TimingWarp
+from posefield_train.sample.sample_controls import STATURES, SampleControls
 
 COUNT = 92
 RATE = 120.0
@@ -32,11 +32,11 @@ _HARMONICS = np.array([0.5, 1.0, 1.5, 2.0])
 
 
 @dataclass(frozen=True)
-class Sample:
+class SampleTrial:
     """One trial: performer, nominal controls, and the noisy motion."""
 
     performer: str
-    controls: Controls
+    controls: SampleControls
     clip: Clip
 
 
@@ -52,7 +52,7 @@ def _spread(group: int, index: int, size: int) -> Floats:
     return np.array([turn, height, np.mod(0.5 + index * np.sqrt(2.0), 1.0)])
 
 
-def _asked(stature: float, standing: bool, spread: Floats) -> Controls:
+def _trial_controls(stature: float, standing: bool, spread: Floats) -> SampleControls:
     """Return the controls of a trial, rounded as the table prints them."""
     low, high = sample_controls.limits("hip_height", stature, 0.0)
     band = (
@@ -65,16 +65,16 @@ def _asked(stature: float, standing: bool, spread: Floats) -> Controls:
         round(float(np.interp(part, (0, 1), sample_controls.limits(name, stature, hip))), 4)
         for name, part in zip(("turn", "target_height"), spread, strict=False)
     )
-    return Controls(stature, hip, turn, height)
+    return SampleControls(stature, hip, turn, height)
 
 
-def design() -> Iterator[tuple[str, Controls]]:
+def design() -> Iterator[tuple[str, SampleControls]]:
     """Yield performer and controls of each sample: by stature, each standing, then sitting."""
     groups = product(STATURES, (True, False))
     for group, (name, standing) in enumerate(groups):
         size = len(range(group, COUNT, _GROUPS))
         for index in range(size):
-            yield name, _asked(STATURES[name], standing, _spread(group, index, size))
+            yield name, _trial_controls(STATURES[name], standing, _spread(group, index, size))
 
 
 def smooth_noise(rng: Generator, frames: int, shape: tuple[int, int]) -> Floats:
@@ -88,7 +88,7 @@ def smooth_noise(rng: Generator, frames: int, shape: tuple[int, int]) -> Floats:
     return noise
 
 
-def _unrest() -> Floats:
+def _noise_shares() -> Floats:
     """Return the share (J, 3) of the noise for each axis of each joint; hinges have one axis."""
     share = np.ones((len(sample_body.NAMES), 3))
     share[[sample_body.INDEX[name] for name in sample_body.HINGES], 1:] = 0.0
@@ -96,23 +96,25 @@ def _unrest() -> Floats:
     return share
 
 
-def _shaken(clip: Clip, rng: Generator) -> Clip:
-    noise = smooth_noise(rng, len(clip), (len(sample_body.NAMES), 3)) * _unrest()
+def _add_noise(clip: Clip, rng: Generator) -> Clip:
+    noise = smooth_noise(rng, len(clip), (len(sample_body.NAMES), 3)) * _noise_shares()
     return replace(clip, rotations=quat.mul(clip.rotations, quat.exp(noise)))
 
 
-def trial(where: Controls, rng: Generator) -> Clip:
+def noisy_trial(where: SampleControls, rng: Generator) -> Clip:
     """Return one noisy trial: the true motion with varied duration, timing and rotations."""
     seconds = noise_free.duration(astuple(where))
     pace = noise_free.warp(where)
     late = np.exp(_DURATION_SPREAD * rng.standard_normal())
     da, db = _WARP_SPREAD * rng.standard_normal(2)
-    played = noise_free.play(where, seconds * late, Warp(pace.a + da, pace.b + db), RATE)
-    return _shaken(played, rng)
+    played = noise_free.synthesize(
+        where, seconds * late, TimingWarp(pace.a + da, pace.b + db), RATE
+    )
+    return _add_noise(played, rng)
 
 
-def samples() -> Iterator[Sample]:
+def samples() -> Iterator[SampleTrial]:
     """Yield all samples in order; every call yields the same."""
     rng = Generator(PCG64(SEED))
     for performer, where in design():
-        yield Sample(performer, where, trial(where, rng))
+        yield SampleTrial(performer, where, noisy_trial(where, rng))

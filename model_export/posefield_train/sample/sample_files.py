@@ -16,7 +16,7 @@ from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.sample import sample_body
 from posefield_train.sample.sample_controls import RANGES
-from posefield_train.sample.sample_family import Sample, samples
+from posefield_train.sample.sample_family import SampleTrial, samples
 
 _RECIPE = """\
 schema = 1
@@ -83,18 +83,18 @@ description = "{description}"
 _BALL = "Zrotation Yrotation Xrotation"
 
 
-def _files(chosen: Iterable[Sample]) -> dict[str, bytes]:
+def _files(chosen: Iterable[SampleTrial]) -> dict[str, bytes]:
     """Return the contents of all files of some samples, by path relative to their directory."""
     files: dict[str, bytes] = {}
     rows: list[list[str]] = []
     for number, sample in enumerate(chosen, start=1):
         path = f"bvh/reach_{number:03}.bvh"
-        files[path] = bvh(sample.clip).encode()
+        files[path] = bvh_text(sample.clip).encode()
         rows.append(_row(path, sample))
     return files | {"clips.csv": _table(rows).encode(), "recipe.toml": _recipe().encode()}
 
 
-def family(output: Path, chosen: Iterable[Sample] | None = None) -> Path:
+def write_family(output: Path, chosen: Iterable[SampleTrial] | None = None) -> Path:
     """Write samples to a directory atomically and return their recipe's path.
 
     chosen: samples; default: the family's 92. A directory with exactly these files is left
@@ -106,11 +106,11 @@ def family(output: Path, chosen: Iterable[Sample] | None = None) -> Path:
     if output.is_dir() and any(output.iterdir()):
         _expect_same(output, files)
     else:
-        _place(output, files)
+        _write_files(output, files)
     return output / "recipe.toml"
 
 
-def _place(output: Path, files: dict[str, bytes]) -> None:
+def _write_files(output: Path, files: dict[str, bytes]) -> None:
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}-") as scratch:
         # A subdirectory, because the temporary directory is readable by its owner only.
@@ -139,7 +139,7 @@ def _recipe() -> str:
     return _RECIPE.format(controls="".join(parts))
 
 
-def _row(path: str, sample: Sample) -> list[str]:
+def _row(path: str, sample: SampleTrial) -> list[str]:
     point = [f"{value:.4f}" for value in astuple(sample.controls)]
     return [path, sample.performer, *point, str(len(sample.clip) - 1)]
 
@@ -152,7 +152,7 @@ def _table(rows: list[list[str]]) -> str:
     return text.getvalue()
 
 
-def bvh(clip: Clip) -> str:
+def bvh_text(clip: Clip) -> str:
     """Return the BVH text of a clip of the family, in metres.
 
     Hinges have one channel, other joints three. The root's offset is zero; its channels contain its

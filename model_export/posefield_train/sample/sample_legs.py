@@ -6,8 +6,8 @@ from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 from posefield_train.sample import reach_timing, sample_body, two_bone_ik
-from posefield_train.sample.sample_controls import Controls
-from posefield_train.sample.sample_trunk import Effort
+from posefield_train.sample.sample_controls import SampleControls
+from posefield_train.sample.sample_trunk import TrunkDisplacement
 
 _TOE_OUT = 0.12
 """Angle by which each foot points outwards, rad."""
@@ -17,10 +17,10 @@ _FORWARDS = np.array([0.0, 0.0, 1.0])
 
 
 def _foot_turn(side: str) -> Floats:
-    return quat.about(UP, np.array(sample_body.SIDES[side] * _TOE_OUT))
+    return quat.from_axis_angle(UP, np.array(sample_body.SIDES[side] * _TOE_OUT))
 
 
-def _ankle(controls: Controls, figure: Skeleton, side: str) -> Floats:
+def _ankle(controls: SampleControls, figure: Skeleton, side: str) -> Floats:
     """Return the fixed position (3,), m, of the ankle.
 
     It is below the hips when standing, and a thigh's length ahead when sitting.
@@ -32,7 +32,11 @@ def _ankle(controls: Controls, figure: Skeleton, side: str) -> Floats:
 
 
 def rotations(
-    controls: Controls, figure: Skeleton, goal: Effort, pelvis: tuple[Floats, Floats], u: Floats
+    controls: SampleControls,
+    figure: Skeleton,
+    goal: TrunkDisplacement,
+    pelvis: tuple[Floats, Floats],
+    u: Floats,
 ) -> dict[str, Floats]:
     """Return rotations (P, 4) of both legs under a pelvis of given positions and orientations."""
     return {
@@ -43,7 +47,7 @@ def rotations(
 
 
 def _leg(
-    controls: Controls, figure: Skeleton, pelvis: tuple[Floats, Floats], side: str
+    controls: SampleControls, figure: Skeleton, pelvis: tuple[Floats, Floats], side: str
 ) -> dict[str, Floats]:
     position, turn = pelvis
     hip = position + quat.rotate(turn, sample_body.offset(figure, side + "UpLeg"))
@@ -53,16 +57,18 @@ def _leg(
     to_ankle = quat.rotate(back, _ankle(controls, figure, side) - hip)
     # The knee bends half way between the directions of the toes and the pelvis.
     upper, angle = two_bone_ik.knee(thigh, shin, to_ankle, toes + _FORWARDS)
-    bend = quat.about(_X, angle)
+    bend = quat.from_axis_angle(_X, angle)
     lower = quat.mul(turn, quat.mul(upper, bend))
     foot = quat.mul(quat.conj(lower), _foot_turn(side))
     return {side + "UpLeg": upper, side + "Leg": bend, side + "Foot": foot}
 
 
-def _toes(goal: Effort, u: Floats) -> dict[str, Floats]:
+def _toes(goal: TrunkDisplacement, u: Floats) -> dict[str, Floats]:
     """Return rotations (P, 4) of the toes, which lift slightly for a low target."""
     lift = 0.05 + 0.10 * goal.lean
     return {
-        "LeftToeBase": quat.about(_X, -lift * (0.4 + 0.6 * reach_timing.trunk(u))),
-        "RightToeBase": quat.about(_X, -0.8 * lift * (0.4 + 0.6 * reach_timing.shoulder(u))),
+        "LeftToeBase": quat.from_axis_angle(_X, -lift * (0.4 + 0.6 * reach_timing.trunk(u))),
+        "RightToeBase": quat.from_axis_angle(
+            _X, -0.8 * lift * (0.4 + 0.6 * reach_timing.shoulder(u))
+        ),
     }

@@ -7,9 +7,9 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield_train.sample import reach_timing, sample_body
-from posefield_train.sample.sample_controls import Controls
+from posefield_train.sample.sample_controls import SampleControls
 
-_SLOUCH = {"Hips": -0.12, "LowerBack": 0.08, "Spine": 0.06, "Spine1": 0.03}
+_RESTING_SLOUCH = {"Hips": -0.12, "LowerBack": 0.08, "Spine": 0.06, "Spine1": 0.03}
 """Pitch of a sitting trunk at rest, rad."""
 
 _YAW = {"LowerBack": 0.30, "Spine": 0.35, "Spine1": 0.35}
@@ -22,7 +22,7 @@ _GAZE = {"Neck": 0.25, "Neck1": 0.30, "Head": 0.45}
 
 
 @dataclass(frozen=True)
-class Effort:
+class TrunkDisplacement:
     """Final displacement of the trunk.
 
     low: height of the resting shoulder above the target, as a fraction of stature. yaw: left, rad.
@@ -42,7 +42,7 @@ def _softplus(x: float, width: float) -> float:
     return width * float(np.logaddexp(0.0, x / width))
 
 
-def effort(controls: Controls) -> Effort:
+def trunk_displacement(controls: SampleControls) -> TrunkDisplacement:
     """Return the displacement of the trunk that brings the shoulder near to the target."""
     stature, upright = controls.stature, controls.uprightness
     low = (controls.hip_height + 0.27 * stature - controls.target_height) / stature
@@ -55,7 +55,7 @@ def effort(controls: Controls) -> Effort:
     forwards = stature * (0.01 + 0.035 * upright)
     # The pelvis moves back under a leaning trunk to keep the centre of mass over the feet.
     backwards = stature * 0.09 * upright * lean
-    return Effort(
+    return TrunkDisplacement(
         low=low,
         yaw=yaw,
         lean=lean,
@@ -65,7 +65,7 @@ def effort(controls: Controls) -> Effort:
     )
 
 
-def root_path(controls: Controls, goal: Effort, u: Floats) -> Floats:
+def root_path(controls: SampleControls, goal: TrunkDisplacement, u: Floats) -> Floats:
     """Return root positions (P, 3), m: from above the origin towards the target, and down."""
     heading = 0.5 * controls.azimuth
     way = np.array([goal.shift * np.sin(heading), -goal.drop, goal.shift * np.cos(heading)])
@@ -74,7 +74,7 @@ def root_path(controls: Controls, goal: Effort, u: Floats) -> Floats:
     return path
 
 
-def rotations(controls: Controls, goal: Effort, u: Floats) -> dict[str, Floats]:
+def rotations(controls: SampleControls, goal: TrunkDisplacement, u: Floats) -> dict[str, Floats]:
     """Return rotations (P, 4) of pelvis and spine."""
     pelvis = np.array(
         [0.12 + 0.26 * controls.uprightness, 0.42 - 0.02 * controls.uprightness, 0.15]
@@ -87,7 +87,7 @@ def rotations(controls: Controls, goal: Effort, u: Floats) -> dict[str, Floats]:
     progress = reach_timing.trunk(u)[:, None]
     sitting = np.array([0.0, 1.0 - controls.uprightness, 0.0])
     return {
-        name: quat.from_euler(_SLOUCH[name] * sitting + progress * share * total, "YXZ")
+        name: quat.from_euler(_RESTING_SLOUCH[name] * sitting + progress * share * total, "YXZ")
         for name, share in {"Hips": pelvis, **shares}.items()
     }
 

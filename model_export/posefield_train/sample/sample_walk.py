@@ -35,7 +35,7 @@ SKELETON = Skeleton(
     np.array([(0, 0, 0.15)] * 2, dtype=float),
 )
 
-TOML = """\
+RECIPE_TEXT = """\
 schema = 1
 name = "stroll"
 description = "Strides of two walkers"
@@ -73,16 +73,18 @@ rms_budget_cm = 0.2
 
 def recipe() -> Recipe:
     """Return the recipe of the strides."""
-    return Recipe.model_validate(tomllib.loads(TOML))
+    return Recipe.model_validate(tomllib.loads(RECIPE_TEXT))
 
 
-def stride(speed: float, turn: float, sway: float) -> Clip:
+def walk_stride(speed: float, turn: float, sway: float) -> Clip:
     """Return one stride at a speed, m/s, with a turn, rad, and a sideways sway, m."""
     frames = round(RATE * (0.5 + 0.45 * speed) / speed)
     length = speed * frames / RATE
     u = np.linspace(0.0, 1.0, frames + 1)
     roll = 0.05 * np.cos(2 * np.pi * u)
-    pelvis = quat.mul(quat.about(UP, turn * u), quat.about(np.array([0.0, 0.0, 1.0]), roll))
+    pelvis = quat.mul(
+        quat.from_axis_angle(UP, turn * u), quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), roll)
+    )
     hips = _along(u, length, turn, sway * np.sin(2 * np.pi * u))
     hips[:, 1] = HIPS + 0.01 * np.cos(4 * np.pi * u)
     legs = [_leg(side, u, length, turn, hips, pelvis) for side in SIDES]
@@ -113,23 +115,23 @@ def _leg(
     here, there = (_along(at + more, length, turn, off * WIDTH) for more in (0.0, 1.0))
     ankle = here + gone[:, None] * (there - here)
     ankle[:, 1] = ANKLE + 0.08 * np.sin(np.pi * swing) ** 2
-    flat = quat.about(UP, turn * (at + gone))
+    flat = quat.from_axis_angle(UP, turn * (at + gone))
     back = quat.conj(pelvis)
     hip = hips + quat.rotate(pelvis, np.array([off * WIDTH, 0.0, 0.0]))
     to_ankle = quat.rotate(back, ankle - hip)
     upper, angle = two_bone_ik.knee(THIGH, SHIN, to_ankle, np.array([0.0, 0.0, 1.0]))
-    bend = quat.about(np.array([1.0, 0.0, 0.0]), angle)
+    bend = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), angle)
     lower = quat.mul(pelvis, quat.mul(upper, bend))
     return [upper, bend, quat.mul(quat.conj(lower), flat)]
 
 
-def write(folder: Path) -> Path:
+def write_walk(folder: Path) -> Path:
     """Write the strides and their table to a folder and return it."""
     rows = ["file,who,haste,veer"]
     points = product((0.7, 0.9, 1.1, 1.3, 1.5), (-0.5, -0.2, 0.2, 0.5))
     for index, (speed, turn) in enumerate(points):
         who, sway = (("ann", 0.02), ("ben", 0.05))[index % 3 == 0]
-        clip = stride(speed, turn, sway)
+        clip = walk_stride(speed, turn, sway)
         (folder / f"{index}.bvh").write_bytes(bvh_writer.dumps(clip, metres_per_unit=1.0))
         rows.append(f"{index}.bvh,{who},{3.6 * speed},{1000 * turn}")
     (folder / "strides.csv").write_text("\n".join(rows) + "\n")

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from posefield.common.units import Floats
 
 # Adults differ by less than this factor in size.
-SIZE = 1.5
+SIZE_LIMIT = 1.5
 # Names of the units that files use, and their length in metres.
 UNITS = {
     "millimetres": 0.001,
@@ -20,14 +20,14 @@ UNITS = {
     "metres": 1.0,
 }
 # Largest ratio between the factor found and a unit's factor.
-NEAR = 1.15
+UNIT_TOLERANCE = 1.15
 # Bones of one performer differ by less than SAME, m, between clips, and from those of another
 # performer by more than CLEAR times that spread.
 SAME, CLEAR = 0.002, 3.0
 
 
 @dataclass(frozen=True)
-class Foreign:
+class ForeignBones:
     """A clip whose bones differ from those of its performer's other clips.
 
     apart: root mean square distance, m. others: number of the performer's other clips. alike:
@@ -36,24 +36,26 @@ class Foreign:
 
     apart: float
     others: int
-    alike: str
-    within: float
+    nearest_performer: str
+    nearest_distance: float
 
 
-def sizes(offsets: Floats) -> Floats:
+def relative_sizes(offsets: Floats) -> Floats:
     """Return the total bone length (N,) of offsets (N, J, 3) relative to the family's median."""
     lengths = np.linalg.norm(offsets, axis=-1).sum(axis=-1)
     return np.asarray(lengths / np.median(lengths))
 
 
-def unit(metres_per_unit: float, size: float) -> str:
+def guess_unit(metres_per_unit: float, size: float) -> str:
     """Return the unit of a file whose skeleton is `size` times too large; "" if none fits."""
     fits = {name: abs(np.log(metres_per_unit / size / m)) for name, m in UNITS.items()}
     name = min(fits, key=lambda name: fits[name])
-    return name if fits[name] < np.log(NEAR) else ""
+    return name if fits[name] < np.log(UNIT_TOLERANCE) else ""
 
 
-def foreign(offsets: Floats, performers: tuple[str, ...], clip: int) -> Foreign | None:
+def find_foreign_bones(
+    offsets: Floats, performers: tuple[str, ...], clip: int
+) -> ForeignBones | None:
     """Return how a clip's bones (N, J, 3) differ from its performer's; None if they match.
 
     If a performer has only two clips and they differ, neither is reported unless it matches another
@@ -70,8 +72,8 @@ def foreign(offsets: Floats, performers: tuple[str, ...], clip: int) -> Foreign 
         return None
     near = _nearest(offsets, whose, clip)
     if near[0] < gap / CLEAR:
-        return Foreign(gap, len(own), near[1], near[0])
-    return Foreign(gap, len(own), "", 0.0) if len(own) > 1 else None
+        return ForeignBones(gap, len(own), near[1], near[0])
+    return ForeignBones(gap, len(own), "", 0.0) if len(own) > 1 else None
 
 
 def _nearest(offsets: Floats, whose: npt.NDArray[np.str_], clip: int) -> tuple[float, str]:

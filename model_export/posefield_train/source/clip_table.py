@@ -13,12 +13,12 @@ import numpy as np
 from posefield.common.errors import RecipeError
 from posefield.common.units import Floats
 from posefield_train.source import data_folder
-from posefield_train.source.data_folder import Place
+from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.recipe import Clips, Condition, Recipe
 
 
 @dataclass(frozen=True)
-class Row:
+class ClipRow:
     """One clip: its file, frames, and controls.
 
     line: in the table, for messages; None without table. first_frame, last_frame: indices in the
@@ -26,7 +26,7 @@ class Row:
     landmarks: frames of the file.
     """
 
-    place: Place
+    place: FileLocation
     table: str
     line: int | None
     performer: str
@@ -48,24 +48,24 @@ class Row:
         last = "the end" if self.last_frame is None else self.last_frame
         return f"{self.place.name}, frames {self.first_frame} to {last}"
 
-    def fault(self, message: str) -> RecipeError:
+    def error(self, message: str) -> RecipeError:
         """Return an error that names this row."""
         return RecipeError(self.table, message, self.line)
 
 
-def read(recipe: Recipe, folder: Path) -> list[Row]:
+def read(recipe: Recipe, folder: Path) -> list[ClipRow]:
     """Return the rows of the recipe's table that meet its conditions.
 
     Raises RecipeError, naming line and column, for the first invalid cell, and for a missing
     column, no matching row, and two rows of the same frames.
     """
     place = data_folder.find(folder, recipe.clips.table)
-    cells = opened(place)
+    cells = open_table(place)
     cells.require(_columns(recipe))
     rows = [
         _row(recipe, folder, cells, line, record)
         for line, record in cells.records
-        if all(cells.meets(line, record, c, w) for c, w in recipe.clips.where.items())
+        if all(cells.satisfies(line, record, c, w) for c, w in recipe.clips.where.items())
     ]
     if not rows:
         raise RecipeError(cells.name, f"none of {len(cells.records)} rows meets the conditions")
@@ -73,13 +73,13 @@ def read(recipe: Recipe, folder: Path) -> list[Row]:
     return rows
 
 
-MOST_BYTES, MOST_ROWS, MOST_COLUMNS = 16_000_000, 100_000, 1_000
+MAX_BYTES, MOST_ROWS, MOST_COLUMNS = 16_000_000, 100_000, 1_000
 """Limits of a table: a hundred times the size of the largest published families of motions."""
 
 
-def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
+def _records(place: FileLocation) -> list[tuple[int, dict[str, str]]]:
     try:
-        text = data_folder.read(place, MOST_BYTES, "a table").decode("utf-8-sig")
+        text = data_folder.read(place, MAX_BYTES, "a table").decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
     reader = csv.DictReader(io.StringIO(text, newline=None), strict=True)
@@ -99,7 +99,7 @@ def _records(place: Place) -> list[tuple[int, dict[str, str]]]:
     return records
 
 
-def _refuse_columns(place: Place, names: Sequence[str]) -> None:
+def _refuse_columns(place: FileLocation, names: Sequence[str]) -> None:
     """Raise RecipeError for too many columns, and for two of one name."""
     if len(names) > MOST_COLUMNS:
         message = f"found {len(names)} columns, expected at most {MOST_COLUMNS}"
@@ -109,13 +109,13 @@ def _refuse_columns(place: Place, names: Sequence[str]) -> None:
         raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
 
 
-def opened(place: Place) -> "Table":
+def open_table(place: FileLocation) -> "ClipTable":
     """Return the table of a CSV file; RecipeError if it is invalid."""
-    return Table(str(place), _records(place))
+    return ClipTable(str(place), _records(place))
 
 
 @dataclass(frozen=True)
-class Table:
+class ClipTable:
     """Cells of a file by line and column; errors name both."""
 
     name: str
@@ -163,7 +163,9 @@ class Table:
             )
         return int(value)
 
-    def meets(self, line: int, record: dict[str, str], column: str, condition: Condition) -> bool:
+    def satisfies(
+        self, line: int, record: dict[str, str], column: str, condition: Condition
+    ) -> bool:
         """Return True if a cell meets a condition."""
         cell = record[column]
         if condition.among is not None and cell not in condition.among:
@@ -183,7 +185,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         clips.file: "clips.file",
         **dict.fromkeys(clips.where, "clips.where"),
         **dict.fromkeys(clips.landmarks, "clips.landmarks"),
-        **{control.column: f"control {control.name}" for control in recipe.typed},
+        **{control.column: f"control {control.name}" for control in recipe.column_controls},
     }
     for key in ("performer", "first_frame", "last_frame"):
         column = getattr(clips, key)
@@ -192,27 +194,29 @@ def _columns(recipe: Recipe) -> dict[str, str]:
     return named
 
 
-def _row(recipe: Recipe, folder: Path, cells: Table, line: int, record: dict[str, str]) -> Row:
+def _row(
+    recipe: Recipe, folder: Path, cells: ClipTable, line: int, record: dict[str, str]
+) -> ClipRow:
     clips = recipe.clips
     first = cells.frame(line, record, clips.first_frame) if clips.first_frame else 0
     last = cells.frame(line, record, clips.last_frame) if clips.last_frame else None
     if last is not None and last <= first:
         raise RecipeError(cells.name, f"frames {first} to {last}, expected at least two", line)
-    return Row(
-        place=_motion_file(folder, clips, cells, line, record),
+    return ClipRow(
+        place=_find_motion_file(folder, clips, cells, line, record),
         table=cells.name,
         line=line,
         performer=record[clips.performer] if clips.performer else "",
         first_frame=first,
         last_frame=last,
-        controls=np.array([cells.number(line, record, c.column) for c in recipe.typed]),
+        controls=np.array([cells.number(line, record, c.column) for c in recipe.column_controls]),
         landmarks=tuple(cells.frame(line, record, column) for column in clips.landmarks),
     )
 
 
-def _motion_file(
-    folder: Path, clips: Clips, cells: Table, line: int, record: dict[str, str]
-) -> Place:
+def _find_motion_file(
+    folder: Path, clips: Clips, cells: ClipTable, line: int, record: dict[str, str]
+) -> FileLocation:
     beside = clips.table.rpartition("/")[0]
     name = f"{beside}/{record[clips.file]}" if beside else record[clips.file]
     try:
@@ -221,13 +225,13 @@ def _motion_file(
         raise RecipeError(cells.name, f"column {clips.file!r}: {fault.message}", line) from fault
 
 
-def refuse_repeats(rows: Sequence[Row]) -> None:
+def refuse_repeats(rows: Sequence[ClipRow]) -> None:
     """Raise RecipeError for two rows with the same frames of the same file."""
-    seen: dict[tuple[str, int, int | None], Row] = {}
+    seen: dict[tuple[str, int, int | None], ClipRow] = {}
     for row in rows:
         key = (str(row.place), row.first_frame, row.last_frame)
         if key in seen:
             line = seen[key].line
             again = "as before" if line is None else f"as line {line}"
-            raise row.fault(f"the same frames of the same file {again}")
+            raise row.error(f"the same frames of the same file {again}")
         seen[key] = row

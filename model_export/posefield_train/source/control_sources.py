@@ -24,25 +24,25 @@ Text = Annotated[str, Field(min_length=1)]
 
 ROOT_HEIGHT = "root_height"
 """Quantity that measures the height of the root."""
-MOMENTS = tuple(moment for moment in measures.MOMENTS if moment != "landmark")
+TIME_NAMES = tuple(moment for moment in measures.MOMENTS if moment != "landmark")
 """Moments that need no column of the table."""
 # Keys that a quantity accepts besides its name, and those that it requires.
-PLACE, MOMENT, PAIR = ("joint", "at"), ("at",), ("joints",)
-TAKES = {
-    **dict.fromkeys(measures.AXES, PLACE),
+JOINT_AND_TIME, MOMENT, PAIR = ("joint", "at"), ("at",), ("joints",)
+ALLOWED_KEYS = {
+    **dict.fromkeys(measures.POSITION_AXES, JOINT_AND_TIME),
     ROOT_HEIGHT: MOMENT,
     **dict.fromkeys(("step_length", "leg_length"), PAIR),
 }
-NEEDS = {quantity: keys for quantity, keys in TAKES.items() if keys != PAIR}
+REQUIRED_KEYS = {quantity: keys for quantity, keys in ALLOWED_KEYS.items() if keys != PAIR}
 
 
-class Part(BaseModel):
+class RecipePart(BaseModel):
     """Base of the parts of a recipe; unknown keys are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
-class Auto(Part):
+class Auto(RecipePart):
     """Measurement that yields a control."""
 
     quantity: Literal[measures.Quantity, "root_height"] = Field(
@@ -72,14 +72,14 @@ class Auto(Part):
         return measures.UNITS.get(self.quantity, "m")
 
     @property
-    def places(self) -> list[str]:
+    def joint_names(self) -> list[str]:
         """Return the joints whose mean position is measured."""
         return [self.joint] if isinstance(self.joint, str) else list(self.joint or ())
 
     @model_validator(mode="after")
-    def _says_what_it_takes(self) -> "Auto":
+    def _check_keys(self) -> "Auto":
         given = [key for key in ("joint", "joints", "at") if getattr(self, key) is not None]
-        takes, needs = TAKES.get(self.quantity, ()), NEEDS.get(self.quantity, ())
+        takes, needs = ALLOWED_KEYS.get(self.quantity, ()), REQUIRED_KEYS.get(self.quantity, ())
         if not set(needs) <= set(given) <= set(takes):
             expected = " and ".join(takes) or "nothing"
             optional = " or nothing" if takes and not needs else ""
@@ -92,18 +92,18 @@ class Auto(Part):
         return self
 
 
-class _Named(Part):
+class _NamedControl(RecipePart):
     name: Name
 
     @field_validator("name")
     @classmethod
-    def _not_reserved(cls, name: str) -> str:
+    def _check_name(cls, name: str) -> str:
         if name in RESERVED:
             raise ValueError(f"{name!r} is the name of a query parameter")
         return name
 
 
-class ControlColumn(_Named):
+class ControlColumn(_NamedControl):
     """One control parameter and the column that holds its value for each clip."""
 
     column: Text
@@ -111,7 +111,7 @@ class ControlColumn(_Named):
     description: Text
 
 
-class ControlMeasured(_Named):
+class ControlMeasured(_NamedControl):
     """One control parameter that is measured from each clip."""
 
     auto: Auto
@@ -123,7 +123,7 @@ class ControlMeasured(_Named):
     description: Text
 
     @model_validator(mode="after")
-    def _unit_is_its_own(self) -> "ControlMeasured":
+    def _check_unit(self) -> "ControlMeasured":
         if self.unit != self.auto.unit:
             raise ValueError(
                 f"unit: found {self.unit!r}, expected {self.auto.unit!r}, in which "
@@ -132,19 +132,19 @@ class ControlMeasured(_Named):
         return self
 
 
-COLUMN, MEASURED = "(column)", "(auto)"
+COLUMN_TAG, MEASURED = "(column)", "(auto)"
 """Tags of the kinds of control in the path of an error: names that no key can have."""
 
 
 def _kind(control: Any) -> str | None:
     if isinstance(control, ControlColumn | ControlMeasured):
-        return COLUMN if isinstance(control, ControlColumn) else MEASURED
+        return COLUMN_TAG if isinstance(control, ControlColumn) else MEASURED
     there = {"column", "auto"} & set(control if isinstance(control, dict) else ())
-    return None if len(there) != 1 else COLUMN if "column" in there else MEASURED
+    return None if len(there) != 1 else COLUMN_TAG if "column" in there else MEASURED
 
 
 Control = Annotated[
-    Annotated[ControlColumn, Tag(COLUMN)] | Annotated[ControlMeasured, Tag(MEASURED)],
+    Annotated[ControlColumn, Tag(COLUMN_TAG)] | Annotated[ControlMeasured, Tag(MEASURED)],
     Discriminator(
         _kind,
         custom_error_type="column_or_auto",

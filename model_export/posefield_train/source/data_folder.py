@@ -14,14 +14,14 @@ from posefield.common.errors import RecipeError
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
 
-METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
+COMPRESSION_METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
 """Accepted compression methods. For bzip2 and LZMA, `zipfile` unpacks the whole content of 4 kB at
 once, which can be gigabytes."""
 
 ENCRYPTED = 0x1
 """Flag of a member that needs a password."""
 
-UNUSABLE = (
+ZIP_ERRORS = (
     zipfile.BadZipFile,
     NotImplementedError,
     zlib.error,
@@ -32,12 +32,12 @@ UNUSABLE = (
 )
 """Errors of zipfile and zlib for damaged data and for features that zipfile lacks."""
 
-PIECE = 1_000_000
+CHUNK_BYTES = 1_000_000
 """Bytes that are unpacked per read."""
 
 
 @dataclass(frozen=True)
-class Member:
+class ZipMember:
     """A file within a zip file.
 
     It holds names only, so that it can be sent to another process.
@@ -56,7 +56,7 @@ class Member:
 
     def is_file(self) -> bool:
         """Return True if the archive contains the entry as a file."""
-        return zipfile.Path(_open(self.archive), self.entry).is_file()
+        return zipfile.Path(_open_zip(self.archive), self.entry).is_file()
 
     def open(self, mode: Literal["rb"]) -> io.BufferedReader:
         """Open the file and decompress it while it is read, whatever size its header declares.
@@ -64,25 +64,27 @@ class Member:
         Raises RecipeError, on opening or reading, for an encrypted or damaged member and for a
         compression method other than METHODS.
         """
-        info = _open(self.archive).getinfo(self.entry)
+        info = _open_zip(self.archive).getinfo(self.entry)
         if info.flag_bits & ENCRYPTED:
             raise RecipeError(str(self), "found an encrypted member, expected no password")
-        if info.compress_type not in METHODS:
-            known = " or ".join(f"{number} ({name})" for number, name in METHODS.items())
+        if info.compress_type not in COMPRESSION_METHODS:
+            known = " or ".join(
+                f"{number} ({name})" for number, name in COMPRESSION_METHODS.items()
+            )
             raise RecipeError(
                 str(self), f"found compression method {info.compress_type}, expected {known}"
             )
         try:
-            file = _open(self.archive).open(self.entry)
-        except UNUSABLE as fault:
-            raise _unusable(self, fault) from fault
-        return io.BufferedReader(_Unpacked(self, file), PIECE)
+            file = _open_zip(self.archive).open(self.entry)
+        except ZIP_ERRORS as fault:
+            raise _member_error(self, fault) from fault
+        return io.BufferedReader(_MemberStream(self, file), CHUNK_BYTES)
 
 
-class _Unpacked(io.RawIOBase):
+class _MemberStream(io.RawIOBase):
     """Raw bytes of a member; zip errors are raised as RecipeError with the member's name."""
 
-    def __init__(self, member: Member, file: IO[bytes]) -> None:
+    def __init__(self, member: ZipMember, file: IO[bytes]) -> None:
         self._member, self._file = member, file
 
     def readable(self) -> bool:
@@ -91,9 +93,9 @@ class _Unpacked(io.RawIOBase):
     def readinto(self, buffer: "WriteableBuffer") -> int:
         view = memoryview(buffer)
         try:
-            piece = self._file.read(min(len(view), PIECE))
-        except UNUSABLE as fault:
-            raise _unusable(self._member, fault) from fault
+            piece = self._file.read(min(len(view), CHUNK_BYTES))
+        except ZIP_ERRORS as fault:
+            raise _member_error(self._member, fault) from fault
         view[: len(piece)] = piece
         return len(piece)
 
@@ -103,15 +105,15 @@ class _Unpacked(io.RawIOBase):
         super().close()
 
 
-def _unusable(member: Member, fault: Exception) -> RecipeError:
+def _member_error(member: ZipMember, fault: Exception) -> RecipeError:
     message = f"found data that cannot be unpacked ({fault}), expected a whole zip member"
     return RecipeError(str(member), message)
 
 
-Place = Path | Member
+FileLocation = Path | ZipMember
 
 
-def read(place: Place, most: int, what: str) -> bytes:
+def read(place: FileLocation, most: int, what: str) -> bytes:
     """Return the whole content of a file; `what` names it in the message of one that is too large.
 
     Raises RecipeError for more than `most` bytes, reading at most one byte more, and if the file
@@ -128,7 +130,7 @@ def read(place: Place, most: int, what: str) -> bytes:
     return content
 
 
-def find(folder: Path, name: str) -> Place:
+def find(folder: Path, name: str) -> FileLocation:
     """Return the file with a relative name such as "takes/bvh/walk.bvh" below the data folder.
 
     If the file does not exist, takes.zip is searched for "takes/bvh/walk.bvh" and "bvh/walk.bvh".
@@ -137,32 +139,32 @@ def find(folder: Path, name: str) -> Place:
     parts = PurePosixPath(name).parts
     if not parts or parts[0] == "/" or ".." in parts:
         raise RecipeError(folder, f"file {name!r}, expected a path below the data folder")
-    places = [folder / name, *_in_zip(folder, parts)]
+    places = [folder / name, *_zip_candidates(folder, parts)]
     for place in places:
-        if _is_there(place):
+        if _is_file(place):
             return place
     tried = ", ".join(str(place) for place in places)
     raise RecipeError(folder, f"no file {name!r}; tried {tried}")
 
 
-def _is_there(place: Place) -> bool:
+def _is_file(place: FileLocation) -> bool:
     try:
         return place.is_file()
     except OSError:  # a name that no file can have
         return False
 
 
-def _in_zip(folder: Path, parts: tuple[str, ...]) -> list[Place]:
+def _zip_candidates(folder: Path, parts: tuple[str, ...]) -> list[FileLocation]:
     archive = folder / f"{parts[0]}.zip"
     if len(parts) < 2 or not archive.is_file():
         return []
     names = ("/".join(parts), "/".join(parts[1:]))
-    return [Member(archive, name) for name in names]
+    return [ZipMember(archive, name) for name in names]
 
 
 @lru_cache(maxsize=8)
-def _open(archive: Path) -> zipfile.ZipFile:
+def _open_zip(archive: Path) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(archive)
-    except UNUSABLE as fault:
+    except ZIP_ERRORS as fault:
         raise RecipeError(archive, f"not a zip file: {fault}") from fault

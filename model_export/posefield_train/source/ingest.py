@@ -13,15 +13,15 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source import bvh, clip_table, half_turns, measured_controls
-from posefield_train.source.clip_table import Row
+from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
 
 # Bones that stretch by less than this are taken as rigid without a note, m.
-RIGID = 1e-4
+RIGID_TOLERANCE = 1e-4
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
 # second, which take 2.4 GB.
-MOST_POSES = 30_000_000
+MAX_POSES = 30_000_000
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Example:
     by which the clip was shifted to begin later.
     """
 
-    row: Row
+    row: ClipRow
     clip: Clip
     controls: Floats
     landmarks: tuple[float, ...]
@@ -43,7 +43,7 @@ class Example:
     @property
     def offsets(self) -> Floats:
         """Return the bone offsets (J, 3), m, of the performer, zero for the root."""
-        return measured_controls.bones(self.clip)
+        return measured_controls.bone_offsets(self.clip)
 
 
 def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
@@ -52,7 +52,7 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     Raises RecipeError for an invalid row, BvhError for a file that cannot be read.
     """
     rows = clip_table.read(recipe, folder)
-    files = read(rows)
+    files = read_files(rows)
     unnoted = set(files) if recipe.source.root_offset is None else set()
     notes: list[str] = []
     examples = []
@@ -62,11 +62,11 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
             unnoted.remove(key)
             notes += offset_notes(files[key], row)
         examples.append(_example(recipe, files[key], row, notes))
-    _refuse_other_trees(examples)
+    _expect_same_skeleton(examples)
     return examples, notes
 
 
-def read(rows: Sequence[Row]) -> dict[str, bvh.BvhFile]:
+def read_files(rows: Sequence[ClipRow]) -> dict[str, bvh.BvhFile]:
     """Return the motion files of rows by their places, each read once.
 
     Raises BvhError for a file that cannot be read and RecipeError for more than MOST_POSES in all.
@@ -78,15 +78,15 @@ def read(rows: Sequence[Row]) -> dict[str, bvh.BvhFile]:
         if key not in files:
             files[key] = bvh.read(row.place)
             poses += len(files[key].values) * len(files[key].joints)
-        if poses > MOST_POSES:
-            raise row.fault(
+        if poses > MAX_POSES:
+            raise row.error(
                 f"found {poses} poses of a joint in the files up to {row.place}, expected at most "
-                f"{MOST_POSES}"
+                f"{MAX_POSES}"
             )
     return files
 
 
-def offset_notes(file: bvh.BvhFile, row: Row) -> list[str]:
+def offset_notes(file: bvh.BvhFile, row: ClipRow) -> list[str]:
     """Return a note on the interpretation of a root's OFFSET that is not zero."""
     if not np.any(file.joints[0].offset):
         return []
@@ -96,17 +96,19 @@ def offset_notes(file: bvh.BvhFile, row: Row) -> list[str]:
     ]
 
 
-def _example(recipe: Recipe, file: bvh.BvhFile, row: Row, notes: list[str]) -> Example:
-    own, last = cut(whole(file, recipe.source), row)
-    clip = _without(own, recipe, row)
+def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow, notes: list[str]) -> Example:
+    own, last = cut_frames(clip_of_file(file, recipe.source), row)
+    clip = _drop_joints(own, recipe, row)
     in_place = recipe.motion.root == "in_place"
-    clip, jumps, said = canonical(clip, row, recipe.motion.cyclic, in_place)
+    clip, jumps, said = canonicalize(clip, row, recipe.motion.cyclic, in_place)
     notes += said
     marks = landmarks(row, last)
-    return Example(row, clip, measured_controls.controls(recipe, row, clip, marks), marks, jumps)
+    return Example(
+        row, clip, measured_controls.control_values(recipe, row, clip, marks), marks, jumps
+    )
 
 
-def whole(file: bvh.BvhFile, source: Source) -> Clip:
+def clip_of_file(file: bvh.BvhFile, source: Source) -> Clip:
     """Return the clip of all frames of a file.
 
     By default position channels replace the root's OFFSET.
@@ -119,23 +121,23 @@ def whole(file: bvh.BvhFile, source: Source) -> Clip:
     )
 
 
-def cut(clip: Clip, row: Row) -> tuple[Clip, int]:
+def cut_frames(clip: Clip, row: ClipRow) -> tuple[Clip, int]:
     """Return the frames that a row names, and the index of the last of them in the file.
 
     Raises RecipeError for a frame that the file lacks, and for a single frame.
     """
     last = len(clip) - 1 if row.last_frame is None else row.last_frame
     if last >= len(clip):
-        raise row.fault(f"frame {last}, but {row.place} has frames 0 to {len(clip) - 1}")
+        raise row.error(f"frame {last}, but {row.place} has frames 0 to {len(clip) - 1}")
     if last <= row.first_frame:
-        raise row.fault(f"{row.place} has frames 0 to {last}, expected two or more")
+        raise row.error(f"{row.place} has frames 0 to {last}, expected two or more")
     kept = slice(row.first_frame, last + 1)
     rotations, translations = clip.rotations[kept], clip.translations[kept]
     return replace(clip, rotations=rotations, translations=translations), last
 
 
-def canonical(
-    clip: Clip, row: Row, cyclic: bool, in_place: bool
+def canonicalize(
+    clip: Clip, row: ClipRow, cyclic: bool, in_place: bool
 ) -> tuple[Clip, tuple[Finding, ...], list[str]]:
     """Return the clip with heading and origin removed, the corrections, and notes.
 
@@ -143,40 +145,40 @@ def canonical(
     """
     notes = []
     stretch = np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0)
-    if stretch > RIGID:
+    if stretch > RIGID_TOLERANCE:
         notes.append(f"{row.place}: bones stretch by up to {stretch:.4f} m; their mean is kept")
     # Before the cycle is closed, because closing it would spread a jump over all frames.
-    clip, jumps = half_turns.without_jumps(clip, 0)
-    clip = _loop(set_out(clip)) if cyclic else _origin_out(clip)
-    return stay(clip) if in_place else clip, tuple(jumps), notes
+    clip, jumps = half_turns.remove_jumps(clip, 0)
+    clip = _close_cycle(straighten_gait(clip)) if cyclic else _start_at_origin(clip)
+    return remove_drift(clip) if in_place else clip, tuple(jumps), notes
 
 
-def _without(clip: Clip, recipe: Recipe, row: Row) -> Clip:
+def _drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     """Return the clip without the dropped joints and their descendants."""
     joints = clip.skeleton
-    needed = _needed(recipe)
+    needed = _named_joints(recipe)
     missing = (needed | set(recipe.motion.drop_joints)) - set(joints.names)
     if missing:
-        raise row.fault(f"{row.place} has no joints {sorted(missing)} that the recipe names")
+        raise row.error(f"{row.place} has no joints {sorted(missing)} that the recipe names")
     dropped = {joints.names.index(name) for name in recipe.motion.drop_joints}
     for joint, parent in enumerate(joints.parents):
         if parent in dropped:
             dropped.add(joint)
     if 0 in dropped:
-        raise row.fault("the root cannot be dropped")
+        raise row.error("the root cannot be dropped")
     kept = [joint for joint in range(len(joints)) if joint not in dropped]
     gone = needed - {joints.names[joint] for joint in kept}
     if gone:
-        raise row.fault(f"joints {sorted(gone)} are dropped, and named by the recipe elsewhere")
-    return keep(clip, kept)
+        raise row.error(f"joints {sorted(gone)} are dropped, and named by the recipe elsewhere")
+    return keep_joints(clip, kept)
 
 
-def closed(joints: Skeleton, kept: Sequence[int]) -> bool:
+def has_all_parents(joints: Skeleton, kept: Sequence[int]) -> bool:
     """Return True if the parent of every kept joint is kept too."""
     return all(joints.parents[joint] in kept or joints.parents[joint] < 0 for joint in kept)
 
 
-def keep(clip: Clip, kept: Sequence[int]) -> Clip:
+def keep_joints(clip: Clip, kept: Sequence[int]) -> Clip:
     """Return the clip of some of its joints, in order; `kept` must be closed under parents."""
     joints = clip.skeleton
     tips = [i for i, joint in enumerate(joints.tip_joints) if joint in kept]
@@ -190,24 +192,24 @@ def keep(clip: Clip, kept: Sequence[int]) -> Clip:
     return Clip(smaller, clip.rotations[:, kept], clip.translations[:, kept], clip.rate)
 
 
-def _needed(recipe: Recipe) -> set[str]:
+def _named_joints(recipe: Recipe) -> set[str]:
     """Return the joints that a recipe names."""
     event = {recipe.event.joint} if recipe.event else set()
     motion = recipe.motion
     autos = [control.auto for control in recipe.measured]
-    event |= {joint for auto in autos for joint in (*auto.places, *recipe.ends(auto))}
+    event |= {joint for auto in autos for joint in (*auto.joint_names, *recipe.leg_ends(auto))}
     return {*motion.joint_weights, *motion.feet, *recipe.roles.values()} | event
 
 
-def landmarks(row: Row, last: int) -> tuple[float, ...]:
+def landmarks(row: ClipRow, last: int) -> tuple[float, ...]:
     """Return the landmarks of a row as fractions of its clip. last: its last frame in the file."""
     frames = (row.first_frame, *row.landmarks, last)
     if any(later <= earlier for earlier, later in pairwise(frames)):
-        raise row.fault(f"landmarks {row.landmarks}, expected to rise within {frames[0]} to {last}")
+        raise row.error(f"landmarks {row.landmarks}, expected to rise within {frames[0]} to {last}")
     return tuple((frame - row.first_frame) / (last - row.first_frame) for frame in row.landmarks)
 
 
-def _refuse_other_trees(examples: list[Example]) -> None:
+def _expect_same_skeleton(examples: list[Example]) -> None:
     first = examples[0]
     for example in examples[1:]:
         if not example.clip.skeleton.same_tree(first.clip.skeleton):
@@ -227,7 +229,7 @@ def _difference(a: Skeleton, b: Skeleton) -> str:
 
 def place(clip: Clip, origin: Floats, heading: Floats) -> Clip:
     """Return the clip with origin (…, 3) subtracted from its root, turned by -heading (…), rad."""
-    turn = np.broadcast_to(quat.about(UP, -np.asarray(heading)), (len(clip), 4))
+    turn = np.broadcast_to(quat.from_axis_angle(UP, -np.asarray(heading)), (len(clip), 4))
     rotations, translations = clip.rotations.copy(), clip.translations.copy()
     rotations[:, 0] = quat.mul(turn, clip.rotations[:, 0])
     translations[:, 0] = quat.rotate(turn, clip.translations[:, 0] - origin)
@@ -239,40 +241,40 @@ def heading(clip: Clip) -> Floats:
     return np.unwrap(quat.twist(clip.rotations[:, 0], UP))
 
 
-def _floor(position: Floats) -> Floats:
+def _horizontal(position: Floats) -> Floats:
     return position * (1.0 - UP)
 
 
-def _origin_out(clip: Clip) -> Clip:
-    return place(clip, _floor(clip.root_path[0]), heading(clip)[0])
+def _start_at_origin(clip: Clip) -> Clip:
+    return place(clip, _horizontal(clip.root_path[0]), heading(clip)[0])
 
 
-def set_out(clip: Clip) -> Clip:
+def straighten_gait(clip: Clip) -> Clip:
     """Return the clip of a gait, starting at the origin with its mean heading forward.
 
     The pelvis swings, so the heading is a line fitted over all frames, taken at the start.
     """
     time = np.arange(len(clip)) / (len(clip) - 1)
     _, at_start = np.polyfit(time, heading(clip), 1)
-    return place(clip, _floor(clip.root_path[0]), at_start)
+    return place(clip, _horizontal(clip.root_path[0]), at_start)
 
 
-def stay(clip: Clip) -> Clip:
+def remove_drift(clip: Clip) -> Clip:
     """Return the clip with the linear part of its travel over the floor removed."""
     translations = clip.translations.copy()
-    travel = _floor(clip.root_path[-1] - clip.root_path[0])
+    travel = _horizontal(clip.root_path[-1] - clip.root_path[0])
     translations[:, 0] -= np.linspace(0.0, 1.0, len(clip))[:, None] * travel
     return replace(clip, translations=translations)
 
 
-def _loop(clip: Clip) -> Clip:
+def _close_cycle(clip: Clip) -> Clip:
     """Close a cycle: make the last pose equal the first except for travel and heading.
 
     Half of the gap is added at either end and fades linearly to zero in the middle.
     """
     share = np.linspace(0.5, -0.5, len(clip))
     line = np.polynomial.Polynomial.fit(np.arange(len(clip)), heading(clip), 1)
-    walking = quat.about(UP, line(np.arange(len(clip))))
+    walking = quat.from_axis_angle(UP, line(np.arange(len(clip))))
     rotations = clip.rotations.copy()
     rotations[:, 0] = quat.mul(quat.conj(walking), rotations[:, 0])
     gap = quat.log(quat.mul(quat.conj(rotations[0]), rotations[-1]))

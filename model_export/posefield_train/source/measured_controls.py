@@ -12,10 +12,10 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import UP, Floats
 from posefield.motion import measures, quat, skeleton
 from posefield.motion.clip import Clip
-from posefield.motion.measures import At, Measure, Seen
+from posefield.motion.measures import Measure, MeasuredMotion, MeasureMoment
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source.clip_table import Row
-from posefield_train.source.control_sources import MOMENTS, Auto, Control, ControlMeasured
+from posefield_train.source.clip_table import ClipRow
+from posefield_train.source.control_sources import TIME_NAMES, Auto, Control, ControlMeasured
 from posefield_train.source.recipe import Recipe
 
 # Decimals of a measured value. Differences below a micrometre are rounding errors, and would give
@@ -23,28 +23,30 @@ from posefield_train.source.recipe import Recipe
 DECIMALS = 6
 
 
-def controls(recipe: Recipe, row: Row, clip: Clip, landmarks: Sequence[float]) -> Floats:
+def control_values(recipe: Recipe, row: ClipRow, clip: Clip, landmarks: Sequence[float]) -> Floats:
     """Return all controls (d,) of a clip, from its row or measured, in the recipe's order.
 
     landmarks: shares of the clip. Raises TrainingError for a leg whose ends are not on one chain.
     """
     if not recipe.measured:
         return row.controls
-    typed, whole = iter(row.controls.tolist()), seen(clip)
+    typed, whole = iter(row.controls.tolist()), measured_quantities(clip)
 
     def value(control: Control) -> float:
         if not isinstance(control, ControlMeasured):
             return float(next(typed))
-        at = _landmark(recipe, control, landmarks)
+        at = _landmark_time(recipe, control, landmarks)
         place = replace(whole, landmark=(at or 0.0) * (len(clip) - 1))
-        found = measures.value(of(recipe, control, clip.skeleton), place)
+        found = measures.evaluate(control_measure(recipe, control, clip.skeleton), place)
         # Adding zero turns minus zero into zero.
         return round(found, DECIMALS) + 0.0
 
     return np.array([value(control) for control in recipe.controls])
 
 
-def of(recipe: Recipe, control: ControlMeasured, joints: Skeleton, share: float = 0.0) -> Measure:
+def control_measure(
+    recipe: Recipe, control: ControlMeasured, joints: Skeleton, share: float = 0.0
+) -> Measure:
     """Return the measure of a control on a skeleton that has the named joints.
 
     share: of canonical time, of the control's landmark, if it has one.
@@ -53,13 +55,13 @@ def of(recipe: Recipe, control: ControlMeasured, joints: Skeleton, share: float 
     if auto.quantity == "root_height":
         return Measure("height", (0,), *_moment(auto, share))
     if auto.quantity == "leg_length":
-        return Measure(auto.quantity, _chain(control, recipe.ends(auto), joints))
-    names = auto.places or recipe.ends(auto)
+        return Measure(auto.quantity, _chain(control, recipe.leg_ends(auto), joints))
+    names = auto.joint_names or recipe.leg_ends(auto)
     own = tuple(joints.names.index(name) for name in names)
     return Measure(auto.quantity, own, *_moment(auto, share))
 
 
-def on_the_card(
+def card_measure(
     recipe: Recipe, control: Control, joints: Skeleton, landmarks: Floats
 ) -> Measure | None:
     """Return the measure of a control for the model card; None for a control of the table.
@@ -68,8 +70,8 @@ def on_the_card(
     """
     if not isinstance(control, ControlMeasured):
         return None
-    share = _landmark(recipe, control, landmarks.mean(axis=0).tolist())
-    return of(recipe, control, joints, round(share or 0.0, 4))
+    share = _landmark_time(recipe, control, landmarks.mean(axis=0).tolist())
+    return control_measure(recipe, control, joints, round(share or 0.0, 4))
 
 
 def travel(roots: Floats, path: Floats) -> Floats:
@@ -82,30 +84,32 @@ def travel(roots: Floats, path: Floats) -> Floats:
     return np.stack([way[..., 0], way[..., 2], quat.twist(turned, UP)], axis=-1)
 
 
-def bones(clip: Clip) -> Floats:
+def bone_offsets(clip: Clip) -> Floats:
     """Return the bone offsets (J, 3), m, of the performer, zero for the root."""
     offsets = clip.translations.mean(axis=0)
     offsets[0] = 0.0
     return offsets
 
 
-def seen(clip: Clip) -> Seen:
+def measured_quantities(clip: Clip) -> MeasuredMotion:
     """Return the quantities of a clip that measures use."""
-    offsets, parents = bones(clip), clip.skeleton.parents
+    offsets, parents = bone_offsets(clip), clip.skeleton.parents
     local = skeleton.translations(offsets, clip.root_path)
     positions = skeleton.positions(parents, clip.rotations, local)
     gone = travel(clip.rotations[:, 0], clip.root_path)
-    return Seen(positions, clip.duration, gone, parents, offsets)
+    return MeasuredMotion(positions, clip.duration, gone, parents, offsets)
 
 
-def _landmark(recipe: Recipe, control: ControlMeasured, landmarks: Sequence[float]) -> float | None:
+def _landmark_time(
+    recipe: Recipe, control: ControlMeasured, landmarks: Sequence[float]
+) -> float | None:
     """Return the time of the control's landmark; None if it uses none."""
     at = control.auto.at
-    own = at is not None and at not in MOMENTS
+    own = at is not None and at not in TIME_NAMES
     return landmarks[recipe.clips.landmarks.index(str(at))] if own else None
 
 
-def _moment(auto: Auto, share: float) -> tuple[At | None, float | None]:
+def _moment(auto: Auto, share: float) -> tuple[MeasureMoment | None, float | None]:
     match auto.at:
         case None | "start" | "end" | "highest" | "lowest" | "farthest":
             return auto.at, None

@@ -18,21 +18,21 @@ from posefield.motion import measures
 from posefield.motion.joint_roles import Role
 from posefield_train.source import data_folder
 from posefield_train.source.control_sources import (
-    COLUMN,
+    COLUMN_TAG,
     MEASURED,
-    MOMENTS,
+    TIME_NAMES,
     Auto,
     Control,
     ControlColumn,
     ControlMeasured,
-    Part,
+    RecipePart,
     Text,
 )
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
-class Source(Part):
+class Source(RecipePart):
     """Unit and axes of the motion files; a BVH file states neither its unit nor its up axis."""
 
     metres_per_unit: Positive = Field(description="length of one unit of the files, m")
@@ -44,7 +44,7 @@ class Source(Part):
     )
 
 
-class Condition(Part):
+class Condition(RecipePart):
     """Selection of rows of the table, by listed values or by a range of a number."""
 
     among: list[str] | None = Field(
@@ -57,7 +57,7 @@ class Condition(Part):
     maximum: float | None = Field(default=None, description="largest accepted number")
 
 
-class Clips(Part):
+class Clips(RecipePart):
     """Location of the table and the meaning of its columns."""
 
     table: Text = Field(description="CSV file, relative to the data folder")
@@ -73,7 +73,7 @@ class Clips(Part):
     where: dict[str, Condition] = Field(default={}, description="conditions on rows, by column")
 
 
-class Motion(Part):
+class Motion(RecipePart):
     """Conversion of clips to a tensor."""
 
     frames: Annotated[int, Field(ge=8, le=1000)] = Field(
@@ -94,7 +94,7 @@ class Motion(Part):
     )
 
 
-class Alignment(Part):
+class Alignment(RecipePart):
     """Time warping."""
 
     knots: Annotated[int, Field(ge=3, le=24)] = Field(
@@ -115,10 +115,10 @@ class Alignment(Part):
 
 
 # Degree one extrapolates to targets, degree zero keeps the common part of the clips.
-MIXED = (0, 1, 1)
+MIXED_DRIFTS = (0, 1, 1)
 
 
-class Kriging(Part):
+class Kriging(RecipePart):
     """Kriging model of the control coefficients."""
 
     covariance: Literal[
@@ -156,11 +156,11 @@ class Kriging(Part):
     def drifts(self) -> tuple[tuple[int, ...], ...]:
         """Return the sets of drift degrees to try; predictions are averaged within a set."""
         if self.drift == "chosen":
-            return (1,), MIXED
-        return (MIXED,) if self.drift == "mixed" else ((self.drift,),)
+            return (1,), MIXED_DRIFTS
+        return (MIXED_DRIFTS,) if self.drift == "mixed" else ((self.drift,),)
 
 
-class Event(Part):
+class Event(RecipePart):
     """Event of a motion: a joint and the moment at which its position matters."""
 
     joint: Text = Field(description="joint of the event: a hand that reaches, a foot that lands")
@@ -169,7 +169,7 @@ class Event(Part):
     )
 
 
-class Detail(Part):
+class Detail(RecipePart):
     """Level of detail below the model's own size."""
 
     times: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
@@ -183,10 +183,10 @@ class Detail(Part):
 
 
 # An image 1080 pixels high, with a horizontal field of view of 60 degrees, resolves 1 cm at 15 m.
-DETAILS = (Detail(times=2.0), Detail(times=4.0), Detail(times=8.0))
+DEFAULT_LEVELS = (Detail(times=2.0), Detail(times=4.0), Detail(times=8.0))
 
 
-class Size(Part):
+class Size(RecipePart):
     """Size of the truncated tensor: ranks, or error budgets.
 
     Errors are true distances between joints, by forward kinematics; all given budgets apply.
@@ -222,11 +222,11 @@ class Size(Part):
     @property
     def details(self) -> Sequence[Detail]:
         """Return the coarser levels of detail."""
-        return DETAILS if self.levels is None else self.levels
+        return DEFAULT_LEVELS if self.levels is None else self.levels
 
     @field_validator("levels")
     @classmethod
-    def _coarser_and_coarser(cls, levels: list[Detail] | None) -> list[Detail] | None:
+    def _check_level_order(cls, levels: list[Detail] | None) -> list[Detail] | None:
         times = [level.times for level in levels or []]
         if times != sorted(set(times)):
             raise ValueError(f"times {times}, expected each larger than the one before")
@@ -243,7 +243,7 @@ class Size(Part):
         return {name: 0.01 * budget for name, budget in given.items() if budget is not None}
 
     @model_validator(mode="after")
-    def _ranks_or_budgets(self) -> "Size":
+    def _check_size(self) -> "Size":
         keys = "rms_budget_cm, p99_budget_cm, effector_budget_cm"
         if self.ranks is None and not self.budgets:
             raise ValueError(f"found neither, expected either ranks or budgets ({keys})")
@@ -254,10 +254,10 @@ class Size(Part):
 
 
 # Quantities that only a whole cycle has.
-OF_CYCLES = (*measures.TRAVELLED, "step_length")
+CYCLE_QUANTITIES = (*measures.TRAVEL_QUANTITIES, "step_length")
 
 
-class Recipe(Part):
+class Recipe(RecipePart):
     """Complete recipe."""
 
     schema_version: Literal[1] = Field(alias="schema", description="version of this format")
@@ -283,7 +283,7 @@ class Recipe(Part):
     size: Size
 
     @property
-    def typed(self) -> list[ControlColumn]:
+    def column_controls(self) -> list[ControlColumn]:
         """Return the controls with values in the table."""
         return [control for control in self.controls if isinstance(control, ControlColumn)]
 
@@ -292,7 +292,7 @@ class Recipe(Part):
         """Return the controls that are measured from the clips."""
         return [control for control in self.controls if isinstance(control, ControlMeasured)]
 
-    def ends(self, auto: Auto) -> list[str]:
+    def leg_ends(self, auto: Auto) -> list[str]:
         """Return the two feet of a step, or the ends of a leg; empty for other quantities."""
         if auto.quantity == "step_length":
             return list(auto.joints or self.motion.feet)
@@ -302,14 +302,14 @@ class Recipe(Part):
         return []
 
     @model_validator(mode="after")
-    def _label_has_a_column(self) -> "Recipe":
+    def _check_label(self) -> "Recipe":
         if self.kriging.label and not self.clips.performer:
             raise ValueError("kriging.label is 'performer', but clips.performer names no column")
         return self
 
     @field_validator("controls")
     @classmethod
-    def _names_differ(cls, controls: list[Control]) -> list[Control]:
+    def _check_control_names(cls, controls: list[Control]) -> list[Control]:
         names = [control.name for control in controls]
         twice = {name for name in names if names.count(name) > 1}
         if twice:
@@ -317,29 +317,29 @@ class Recipe(Part):
         return controls
 
     @model_validator(mode="after")
-    def _controls_can_be_measured(self) -> "Recipe":
+    def _check_measured_controls(self) -> "Recipe":
         for control in self.measured:
-            fault = self._unmeasurable(control.auto)
+            fault = self._measurement_fault(control.auto)
             if fault:
                 raise ValueError(f"controls.{control.name}.auto: {fault}")
         return self
 
-    def _unmeasurable(self, auto: Auto) -> str | None:
+    def _measurement_fault(self, auto: Auto) -> str | None:
         """Return the reason for which a quantity cannot be measured; None if it can."""
         quantity, landmarks = auto.quantity, self.clips.landmarks
-        if quantity in OF_CYCLES and not self.motion.cyclic:
+        if quantity in CYCLE_QUANTITIES and not self.motion.cyclic:
             return (
                 f"found {quantity!r} and motion.cyclic = false, expected a cycle: of a motion that "
                 "ends elsewhere it hangs on where it was cut"
             )
         if quantity in ("speed", "stride_length") and self.motion.root == "in_place":
             return f"found {quantity!r} and motion.root = 'in_place', expected one that travels"
-        if auto.at is not None and auto.at not in (*MOMENTS, *landmarks):
-            known = ", ".join(map(repr, MOMENTS))
+        if auto.at is not None and auto.at not in (*TIME_NAMES, *landmarks):
+            known = ", ".join(map(repr, TIME_NAMES))
             return f"at: found {auto.at!r}, expected {known} or a column of {landmarks}"
-        if quantity == "step_length" and len(self.ends(auto)) != 2:
+        if quantity == "step_length" and len(self.leg_ends(auto)) != 2:
             return f"joints: found none and motion.feet {self.motion.feet}, expected two feet"
-        if quantity == "leg_length" and len(self.ends(auto)) != 2:
+        if quantity == "leg_length" and len(self.leg_ends(auto)) != 2:
             return (
                 "joints: found none, and not both roles leftUpperLeg and leftFoot; expected the "
                 "upper end of a leg and its lower"
@@ -348,7 +348,7 @@ class Recipe(Part):
 
     @field_validator("roles")
     @classmethod
-    def _one_role_a_joint(cls, roles: dict[Role, str]) -> dict[Role, str]:
+    def _check_roles(cls, roles: dict[Role, str]) -> dict[Role, str]:
         joints = list(roles.values())
         twice = sorted({joint for joint in joints if joints.count(joint) > 1})
         if twice:
@@ -356,7 +356,7 @@ class Recipe(Part):
         return roles
 
     @model_validator(mode="after")
-    def _event_is_known(self) -> "Recipe":
+    def _check_event(self) -> "Recipe":
         if self.event is None:
             if self.size.effector_budget_cm is not None:
                 raise ValueError(
@@ -371,28 +371,28 @@ class Recipe(Part):
         return self
 
 
-MOST_BYTES = 128_000
+MAX_BYTES = 128_000
 """Size of a recipe; those of the project take 3 kB."""
 
-MOST_DOTS = 1_000
+MAX_DOTS = 1_000
 """Dots in one key: far more than MOST_LEVELS, and few enough to parse quickly."""
 
 SHOWN = 200
 """Characters of a value in a message."""
 
-MOST_LEVELS = 16
+MAX_DEPTH = 16
 """Nesting depth of tables and arrays; a recipe needs five."""
 
 
 def read(path: Path) -> Recipe:
     """Return the recipe of a TOML file; RecipeError names the invalid key."""
-    content = data_folder.read(path, MOST_BYTES, "a recipe")
+    content = data_folder.read(path, MAX_BYTES, "a recipe")
     try:
         text = content.decode()
     except UnicodeDecodeError as fault:
         raise RecipeError(path, f"not UTF-8 text: {fault}") from fault
     # tomllib takes quadratic time in the parts of a key: 40 s for a key of MOST_BYTES.
-    if any(line.partition("=")[0].count(".") > MOST_DOTS for line in text.splitlines()):
+    if any(line.partition("=")[0].count(".") > MAX_DOTS for line in text.splitlines()):
         raise RecipeError(path, TOO_DEEP)
     try:
         found = tomllib.loads(text)
@@ -401,7 +401,7 @@ def read(path: Path) -> Recipe:
     except ValueError as fault:
         # ValueError covers TOMLDecodeError and int's error for a number of thousands of digits.
         raise RecipeError(path, f"not TOML: {fault}", _line_of(str(fault))) from fault
-    if _levels(found) > MOST_LEVELS:
+    if _nesting_depth(found) > MAX_DEPTH:
         raise RecipeError(path, TOO_DEEP)
     try:
         return Recipe.model_validate(found)
@@ -409,18 +409,18 @@ def read(path: Path) -> Recipe:
         raise RecipeError(path, _explain(fault)) from fault
 
 
-TOO_DEEP = f"tables or arrays nested deeper than {MOST_LEVELS} levels, expected at most that many"
+TOO_DEEP = f"tables or arrays nested deeper than {MAX_DEPTH} levels, expected at most that many"
 
 
-def _levels(found: dict[str, Any]) -> int:
+def _nesting_depth(found: dict[str, Any]) -> int:
     """Return the nesting depth of tables and arrays, at most MOST_LEVELS + 1."""
     inside: list[Any] = [found]
-    for level in range(MOST_LEVELS + 1):
+    for level in range(MAX_DEPTH + 1):
         if not inside:
             return level
         parts = (one.values() if isinstance(one, dict) else one for one in inside)
         inside = [one for part in parts for one in part if isinstance(one, dict | list)]
-    return MOST_LEVELS + 1
+    return MAX_DEPTH + 1
 
 
 def _line_of(message: str) -> int | None:
@@ -433,14 +433,14 @@ def _explain(fault: ValidationError) -> str:
     # The default unit follows from the measured quantity; an error there is reported already.
     errors = fault.errors(include_url=False)
     for error in (one for one in errors if one["type"] != "default_factory_not_called"):
-        parts = [str(part) for part in error["loc"] if part not in (COLUMN, MEASURED)]
+        parts = [str(part) for part in error["loc"] if part not in (COLUMN_TAG, MEASURED)]
         key = ".".join(parts) or "recipe"
-        found = "" if error["type"] in ("missing", "value_error") else _found(error["input"])
+        found = "" if error["type"] in ("missing", "value_error") else _quote_input(error["input"])
         lines.append(f"{key}: {error['msg']}{found}")
     return "; ".join(lines)
 
 
-def _found(given: Any) -> str:
+def _quote_input(given: Any) -> str:
     """Return the given value for a message, cut to SHOWN characters."""
     shown = repr(given)
     return f", found {shown if len(shown) <= SHOWN else f'{shown[:SHOWN]}...'}"

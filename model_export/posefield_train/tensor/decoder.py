@@ -7,19 +7,19 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield.motion import blend, quat
-from posefield_train.onnx_graph.graph_builder import Net
-from posefield_train.onnx_graph.level_tables import Numbers
-from posefield_train.tensor.hosvd import Multilinear
-from posefield_train.tensor.pose_vectors import Chart
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph.level_tables import Integers
+from posefield_train.tensor.hosvd import TuckerTensor
+from posefield_train.tensor.pose_vectors import PoseChart
 
 # Added to squared half angles, so that sin(a) / a is defined at zero.
 TINY = 1e-12
 # Numbers of decoded motion per block: 16 MB.
-MOTIONS = 2_000_000
+BLOCK_NUMBERS = 2_000_000
 
 
 @dataclass(frozen=True)
-class Rung:
+class LevelSize:
     """Size of a level of detail.
 
     ranks: (r1, r2, r3). joints: indices of the moving joints, in order; all others stay at the
@@ -41,21 +41,21 @@ class Decoder:
     coarser level.
     """
 
-    reduced: Multilinear
+    reduced: TuckerTensor
     mean: Floats
     unwhiten: Floats
     means: Floats
-    coarse: tuple[Rung, ...] = ()
+    coarse: tuple[LevelSize, ...] = ()
 
     @property
-    def rungs(self) -> tuple[Rung, ...]:
+    def level_sizes(self) -> tuple[LevelSize, ...]:
         """Return the ranks and joints of all levels, the finest first."""
         r1, r2, r3 = self.reduced.core.shape
-        return (Rung((r1, r2, r3), tuple(range(len(self.means)))), *self.coarse)
+        return (LevelSize((r1, r2, r3), tuple(range(len(self.means)))), *self.coarse)
 
-    def at(self, level: int) -> "Decoder":
+    def at_level(self, level: int) -> "Decoder":
         """Return the decoder of one level: truncated core and bases, and fixed joints."""
-        rung = self.rungs[level]
+        rung = self.level_sizes[level]
         moves = np.zeros((1 + len(self.means), 3))
         moves[[0, *(1 + joint for joint in rung.joints)]] = 1.0
         unwhiten = self.unwhiten * moves.reshape(-1, 1)
@@ -75,7 +75,7 @@ class Decoder:
         Kuriyama 2006, section 2).
         """
         numbers = self.mean + self.reduced_poses(coefficients, place) @ self.directions
-        return Chart(self.means).poses(numbers)
+        return PoseChart(self.means).poses(numbers)
 
     def at_frame(self, coefficients: Floats, frame: int) -> tuple[Floats, Floats]:
         """Return rotations (B, J, 4) and root positions (B, 3) at one canonical frame of all.
@@ -84,9 +84,9 @@ class Decoder:
         """
         core = np.tensordot(self.reduced.bases[1][frame], self.reduced.core, axes=(0, 1))
         numbers = self.mean + coefficients @ (core.T @ self.directions)
-        return Chart(self.means).poses(numbers)
+        return PoseChart(self.means).poses(numbers)
 
-    def of_joints(self, joints: Sequence[int]) -> "Decoder":
+    def select_joints(self, joints: Sequence[int]) -> "Decoder":
         """Return the decoder of some joints alone, including the root, at its finest level."""
         kept = [0, *(1 + joint for joint in joints)]
         rows = np.ravel(np.arange(len(self.mean)).reshape(-1, 3)[kept])
@@ -101,20 +101,23 @@ class Decoder:
     def reduced_poses(self, coefficients: Floats, place: Floats) -> Floats:
         """Return coefficients (B, S, r1) of the first mode."""
         table, (r1, r2, r3) = self.reduced.bases[1], self.reduced.core.shape
-        time = blend.between(table, place)
+        time = blend.interpolate_rows(table, place)
         # Contracting the core first as a matrix product is 17 times as fast as one einsum.
         core = self.reduced.core.transpose(2, 0, 1).reshape(r3, -1)
         poses = np.empty((*place.shape, r1))
-        step = max(1, MOTIONS // core.shape[1])
+        step = max(1, BLOCK_NUMBERS // core.shape[1])
         for start in range(0, len(place), step):
             block = slice(start, start + step)
             motion = (coefficients[block] @ core).reshape(-1, r1, r2)
             poses[block] = time[block] @ motion.swapaxes(1, 2)
         return poses
 
-    def entries(self) -> dict[str, list[Numbers]]:
+    def entries(self) -> dict[str, list[Integers]]:
         """Return the level-dependent slice ends and shapes of the decoder's graph, by name."""
-        ranks, joints = [rung.ranks for rung in self.rungs], [len(r.joints) for r in self.rungs]
+        ranks, joints = (
+            [rung.ranks for rung in self.level_sizes],
+            [len(r.joints) for r in self.level_sizes],
+        )
         return {
             "core": [[r2, r1, r3] for r1, r2, r3 in ranks],
             "core_rows": [[-1, r3] for _, _, r3 in ranks],
@@ -128,7 +131,7 @@ class Decoder:
         }
 
     def onnx(
-        self, net: Net, coefficients: str, place: str, ends: dict[str, str]
+        self, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
     ) -> tuple[str, str]:
         """Build `numpy` in a graph, from canonical frames (B, S, 1).
 
@@ -149,7 +152,9 @@ class Decoder:
             net("Reshape", root, root_shape),
         )
 
-    def _reduced(self, net: Net, coefficients: str, place: str, ends: dict[str, str]) -> str:
+    def _reduced(
+        self, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
+    ) -> str:
         """Build the coefficients of the first mode (r1, B S).
 
         Poses lie innermost: one small matrix product per pose would cost more in calls than in
@@ -164,7 +169,7 @@ class Decoder:
         poses = net("ReduceSum", terms, net.indices(0), keepdims=0)
         return net("Reshape", poses, ends["flat"])
 
-    def _time(self, net: Net, place: str, end: str) -> str:
+    def _time(self, net: GraphBuilder, place: str, end: str) -> str:
         """Build time coefficients (r2, B, S), linearly interpolated between frames."""
         table = net.weights("time_basis", self.reduced.bases[1].T)
         last = len(self.reduced.bases[1]) - 1
@@ -178,7 +183,7 @@ class Decoder:
         rise = net("Mul", net("Gather", steps, column, axis=1), net("Sub", when, before))
         return net("Add", net("Gather", first, column, axis=1), rise)
 
-    def _directions(self, net: Net) -> str:
+    def _directions(self, net: GraphBuilder) -> str:
         """Build directions (D, r1) from stored nonzero rows when the session loads."""
         varies = np.any(self.unwhiten != 0.0, axis=1)
         stored = net.weights("directions", self.directions[:, varies].T)
@@ -187,12 +192,14 @@ class Decoder:
         row = np.where(varies, np.cumsum(varies) - 1, np.count_nonzero(varies))
         return net("Gather", net("Concat", stored, nothing, axis=0), net.weights("freedoms", row))
 
-    def _rotations(self, net: Net, flat: str, directions: str, ends: dict[str, str]) -> str:
+    def _rotations(
+        self, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
+    ) -> str:
         """Build quaternions (B S, J, 4) from the first mode's coefficients (r1, B S)."""
-        turning = turned_onnx(net, self.means, directions)
-        offset = turned(self.means, self.mean[3:])
-        if any(len(rung.joints) < len(self.means) for rung in self.rungs):
-            return self._some(net, flat, turning, offset, ends)
+        turning = half_angle_products_onnx(net, self.means, directions)
+        offset = half_angle_products(self.means, self.mean[3:])
+        if any(len(rung.joints) < len(self.means) for rung in self.level_sizes):
+            return self._partly_fixed_rotations(net, flat, turning, offset, ends)
         turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
         means = net.weights("mean_rotations", self.means[:, :, None])
         constant = net.weights("rotation_mean", offset[:, None])
@@ -202,7 +209,9 @@ class Decoder:
             len(self.means),
         )
 
-    def _some(self, net: Net, flat: str, turning: str, offset: Floats, ends: dict[str, str]) -> str:
+    def _partly_fixed_rotations(
+        self, net: GraphBuilder, flat: str, turning: str, offset: Floats, ends: dict[str, str]
+    ) -> str:
         """Build quaternions where some level fixes joints.
 
         Joints are sorted by the number of levels that move them, so that a slice selects a level's
@@ -235,7 +244,7 @@ class Decoder:
         return np.argsort(-np.sum(kept, axis=0), kind="stable")
 
 
-def turned(means: Floats, vectors: Floats) -> Floats:
+def half_angle_products(means: Floats, vectors: Floats) -> Floats:
     """Return mean · v / 2 of rotation vectors (..., 3 J) about means (J, 4), as (..., 4 J).
 
     mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2. The bracket is linear in
@@ -247,8 +256,8 @@ def turned(means: Floats, vectors: Floats) -> Floats:
     return quat.mul(means, pure).reshape(*vectors.shape[:-1], -1)
 
 
-def turned_onnx(net: Net, means: Floats, vectors: str) -> str:
-    """Build `turned` in a graph: columns of rotation vectors (3 J, r) to columns (4 J, r)."""
+def half_angle_products_onnx(net: GraphBuilder, means: Floats, vectors: str) -> str:
+    """Build `half_angle_products` in a graph: columns (3 J, r) to columns (4 J, r)."""
     # A quaternion's product with each axis is linear in it: (J, 4) becomes (J, 4, 3).
     axes = quat.mul(np.eye(4)[:, None], 0.5 * np.eye(4)[1:]).swapaxes(1, 2).reshape(4, 12)
     rotations = net("Squeeze", net.weights("mean_rotations", means[:, :, None]), net.indices(2))
@@ -258,7 +267,7 @@ def turned_onnx(net: Net, means: Floats, vectors: str) -> str:
     return net("Reshape", columns, net.indices(4 * len(means), -1))
 
 
-def quaternions(net: Net, rows: str, means: str) -> str:
+def quaternions(net: GraphBuilder, rows: str, means: str) -> str:
     """Build quaternions (J, 4, P) from turned rotation vectors (4 J, P) about means (J, 4, 1).
 
     Poses lie innermost, so that every operation runs over long rows.
@@ -267,11 +276,11 @@ def quaternions(net: Net, rows: str, means: str) -> str:
         "Reshape", rows, net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
     )
     squares = net("ReduceSum", net("Mul", joints, joints), net.indices(1), keepdims=1)
-    cosine, share = _of_half_angles(net, squares)
+    cosine, share = _half_angle_terms(net, squares)
     return net("Add", net("Mul", means, cosine), net("Mul", joints, share))
 
 
-def _of_half_angles(net: Net, squares: str) -> tuple[str, str]:
+def _half_angle_terms(net: GraphBuilder, squares: str) -> tuple[str, str]:
     """Build cosines of half angles a and ratios sin(a) / a, from their squares (J, 1, P)."""
     half = net("Sqrt", net("Add", net.padded(squares), net.number(TINY)))
     shape = net("Shape", squares)
@@ -279,7 +288,7 @@ def _of_half_angles(net: Net, squares: str) -> tuple[str, str]:
     return net.unpadded(net("Cos", half), shape), net.unpadded(share, shape)
 
 
-def innermost_joints(net: Net, rotations: str, joints: int) -> str:
+def innermost_joints(net: GraphBuilder, rotations: str, joints: int) -> str:
     """Build quaternions (P, J, 4) from quaternions (J, 4, P) with poses innermost."""
     finished = net("Reshape", rotations, net.indices(4 * joints, -1))
     return net("Reshape", net("Transpose", finished, perm=[1, 0]), net.indices(-1, joints, 4))
@@ -299,7 +308,7 @@ class Proportions:
         """Return bone offsets (B, J, 3), m, of coefficients (B, r)."""
         return self.mean + np.einsum("br,rjk->bjk", coefficients, self.directions)
 
-    def onnx(self, net: Net, coefficients: str) -> str:
+    def onnx(self, net: GraphBuilder, coefficients: str) -> str:
         """Build `numpy` in a graph."""
         flat = net(
             "Gemm",

@@ -14,17 +14,17 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 
 # Directions with less than this share of the first singular value are rounding errors.
-NOTHING = 1e-9
+RELATIVE_ZERO = 1e-9
 
 
 @dataclass(frozen=True)
-class Multilinear:
+class TuckerTensor:
     """Core tensor (r1, r2, …) and one orthonormal basis (size of the mode, r) for each mode."""
 
     core: Floats
     bases: tuple[Floats, ...]
 
-    def truncated(self, ranks: tuple[int, ...]) -> "Multilinear":
+    def truncated(self, ranks: tuple[int, ...]) -> "TuckerTensor":
         """Return the decomposition cut to the leading columns of every basis.
 
         The squared error is at most the sum over modes of the squared singular values cut off, and
@@ -35,7 +35,7 @@ class Multilinear:
             raise TrainingError(f"ranks {ranks}, expected 1 to {self.core.shape}")
         prefix = tuple(slice(rank) for rank in ranks)
         bases = (basis[:, :rank] for basis, rank in zip(self.bases, ranks, strict=True))
-        return Multilinear(self.core[prefix], tuple(bases))
+        return TuckerTensor(self.core[prefix], tuple(bases))
 
     @property
     def motions(self) -> Floats:
@@ -46,9 +46,9 @@ class Multilinear:
         """Return the slices (..., B) of the tensor for rows (B, r) of coordinates as `motions`."""
         # Directions with tiny singular values are rounding errors; do not divide by these.
         lengths = self._lengths
-        carried = lengths > NOTHING * lengths[0]
+        carried = lengths > RELATIVE_ZERO * lengths[0]
         worth = np.where(carried, 1.0 / np.where(carried, lengths, 1.0), 0.0)
-        rest = Multilinear(self.core * worth, (*self.bases[:-1], motions))
+        rest = TuckerTensor(self.core * worth, (*self.bases[:-1], motions))
         return rest.restored()
 
     @property
@@ -78,28 +78,28 @@ def mode_dot(tensor: Floats, matrix: Floats, mode: int) -> Floats:
     return (matrix @ fibres).reshape(*before, len(matrix), *after)
 
 
-def decompose(tensor: Floats) -> Multilinear:
+def decompose(tensor: Floats) -> TuckerTensor:
     """Return the HOSVD at full rank, with an all-orthogonal core and slices ordered by norm.
 
     Each basis holds the eigenvectors of its unfolding's Gram matrix, largest first; the largest
     entry of every column is positive, so the result does not depend on LAPACK's choice of sign.
     """
-    return _projected(tensor, tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim)))
+    return _project(tensor, tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim)))
 
 
-def decompose_at(tensor: Floats, ranks: tuple[int, ...]) -> Multilinear:
+def decompose_truncated(tensor: Floats, ranks: tuple[int, ...]) -> TuckerTensor:
     """Return `decompose` truncated to ranks, in half the time.
 
     Only the required part of the core is computed.
     """
     pairs = zip(range(tensor.ndim), ranks, strict=True)
     bases = tuple(_basis(unfold(tensor, mode))[:, :rank] for mode, rank in pairs)
-    return _projected(tensor, bases)
+    return _project(tensor, bases)
 
 
-def _projected(tensor: Floats, bases: tuple[Floats, ...]) -> Multilinear:
+def _project(tensor: Floats, bases: tuple[Floats, ...]) -> TuckerTensor:
     core = reduce(lambda x, mb: mode_dot(x, mb[1].T, mb[0]), enumerate(bases), tensor)
-    return Multilinear(core, bases)
+    return TuckerTensor(core, bases)
 
 
 def _basis(unfolded: Floats) -> Floats:

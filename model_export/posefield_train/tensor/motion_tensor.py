@@ -8,15 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.align.time_alignment import Aligned
+from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.source import half_turns
 from posefield_train.source.half_turns import Finding
 from posefield_train.tensor import pose_metric
 from posefield_train.tensor import pose_vectors as chart
-from posefield_train.tensor.pose_vectors import Chart
+from posefield_train.tensor.pose_vectors import PoseChart
 
 # A degree of freedom with a smaller range over the family is left out, m or rad.
-CONSTANT = 1e-9
+CONSTANT_RANGE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class MotionTensor:
     mean: Floats
     whiten: Floats
     unwhiten: Floats
-    chart: Chart
+    chart: PoseChart
     weight: float
 
     def numbers(self, values: Floats) -> Floats:
@@ -47,21 +47,21 @@ class MotionTensor:
 
 
 def pose_vectors(
-    aligned: Aligned, parents: tuple[int, ...], offsets: Floats
-) -> tuple[Floats, Chart, list[Finding]]:
+    aligned: AlignedClips, parents: tuple[int, ...], offsets: Floats
+) -> tuple[Floats, PoseChart, list[Finding]]:
     """Return pose vectors (N, T, D) of aligned clips, their chart, and flips and far joints.
 
     offsets: bone offsets (N, J, 3) of each clip's performer, m.
     """
     small = half_turns.small_joints(parents, offsets.mean(axis=0))
-    rotations, flipped = half_turns.without_flips(aligned.rotations, small)
-    own_chart, far = chart.fit(rotations)
+    rotations, flipped = half_turns.remove_flips(aligned.rotations, small)
+    own_chart, far = chart.fit_chart(rotations)
     return own_chart.numbers(rotations, aligned.root_path), own_chart, flipped + far
 
 
-def build(
+def build_tensor(
     numbers: Floats,
-    own_chart: Chart,
+    own_chart: PoseChart,
     parents: tuple[int, ...],
     offsets: Floats,
     joint_weights: Floats,
@@ -71,16 +71,16 @@ def build(
     offsets: bone offsets (N, J, 3) of each clip's performer, m. joint_weights: (J,).
     """
     mean = numbers.mean(axis=(0, 1))
-    varies = np.ptp(numbers.reshape(-1, len(mean)), axis=0) > CONSTANT
-    own_gram = gram(numbers, own_chart, parents, offsets, joint_weights)
+    varies = np.ptp(numbers.reshape(-1, len(mean)), axis=0) > CONSTANT_RANGE
+    own_gram = sampled_gram(numbers, own_chart, parents, offsets, joint_weights)
     root, inverse = pose_metric.whitening(own_gram[np.ix_(varies, varies)])
     whiten, unwhiten = np.zeros((2, len(root), len(mean)))
     whiten[:, varies], unwhiten[:, varies] = root, inverse
-    values = _whitened(numbers, mean, whiten)
+    values = _whiten(numbers, mean, whiten)
     return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, float(joint_weights.sum()))
 
 
-def _whitened(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
+def _whiten(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
     """Return the tensor (D', T, N) of pose vectors (N, T, D), transposed in small blocks."""
     samples, frames, _ = numbers.shape
     flat = whiten @ numbers.reshape(samples * frames, -1).T
@@ -88,16 +88,18 @@ def _whitened(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
     return np.ascontiguousarray(flat.reshape(-1, samples, frames).swapaxes(1, 2))
 
 
-def gram(
+def sampled_gram(
     numbers: Floats,
-    own_chart: Chart,
+    own_chart: PoseChart,
     parents: tuple[int, ...],
     offsets: Floats,
     joint_weights: Floats,
 ) -> Floats:
     """Return the Gram matrix (D, D) over poses spaced evenly through pose vectors (N, T, D)."""
     samples, frames, _ = numbers.shape
-    chosen = np.unique(np.linspace(0, samples * frames - 1, pose_metric.POSES).astype(np.int64))
+    chosen = np.unique(
+        np.linspace(0, samples * frames - 1, pose_metric.SAMPLED_POSES).astype(np.int64)
+    )
     some = numbers.reshape(samples * frames, -1)[chosen]
     rotations, root = own_chart.poses(some)
     translations = offsets[chosen // frames].copy()

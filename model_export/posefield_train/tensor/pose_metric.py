@@ -15,10 +15,10 @@ from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 
 # Radius of a sphere at every joint, m, so that rotations about a bone have a cost.
-SHELL = 0.03
+SHELL_RADIUS = 0.03
 # Poses over which the metric is averaged: 40 times as many change the truncation error by less than
 # half a percent, on the procedural family and on real motion.
-POSES = 50
+SAMPLED_POSES = 50
 # Least eigenvalue of the metric, as a share of the largest.
 FLOOR = 1e-6
 
@@ -35,8 +35,8 @@ def gram(
     rotations: local (P, J, 4). vectors: the same as rotation vectors about the means (P, J, 3).
     translations: local (P, J, 3), m. joint_weights: mass (J,) of each joint.
     """
-    positions, orientations = skeleton.forward(parents, rotations, translations)
-    below = skeleton.descendants(parents)
+    positions, orientations = skeleton.forward_kinematics(parents, rotations, translations)
+    below = skeleton.descendant_matrix(parents)
     motions = _motions(positions, _axes(orientations, vectors))
     forces = _forces(motions, positions, joint_weights, below)
     poses = len(positions)
@@ -73,7 +73,7 @@ def _forces(motions: Floats, positions: Floats, mass: Floats, below: Floats) -> 
     """
     moments = mass[:, None] * positions
     second = moments[..., :, None] * positions[..., None, :]
-    size = np.trace(second, axis1=-2, axis2=-1) + 2.0 / 3.0 * SHELL**2 * mass
+    size = np.trace(second, axis1=-2, axis2=-1) + 2.0 / 3.0 * SHELL_RADIUS**2 * mass
     inertia = size[..., None, None] * np.eye(3) - second
     carried = np.vstack([below[:1], below])
     mass_below = np.repeat(carried @ mass, 3)[:, None]

@@ -10,22 +10,22 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import quat, quat_planes
-from posefield.motion.skeleton import BLOCK
+from posefield.motion.skeleton import POSES_PER_BLOCK
 from posefield_train.source.half_turns import Finding
 
 # Angle from the mean, rad, above which a joint is reported: rotation vectors become ambiguous at π.
-FAR = 0.9 * np.pi
+REPORTED_ANGLE = 0.9 * np.pi
 
 
 @dataclass(frozen=True)
-class Chart:
+class PoseChart:
     """Chart of poses. means: rotations (J, 4) about which rotation vectors are taken."""
 
     means: Floats
 
     def numbers(self, rotations: Floats, root_path: Floats) -> Floats:
         """Return pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4), root paths (N, T, 3)."""
-        vectors = _unwrapped(quat.log(quat.mul(quat.conj(self.means), rotations)))
+        vectors = _unwrap(quat.log(quat.mul(quat.conj(self.means), rotations)))
         return np.concatenate([root_path, vectors.reshape(*root_path.shape[:2], -1)], axis=-1)
 
     def poses(self, numbers: Floats) -> tuple[Floats, Floats]:
@@ -33,8 +33,8 @@ class Chart:
         *lead, freedoms = numbers.shape
         rows = numbers.reshape(-1, freedoms)
         rotations = np.empty((len(rows), 4 * len(self.means)))
-        for start in range(0, len(rows), BLOCK):
-            block = slice(start, start + BLOCK)
+        for start in range(0, len(rows), POSES_PER_BLOCK):
+            block = slice(start, start + POSES_PER_BLOCK)
             planes = self.rotation_planes(np.ascontiguousarray(rows[block, 3:].T))
             rotations[block] = planes.reshape(rotations.shape[1], -1).T
         return rotations.reshape(*lead, -1, 4), numbers[..., :3]
@@ -47,15 +47,15 @@ class Chart:
         quat_planes.product(means, quat_planes.exp(planes), out=rotations.swapaxes(0, 1))
         return rotations
 
-    def far(self, rotations: Floats) -> list[Finding]:
+    def far_joints(self, rotations: Floats) -> list[Finding]:
         """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
-        return _far(quat.log(quat.mul(quat.conj(self.means), rotations)))
+        return _far_joints(quat.log(quat.mul(quat.conj(self.means), rotations)))
 
 
-def fit(rotations: Floats) -> tuple[Chart, list[Finding]]:
+def fit_chart(rotations: Floats) -> tuple[PoseChart, list[Finding]]:
     """Return the chart about the chordal means of rotations (N, T, J, 4), and far joints."""
-    own_chart = Chart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])))
-    return own_chart, own_chart.far(rotations)
+    own_chart = PoseChart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])))
+    return own_chart, own_chart.far_joints(rotations)
 
 
 def _jumps(vectors: Floats) -> Floats:
@@ -65,24 +65,24 @@ def _jumps(vectors: Floats) -> Floats:
     return jumps
 
 
-def _far(vectors: Floats) -> list[Finding]:
+def _far_joints(vectors: Floats) -> list[Finding]:
     largest = np.linalg.norm(vectors, axis=-1).max(axis=1)
     jumps = _jumps(vectors)
     return [
         Finding("wrap" if jumps[clip, joint] else "far", int(joint), int(clip), float(angle))
         for (clip, joint), angle in np.ndenumerate(largest)
-        if angle > FAR
+        if angle > REPORTED_ANGLE
     ]
 
 
-def _unwrapped(vectors: Floats) -> Floats:
+def _unwrap(vectors: Floats) -> Floats:
     vectors = vectors.copy()
     for clip, joint in np.argwhere(_jumps(vectors)):
-        vectors[clip, :, joint] = _followed(vectors[clip, :, joint])
+        vectors[clip, :, joint] = _unwrap_path(vectors[clip, :, joint])
     return vectors
 
 
-def _followed(path: Floats) -> Floats:
+def _unwrap_path(path: Floats) -> Floats:
     """Unwrap rotation vectors (T, 3) in both directions from the frame nearest to the mean.
 
     Starting at that frame puts all clips on the same branch.

@@ -16,12 +16,12 @@ from posefield.motion import skeleton
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import hosvd
-from posefield_train.tensor.hosvd import Multilinear
+from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
 
 
 @dataclass(frozen=True)
-class Fidelity:
+class TruncationErrors:
     """Distances, m, between joints of the truncated and the full tensor.
 
     rms: weighted root mean square over clips, frames and joints. p99, max: over the same,
@@ -36,7 +36,7 @@ class Fidelity:
 
 
 @dataclass(frozen=True)
-class Moment:
+class EventFrame:
     """A joint and the canonical frame of its event."""
 
     joint: int
@@ -44,7 +44,7 @@ class Moment:
 
 
 @dataclass(frozen=True)
-class Judge:
+class TruncationReference:
     """Joint positions of the full tensor, for measuring truncations.
 
     whole: joint positions (N, T, J, 3), m, without a cycle's travel. offsets: (N, J, 3), m.
@@ -55,36 +55,39 @@ class Judge:
     parents: tuple[int, ...]
     offsets: Floats
     weights: Floats
-    moment: Moment | None
+    event_frame: EventFrame | None
     whole: Floats
 
-    def of(self, reduced: Multilinear) -> Fidelity:
+    def evaluate(self, reduced: TuckerTensor) -> TruncationErrors:
         """Return the fidelity of a truncation of this tensor."""
         found = self._distances(reduced)
-        return Fidelity(found.rms, found.p99, found.max, found.effector)
+        return TruncationErrors(found.rms, found.p99, found.max, found.effector)
 
-    def strain(self, reduced: Multilinear, budgets: Mapping[str, float]) -> float:
-        """Return the largest error of a truncation over its budget, m, by name in `Fidelity`."""
+    def strain(self, reduced: TuckerTensor, budgets: Mapping[str, float]) -> float:
+        """Return the largest ratio of an error of a truncation to its budget.
+
+        budgets: m, by name in `TruncationErrors`.
+        """
         found = self._distances(reduced)
         return max(getattr(found, name) / budget for name, budget in budgets.items())
 
-    def _distances(self, reduced: Multilinear) -> "_Distances":
+    def _distances(self, reduced: TuckerTensor) -> "_Distances":
         first, *others = reduced.bases
         # Restore pose vectors directly: the whitened tensor would be as large again.
-        unwhitened = Multilinear(reduced.core, (self.own_tensor.unwhiten @ first, *others))
-        gaps = _joints(self.own_tensor, unwhitened.restored(), self.parents, self.offsets)
+        unwhitened = TuckerTensor(reduced.core, (self.own_tensor.unwhiten @ first, *others))
+        gaps = _joint_positions(self.own_tensor, unwhitened.restored(), self.parents, self.offsets)
         gaps -= self.whole
         distances = np.sqrt(np.sum(np.square(gaps, out=gaps), axis=-1))
-        return _Distances(distances, self.weights, self.moment)
+        return _Distances(distances, self.weights, self.event_frame)
 
 
 @dataclass(frozen=True)
 class _Distances:
-    """Distances (N, T, J), m, with the statistics of `Fidelity`, each computed on access."""
+    """Distances (N, T, J), m, with the statistics of `TruncationErrors`, computed on access."""
 
     gaps: Floats
     weights: Floats
-    moment: Moment | None
+    event_frame: EventFrame | None
 
     @property
     def rms(self) -> float:
@@ -101,10 +104,12 @@ class _Distances:
 
     @property
     def effector(self) -> float | None:
-        if self.moment is None:
+        if self.event_frame is None:
             return None
         return float(
-            np.sqrt(np.mean(np.square(self.gaps[:, self.moment.frame, self.moment.joint])))
+            np.sqrt(
+                np.mean(np.square(self.gaps[:, self.event_frame.frame, self.event_frame.joint]))
+            )
         )
 
 
@@ -114,7 +119,9 @@ def joint_weights(recipe: Recipe, examples: Sequence[Example]) -> Floats:
     return np.array([recipe.motion.joint_weights.get(name, 1.0) for name in names])
 
 
-def judge(recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor) -> Judge:
+def truncation_reference(
+    recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor
+) -> TruncationReference:
     """Return a judge of the truncations of a recipe's tensor.
 
     Raises TrainingError if the skeleton lacks the event's joint.
@@ -122,7 +129,9 @@ def judge(recipe: Recipe, examples: Sequence[Example], own_tensor: MotionTensor)
     parents, weights = examples[0].clip.skeleton.parents, joint_weights(recipe, examples)
     offsets = np.stack([example.offsets for example in examples])
     whole = positions(own_tensor, own_tensor.values, parents, offsets)
-    return Judge(own_tensor, parents, offsets, weights, moment(recipe, examples), whole)
+    return TruncationReference(
+        own_tensor, parents, offsets, weights, event_frame(recipe, examples), whole
+    )
 
 
 def positions(
@@ -132,17 +141,19 @@ def positions(
 
     offsets: bone offsets (N, J, 3), m.
     """
-    return _joints(own_tensor, hosvd.mode_dot(values, own_tensor.unwhiten, 0), parents, offsets)
+    return _joint_positions(
+        own_tensor, hosvd.mode_dot(values, own_tensor.unwhiten, 0), parents, offsets
+    )
 
 
-def _joints(
+def _joint_positions(
     own_tensor: MotionTensor, centred: Floats, parents: tuple[int, ...], offsets: Floats
 ) -> Floats:
     """Return joint positions (N, T, J, 3) of pose vectors (D, T, N) less the tensor's mean."""
     _, frames, samples = centred.shape
     places = np.empty((len(parents), 3, frames, samples))
     bones = offsets.transpose(1, 2, 0)[1:, :, None]
-    step = max(1, skeleton.BLOCK // samples)
+    step = max(1, skeleton.POSES_PER_BLOCK // samples)
     for start in range(0, frames, step):
         block = slice(start, start + step)
         numbers = own_tensor.mean[:, None, None] + centred[:, block]
@@ -151,7 +162,7 @@ def _joints(
     return places.transpose(3, 2, 0, 1)
 
 
-def moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
+def event_frame(recipe: Recipe, examples: Sequence[Example]) -> EventFrame | None:
     """Return the joint and canonical frame of the recipe's event; None without event.
 
     Raises TrainingError if the skeleton lacks its joint.
@@ -162,23 +173,23 @@ def moment(recipe: Recipe, examples: Sequence[Example]) -> Moment | None:
     names = examples[0].clip.skeleton.names
     if event.joint not in names:
         raise TrainingError(f"event.joint {event.joint!r}, expected one of {', '.join(names)}")
-    return Moment(names.index(event.joint), _frame(recipe, event.at, examples))
+    return EventFrame(names.index(event.joint), _canonical_frame(recipe, event.at, examples))
 
 
 def event(recipe: Recipe, examples: Sequence[Example]) -> Event | None:
     """Return the recipe's event: its joint and share of canonical time; None without event."""
-    found = moment(recipe, examples)
+    found = event_frame(recipe, examples)
     if found is None or recipe.event is None:
         return None
-    return Event(found.joint, round(_share(recipe, recipe.event.at, examples), 4))
+    return Event(found.joint, round(_event_share(recipe, recipe.event.at, examples), 4))
 
 
-def _frame(recipe: Recipe, at: str, examples: Sequence[Example]) -> int:
+def _canonical_frame(recipe: Recipe, at: str, examples: Sequence[Example]) -> int:
     """Return the canonical frame of the event; a landmark lies at the mean of its times."""
-    return round((recipe.motion.frames - 1) * _share(recipe, at, examples))
+    return round((recipe.motion.frames - 1) * _event_share(recipe, at, examples))
 
 
-def _share(recipe: Recipe, at: str, examples: Sequence[Example]) -> float:
+def _event_share(recipe: Recipe, at: str, examples: Sequence[Example]) -> float:
     if at == "end":
         return 1.0
     mark = recipe.clips.landmarks.index(at)

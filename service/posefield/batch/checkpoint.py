@@ -13,17 +13,24 @@ from typing import Any
 import orjson
 
 from posefield.batch import layouts, manifest
-from posefield.batch.job import Job, Work
-from posefield.batch.rows.row_query import Fault
-from posefield.batch.target import STATE, Target, Written, intact, lines, put
+from posefield.batch.job import ExportJob, WorkerInput
+from posefield.batch.rows.row_query import RowFault
+from posefield.batch.target import (
+    STATE_FOLDER,
+    ExportTarget,
+    WrittenFile,
+    is_intact,
+    put_file,
+    read_lines,
+)
 from posefield.common.errors import FileError
 
-JOB, PARTS = f"{STATE}/job.json", f"{STATE}/parts"
+JOB, PARTS = f"{STATE_FOLDER}/job.json", f"{STATE_FOLDER}/parts"
 MANIFEST, SKIPPED, EXPORT = "manifest.jsonl", "skipped.jsonl", "export.json"
 
 
 @dataclass(frozen=True)
-class Part:
+class ChunkResult:
     """Result of one chunk, or of several.
 
     clips, bytes: number of clips and bytes written. warned: clips with a warning. skipped: faults
@@ -33,55 +40,55 @@ class Part:
     clips: int = 0
     bytes: int = 0
     warned: int = 0
-    skipped: list[Fault] = field(default_factory=list)
-    archives: list[Written] = field(default_factory=list)
+    skipped: list[RowFault] = field(default_factory=list)
+    archives: list[WrittenFile] = field(default_factory=list)
 
 
-def begin(target: Target, place: str, job: Job) -> None:
+def assign_job(target: ExportTarget, place: str, job: ExportJob) -> None:
     """Assign the target to this job.
 
     Raises FileError, with the target unchanged, if it belongs to another job or is not empty.
     """
     if target.read(JOB) is None:
-        if not target.empty(but=STATE):
+        if not target.empty(but=STATE_FOLDER):
             raise FileError(place, "is not empty and has no manifest of an export")
-        _claim(target, job)
-    _expect(place, job, target.read(JOB))
+        _record_job(target, job)
+    _check_job(place, job, target.read(JOB))
     target.prepare()
 
 
-def _claim(target: Target, job: Job) -> None:
+def _record_job(target: ExportTarget, job: ExportJob) -> None:
     """Record the job of a target that has none."""
     target.prepare()
     target.create(JOB, _json({"job": job.digest, **job.facts()}))
 
 
-def complete(target: Target, place: str, job: Job) -> dict[str, Any] | None:
+def completed_facts(target: ExportTarget, place: str, job: ExportJob) -> dict[str, Any] | None:
     """Return the facts of a complete export, else None; FileError if it is another job's."""
     content = target.read(EXPORT)
-    return None if content is None else _expect(place, job, content)
+    return None if content is None else _check_job(place, job, content)
 
 
-def damaged(target: Target, facts: dict[str, Any], verify: bool) -> str | None:
+def first_damaged_file(target: ExportTarget, facts: dict[str, Any], verify: bool) -> str | None:
     """Return the path of the first missing or changed file of a complete export, or None.
 
     verify: compare checksums, not only sizes.
     """
     try:
-        found = (file.file for file in _files(target, facts) if not intact(target, file, verify))
+        found = (file.file for file in _files(target, facts) if not is_intact(target, file, verify))
         return next(found, None)
     except (ValueError, LookupError, TypeError):
         return MANIFEST
 
 
-def _files(target: Target, facts: dict[str, Any]) -> Iterator[Written]:
+def _files(target: ExportTarget, facts: dict[str, Any]) -> Iterator[WrittenFile]:
     """Yield every file of a complete export.
 
     Raises ValueError, LookupError or TypeError for a damaged manifest.
     """
-    yield from (Written(**file) for file in facts["files"])
+    yield from (WrittenFile(**file) for file in facts["files"])
     clips = 0
-    for line in lines(target, MANIFEST):
+    for line in read_lines(target, MANIFEST):
         clips += 1
         entry = orjson.loads(line)
         if "archive" not in entry:
@@ -90,17 +97,17 @@ def _files(target: Target, facts: dict[str, Any]) -> Iterator[Written]:
         raise ValueError
 
 
-def _clip(entry: dict[str, Any]) -> Written:
-    return Written(entry["file"], entry["bytes"], entry["sha256"])
+def _clip(entry: dict[str, Any]) -> WrittenFile:
+    return WrittenFile(entry["file"], entry["bytes"], entry["sha256"])
 
 
-def reopen(target: Target, job: Job) -> None:
+def reopen(target: ExportTarget, job: ExportJob) -> None:
     """Reset a complete export to one without finished chunks; its files remain."""
-    _claim(target, job)
+    _record_job(target, job)
     target.drop(EXPORT)
 
 
-def _expect(place: str, job: Job, content: bytes | None) -> dict[str, Any]:
+def _check_job(place: str, job: ExportJob, content: bytes | None) -> dict[str, Any]:
     """Return the facts of a job or an export; FileError unless they are this job's."""
     try:
         found = orjson.loads(content or b"")
@@ -116,13 +123,17 @@ def _expect(place: str, job: Job, content: bytes | None) -> dict[str, Any]:
     )
 
 
-def record(target: Target, number: int, part: Part, entries: Iterable[dict[str, Any]]) -> None:
+def record_chunk(
+    target: ExportTarget, number: int, part: ChunkResult, entries: Iterable[dict[str, Any]]
+) -> None:
     """Write the part of a finished chunk, with its entries of the manifest."""
     content = b"".join(map(manifest.line, [asdict(part), *entries]))
     target.write([(f"{PARTS}/{_name(number)}", content)])
 
 
-def done(target: Target, number: int, names: set[str], verify: bool = False) -> Part | None:
+def finished_chunk(
+    target: ExportTarget, number: int, names: set[str], verify: bool = False
+) -> ChunkResult | None:
     """Return the part of a chunk if it is listed in `names` and its files are intact, else None.
 
     verify: compare checksums, not only sizes.
@@ -135,15 +146,15 @@ def done(target: Target, number: int, names: set[str], verify: bool = False) -> 
         files = part.archives or [_clip(orjson.loads(line)) for line in entries.splitlines()]
     except (ValueError, LookupError, TypeError):
         return None
-    return part if all(intact(target, file, verify) for file in files) else None
+    return part if all(is_intact(target, file, verify) for file in files) else None
 
 
-def names(target: Target) -> set[str]:
+def names(target: ExportTarget) -> set[str]:
     """Return the names of the present parts."""
     return target.names(PARTS)
 
 
-def finish(target: Target, work: Work, chunks: int) -> dict[str, Any] | None:
+def finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, Any] | None:
     """Complete an export if all of its chunks are finished, and return its facts; else None.
 
     If another process completed it meanwhile, the facts are the same.
@@ -153,21 +164,21 @@ def finish(target: Target, work: Work, chunks: int) -> dict[str, Any] | None:
             return _finish(target, work, chunks)
     except FileError:
         # Another process may have completed it and removed the parts.
-        if (found := complete(target, work.target, work.job)) is None:
+        if (found := completed_facts(target, work.target, work.job)) is None:
             raise
         return found
-    return complete(target, work.target, work.job)
+    return completed_facts(target, work.target, work.job)
 
 
-def _finish(target: Target, work: Work, chunks: int) -> dict[str, Any]:
+def _finish(target: ExportTarget, work: WorkerInput, chunks: int) -> dict[str, Any]:
     total, job = _total(target, chunks), work.job
     entries = (entries for _, entries in _parts(target, chunks))
-    files = [*total.archives, put(target, MANIFEST, entries)]
+    files = [*total.archives, put_file(target, MANIFEST, entries)]
     if total.skipped:
-        files.append(put(target, SKIPPED, map(manifest.line, map(asdict, total.skipped))))
+        files.append(put_file(target, SKIPPED, map(manifest.line, map(asdict, total.skipped))))
     if total.clips:
-        about = layouts.find(job.layout).complete(work, _entries(target, chunks))
-        files += [put(target, path, (content,)) for path, content in about]
+        about = layouts.find_layout(job.layout).complete(work, _entries(target, chunks))
+        files += [put_file(target, path, (content,)) for path, content in about]
     counts = {"clips": total.clips, "bytes": total.bytes, "warned": total.warned}
     facts = {
         "job": job.digest,
@@ -177,18 +188,18 @@ def _finish(target: Target, work: Work, chunks: int) -> dict[str, Any]:
         "files": list(map(asdict, files)),
     }
     target.write([(EXPORT, _json(facts))])
-    target.remove(STATE)
+    target.remove(STATE_FOLDER)
     return facts
 
 
-def _entries(target: Target, chunks: int) -> Iterator[dict[str, Any]]:
+def _entries(target: ExportTarget, chunks: int) -> Iterator[dict[str, Any]]:
     for _, entries in _parts(target, chunks):
         yield from map(orjson.loads, entries.splitlines())
 
 
-def _total(target: Target, chunks: int) -> Part:
+def _total(target: ExportTarget, chunks: int) -> ChunkResult:
     parts = [part for part, _ in _parts(target, chunks)]
-    return Part(
+    return ChunkResult(
         sum(part.clips for part in parts),
         sum(part.bytes for part in parts),
         sum(part.warned for part in parts),
@@ -197,7 +208,7 @@ def _total(target: Target, chunks: int) -> Part:
     )
 
 
-def _parts(target: Target, chunks: int) -> Iterator[tuple[Part, bytes]]:
+def _parts(target: ExportTarget, chunks: int) -> Iterator[tuple[ChunkResult, bytes]]:
     for number in range(chunks):
         path = f"{PARTS}/{_name(number)}"
         if (content := target.read(path)) is None:
@@ -206,11 +217,11 @@ def _parts(target: Target, chunks: int) -> Iterator[tuple[Part, bytes]]:
         yield _part(head), entries
 
 
-def _part(head: bytes) -> Part:
+def _part(head: bytes) -> ChunkResult:
     plain = orjson.loads(head)
-    skipped = [Fault(**fault) for fault in plain["skipped"]]
-    archives = [Written(**archive) for archive in plain["archives"]]
-    return Part(**{**plain, "skipped": skipped, "archives": archives})
+    skipped = [RowFault(**fault) for fault in plain["skipped"]]
+    archives = [WrittenFile(**archive) for archive in plain["archives"]]
+    return ChunkResult(**{**plain, "skipped": skipped, "archives": archives})
 
 
 def _name(number: int) -> str:

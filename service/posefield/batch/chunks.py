@@ -9,13 +9,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from posefield.batch import checkpoint, layouts, manifest
-from posefield.batch.checkpoint import Part
-from posefield.batch.job import Job, Work, opened
-from posefield.batch.layouts import Entry, File, Layout, path
-from posefield.batch.rows.row_query import KEPT, Fault, Query
+from posefield.batch.checkpoint import ChunkResult
+from posefield.batch.job import ExportJob, WorkerInput, open_model_of
+from posefield.batch.layouts import ClipFile, Layout, ManifestEntry, path
+from posefield.batch.rows.row_query import MAX_KEPT_FAULTS, ClipQuery, RowFault
 from posefield.batch.target import open_target
 from posefield.common.errors import InvalidField, QueryError
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
@@ -25,117 +25,119 @@ CLIPS, POSES = 128, 8192
 share data.
 """
 
-Stopped = Callable[[], bool]
+StopCheck = Callable[[], bool]
 """Returns true when the work should stop."""
 
 
-class Stop(Exception):
+class ChunkAbandoned(Exception):
     """Raised when a chunk is abandoned because the work should stop."""
 
 
 @dataclass(frozen=True)
-class Task:
+class ChunkTask:
     """One chunk: its number, the index of its first row, and its rows in order."""
 
     number: int
     first: int
-    rows: tuple[Query | Fault, ...]
+    rows: tuple[ClipQuery | RowFault, ...]
 
 
-def make(work: Work, task: Task, stopped: Stopped = lambda: False) -> Part:
+def make_chunk(
+    work: WorkerInput, task: ChunkTask, stopped: StopCheck = lambda: False
+) -> ChunkResult:
     """Make a chunk and return its result.
 
     Raises InvalidField, which names the rows at fault, unless they are skipped; FileError if the
     target cannot be written; Stop if the work should stop. None of these records a part.
     """
     target = open_target(work.target)
-    layout = layouts.find(work.job.layout)
-    chunk = _Chunk(work.job, layout, opened(work), task, [])
+    layout = layouts.find_layout(work.job.layout)
+    chunk = _ChunkInProgress(work.job, layout, open_model_of(work), task, [])
     entries, archives = layout.write(target, task.number, chunk.batches(stopped))
     if chunk.faults and not work.skip:
-        raise refusal(len(chunk.faults), chunk.faults)
+        raise invalid_rows_error(len(chunk.faults), chunk.faults)
     warned = sum(bool(entry["warnings"]) for entry in entries)
     size = sum(file.bytes for file in archives) or sum(entry["bytes"] for entry in entries)
-    part = Part(len(entries), size, warned, chunk.faults, archives)
-    checkpoint.record(target, task.number, part, entries)
+    part = ChunkResult(len(entries), size, warned, chunk.faults, archives)
+    checkpoint.record_chunk(target, task.number, part, entries)
     return part
 
 
-def refusal(count: int, faults: Sequence[Fault]) -> InvalidField:
+def invalid_rows_error(count: int, faults: Sequence[RowFault]) -> InvalidField:
     """Return the error for invalid rows, with the first of them in its message.
 
     count: their number. faults: the known ones, at least the first KEPT.
     """
-    said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:KEPT])
-    more = f"\n  and {count - KEPT} more" if count > KEPT else ""
+    said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:MAX_KEPT_FAULTS])
+    more = f"\n  and {count - MAX_KEPT_FAULTS} more" if count > MAX_KEPT_FAULTS else ""
     found = f"rows that cannot be answered: {count} (--skip-errors leaves them out)"
     return InvalidField("queries", f"{found}:{said}{more}")
 
 
 @dataclass(frozen=True)
-class _Made:
+class _SynthesizedClip:
     path: str
-    query: Query
+    query: ClipQuery
     answer: ClipAnswer
 
 
 @dataclass(frozen=True)
-class _Chunk:
+class _ChunkInProgress:
     """A chunk in progress. faults: those found so far."""
 
-    job: Job
+    job: ExportJob
     layout: Layout
     synthesizer: Synthesizer
-    task: Task
-    faults: list[Fault]
+    task: ChunkTask
+    faults: list[RowFault]
 
-    def batches(self, stopped: Stopped) -> Iterator[list[File]]:
+    def batches(self, stopped: StopCheck) -> Iterator[list[ClipFile]]:
         """Yield batches of files of the valid rows, in order."""
-        made: list[_Made] = []
+        made: list[_SynthesizedClip] = []
         poses = 0
-        for one in self._made():
+        for one in self._synthesized_clips():
             made.append(one)
             poses += len(one.answer.clip)
             if len(made) == CLIPS or poses >= POSES:
                 yield self._files(made)
                 made, poses = [], 0
                 if stopped():
-                    raise Stop
+                    raise ChunkAbandoned
         yield self._files(made)
 
-    def _files(self, made: list[_Made]) -> list[File]:
+    def _files(self, made: list[_SynthesizedClip]) -> list[ClipFile]:
         contents = self._contents(made)
         return [
-            File(one.path, content, self._entry(one, content))
+            ClipFile(one.path, content, self._entry(one, content))
             for one, content in zip(made, contents, strict=True)
         ]
 
-    def _entry(self, one: _Made, content: bytes) -> Entry:
+    def _entry(self, one: _SynthesizedClip, content: bytes) -> ManifestEntry:
         said = manifest.entry(one.query.name, one.path, content, one.answer)
         return said | self.layout.describe(one.query.name, one.path, one.answer)
 
-    def _made(self) -> Iterator[_Made]:
+    def _synthesized_clips(self) -> Iterator[_SynthesizedClip]:
         for number, row in enumerate(self.task.rows, self.task.first):
-            if isinstance(row, Fault):
-                self._note(row.place, row.message)
+            if isinstance(row, RowFault):
+                self._record_fault(row.place, row.message)
                 continue
             try:
-                answer = clips.clip(self.synthesizer, row.question)
+                answer = clips.synthesize_clip(self.synthesizer, row.question)
             except QueryError as fault:
-                self._note(row.place, str(fault))
+                self._record_fault(row.place, str(fault))
             else:
-                yield _Made(path(number, row.name, row.format), row, answer)
+                yield _SynthesizedClip(path(number, row.name, row.format), row, answer)
 
-    def _note(self, place: str, message: str) -> None:
+    def _record_fault(self, place: str, message: str) -> None:
         # The table's folder is not part of the job and must not affect its files.
-        self.faults.append(Fault(place.rpartition("/")[2], message))
+        self.faults.append(RowFault(place.rpartition("/")[2], message))
 
-    def _contents(self, made: list[_Made]) -> list[bytes]:
+    def _contents(self, made: list[_SynthesizedClip]) -> list[bytes]:
         """Return the files of the clips; those of one format are encoded together."""
         contents: dict[int, bytes] = {}
         for extension in dict.fromkeys(one.query.format for one in made):
             own = [index for index, one in enumerate(made) if one.query.format == extension]
-            convention = ENCODERS[extension].convention(self.job.unit, self.job.up)
+            convention = CLIP_ENCODERS[extension].convention(self.job.unit, self.job.up)
             answers = [made[index].answer for index in own]
             files = self.layout.encode(extension)(answers, convention)
             contents |= zip(own, files, strict=True)

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from posefield.batch import manifest
-from posefield.batch.rows.row_query import Query
+from posefield.batch.rows.row_query import ClipQuery
 from posefield.common import cancellation
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.formats import Encoder
+from posefield.encode.formats import ClipEncoder
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clips
-from posefield.synthesis.clips import Prospect
+from posefield.synthesis.clips import ClipPreview
 from posefield.synthesis.synthesizer import Synthesizer
 
 MANIFEST = "manifest.jsonl"
@@ -19,17 +19,17 @@ CLIPS, POSES = 16, 4096
 
 
 @dataclass(frozen=True)
-class Order:
+class ArchiveOrder:
     """Validated clips of one format.
 
     queries: of the clips. prospects: frames and warnings of each, known before synthesis.
     """
 
     model: Synthesizer
-    encoder: Encoder
+    encoder: ClipEncoder
     convention: Convention
-    queries: Sequence[Query]
-    prospects: Sequence[Prospect]
+    queries: Sequence[ClipQuery]
+    prospects: Sequence[ClipPreview]
 
     @property
     def warnings(self) -> list[str]:
@@ -47,7 +47,7 @@ class Order:
         return [f"{count} of {every} clips {said}" for said, count in counts.items() if count]
 
 
-def members(order: Order) -> Iterator[tuple[str, bytes]]:
+def archive_members(order: ArchiveOrder) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each clip's file in the order of the queries, then the manifest.
 
     A batch is made when its first file is requested; of earlier batches only manifest lines remain
@@ -60,7 +60,9 @@ def members(order: Order) -> Iterator[tuple[str, bytes]]:
     yield MANIFEST, bytes(lines)
 
 
-def _files(order: Order, queries: Sequence[Query], lines: bytearray) -> Iterator[tuple[str, bytes]]:
+def _files(
+    order: ArchiveOrder, queries: Sequence[ClipQuery], lines: bytearray
+) -> Iterator[tuple[str, bytes]]:
     answers = [_clip(order.model, query) for query in queries]
     contents = order.encoder.write(answers, order.convention)
     for query, answer, content in zip(queries, answers, contents, strict=True):
@@ -69,9 +71,9 @@ def _files(order: Order, queries: Sequence[Query], lines: bytearray) -> Iterator
         yield file, content
 
 
-def _clip(model: Synthesizer, query: Query) -> ClipAnswer:
+def _clip(model: Synthesizer, query: ClipQuery) -> ClipAnswer:
     cancellation.check()
-    return clips.clip(model, query.question)
+    return clips.synthesize_clip(model, query.question)
 
 
 def _batches(frames: Sequence[int]) -> Iterator[slice]:

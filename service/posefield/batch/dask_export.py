@@ -21,23 +21,23 @@ from distributed.comm import CommClosedError
 from distributed.scheduler import KilledWorker
 
 from posefield.batch import checkpoint, chunks
-from posefield.batch.checkpoint import Part
-from posefield.batch.chunks import Stop, Stopped, Task
-from posefield.batch.job import MAKERS, Work
+from posefield.batch.checkpoint import ChunkResult
+from posefield.batch.chunks import ChunkAbandoned, ChunkTask, StopCheck
+from posefield.batch.job import VERSIONED_PACKAGES, WorkerInput
 from posefield.batch.process_pool import RESUMES, Runner
 from posefield.batch.target import open_target
 from posefield.common import dask_scheduler
 from posefield.common.errors import ClusterError, FileError
 
-KIT = dask_scheduler.Kit(("posefield",), MAKERS)
+KIT = dask_scheduler.RequiredSoftware(("posefield",), VERSIONED_PACKAGES)
 """Code and packages on which a chunk's bytes depend."""
-AHEAD = 3
+CHUNKS_PER_THREAD = 3
 """Chunks submitted for each thread of the workers, so that none waits for the next."""
-PATIENCE = 0.1
+POLL_INTERVAL = 0.1
 """Seconds between two checks for a stop and for the number of workers."""
-FETCH = 5.0
+FETCH_INTERVAL = 5.0
 """Seconds until the result of a finished chunk is considered lost with its worker."""
-DESERTED = 60.0
+NO_WORKERS_TIMEOUT = 60.0
 """Seconds without workers after which the export fails."""
 
 
@@ -49,35 +49,35 @@ def runner(address: str) -> Iterator[Runner]:
     are no workers for a minute, or if one chunk has ended every worker that ran it.
     """
     with dask_scheduler.connect(address, KIT) as client:
-        yield partial(_together, client, address)
+        yield partial(_run_on_workers, client, address)
 
 
-def _together(
-    client: Client, address: str, work: Work, tasks: Iterator[Task], stopped: Stopped
-) -> Iterator[Part]:
-    with _said(address):
-        hands = _Hands(client, address, _Given.by(client, work))
+def _run_on_workers(
+    client: Client, address: str, work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
+) -> Iterator[ChunkResult]:
+    with _cluster_errors(address):
+        hands = _PendingChunks(client, address, _SharedWork.scatter(client, work))
         try:
             yield from hands.parts(tasks, stopped)
         finally:
-            hands.put_down()
+            hands.cancel_all()
 
 
 @dataclass(frozen=True)
-class _Given:
+class _SharedWork:
     """Data that every chunk needs. kit: packages and versions that a worker must have installed."""
 
-    work: Work
+    work: WorkerInput
     kit: Mapping[str, str]
 
     @classmethod
-    def by(cls, client: Client, work: Work) -> Future:
+    def scatter(cls, client: Client, work: WorkerInput) -> Future:
         """Return a future of this data, which the workers keep as long as the future exists."""
-        own = cls(work, dask_scheduler.installed(KIT))
-        return client.submit(_same, own, key=f"posefield-{uuid.uuid4().hex}")
+        own = cls(work, dask_scheduler.installed_versions(KIT))
+        return client.submit(_identity, own, key=f"posefield-{uuid.uuid4().hex}")
 
 
-class _Hands:
+class _PendingChunks:
     """Chunks that are submitted and not yet collected."""
 
     def __init__(self, client: Client, address: str, given: Future) -> None:
@@ -87,31 +87,31 @@ class _Hands:
         self._ready: SimpleQueue[Future] = SimpleQueue()
         self._threads, self._counted = 0, -1.0
 
-    def parts(self, tasks: Iterator[Task], stopped: Stopped) -> Iterator[Part]:
+    def parts(self, tasks: Iterator[ChunkTask], stopped: StopCheck) -> Iterator[ChunkResult]:
         """Yield the parts of tasks in the order of completion."""
         while not stopped():
-            for task in islice(tasks, max(self._room(), 0)):
-                self._give(task)
+            for task in islice(tasks, max(self._free_slots(), 0)):
+                self._submit(task)
             if not self._pending:
                 return
-            yield from self._take()
+            yield from self._collect()
         while not self._ready.empty():
-            yield from self._take()
+            yield from self._collect()
 
-    def put_down(self) -> None:
+    def cancel_all(self) -> None:
         """Cancel the submitted chunks; workers stop within a batch and record no part."""
         self._client.cancel([*self._pending, self._given])
 
-    def _give(self, task: Task) -> None:
+    def _submit(self, task: ChunkTask) -> None:
         key = f"chunk-{task.number}-{self._run}"
-        future = self._client.submit(_do, self._given, task, key=key)
+        future = self._client.submit(_run_task, self._given, task, key=key)
         self._pending.add(future)
         future.add_done_callback(self._ready.put)
 
-    def _take(self) -> Iterator[Part]:
+    def _collect(self) -> Iterator[ChunkResult]:
         try:
-            future = self._ready.get(timeout=PATIENCE)
-            part = future.result(timeout=FETCH)
+            future = self._ready.get(timeout=POLL_INTERVAL)
+            part = future.result(timeout=FETCH_INTERVAL)
         except Empty:
             return
         except TimeoutError:
@@ -121,47 +121,49 @@ class _Hands:
         self._pending.discard(future)
         yield part
 
-    def _room(self) -> int:
+    def _free_slots(self) -> int:
         """Return how many more chunks to submit, by the present number of workers' threads."""
         now = time.monotonic()
         if now - self._counted > 1.0 or not self._threads:
             threads = sum(self._client.nthreads().values())
-            self._expect_somebody(threads, now)
+            self._check_workers(threads, now)
             self._threads = threads
-        return self._threads * AHEAD - len(self._pending)
+        return self._threads * CHUNKS_PER_THREAD - len(self._pending)
 
-    def _expect_somebody(self, threads: int, now: float) -> None:
+    def _check_workers(self, threads: int, now: float) -> None:
         if threads or self._counted < 0.0:
             self._counted = now
-        elif now - self._counted > DESERTED:
-            message = f"has had no workers for {DESERTED:g} s; {RESUMES}"
+        elif now - self._counted > NO_WORKERS_TIMEOUT:
+            message = f"has had no workers for {NO_WORKERS_TIMEOUT:g} s; {RESUMES}"
             raise ClusterError(self._address, message)
 
 
 @contextmanager
-def _said(address: str) -> Iterator[None]:
+def _cluster_errors(address: str) -> Iterator[None]:
     """Convert Dask's errors to ClusterError."""
     try:
         yield
     except KilledWorker as fault:
-        message = f"{dask_scheduler.killed(fault)} {RESUMES.capitalize()}"
+        message = f"{dask_scheduler.killed_message(fault)} {RESUMES.capitalize()}"
         raise ClusterError(address, message) from fault
     except (FutureCancelledError, CommClosedError) as fault:
         raise ClusterError(address, f"the scheduler has gone; {RESUMES}") from fault
 
 
-def _same(given: _Given) -> _Given:
+def _identity(given: _SharedWork) -> _SharedWork:
     return given
 
 
-def _do(given: _Given, task: Task) -> Part | None:
+def _run_task(given: _SharedWork, task: ChunkTask) -> ChunkResult | None:
     """Make a chunk on a worker; return None if it was cancelled.
 
     Raises ClusterError if the worker's packages differ, and FileError if it cannot see the target.
     """
     worker = get_worker()
     # Workers that joined later were not checked at the connection.
-    if unlike := dask_scheduler.differences(dask_scheduler.installed(KIT), given.kit):
+    if unlike := dask_scheduler.describe_differences(
+        dask_scheduler.installed_versions(KIT), given.kit
+    ):
         raise ClusterError(worker.address, unlike)
     work = given.work
     if open_target(work.target).read(checkpoint.JOB) is None:
@@ -171,12 +173,12 @@ def _do(given: _Given, task: Task) -> Part | None:
             "share, or an object store's URL",
         )
     try:
-        return chunks.make(work, task, _abandoned(worker, worker.get_current_task()))
-    except Stop:
+        return chunks.make_chunk(work, task, _cancellation_check(worker, worker.get_current_task()))
+    except ChunkAbandoned:
         return None
 
 
-def _abandoned(worker: Any, key: str) -> Callable[[], bool]:
+def _cancellation_check(worker: Any, key: str) -> Callable[[], bool]:
     """Return a function that returns true once a task is cancelled or its client is gone."""
     task = worker.state.tasks[key]
     return lambda: task.state == "cancelled"

@@ -22,11 +22,11 @@ TRIES, PAUSE = 40, 0.05
 them, s.
 """
 
-LINKLESS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
+NO_HARD_LINK_ERRORS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
 """Errors of file systems without hard links: exFAT, and some network file systems."""
 
 
-class Folder:
+class FolderTarget:
     """Files under a root folder.
 
     Paths are strings: creating a Path costs a tenth of a small write.
@@ -34,13 +34,13 @@ class Folder:
 
     def __init__(self, root: str, aside: str) -> None:
         self.root = root
-        self._aside = f"{root}/{aside}/{uuid.uuid4().hex}"
-        self._made: set[str] = set()
+        self._temporary_path = f"{root}/{aside}/{uuid.uuid4().hex}"
+        self._made_folders: set[str] = set()
 
     def prepare(self) -> None:
         """Create the root and its folder for temporary files."""
-        folder = Path(self._aside).parent
-        with _said(str(folder)):
+        folder = Path(self._temporary_path).parent
+        with _file_errors(str(folder)):
             folder.mkdir(parents=True, exist_ok=True)
 
     def write(self, files: Iterable[tuple[str, bytes]]) -> None:
@@ -51,22 +51,22 @@ class Folder:
     def stream(self, path: str, pieces: Iterable[bytes]) -> None:
         """Write one file from an iterable of pieces."""
         whole = self._path(path)
-        with self._set_aside(whole, pieces):
-            os.rename(self._aside, whole)
+        with self._write_temporary(whole, pieces):
+            os.rename(self._temporary_path, whole)
 
     def create(self, path: str, content: bytes) -> bool:
         """Write a file if none exists; return whether it was written."""
         whole = self._path(path)
-        with self._set_aside(whole, (content,)):
+        with self._write_temporary(whole, (content,)):
             try:
-                return _place(self._aside, whole)
+                return _move_if_absent(self._temporary_path, whole)
             finally:
                 with contextlib.suppress(FileNotFoundError):
-                    os.unlink(self._aside)
+                    os.unlink(self._temporary_path)
 
     def read(self, path: str) -> bytes | None:
         """Return the content of a file; None if it does not exist."""
-        with _said(self._path(path)):
+        with _file_errors(self._path(path)):
             try:
                 return Path(self.root, path).read_bytes()
             except (FileNotFoundError, NotADirectoryError):
@@ -74,12 +74,15 @@ class Folder:
 
     def pieces(self, path: str) -> Iterator[bytes]:
         """Yield the content of a file in pieces; none if it does not exist."""
-        with _said(self._path(path)), contextlib.suppress(FileNotFoundError, NotADirectoryError):
-            yield from atomic_files.pieces(Path(self.root, path))
+        with (
+            _file_errors(self._path(path)),
+            contextlib.suppress(FileNotFoundError, NotADirectoryError),
+        ):
+            yield from atomic_files.read_chunks(Path(self.root, path))
 
     def names(self, folder: str) -> set[str]:
         """Return the names of the files in a folder."""
-        with _said(self._path(folder)):
+        with _file_errors(self._path(folder)):
             try:
                 return set(os.listdir(self._path(folder)))
             except FileNotFoundError:
@@ -98,7 +101,7 @@ class Folder:
 
     def drop(self, path: str) -> None:
         """Remove a file, if it exists."""
-        with _said(self._path(path)):
+        with _file_errors(self._path(path)):
             Path(self._path(path)).unlink(missing_ok=True)
 
     def remove(self, folder: str) -> None:
@@ -114,33 +117,33 @@ class Folder:
         return f"{self.root}/{path}" if path else self.root
 
     @contextmanager
-    def _set_aside(self, whole: str, pieces: Iterable[bytes]) -> Iterator[None]:
+    def _write_temporary(self, whole: str, pieces: Iterable[bytes]) -> Iterator[None]:
         """Write the pieces to the temporary file, which the caller renames."""
-        with _said(whole):
-            self._room(whole.rpartition("/")[0])
+        with _file_errors(whole):
+            self._ensure_folder(whole.rpartition("/")[0])
             try:
-                with open(self._aside, "wb") as file:
+                with open(self._temporary_path, "wb") as file:
                     file.writelines(pieces)
                 yield
             except BaseException:
                 with contextlib.suppress(OSError):
-                    os.unlink(self._aside)
+                    os.unlink(self._temporary_path)
                 raise
 
-    def _room(self, folder: str) -> None:
-        if folder not in self._made:
+    def _ensure_folder(self, folder: str) -> None:
+        if folder not in self._made_folders:
             Path(folder).mkdir(parents=True, exist_ok=True)
-            self._made.add(folder)
+            self._made_folders.add(folder)
 
 
-def _place(aside: str, whole: str) -> bool:
+def _move_if_absent(aside: str, whole: str) -> bool:
     """Move a file to a path if none exists there; return whether it was moved."""
     try:
         os.link(aside, whole)
     except FileExistsError:
         return False
     except OSError as fault:
-        if fault.errno not in LINKLESS:
+        if fault.errno not in NO_HARD_LINK_ERRORS:
             raise
         # Not atomic: two processes that begin at once may both find no file; the later one's
         # remains.
@@ -151,7 +154,7 @@ def _place(aside: str, whole: str) -> bool:
 
 
 @contextmanager
-def _said(path: str) -> Iterator[None]:
+def _file_errors(path: str) -> Iterator[None]:
     """Convert errors of the file system to FileError for this path."""
     try:
         yield

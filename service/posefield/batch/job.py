@@ -12,15 +12,15 @@ from posefield import __version__
 from posefield.common.errors import InvalidField
 from posefield.encode.files.file_convention import Unit, Up
 from posefield.inference import session
-from posefield.motion.joint_roles import Names
+from posefield.motion.joint_roles import NamingConvention
 from posefield.synthesis.synthesizer import Synthesizer
 
-MAKERS = ("numpy", "onnxruntime", "usd-core")
+VERSIONED_PACKAGES = ("numpy", "onnxruntime", "usd-core")
 """Packages whose versions may affect the bytes."""
 
 
 @dataclass(frozen=True)
-class Job:
+class ExportJob:
     """One export, independent of the processes and runs that make it.
 
     model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
@@ -35,7 +35,7 @@ class Job:
     chunk: int
     unit: Unit | None = None
     up: Up | None = None
-    names: Names = "own"
+    names: NamingConvention = "own"
 
     def __post_init__(self) -> None:
         if self.chunk < 1:
@@ -43,7 +43,10 @@ class Job:
 
     def facts(self) -> dict[str, Any]:
         """Return the fields as plain values, with the versions of the packages used."""
-        versions = {"posefield": __version__, **{maker: version(maker) for maker in MAKERS}}
+        versions = {
+            "posefield": __version__,
+            **{maker: version(maker) for maker in VERSIONED_PACKAGES},
+        }
         return {**asdict(self), "versions": versions}
 
     @cached_property
@@ -54,21 +57,21 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Work:
+class WorkerInput:
     """Data that a worker needs besides the rows; it can be pickled.
 
     model: content of the model file, read once; the job has its checksum. target: folder or URL.
     skip: leave invalid rows out instead of ending the export.
     """
 
-    job: Job
+    job: ExportJob
     model: bytes = field(compare=False, repr=False)
     target: str
     skip: bool = False
 
 
 @lru_cache(maxsize=1)
-def opened(work: Work) -> Synthesizer:
+def open_model_of(work: WorkerInput) -> Synthesizer:
     """Return the model of a job, cached so that a process opens it once for many chunks."""
     identity = work.job.model
     return Synthesizer(identity.partition("@")[0], session.open_bytes(work.model, identity))

@@ -10,38 +10,40 @@ from dataclasses import dataclass
 from typing import Any
 
 from posefield.batch import manifest
-from posefield.batch.job import Job, Work, opened
-from posefield.batch.rows.row_query import Query
-from posefield.batch.target import Target, Written, put
+from posefield.batch.job import ExportJob, WorkerInput, open_model_of
+from posefield.batch.rows.row_query import ClipQuery
+from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField
-from posefield.encode.archives import PACKS, Pack
+from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import joint_roles
 from posefield.question.results import ClipAnswer
 
-CROWDED = 1000
+ROWS_PER_FOLDER = 1000
 """Files per folder; many more make file systems and file browsers slow."""
 
-Entry = dict[str, Any]
+ManifestEntry = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class File:
+class ClipFile:
     """A clip's file: its path, its content and its entry in the manifest."""
 
     path: str
     content: bytes
-    entry: Entry
+    entry: ManifestEntry
 
 
-Put = Callable[[Target, int, Iterable[list[File]]], tuple[list[Entry], list[Written]]]
+ChunkWriter = Callable[
+    [ExportTarget, int, Iterable[list[ClipFile]]], tuple[list[ManifestEntry], list[WrittenFile]]
+]
 """Write the files of the chunk of a number, which come in batches; return their entries and the
 archives that contain them.
 """
 
 
-Write = Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
+ClipsEncoder = Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
 
 
 @dataclass(frozen=True)
@@ -56,23 +58,23 @@ class Layout:
     """
 
     chunk: int
-    write: Put
-    encode: Callable[[str], Write] = lambda extension: ENCODERS[extension].write
-    misfit: Callable[[Job, Query], str | None] | None = None
-    describe: Callable[[str, str, ClipAnswer], Entry] = lambda name, path, answer: {}
-    complete: Callable[[Work, Iterable[Entry]], Iterable[tuple[str, bytes]]] = (
+    write: ChunkWriter
+    encode: Callable[[str], ClipsEncoder] = lambda extension: CLIP_ENCODERS[extension].write
+    misfit: Callable[[ExportJob, ClipQuery], str | None] | None = None
+    describe: Callable[[str, str, ClipAnswer], ManifestEntry] = lambda name, path, answer: {}
+    complete: Callable[[WorkerInput, Iterable[ManifestEntry]], Iterable[tuple[str, bytes]]] = (
         lambda work, entries: ()
     )
 
 
 def path(row: int, name: str, extension: str) -> str:
     """Return the path of a row's file, in a folder or inside an archive."""
-    return f"clips/{row // CROWDED:03d}/{name}.{extension}"
+    return f"clips/{row // ROWS_PER_FOLDER:03d}/{name}.{extension}"
 
 
-def loose(
-    target: Target, number: int, batches: Iterable[list[File]]
-) -> tuple[list[Entry], list[Written]]:
+def write_loose_files(
+    target: ExportTarget, number: int, batches: Iterable[list[ClipFile]]
+) -> tuple[list[ManifestEntry], list[WrittenFile]]:
     """Write each file separately."""
     entries = []
     for files in batches:
@@ -81,22 +83,22 @@ def loose(
     return entries, []
 
 
-def packed(pack: Pack) -> Put:
+def archive_chunk_writer(pack: ArchiveWriter) -> ChunkWriter:
     """Return a function that writes one archive per chunk, with its part of the manifest last."""
 
     def archived(
-        target: Target, number: int, batches: Iterable[list[File]]
-    ) -> tuple[list[Entry], list[Written]]:
-        entries: list[Entry] = []
+        target: ExportTarget, number: int, batches: Iterable[list[ClipFile]]
+    ) -> tuple[list[ManifestEntry], list[WrittenFile]]:
+        entries: list[ManifestEntry] = []
         path = f"clips-{number:06d}.{pack.extension}"
-        archive = put(target, path, pack.write(_members(number, batches, entries)))
+        archive = put_file(target, path, pack.write(_archive_members(number, batches, entries)))
         return [{**entry, "archive": path} for entry in entries], [archive]
 
     return archived
 
 
-def _members(
-    number: int, batches: Iterable[list[File]], entries: list[Entry]
+def _archive_members(
+    number: int, batches: Iterable[list[ClipFile]], entries: list[ManifestEntry]
 ) -> Iterator[tuple[str, bytes]]:
     """Yield the files by path, then the manifest of their entries, which are added to `entries`."""
     for files in batches:
@@ -109,7 +111,7 @@ def _members(
 STAGE, LIBRARY_FORMAT = "character.usd", "usdc"
 
 
-def _misfit(job: Job, query: Query) -> str | None:
+def _library_misfit(job: ExportJob, query: ClipQuery) -> str | None:
     """Return the reason for which a query does not fit a library of one character, or None."""
     if query.format != LIBRARY_FORMAT:
         return f"format: {query.format!r}, expected {LIBRARY_FORMAT!r} in a library"
@@ -119,41 +121,53 @@ def _misfit(job: Job, query: Query) -> str | None:
     return None
 
 
-def _animations(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+def _animation_layers(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, without a character."""
     from posefield.encode.usd import usd_animation  # usd-core, which other layouts do not need.
 
     return usd_animation.usdc(answers, convention)
 
 
-def _box(name: str, file: str, answer: ClipAnswer) -> Entry:
+def _clip_box(name: str, file: str, answer: ClipAnswer) -> ManifestEntry:
     """Return the corners, m, of a box that contains the character throughout a clip."""
     from posefield.encode.usd import usd_library
 
-    entry = usd_library.entry(name, file, answer)
+    entry = usd_library.library_entry(name, file, answer)
     return {"low": entry.low, "high": entry.high}
 
 
-def _stage(work: Work, entries: Iterable[Entry]) -> Iterator[tuple[str, bytes]]:
+def _library_stage(
+    work: WorkerInput, entries: Iterable[ManifestEntry]
+) -> Iterator[tuple[str, bytes]]:
     """Yield the stage of a library, at the rate of its first clip."""
     from posefield.encode.usd import usd_library
 
-    job, card = work.job, opened(work).session.card
+    job, card = work.job, open_model_of(work).session.card
     keys = ("name", "file", "frames", "fps", "low", "high")
-    clips = [usd_library.Entry(*(entry[key] for key in keys)) for entry in entries]
-    skeleton = joint_roles.renamed(card.skeleton, card.roles, job.names)
-    convention = ENCODERS[LIBRARY_FORMAT].convention(job.unit, job.up)
-    yield STAGE, usd_library.stage(skeleton, convention, clips[0].rate, clips)
+    clips = [usd_library.LibraryEntry(*(entry[key] for key in keys)) for entry in entries]
+    skeleton = joint_roles.rename_joints(card.skeleton, card.roles, job.names)
+    convention = CLIP_ENCODERS[LIBRARY_FORMAT].convention(job.unit, job.up)
+    yield STAGE, usd_library.library_stage(skeleton, convention, clips[0].rate, clips)
 
 
 LAYOUTS = {
-    "folder": Layout(256, loose),
-    "library": Layout(256, loose, lambda extension: _animations, _misfit, _box, _stage),
-    **{pack.extension: Layout(1000, packed(pack)) for pack in PACKS.values()},
+    "folder": Layout(256, write_loose_files),
+    "library": Layout(
+        256,
+        write_loose_files,
+        lambda extension: _animation_layers,
+        _library_misfit,
+        _clip_box,
+        _library_stage,
+    ),
+    **{
+        pack.extension: Layout(1000, archive_chunk_writer(pack))
+        for pack in ARCHIVE_WRITERS.values()
+    },
 }
 
 
-def find(name: str) -> Layout:
+def find_layout(name: str) -> Layout:
     """Return the layout of a name; InvalidField if there is none."""
     if name not in LAYOUTS:
         raise InvalidField("layout", f"{name!r}, expected one of {', '.join(LAYOUTS)}")

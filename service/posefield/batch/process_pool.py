@@ -19,17 +19,17 @@ from multiprocessing import connection
 from multiprocessing.connection import Connection
 
 from posefield.batch import chunks
-from posefield.batch.checkpoint import Part
-from posefield.batch.chunks import Stop, Stopped, Task
-from posefield.batch.job import Work
-from posefield.common.cpu_cores import ALONE
+from posefield.batch.checkpoint import ChunkResult
+from posefield.batch.chunks import ChunkAbandoned, ChunkTask, StopCheck
+from posefield.batch.job import WorkerInput
+from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.common.errors import WorkerDied
 
-POLL = 0.1
+POLL_INTERVAL = 0.1
 """Seconds between two checks for a stop."""
 RESUMES = "finished chunks are kept, and the same command resumes the export"
 
-Runner = Callable[[Work, Iterator[Task], Stopped], Iterator[Part]]
+Runner = Callable[[WorkerInput, Iterator[ChunkTask], StopCheck], Iterator[ChunkResult]]
 """Run tasks until none is left or `stopped()` is true; yield the part of each finished one.
 
 Parts are in the order of completion. Only a few tasks are taken in advance, so that memory does not
@@ -47,29 +47,33 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0))
 
 
-def run_here(work: Work, tasks: Iterator[Task], stopped: Stopped) -> Iterator[Part]:
+def run_here(
+    work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
+) -> Iterator[ChunkResult]:
     """Run the tasks in this process, one after another."""
     for task in tasks:
         if stopped():
             return
         try:
-            yield chunks.make(work, task, stopped)
-        except Stop:
+            yield chunks.make_chunk(work, task, stopped)
+        except ChunkAbandoned:
             return
 
 
 def _run_in_processes(
-    workers: int, work: Work, tasks: Iterator[Task], stopped: Stopped
-) -> Iterator[Part]:
+    workers: int, work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
+) -> Iterator[ChunkResult]:
     first = list(islice(tasks, workers))
     tasks = chain(first, tasks)
     # Starting a process takes as long as making a thousand clips.
     if len(first) < 2:
         return run_here(work, tasks, stopped)
-    return _pooled(len(first), work, tasks, stopped)
+    return _run_in_pool(len(first), work, tasks, stopped)
 
 
-def _pooled(workers: int, work: Work, tasks: Iterator[Task], stopped: Stopped) -> Iterator[Part]:
+def _run_in_pool(
+    workers: int, work: WorkerInput, tasks: Iterator[ChunkTask], stopped: StopCheck
+) -> Iterator[ChunkResult]:
     """Run the tasks in a pool.
 
     Raises WorkerDied if a worker process dies, and the MotionError of a failed task.
@@ -80,13 +84,13 @@ def _pooled(workers: int, work: Work, tasks: Iterator[Task], stopped: Stopped) -
     pool = ProcessPoolExecutor(workers, context, _start_worker, (stop_seen,))
     try:
         submit = partial(_submit, pool, work)
-        yield from _parts(submit, 2 * workers, tasks, stopped, stop.close)
+        yield from _finished_parts(submit, 2 * workers, tasks, stopped, stop.close)
     except BrokenProcessPool as fault:
         # The pool waits for ever for a worker that was being started when another died.
         for child in multiprocessing.active_children():
             child.terminate()
         # The signal that ended the worker may be about to reach this process.
-        time.sleep(POLL)
+        time.sleep(POLL_INTERVAL)
         if not stopped():
             raise WorkerDied(f"a worker process has died; {RESUMES}") from fault
     finally:
@@ -95,34 +99,36 @@ def _pooled(workers: int, work: Work, tasks: Iterator[Task], stopped: Stopped) -
         stop_seen.close()
 
 
-def _parts(
-    submit: Callable[[Task], "Future[Part | None]"],
+def _finished_parts(
+    submit: Callable[[ChunkTask], "Future[ChunkResult | None]"],
     ahead: int,
-    tasks: Iterator[Task],
-    stopped: Stopped,
+    tasks: Iterator[ChunkTask],
+    stopped: StopCheck,
     stop: Callable[[], None],
-) -> Iterator[Part]:
+) -> Iterator[ChunkResult]:
     """Yield the part of each finished task, with `ahead` of them submitted at any time."""
-    pending: set[Future[Part | None]] = set()
+    pending: set[Future[ChunkResult | None]] = set()
     while not stopped():
         pending |= {submit(task) for task in islice(tasks, ahead - len(pending))}
         if not pending:
             return
-        done, pending = wait(pending, POLL, FIRST_COMPLETED)
-        yield from _made(done)
+        done, pending = wait(pending, POLL_INTERVAL, FIRST_COMPLETED)
+        yield from _completed_results(done)
     stop()
-    yield from _made(wait([future for future in pending if not future.cancel()]).done)
+    yield from _completed_results(wait([future for future in pending if not future.cancel()]).done)
 
 
-def _made(done: "Iterable[Future[Part | None]]") -> Iterator[Part]:
+def _completed_results(done: "Iterable[Future[ChunkResult | None]]") -> Iterator[ChunkResult]:
     """Yield the results of futures, except those of abandoned tasks."""
     return (part for future in done if (part := future.result()) is not None)
 
 
-def _submit(pool: ProcessPoolExecutor, work: Work, task: Task) -> "Future[Part | None]":
+def _submit(
+    pool: ProcessPoolExecutor, work: WorkerInput, task: ChunkTask
+) -> "Future[ChunkResult | None]":
     # A submission may start a worker, which inherits this environment.
     with _worker_environment():
-        return pool.submit(_make, work, task)
+        return pool.submit(_run_task, work, task)
 
 
 @contextmanager
@@ -132,8 +138,8 @@ def _worker_environment() -> Iterator[None]:
     Each uses one thread, as there is a worker per core, and blocks SIGINT: a terminal sends Ctrl-C
     to all processes, and only the parent handles it.
     """
-    before = {name: os.environ.get(name) for name in ALONE}
-    os.environ.update(ALONE)
+    before = {name: os.environ.get(name) for name in SINGLE_THREAD_ENV}
+    os.environ.update(SINGLE_THREAD_ENV)
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -143,7 +149,7 @@ def _worker_environment() -> Iterator[None]:
             os.environ.pop(name) if value is None else os.environ.update({name: value})
 
 
-_stopped: Stopped = lambda: False  # noqa: E731
+_stopped: StopCheck = lambda: False  # noqa: E731
 """Returns true in a worker when the export should stop."""
 
 
@@ -162,12 +168,12 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _make(work: Work, task: Task) -> Part | None:
+def _run_task(work: WorkerInput, task: ChunkTask) -> ChunkResult | None:
     """Make a chunk in a worker; return None if it was abandoned."""
     # The pool hands over a few tasks in advance, which it cannot cancel.
     if _stopped():
         return None
     try:
-        return chunks.make(work, task, _stopped)
-    except Stop:
+        return chunks.make_chunk(work, task, _stopped)
+    except ChunkAbandoned:
         return None

@@ -7,23 +7,29 @@ from itertools import islice
 from typing import Any, Protocol
 
 from posefield.batch import checkpoint, chunks, layouts, process_pool
-from posefield.batch.checkpoint import Part
-from posefield.batch.chunks import Task
-from posefield.batch.job import Job, Work
+from posefield.batch.checkpoint import ChunkResult
+from posefield.batch.chunks import ChunkTask
+from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.process_pool import Runner
-from posefield.batch.rows.row_query import KEPT, Fault, Query, Source, Survey
-from posefield.batch.target import STATE, Target, open_target
+from posefield.batch.rows.row_query import (
+    MAX_KEPT_FAULTS,
+    ClipQuery,
+    RowFault,
+    RowSource,
+    RowSurvey,
+)
+from posefield.batch.target import STATE_FOLDER, ExportTarget, open_target
 from posefield.common.errors import FileError, InvalidField
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 
 
-class Monitor(Protocol):
+class RunMonitor(Protocol):
     """Observer of a run, which also decides when to stop it."""
 
     def begin(self, total: int, done: int) -> None:
         """Begin a run; `done` of the `total` rows were finished by earlier runs."""
 
-    def advance(self, part: Part) -> None:
+    def advance(self, part: ChunkResult) -> None:
         """Record a finished chunk."""
 
     def note(self, message: str) -> None:
@@ -45,7 +51,7 @@ class Shard:
             raise InvalidField("shard", f"{self.index}/{self.count}, expected 0/N to N-1/N")
 
     @classmethod
-    def of(cls, text: str) -> "Shard":
+    def parse(cls, text: str) -> "Shard":
         """Return the shard of the text I/N; InvalidField for any other."""
         index, _, count = text.partition("/")
         try:
@@ -53,16 +59,16 @@ class Shard:
         except ValueError as fault:
             raise InvalidField("shard", f"{text!r}, expected I/N, such as 0/4") from fault
 
-    def has(self, number: int) -> bool:
+    def contains(self, number: int) -> bool:
         """Return whether a chunk belongs to the shard."""
         return number % self.count == self.index
 
 
-WHOLE = Shard()
+WHOLE_EXPORT = Shard()
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunOutcome:
     """Result of a run.
 
     rows: of the shard. done: how many of them are finished. facts: of the whole export if it is
@@ -72,17 +78,17 @@ class Outcome:
     rows: int
     done: int
     facts: dict[str, Any] | None = None
-    before: bool = False
+    already_complete: bool = False
 
 
 def run(
-    work: Work,
-    source: Source,
-    monitor: Monitor,
+    work: WorkerInput,
+    source: RowSource,
+    monitor: RunMonitor,
     runner: Runner = process_pool.run_here,
-    shard: Shard = WHOLE,
+    shard: Shard = WHOLE_EXPORT,
     verify: bool = False,
-) -> Outcome:
+) -> RunOutcome:
     """Make the unfinished chunks of a shard, and complete the export if those were all.
 
     verify: compare files of finished chunks by checksum, not only by size. Chunks with a file that
@@ -91,24 +97,24 @@ def run(
     next run resumes from there.
     """
     target = open_target(work.target)
-    if (facts := checkpoint.complete(target, work.target, work.job)) is not None:
+    if (facts := checkpoint.completed_facts(target, work.target, work.job)) is not None:
         # The run that completed it may have been killed before this.
-        target.remove(STATE)
-        if (path := checkpoint.damaged(target, facts, verify)) is None:
+        target.remove(STATE_FOLDER)
+        if (path := checkpoint.first_damaged_file(target, facts, verify)) is None:
             rows = facts["clips"] + facts["skipped"]
-            return Outcome(rows, rows, facts, before=True)
+            return RunOutcome(rows, rows, facts, already_complete=True)
         monitor.note(f"{work.target}/{path}: missing or damaged; the export is made again")
         checkpoint.reopen(target, work.job)
-    source = _fitting(work.job, source)
-    total = _survey(source, work.skip)
-    return _resume(_Run(work, source, target, shard, total, verify), monitor, runner)
+    source = _checked_source(work.job, source)
+    total = _row_count(source, work.skip)
+    return _resume(_ShardRun(work, source, target, shard, total, verify), monitor, runner)
 
 
 @dataclass(frozen=True)
-class _Run:
-    work: Work
-    source: Source
-    target: Target
+class _ShardRun:
+    work: WorkerInput
+    source: RowSource
+    target: ExportTarget
     shard: Shard
     total: int
     verify: bool
@@ -122,9 +128,9 @@ class _Run:
         return math.ceil(self.total / self.size)
 
     @property
-    def own(self) -> dict[int, int]:
+    def chunk_sizes(self) -> dict[int, int]:
         """Number of rows of each chunk of the shard, by the number of the chunk."""
-        numbers = filter(self.shard.has, range(self.chunks))
+        numbers = filter(self.shard.contains, range(self.chunks))
         return {number: min(self.size, self.total - number * self.size) for number in numbers}
 
     def unfinished(self) -> set[int]:
@@ -132,27 +138,27 @@ class _Run:
         names = checkpoint.names(self.target)
         return {
             number
-            for number in self.own
-            if checkpoint.done(self.target, number, names, self.verify) is None
+            for number in self.chunk_sizes
+            if checkpoint.finished_chunk(self.target, number, names, self.verify) is None
         }
 
-    def tasks(self, numbers: set[int]) -> Iterator[Task]:
+    def tasks(self, numbers: set[int]) -> Iterator[ChunkTask]:
         """Yield the tasks of some chunks, from one pass through the queries."""
         rows = self.source.rows()
         for number in range(max(numbers, default=-1) + 1):
             chunk = tuple(islice(rows, self.size))
             if number in numbers:
-                yield Task(number, number * self.size, chunk)
+                yield ChunkTask(number, number * self.size, chunk)
 
     def finish(self) -> dict[str, Any] | None:
         return checkpoint.finish(self.target, self.work, self.chunks)
 
 
-def _resume(run: _Run, monitor: Monitor, runner: Runner) -> Outcome:
-    own = run.own
+def _resume(run: _ShardRun, monitor: RunMonitor, runner: Runner) -> RunOutcome:
+    own = run.chunk_sizes
     rows = sum(own.values())
     try:
-        checkpoint.begin(run.target, run.work.target, run.work.job)
+        checkpoint.assign_job(run.target, run.work.target, run.work.job)
         left = run.unfinished()
         done = rows - sum(own[number] for number in left)
         monitor.begin(rows, done)
@@ -161,65 +167,65 @@ def _resume(run: _Run, monitor: Monitor, runner: Runner) -> Outcome:
             monitor.advance(part)
     except FileError:
         # Another run of the same export may have completed it meanwhile, or during the survey.
-        if (facts := checkpoint.complete(run.target, run.work.target, run.work.job)) is None:
+        if (facts := checkpoint.completed_facts(run.target, run.work.target, run.work.job)) is None:
             raise
-        return Outcome(rows, rows, facts)
-    return Outcome(rows, done, None if done < rows else run.finish())
+        return RunOutcome(rows, rows, facts)
+    return RunOutcome(rows, done, None if done < rows else run.finish())
 
 
-def _survey(source: Source, skip: bool) -> int:
+def _row_count(source: RowSource, skip: bool) -> int:
     """Return the number of rows.
 
     Raises InvalidField for faults that are not skipped, or if all rows are faults.
     """
     found = source.survey()
     if found.faulty and not skip:
-        raise chunks.refusal(found.faulty, found.faults)
+        raise chunks.invalid_rows_error(found.faulty, found.faults)
     if found.faulty == found.total:
         raise InvalidField("queries", "no row that can be answered, expected at least one")
     return found.total
 
 
-def _fitting(job: Job, source: Source) -> Source:
+def _checked_source(job: ExportJob, source: RowSource) -> RowSource:
     """Return the source with faults in place of the queries that the job cannot write."""
-    misfit = layouts.find(job.layout).misfit
+    misfit = layouts.find_layout(job.layout).misfit
     if misfit is None and (job.unit or job.up):
-        misfit = _unlawful
-    return source if misfit is None else _Fitting(source, job, misfit)
+        misfit = _convention_misfit
+    return source if misfit is None else _CheckedSource(source, job, misfit)
 
 
-def _unlawful(job: Job, query: Query) -> str | None:
+def _convention_misfit(job: ExportJob, query: ClipQuery) -> str | None:
     """Return the reason for which a format cannot have the job's unit and up axis, or None."""
     try:
-        ENCODERS[query.format].convention(job.unit, job.up)
+        CLIP_ENCODERS[query.format].convention(job.unit, job.up)
     except InvalidField as fault:
         return str(fault)
     return None
 
 
 @dataclass(frozen=True)
-class _Fitting:
+class _CheckedSource:
     """Rows of a source; those for which `misfit` returns a reason are faults."""
 
-    source: Source
-    job: Job
-    misfit: Callable[[Job, Query], str | None]
+    source: RowSource
+    job: ExportJob
+    misfit: Callable[[ExportJob, ClipQuery], str | None]
 
     @property
     def digest(self) -> str:
         # The reasons depend on the job, which has a digest of its own.
         return self.source.digest
 
-    def rows(self) -> Iterator[Query | Fault]:
+    def rows(self) -> Iterator[ClipQuery | RowFault]:
         for row in self.source.rows():
-            why = self.misfit(self.job, row) if isinstance(row, Query) else None
-            yield row if why is None else Fault(row.place, why)
+            why = self.misfit(self.job, row) if isinstance(row, ClipQuery) else None
+            yield row if why is None else RowFault(row.place, why)
 
-    def survey(self) -> Survey:
+    def survey(self) -> RowSurvey:
         total, faulty, faults = 0, 0, []
         for row in self.rows():
             total += 1
-            if isinstance(row, Fault):
+            if isinstance(row, RowFault):
                 faulty += 1
-                faults += [row] if faulty <= KEPT else []
-        return Survey(total, faulty, tuple(faults))
+                faults += [row] if faulty <= MAX_KEPT_FAULTS else []
+        return RowSurvey(total, faulty, tuple(faults))

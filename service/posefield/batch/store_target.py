@@ -16,20 +16,20 @@ from obstore.exceptions import AlreadyExistsError, BaseError
 from posefield.common.errors import FileError
 from posefield.registry import object_store
 
-PIECE = 8 << 20
+PART_SIZE = 8 << 20
 """Part size of multipart uploads, bytes; S3 allows 10,000 parts at most, and none below 5 MiB."""
-AT_ONCE = 4
+CONCURRENT_PARTS = 4
 """Concurrent parts of one upload."""
-LISTED = 1000
+LIST_PAGE_SIZE = 1000
 """Objects of one page of a listing."""
 
 
-class Store:
+class StoreTarget:
     """Objects under the path of a URL."""
 
     def __init__(self, url: str) -> None:
         self.url = url.rstrip("/")
-        with _said(self.url):
+        with _store_errors(self.url):
             self._store: Any = object_store.connect(self.url)
 
     def prepare(self) -> None:
@@ -43,14 +43,14 @@ class Store:
         puts = (obstore.put_async(self._store, path, content) for path, content in files)
         results = await asyncio.gather(*puts, return_exceptions=True)
         for (path, _), result in zip(files, results, strict=True):
-            with _said(self._url(path)):
+            with _store_errors(self._url(path)):
                 if isinstance(result, BaseException):
                     raise result
 
     def stream(self, path: str, pieces: Iterable[bytes]) -> None:
         """Write one file from an iterable of pieces."""
-        with _said(self._url(path)):
-            asyncio.run(self._stream(path, _in_turn(pieces)))
+        with _store_errors(self._url(path)):
+            asyncio.run(self._stream(path, _async_pieces(pieces)))
 
     async def _stream(self, path: str, pieces: AsyncIterator[bytes]) -> None:
         await obstore.put_async(
@@ -58,13 +58,13 @@ class Store:
             path,
             pieces,
             use_multipart=True,
-            chunk_size=PIECE,
-            max_concurrency=AT_ONCE,
+            chunk_size=PART_SIZE,
+            max_concurrency=CONCURRENT_PARTS,
         )
 
     def create(self, path: str, content: bytes) -> bool:
         """Write a file if none exists; return whether it was written."""
-        with _said(self._url(path)):
+        with _store_errors(self._url(path)):
             try:
                 obstore.put(self._store, path, content, mode="create")
             except AlreadyExistsError:
@@ -73,7 +73,7 @@ class Store:
 
     def read(self, path: str) -> bytes | None:
         """Return the content of a file; None if it does not exist."""
-        with _said(self._url(path)):
+        with _store_errors(self._url(path)):
             try:
                 return bytes(obstore.get(self._store, path).bytes())
             except FileNotFoundError:
@@ -81,13 +81,13 @@ class Store:
 
     def pieces(self, path: str) -> Iterator[bytes]:
         """Yield the content of a file in pieces; none if it does not exist."""
-        with _said(self._url(path)), suppress(FileNotFoundError):
-            yield from map(bytes, obstore.get(self._store, path).stream(min_chunk_size=PIECE))
+        with _store_errors(self._url(path)), suppress(FileNotFoundError):
+            yield from map(bytes, obstore.get(self._store, path).stream(min_chunk_size=PART_SIZE))
 
     def names(self, folder: str) -> set[str]:
         """Return the names of the files in a folder."""
-        with _said(self._url(folder)):
-            batches = obstore.list(self._store, f"{folder}/", chunk_size=LISTED)
+        with _store_errors(self._url(folder)):
+            batches = obstore.list(self._store, f"{folder}/", chunk_size=LIST_PAGE_SIZE)
             return {meta["path"].rpartition("/")[2] for batch in batches for meta in batch}
 
     def holds(self, path: str, size: int) -> bool:
@@ -96,33 +96,33 @@ class Store:
 
     def empty(self, but: str) -> bool:
         """Return whether the store contains nothing except, possibly, one folder."""
-        with _said(self.url):
+        with _store_errors(self.url):
             found = obstore.list_with_delimiter(self._store)
         return not found["objects"] and set(found["common_prefixes"]) <= {but}
 
     def drop(self, path: str) -> None:
         """Remove a file, if it exists."""
-        with _said(self._url(path)):
+        with _store_errors(self._url(path)):
             obstore.delete(self._store, path)
 
     def remove(self, folder: str) -> None:
         """Remove a folder and its content."""
-        with _said(self._url(folder)):
-            for batch in obstore.list(self._store, f"{folder}/", chunk_size=LISTED):
+        with _store_errors(self._url(folder)):
+            for batch in obstore.list(self._store, f"{folder}/", chunk_size=LIST_PAGE_SIZE):
                 obstore.delete(self._store, [meta["path"] for meta in batch])
 
     def _url(self, path: str) -> str:
         return f"{self.url}/{path}"
 
 
-async def _in_turn(pieces: Iterable[bytes]) -> AsyncIterator[bytes]:
+async def _async_pieces(pieces: Iterable[bytes]) -> AsyncIterator[bytes]:
     # Iterated in this thread's event loop: the pieces may come from calls that use the store.
     for piece in pieces:
         yield piece
 
 
 @contextmanager
-def _said(url: str) -> Iterator[None]:
+def _store_errors(url: str) -> Iterator[None]:
     """Convert errors of the store to FileError for this object."""
     try:
         yield

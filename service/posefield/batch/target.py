@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import Protocol
 from urllib.parse import unquote, urlsplit
 
-from posefield.batch.folder_target import Folder
+from posefield.batch.folder_target import FolderTarget
 from posefield.common.errors import InvalidField
 
-STATE = ".posefield"
+STATE_FOLDER = ".posefield"
 """Folder that a target contains only until its export is complete."""
-ASIDE = f"{STATE}/writing"
+TEMPORARY_FILE = f"{STATE_FOLDER}/writing"
 URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.IGNORECASE)
 
 
-class Target(Protocol):
+class ExportTarget(Protocol):
     """Files by path, with `/` between folders; each is complete or absent.
 
     Every method raises FileError, which names the file, if the folder or the store fails.
@@ -57,7 +57,7 @@ class Target(Protocol):
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenFile:
     """A written file: its path in the target, its size in bytes and its SHA-256."""
 
     file: str
@@ -65,7 +65,7 @@ class Written:
     sha256: str
 
 
-def put(target: Target, path: str, pieces: Iterable[bytes]) -> Written:
+def put_file(target: ExportTarget, path: str, pieces: Iterable[bytes]) -> WrittenFile:
     """Write one file from an iterable of pieces; return its size and checksum. Raises FileError."""
     size, digest = 0, hashlib.sha256()
 
@@ -77,10 +77,10 @@ def put(target: Target, path: str, pieces: Iterable[bytes]) -> Written:
             yield piece
 
     target.stream(path, counted())
-    return Written(path, size, digest.hexdigest())
+    return WrittenFile(path, size, digest.hexdigest())
 
 
-def intact(target: Target, written: Written, verify: bool) -> bool:
+def is_intact(target: ExportTarget, written: WrittenFile, verify: bool) -> bool:
     """Return whether a file is unchanged, by its size or, with `verify`, its SHA-256."""
     if not verify:
         return target.holds(written.file, written.bytes)
@@ -90,7 +90,7 @@ def intact(target: Target, written: Written, verify: bool) -> bool:
     return digest.hexdigest() == written.sha256
 
 
-def lines(target: Target, path: str) -> Iterator[bytes]:
+def read_lines(target: ExportTarget, path: str) -> Iterator[bytes]:
     """Yield the lines of a file, without holding the whole file in memory."""
     rest = b""
     for piece in target.pieces(path):
@@ -100,7 +100,7 @@ def lines(target: Target, path: str) -> Iterator[bytes]:
         yield rest
 
 
-def open_target(place: str) -> Target:
+def open_target(place: str) -> ExportTarget:
     """Return the target of a path, of a file:/// URL or, through obstore, of an object store's URL.
 
     Raises InvalidField for any other text, and FileError for a store that cannot be used.
@@ -108,13 +108,13 @@ def open_target(place: str) -> Target:
     if not place:
         raise InvalidField("output", "empty, expected a folder or an object store's URL")
     if not URL.match(place):
-        return Folder(place.rstrip("/") or "/", ASIDE)
+        return FolderTarget(place.rstrip("/") or "/", TEMPORARY_FILE)
     url = urlsplit(place)
     if url.scheme == "file":
         if url.netloc not in ("", "localhost"):
             raise InvalidField("output", f"{place!r}, expected file:///FOLDER without a host")
         return open_target(unquote(url.path))
     # Imported here because obstore is an optional extra.
-    from posefield.batch.store_target import Store
+    from posefield.batch.store_target import StoreTarget
 
-    return Store(place)
+    return StoreTarget(place)

@@ -19,7 +19,7 @@ from posefield.check import (
     stage_checks,
 )
 from posefield.check.finding import Finding, Severity, error
-from posefield.check.skeleton_bindings import Rig
+from posefield.check.skeleton_bindings import SkeletonBinding
 from posefield.common.errors import UsdError
 
 __all__ = ["Finding", "check"]
@@ -34,7 +34,7 @@ def check(path: Path) -> list[Finding]:
     quiet = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         stage = _open(path)
-        return [*_stage(stage), *findings(stage)]
+        return [*_stage_findings(stage), *validator_findings(stage)]
     finally:
         quiet.TakeUncoalescedDiagnostics()
 
@@ -52,16 +52,16 @@ def _reason(fault: Any) -> str:
     return "; ".join(str(entry.commentary).strip() for entry in fault.args) or str(fault)
 
 
-def _stage(stage: Any) -> Iterator[Finding]:
+def _stage_findings(stage: Any) -> Iterator[Finding]:
     yield from stage_checks.metadata(stage)
-    found = skeleton_bindings.rigs(stage)
+    found = skeleton_bindings.skeleton_bindings(stage)
     if not found:
         yield error("no-skeleton", stage.GetPseudoRoot(), "no Skeleton, expected at least one")
     for each in found:
-        yield from _rig(each)
+        yield from _skeleton_findings(each)
 
 
-def _rig(each: Rig) -> Iterator[Finding]:
+def _skeleton_findings(each: SkeletonBinding) -> Iterator[Finding]:
     for look in (
         stage_checks.bindings,
         joint_checks.names,
@@ -70,7 +70,7 @@ def _rig(each: Rig) -> Iterator[Finding]:
         mesh_checks.extents,
     ):
         yield from look(each)
-    for skinned in stage_checks.meshes(each):
+    for skinned in stage_checks.skinned_meshes(each):
         yield from mesh_checks.influences(each, skinned)
     if each.animation is not None:
         for look in (
@@ -82,13 +82,13 @@ def _rig(each: Rig) -> Iterator[Finding]:
             yield from look(each)
 
 
-def findings(stage: Any) -> Iterator[Finding]:
+def validator_findings(stage: Any) -> Iterator[Finding]:
     """Yield errors and warnings of all validators of pxr."""
     for fault in UsdValidation.ValidationContext(_validators()).Validate(stage):
         warned = fault.GetType() == UsdValidation.ValidationErrorType.Warn
         severity: Severity = "warning" if warned else "error"
         code = f"usd:{fault.GetName()}"
-        yield Finding(code, _place(fault), fault.GetMessage().strip(), severity)
+        yield Finding(code, _prim_path(fault), fault.GetMessage().strip(), severity)
 
 
 @cache
@@ -96,6 +96,6 @@ def _validators() -> Any:
     return UsdValidation.ValidationRegistry().GetOrLoadAllValidators()
 
 
-def _place(fault: Any) -> str:
+def _prim_path(fault: Any) -> str:
     sites = [site for site in fault.GetSites() if site.IsPrim()]
     return str(sites[0].GetPrim().GetPath()) if sites else "/"

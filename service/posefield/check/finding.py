@@ -29,7 +29,7 @@ def warning(code: str, prim: Any, message: str) -> Finding:
     return Finding(code, str(prim.GetPath()), message, "warning")
 
 
-def some(values: list[Any]) -> str:
+def first_values(values: list[Any]) -> str:
     """Return the first three of many values as text, for a message."""
     shown = ", ".join(str(value) for value in values[:3])
     return shown if len(values) <= 3 else f"{shown} and {len(values) - 3} more"

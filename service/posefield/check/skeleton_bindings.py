@@ -10,7 +10,7 @@ from posefield.common.units import Floats
 
 
 @dataclass(frozen=True)
-class Rig:
+class SkeletonBinding:
     """Skeleton of a stage: its prim, the SkelRoot above it, its SkelAnimation, and its joints.
 
     root, animation: None if missing.
@@ -28,19 +28,19 @@ class Rig:
         return [joint.rpartition("/")[2] for joint in self.joints]
 
 
-def rigs(stage: Any) -> list[Rig]:
+def skeleton_bindings(stage: Any) -> list[SkeletonBinding]:
     """Return every skeleton of the stage, instances included."""
     prims = stage.Traverse(Usd.TraverseInstanceProxies())
-    return [_rig(stage, prim) for prim in prims if prim.IsA(UsdSkel.Skeleton)]
+    return [_skeleton_binding(stage, prim) for prim in prims if prim.IsA(UsdSkel.Skeleton)]
 
 
-def authored(prim: Any, name: str) -> bool:
+def is_authored(prim: Any, name: str) -> bool:
     """Return whether the attribute has an authored value, a default or time samples."""
     attribute = prim.GetAttribute(name)
     return bool(attribute and attribute.HasAuthoredValue())
 
 
-def array(prim: Any, name: str, time: Any = None) -> Floats:
+def attribute_array(prim: Any, name: str, time: Any = None) -> Floats:
     """Return the value of an attribute as numbers; empty if it has none or another type."""
     code = Usd.TimeCode.Default() if time is None else time
     value = prim.GetAttribute(name).Get(code) if prim.HasAttribute(name) else None
@@ -50,16 +50,20 @@ def array(prim: Any, name: str, time: Any = None) -> Floats:
         return np.empty(0)
 
 
-def tokens(prim: Any, name: str = "joints") -> tuple[str, ...]:
+def attribute_tokens(prim: Any, name: str = "joints") -> tuple[str, ...]:
     """Return the tokens of an attribute; empty if it has none."""
     value = prim.GetAttribute(name).Get() if prim.HasAttribute(name) else None
     return tuple(str(token) for token in value or ())
 
 
-def _rig(stage: Any, skeleton: Any) -> Rig:
+def _skeleton_binding(stage: Any, skeleton: Any) -> SkeletonBinding:
     source = UsdSkel.BindingAPI(skeleton).GetInheritedAnimationSource()
     animation = source if source and source.IsA(UsdSkel.Animation) else None
     root = UsdSkel.Root.Find(skeleton)
-    return Rig(
-        stage, skeleton, root.GetPrim() if root else None, animation, tokens(skeleton, "joints")
+    return SkeletonBinding(
+        stage,
+        skeleton,
+        root.GetPrim() if root else None,
+        animation,
+        attribute_tokens(skeleton, "joints"),
     )

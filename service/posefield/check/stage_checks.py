@@ -7,7 +7,7 @@ from pxr import Usd, UsdSkel
 
 from posefield.check import skeleton_bindings as rigs
 from posefield.check.finding import Finding, error, warning
-from posefield.check.skeleton_bindings import Rig
+from posefield.check.skeleton_bindings import SkeletonBinding
 
 FALLBACKS = {
     "upAxis": "readers differ in their fallback",
@@ -32,12 +32,12 @@ def metadata(stage: Any) -> Iterator[Finding]:
         yield warning("start-not-zero", root, message)
 
 
-def bindings(rig: Rig) -> Iterator[Finding]:
+def bindings(rig: SkeletonBinding) -> Iterator[Finding]:
     """Yield findings on the bindings of a skeleton to its root, animation and meshes."""
     if rig.root is None:
         message = "no SkelRoot above this skeleton, expected one instead of an Xform"
         yield error("no-skel-root", rig.skeleton, message)
-    bound = [prim for prim in (rig.root, rig.skeleton, *meshes(rig)) if prim]
+    bound = [prim for prim in (rig.root, rig.skeleton, *skinned_meshes(rig)) if prim]
     for prim in bound:
         if not prim.HasAPI(UsdSkel.BindingAPI):
             message = f"a {prim.GetTypeName()} without SkelBindingAPI; expected it applied"
@@ -45,12 +45,12 @@ def bindings(rig: Rig) -> Iterator[Finding]:
     if rig.animation is None:
         message = "no SkelAnimation bound, expected one at skel:animationSource"
         yield error("no-animation", rig.skeleton, message)
-    if not meshes(rig):
+    if not skinned_meshes(rig):
         message = "no mesh is skinned to this skeleton, expected one: some readers find no bones"
         yield error("no-skinned-mesh", rig.skeleton, message)
 
 
-def meshes(rig: Rig) -> list[Any]:
+def skinned_meshes(rig: SkeletonBinding) -> list[Any]:
     """Return the prims below the skeleton's root that are skinned to it."""
     top = rig.root or rig.skeleton.GetParent()
     below = Usd.PrimRange(top, Usd.TraverseInstanceProxies())
@@ -58,7 +58,7 @@ def meshes(rig: Rig) -> list[Any]:
 
 
 def _skinned(prim: Any, skeleton: Any) -> bool:
-    if not rigs.authored(prim, "primvars:skel:jointIndices"):
+    if not rigs.is_authored(prim, "primvars:skel:jointIndices"):
         return False
     bound = UsdSkel.BindingAPI(prim).GetInheritedSkeleton()
     return bool(bound and bound.GetPrim() == skeleton)

@@ -67,7 +67,7 @@ def main() -> None:
         sys.exit(INTERRUPTED)
     except MotionError as fault:
         typer.echo(f"posefield: {fault}", err=True)
-        sys.exit(_code(fault))
+        sys.exit(_exit_code(fault))
 
 
 def _missing(module: str) -> str:
@@ -91,7 +91,7 @@ def _list_training() -> None:
         app.command(name, help=text, context_settings=anything)(absent)
 
 
-def _code(fault: MotionError) -> int:
+def _exit_code(fault: MotionError) -> int:
     if isinstance(fault, FileError):
         return 3
     if isinstance(fault, TrainingError):

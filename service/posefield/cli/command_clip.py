@@ -6,23 +6,23 @@ from typing import Annotated
 import typer
 
 from posefield.common import atomic_files
-from posefield.console.arguments import Json, ModelPath, encoder, open_model
-from posefield.console.output import tell, wrote
-from posefield.console.question_options import asks
+from posefield.console.arguments import Json, ModelPath, encoder_for, open_model
+from posefield.console.output import print_warnings, written_message
+from posefield.console.question_options import with_question_options
 from posefield.encode.formats import POSE_ENCODERS
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
 
 
-@asks(PoseQuestion, usual={"times": [0.0]})
+@with_question_options(PoseQuestion, usual={"times": [0.0]})
 def pose(model: ModelPath, question: PoseQuestion) -> None:
     """Print the poses at one or more times as JSON."""
-    answer = poses.pose(open_model(model), question)
-    tell(answer.trust)
+    answer = poses.synthesize_poses(open_model(model), question)
+    print_warnings(answer.trust)
     typer.echo(POSE_ENCODERS["json"].encode(answer).decode())
 
 
-@asks(FileQuestion)
+@with_question_options(FileQuestion)
 def clip(
     model: ModelPath,
     output: Annotated[
@@ -32,9 +32,9 @@ def clip(
     json: Json = False,
 ) -> None:
     """Write a clip as a usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack file."""
-    found = encoder(output)
+    found = encoder_for(output)
     convention = found.convention(question.unit, question.up)
-    answer = clips.clip(open_model(model), question)
+    answer = clips.synthesize_clip(open_model(model), question)
     atomic_files.write(found.encode(answer, convention), output)
-    tell(answer.trust)
-    typer.echo(wrote(output, answer, json))
+    print_warnings(answer.trust)
+    typer.echo(written_message(output, answer, json))

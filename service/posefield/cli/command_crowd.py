@@ -9,13 +9,13 @@ from msgspec import structs
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, ModelPath, open_model
 from posefield.console.output import as_json
-from posefield.console.question_options import asks
+from posefield.console.question_options import with_question_options
 from posefield.question.walk_question import WalkQuestion
 
-COUNT = 500
+DEFAULT_COUNT = 500
 
 
-@asks(WalkQuestion, usual={"seconds": 10.0}, without={"count"})
+@with_question_options(WalkQuestion, usual={"seconds": 10.0}, without={"count"})
 def crowd(
     model: ModelPath,
     output: Annotated[
@@ -25,7 +25,7 @@ def crowd(
     question: WalkQuestion,
     count: Annotated[
         int | None,
-        typer.Option(help=f"number of characters, each on its own path; default: {COUNT}"),
+        typer.Option(help=f"number of characters, each on its own path; default: {DEFAULT_COUNT}"),
     ] = None,
     paths: Annotated[
         Path | None,
@@ -42,7 +42,7 @@ def crowd(
 
     if paths and count is not None:
         raise InvalidField("count", f"{count}, expected none: every path has one character")
-    question = structs.replace(question, count=COUNT if count is None else count)
-    asked = crowd_order.of(question, crowd_files.routes(paths) if paths else ())
-    facts = crowd_files.write(open_model(model), asked, question.instancing, output)
-    typer.echo(as_json(facts) if json else crowd_files.said(facts))
+    question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
+    asked = crowd_order.from_question(question, crowd_files.routes(paths) if paths else ())
+    facts = crowd_files.write_crowd(open_model(model), asked, question.instancing, output)
+    typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

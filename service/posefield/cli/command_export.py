@@ -12,25 +12,25 @@ from typing import Annotated, Self
 import typer
 
 from posefield.batch import layouts, process_pool, run, target
-from posefield.batch.checkpoint import Part
-from posefield.batch.job import Job, Work
+from posefield.batch.checkpoint import ChunkResult
+from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.layouts import LAYOUTS
 from posefield.batch.process_pool import Runner
 from posefield.batch.rows import row_sources
-from posefield.batch.rows.row_query import KEPT
-from posefield.batch.rows.row_sources import Asked
+from posefield.batch.rows.row_query import MAX_KEPT_FAULTS
+from posefield.batch.rows.row_sources import SourceOptions
 from posefield.batch.rows.row_validation import Defaults
-from posefield.batch.run import Outcome, Shard
+from posefield.batch.run import RunOutcome, Shard
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, ModelPath
 from posefield.console.output import as_json
-from posefield.console.question_options import asks
+from posefield.console.question_options import with_question_options
 from posefield.model_file import checked_file
 from posefield.question.motion_question import FileQuestion
 from posefield.registry import model_loading
 
 
-@asks(FileQuestion, without={"controls", "targets", "joint_sigma"})
+@with_question_options(FileQuestion, without={"controls", "targets", "joint_sigma"})
 def export(
     model: ModelPath,
     output: Annotated[
@@ -95,12 +95,12 @@ def export(
     resumes an interrupted export and gives the same files. It rewrites missing or damaged files.
     """
     content = checked_file.read(model)
-    opened = model_loading.opened(model.stem, model, content)
-    asked = Asked(table, tuple(grid or ()), sample, method, seed)
-    source = row_sources.source(asked, Defaults(form, question), opened)
-    rows = layouts.find(layout).chunk if chunk is None else chunk
+    opened = model_loading.open_model(model.stem, model, content)
+    asked = SourceOptions(table, tuple(grid or ()), sample, method, seed)
+    source = row_sources.open_source(asked, Defaults(form, question), opened)
+    rows = layouts.find_layout(layout).chunk if chunk is None else chunk
     digest = hashlib.sha256(content).hexdigest()
-    job = Job(
+    job = ExportJob(
         opened.identity,
         digest,
         source.digest,
@@ -110,11 +110,11 @@ def export(
         question.up,
         question.names,
     )
-    part = Shard.of(shard)
-    with _runner(workers, scheduler) as runner, Monitor() as monitor:
-        work = Work(job, content, _absolute(output) if scheduler else output, skip_errors)
+    part = Shard.parse(shard)
+    with _runner(workers, scheduler) as runner, ExportMonitor() as monitor:
+        work = WorkerInput(job, content, _absolute(output) if scheduler else output, skip_errors)
         outcome = run.run(work, source, monitor, runner, part, verify)
-    _end(output, outcome, monitor, verify, json)
+    _finish(output, outcome, monitor, verify, json)
 
 
 def _runner(workers: int | None, scheduler: str | None) -> AbstractContextManager[Runner]:
@@ -135,7 +135,7 @@ def _absolute(output: str) -> str:
     return output if target.URL.match(output) else str(Path(output).absolute())
 
 
-class Monitor:
+class ExportMonitor:
     """Progress display of a run, which also records SIGINT or SIGTERM after the run has begun.
 
     signal: the number of the first such signal, else None. A second signal raises KeyboardInterrupt
@@ -158,19 +158,19 @@ class Monitor:
     def begin(self, total: int, done: int) -> None:
         """Start the progress display and the signal handlers."""
         # Importing rich takes 0.1 s, which other commands must not spend.
-        from posefield.console.progress import Bar
+        from posefield.console.progress import ProgressBar
 
         self._began = time.monotonic()
-        self._bar = self._stack.enter_context(Bar("clips", total, done))
+        self._bar = self._stack.enter_context(ProgressBar("clips", total, done))
         self._print = self._bar.print
         if done:
             self.note(f"resumed: {done} of {total} clips were finished")
         for number in (signal.SIGINT, signal.SIGTERM):
             self._stack.callback(signal.signal, number, signal.signal(number, self._receive))
 
-    def advance(self, part: Part) -> None:
+    def advance(self, part: ChunkResult) -> None:
         """Show that a chunk is finished, and the first of the rows that were skipped."""
-        for fault in part.skipped[: max(KEPT - self._skipped, 0)]:
+        for fault in part.skipped[: max(MAX_KEPT_FAULTS - self._skipped, 0)]:
             self.note(f"skipped: {fault.place}: {fault.message}")
         self._skipped += len(part.skipped)
         self._done += part.clips + len(part.skipped)
@@ -200,7 +200,9 @@ class Monitor:
         self.signal = number
 
 
-def _end(place: str, outcome: Outcome, monitor: Monitor, verify: bool, json: bool) -> None:
+def _finish(
+    place: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool, json: bool
+) -> None:
     """Print the outcome; exit with the code that shells expect after a signal."""
     if json:
         facts = {
@@ -216,7 +218,7 @@ def _end(place: str, outcome: Outcome, monitor: Monitor, verify: bool, json: boo
         raise typer.Exit(128 + monitor.signal)
 
 
-def _summary(place: str, outcome: Outcome, monitor: Monitor, verify: bool) -> str:
+def _summary(place: str, outcome: RunOutcome, monitor: ExportMonitor, verify: bool) -> str:
     if outcome.done < outcome.rows:
         return (
             f"{place}: stopped when {outcome.done} of {outcome.rows} clips were finished; the same "
@@ -230,7 +232,7 @@ def _summary(place: str, outcome: Outcome, monitor: Monitor, verify: bool) -> st
         text += f", with a warning in the manifest: {facts['warned']}"
     if facts["skipped"]:
         text += f", rows skipped and listed in skipped.jsonl: {facts['skipped']}"
-    if outcome.before:
+    if outcome.already_complete:
         checked = ", and all checksums agree" if verify else ""
         return f"{text}; it was complete before{checked}"
     return f"{text}, in {monitor.seconds:.1f} s, {monitor.rate:,.0f} a second"

@@ -57,5 +57,5 @@ def _control(plain: dict[str, Any], joints: list[str]) -> str:
     """Return one line on a control: its sampled range, its description and its measure."""
     span = f"{plain['minimum']:g} to {plain['maximum']:g} {plain['unit']}"
     own = plain.get("measure")
-    how = f" (measured: {measures.words(measures.parse(own), joints)})" if own else ""
+    how = f" (measured: {measures.describe(measures.from_dict(own), joints)})" if own else ""
     return f"  {plain['name']}: {span}, {plain['description']}{how}"

@@ -17,8 +17,8 @@ from posefield.common.errors import FileError
 from posefield.inference import session
 from posefield.model_file import checked_file
 
-PAGES = Path(__file__).parents[1] / "http/pages"
-PARTS = ("offline.js", "ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm.gz")
+PAGES_FOLDER = Path(__file__).parents[1] / "http/pages"
+OFFLINE_FILES = ("offline.js", "ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm.gz")
 _HEAD, _PRESSED = b"<head>", ".gz"
 
 
@@ -31,7 +31,7 @@ def page(
     content = checked_file.read(model)
     opened = session.load_bytes(content, str(model))
     identity = f"{model.stem}@{opened.digest}"
-    written = write(files_of(model.name, content, identity), output)
+    written = write_files(page_files(model.name, content, identity), output)
     if json:
         plain = {"folder": str(output), "model": identity, "files": written}
         typer.echo(orjson.dumps(plain, option=orjson.OPT_INDENT_2).decode())
@@ -43,7 +43,7 @@ def page(
     typer.echo(f"  python3 -m http.server --directory {output}")
 
 
-def write(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]:
+def write_files(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]:
     """Write files by name, each atomically, and return their sizes in bytes.
 
     Raises FileError if a file cannot be written.
@@ -55,8 +55,8 @@ def write(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]
     return sizes
 
 
-def files_of(
-    name: str, model: bytes, identity: str, web: Path = PAGES
+def page_files(
+    name: str, model: bytes, identity: str, web: Path = PAGES_FOLDER
 ) -> Iterator[tuple[str, bytes]]:
     """Yield names and contents of the folder's files; the page itself is last.
 
@@ -64,8 +64,8 @@ def files_of(
     FileError if one of them is missing.
     """
     page = web / "viewer/index.html"
-    shown = _marked(_read(page), name, identity)
-    for part in PARTS:
+    shown = _with_model_mark(_read(page), name, identity)
+    for part in OFFLINE_FILES:
         content = _read(web / "offline" / part)
         plain = gzip.decompress(content) if part.endswith(_PRESSED) else content
         yield part.removesuffix(_PRESSED), plain
@@ -73,7 +73,7 @@ def files_of(
     yield page.name, shown
 
 
-def _marked(content: bytes, model: str, identity: str) -> bytes:
+def _with_model_mark(content: bytes, model: str, identity: str) -> bytes:
     """Return the page with the mark that makes it use the model instead of a service."""
     # Imported here, since other commands need no Jinja.
     from posefield.http.pages import templates

@@ -24,7 +24,7 @@ def serve(
     from posefield.http import server
     from posefield.http.api import settings
 
-    server.serve(places, settings.read(host=host, port=port))
+    server.serve(places, settings.read_settings(host=host, port=port))
 
 
 def key(
@@ -46,7 +46,7 @@ def key(
     from posefield.http.access import api_keys
 
     scopes = [f"read:{one}" for one in model or ["*"]] + ["metrics"] * metrics
-    secret = api_keys.make()
+    secret = api_keys.generate_key()
     line = api_keys.line(name, scopes, secret)
     if json:
         typer.echo(as_json({"key": secret, "line": line}))

@@ -7,24 +7,24 @@ import typer
 
 from posefield.batch.rows import row_sources
 from posefield.console.arguments import Json, ModelPath, open_model
-from posefield.console.output import as_json, tell
-from posefield.console.question_options import asks
+from posefield.console.output import as_json, print_warnings
+from posefield.console.question_options import with_question_options
 from posefield.encode.tables import model_tables
 from posefield.question.model_question import SuggestQuestion, WhyQuestion
 from posefield.synthesis.capture_suggestions import suggest as find_suggestions
-from posefield.synthesis.explanation import why as find_reasons
+from posefield.synthesis.explanation import explain_result as find_reasons
 
 
-@asks(WhyQuestion)
+@with_question_options(WhyQuestion)
 def why(model: ModelPath, question: WhyQuestion, json: Json = False) -> None:
     """Print the captured clips nearest to the controls, and their weights."""
     found = find_reasons(open_model(model), question)
-    tell(found)
+    print_warnings(found)
     as_text = model_tables.explanation_text
     typer.echo(as_json(model_tables.explanation(found)) if json else as_text(found))
 
 
-@asks(SuggestQuestion)
+@with_question_options(SuggestQuestion)
 def suggest(
     model: ModelPath,
     question: SuggestQuestion,

@@ -10,7 +10,7 @@ import orjson
 
 from posefield.common.errors import FileError, InvalidField
 from posefield.common.units import Floats
-from posefield.console.progress import Bar
+from posefield.console.progress import ProgressBar
 from posefield.encode import usd_crowd
 from posefield.encode.tables import crowd_tables
 from posefield.encode.usd_crowd import crowd_writer
@@ -20,30 +20,32 @@ from posefield.locomotion import (
     walking_crowd,
 )
 from posefield.locomotion import routes as given
-from posefield.locomotion.crowd_order import Order
+from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.routes import Route
 from posefield.motion.crowd_clip import CrowdClip, Motions
 from posefield.synthesis.synthesizer import Synthesizer
 
-ENDINGS = (*usd_crowd.FILES, "npz")
+EXTENSIONS = (*usd_crowd.FILES, "npz")
 
 
-def write(model: Synthesizer, asked: Order, instancing: str, output: Path) -> dict[str, Any]:
+def write_crowd(
+    model: Synthesizer, asked: CrowdOrder, instancing: str, output: Path
+) -> dict[str, Any]:
     """Write a crowd to a file, and return its report as plain values.
 
     Raises InvalidField for an invalid query or extension, and FileError if the file cannot be
     written.
     """
     ending = output.suffix.removeprefix(".")
-    if ending not in ENDINGS:
-        raise InvalidField("output", f"{output.name!r} ends in none of {', '.join(ENDINGS)}")
-    opened = gait.of(model.session)
-    made = crowd_order.crowd(model, opened, asked)
-    feet = _Feet(opened, asked.fps)
-    watched = _watched(made, asked.motions or len(made.motion), feet)
+    if ending not in EXTENSIONS:
+        raise InvalidField("output", f"{output.name!r} ends in none of {', '.join(EXTENSIONS)}")
+    opened = gait.fit_gait(model.session)
+    made = crowd_order.build_crowd(model, opened, asked)
+    feet = _FootSkateMeter(opened, asked.fps)
+    watched = _with_progress(made, asked.motions or len(made.motion), feet)
     if ending == "npz":
-        crowd_tables.write(watched, output)
+        crowd_tables.write_npz(watched, output)
     else:
         crowd_writer.write(watched, output, instancing)
     return {
@@ -65,10 +67,10 @@ def routes(path: Path) -> Sequence[Route]:
 
     Raises FileError for a file that is not JSON, and InvalidField for invalid routes.
     """
-    return given.parse(_json(path))
+    return given.parse_routes(_read_json(path))
 
 
-def _json(path: Path) -> Any:
+def _read_json(path: Path) -> Any:
     try:
         return orjson.loads(path.read_bytes())
     except OSError as fault:
@@ -78,43 +80,43 @@ def _json(path: Path) -> Any:
 
 
 @dataclass(frozen=True)
-class _Feet:
+class _FootSkateMeter:
     """Foot skate of motions as they are written; empty if the model's card names no feet."""
 
     gait: Gait
     rate: float
-    seen: list[Floats] = field(default_factory=list)
+    samples: list[Floats] = field(default_factory=list)
 
-    def look(self, motions: Motions) -> None:
+    def measure(self, motions: Motions) -> None:
         card = self.gait.session.card
         if card.feet:
-            self.seen.append(walking_crowd.foot_skate_of(card, motions, self.rate).ravel())
+            self.samples.append(walking_crowd.measure_foot_skate(card, motions, self.rate).ravel())
 
     def facts(self) -> dict[str, float]:
-        if not self.seen:
+        if not self.samples:
             return {}
         return {
-            "skate_cm_per_s": round(100.0 * float(np.concatenate(self.seen).mean()), 2),
+            "skate_cm_per_s": round(100.0 * float(np.concatenate(self.samples).mean()), 2),
             "skate_strides_cm_per_s": round(
-                100.0 * walking_crowd.usual_skate(self.gait, self.rate), 2
+                100.0 * walking_crowd.mean_foot_skate(self.gait, self.rate), 2
             ),
         }
 
 
-def _watched(made: CrowdClip, motions: int, feet: _Feet) -> CrowdClip:
+def _with_progress(made: CrowdClip, motions: int, feet: _FootSkateMeter) -> CrowdClip:
     """Return the crowd with a progress bar on standard error while its motions are computed."""
 
     def batches() -> Iterator[Motions]:
-        with Bar("motions", motions) as bar:
+        with ProgressBar("motions", motions) as bar:
             for batch in made.batches:
-                feet.look(batch)
+                feet.measure(batch)
                 yield batch
                 bar.advance(len(batch))
 
     return replace(made, batches=batches())
 
 
-def said(facts: dict[str, Any]) -> str:
+def report_text(facts: dict[str, Any]) -> str:
     """Return the report of a crowd as text."""
     shares = (f"{100.0 * share:.3g} %" for share in facts["level_shares"])
     lines = [

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from posefield.common.errors import FileError
 
-CHUNK = 1 << 20
+CHUNK_BYTES = 1 << 20
 
 
-def pieces(path: Path) -> Iterator[bytes]:
+def read_chunks(path: Path) -> Iterator[bytes]:
     """Yield the bytes of a file in chunks of a megabyte."""
     with path.open("rb") as file:
-        while chunk := file.read(CHUNK):
+        while chunk := file.read(CHUNK_BYTES):
             yield chunk
 
 
@@ -22,10 +22,10 @@ def write(content: bytes, path: Path) -> None:
 
     Raises FileError if it cannot be written.
     """
-    stream([content], path)
+    write_chunks([content], path)
 
 
-def stream(chunks: Iterable[bytes], path: Path) -> None:
+def write_chunks(chunks: Iterable[bytes], path: Path) -> None:
     """Write a file atomically from chunks; no file remains if their iteration fails.
 
     Raises FileError if it cannot be written.
@@ -40,9 +40,9 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Raises FileError if it cannot be written.
     """
-    with _room(path) as room:
+    with _temporary_folder(path) as room:
         yield room / path.name
-        _settle(room / path.name, path)
+        _move_into_place(room / path.name, path)
 
 
 @contextmanager
@@ -52,20 +52,20 @@ def replacing_pair(path: Path, folder: Path) -> Iterator[tuple[Path, Path]]:
     The folder is replaced first, so that the file never refers to missing ones. After an error the
     previous file and folder are kept or restored. Raises FileError if they cannot be written.
     """
-    with _room(path) as room:
+    with _temporary_folder(path) as room:
         new, old = room / "new", room / "old"
         new.mkdir()
         yield room / path.name, new
-        _exchange(new, folder, old)
+        _replace_folder(new, folder, old)
         try:
-            _settle(room / path.name, path)
+            _move_into_place(room / path.name, path)
         except BaseException:
             _restore(folder, old)
             raise
 
 
 @contextmanager
-def _room(path: Path) -> Iterator[Path]:
+def _temporary_folder(path: Path) -> Iterator[Path]:
     """Yield a temporary folder beside the path, on the same disk."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -75,12 +75,12 @@ def _room(path: Path) -> Iterator[Path]:
         raise FileError(path, f"cannot be written: {fault.strerror}") from fault
 
 
-def _settle(made: Path, path: Path) -> None:
+def _move_into_place(made: Path, path: Path) -> None:
     made.chmod(0o644)
     made.replace(path)
 
 
-def _exchange(new: Path, folder: Path, old: Path) -> None:
+def _replace_folder(new: Path, folder: Path, old: Path) -> None:
     if folder.exists():
         folder.rename(old)
     try:

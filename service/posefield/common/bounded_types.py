@@ -9,8 +9,8 @@ from typing import Annotated
 from msgspec import Meta
 
 # Larger numbers would overflow when they are squared in float32.
-_LARGEST = 1e15
-_MOST = 2**53
+_MAX_NUMBER = 1e15
+_MAX_INTEGER = 2**53
 
 Text = Annotated[str, Meta(max_length=100_000)]
 Name = Annotated[str, Meta(min_length=1, max_length=1_000)]
@@ -19,16 +19,16 @@ Slug = Annotated[str, Meta(pattern="^[a-z0-9][a-z0-9_-]{0,63}$")]
 Key = Annotated[str, Meta(pattern="^[a-z][a-z0-9_]{0,39}$")]
 """Name of a control, as written in recipes."""
 
-Number = Annotated[float, Meta(ge=-_LARGEST, le=_LARGEST)]
-Positive = Annotated[float, Meta(gt=0.0, le=_LARGEST)]
-NonNegative = Annotated[float, Meta(ge=0.0, le=_LARGEST)]
+Number = Annotated[float, Meta(ge=-_MAX_NUMBER, le=_MAX_NUMBER)]
+Positive = Annotated[float, Meta(gt=0.0, le=_MAX_NUMBER)]
+NonNegative = Annotated[float, Meta(ge=0.0, le=_MAX_NUMBER)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 Rate = Annotated[float, Meta(ge=1.0, le=10_000.0)]
 """Frames a second."""
 
-Count = Annotated[int, Meta(ge=1, le=_MOST)]
-Index = Annotated[int, Meta(ge=0, le=_MOST)]
-Parent = Annotated[int, Meta(ge=-1, le=_MOST)]
+Count = Annotated[int, Meta(ge=1, le=_MAX_INTEGER)]
+Index = Annotated[int, Meta(ge=0, le=_MAX_INTEGER)]
+Parent = Annotated[int, Meta(ge=-1, le=_MAX_INTEGER)]
 """Index of a parent, -1 for none."""
 Degree = Annotated[int, Meta(ge=0, le=1)]
 """Degree of a polynomial drift."""

@@ -1,8 +1,8 @@
 """Cancellation of work whose client has gone, and turns between threads.
 
 A request handler sets `current`; loops that may take longer than a tenth of a second call `check`.
-anyio.to_thread.run_sync copies the caller's context into its threads; `carried` does so for the
-threads of other pools.
+anyio.to_thread.run_sync copies the caller's context into its threads; `bind_context` does so for
+the threads of other pools.
 """
 
 import threading
@@ -15,9 +15,9 @@ Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
 
 
-TURN = 0.002
+YIELD_INTERVAL = 0.002
 """Seconds of work after which a thread releases Python's lock."""
-PAUSE = 0.00005
+YIELD_SLEEP = 0.00005
 """Seconds of sleep in which another thread acquires the lock; less is often too short."""
 
 
@@ -49,8 +49,8 @@ class Cancellation:
         """
         if self.requested:
             raise Cancelled
-        if time.perf_counter() - self._paused > TURN:
-            time.sleep(PAUSE)
+        if time.perf_counter() - self._paused > YIELD_INTERVAL:
+            time.sleep(YIELD_SLEEP)
             self._paused = time.perf_counter()
 
 
@@ -65,7 +65,7 @@ def check() -> None:
         cancellation.check()
 
 
-def carried(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+def bind_context(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
     """Return a function that runs in a copy of this context, in whichever thread it is called.
 
     It first calls `check`, so that tasks which still wait in a pool end at once.

@@ -18,6 +18,6 @@ Singles = npt.NDArray[np.float32]
 
 Indices = npt.NDArray[np.int64]
 
-Truths = npt.NDArray[np.bool_]
+Booleans = npt.NDArray[np.bool_]
 
 UP = np.array([0.0, 1.0, 0.0])

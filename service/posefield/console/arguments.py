@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from posefield.common.errors import ModelError, UnknownFormat
-from posefield.encode.formats import ENCODERS, Encoder
+from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder
 from posefield.registry import model_registry
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -21,9 +21,9 @@ def open_model(path: Path) -> Synthesizer:
     return next(iter(model_registry.load([path]).models.values()))
 
 
-def encoder(path: Path) -> Encoder:
+def encoder_for(path: Path) -> ClipEncoder:
     """Return the encoder for a path's ending; UnknownFormat if there is none."""
     ending = path.suffix.removeprefix(".")
-    if ending not in ENCODERS:
-        raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(ENCODERS)}")
-    return ENCODERS[ending]
+    if ending not in CLIP_ENCODERS:
+        raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(CLIP_ENCODERS)}")
+    return CLIP_ENCODERS[ending]

@@ -6,7 +6,7 @@ from typing import Any
 import orjson
 import typer
 
-from posefield.question.results import ClipAnswer, Reasons, Trust
+from posefield.question.results import ClipAnswer, Explanation, Trust
 
 
 def as_json(value: Any) -> str:
@@ -14,7 +14,7 @@ def as_json(value: Any) -> str:
     return orjson.dumps(value, option=orjson.OPT_INDENT_2).decode()
 
 
-def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
+def written_message(path: Path, answer: ClipAnswer, json: bool) -> str:
     """Return the message about a written clip, as JSON or as text."""
     frames = len(answer.clip)
     if json:
@@ -27,7 +27,7 @@ def wrote(path: Path, answer: ClipAnswer, json: bool) -> str:
     )
 
 
-def tell(found: Trust | Reasons) -> None:
+def print_warnings(found: Trust | Explanation) -> None:
     """Print inferred controls and warnings on standard error."""
     if found.inferred:
         chosen = " ".join(f"{name}={found.controls[name]!r}" for name in found.inferred)

@@ -21,7 +21,7 @@ INTERVAL = 5.0
 """Seconds between two lines where standard error is not a terminal."""
 
 
-class Bar:
+class ProgressBar:
     """Progress bar of `total` units of work; None for an unknown total.
 
     done: units that were finished before. Where standard error is not a terminal, such as in the

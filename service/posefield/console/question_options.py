@@ -10,7 +10,7 @@ from msgspec import Struct
 
 from posefield.common.errors import InvalidField
 from posefield.question import text_decoding
-from posefield.question.text_decoding import CONTROLS, Parameter
+from posefield.question.text_decoding import CONTROLS_FIELD, Parameter
 
 Command = Callable[..., None]
 Controls = Annotated[
@@ -22,14 +22,14 @@ Controls = Annotated[
         metavar="NAME=VALUE",
     ),
 ]
-CONTROL = inspect.Parameter(
+CONTROL_OPTION = inspect.Parameter(
     "control", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Controls
 )
-TYPED = (float, int, bool)
+TYPED_FIELDS = (float, int, bool)
 """Types that typer parses itself, in addition to literals."""
 
 
-def asks(
+def with_question_options(
     form: type[Struct], usual: Mapping[str, Any] | None = None, without: Collection[str] = ()
 ) -> Callable[[Command], Command]:
     """Return a decorator that builds the parameter `question` of a command from its options.
@@ -44,14 +44,14 @@ def asks(
         first = [p for p in own if p.name != "question" and p.default is p.empty]
         last = [p for p in own if p.default is not p.empty]
         options = [_option(p, defaults[p.field]) for p in known]
-        if CONTROLS in form.__struct_fields__ and CONTROLS not in without:
-            options.insert(0, CONTROL)
+        if CONTROLS_FIELD in form.__struct_fields__ and CONTROLS_FIELD not in without:
+            options.insert(0, CONTROL_OPTION)
 
         @functools.wraps(command)
         def run(**given: Any) -> None:
             said = {p.field: _value(p, given.pop(p.field), defaults[p.field]) for p in known}
-            if CONTROLS in form.__struct_fields__:
-                said[CONTROLS] = numbers(given.pop("control", None) or [])
+            if CONTROLS_FIELD in form.__struct_fields__:
+                said[CONTROLS_FIELD] = parse_controls(given.pop("control", None) or [])
             command(question=form(**said), **given)
 
         every = [p.replace(kind=p.KEYWORD_ONLY) for p in (*first, *options, *last)]
@@ -64,7 +64,7 @@ def asks(
 
 def _option(parameter: Parameter, default: Any) -> inspect.Parameter:
     kind = parameter.kind
-    typed = kind in TYPED or get_origin(kind) is Literal
+    typed = kind in TYPED_FIELDS or get_origin(kind) is Literal
     shown = kind if typed else str
     if parameter.repeated:
         shown = list[shown]  # type: ignore[valid-type]
@@ -86,14 +86,14 @@ def _value(parameter: Parameter, given: Any, default: Any) -> Any:
     """Return the value of a field; `given` is text where typer does not parse the field's type."""
     if given is None or given == []:
         return default
-    if parameter.repeated and parameter.kind not in TYPED:
-        return tuple(text_decoding.value(parameter, word) for word in given)
+    if parameter.repeated and parameter.kind not in TYPED_FIELDS:
+        return tuple(text_decoding.parse_value(parameter, word) for word in given)
     if isinstance(given, str) and get_origin(parameter.kind) is not Literal:
-        return text_decoding.value(parameter, given)
+        return text_decoding.parse_value(parameter, given)
     return given
 
 
-def numbers(pairs: Sequence[str]) -> dict[str, float]:
+def parse_controls(pairs: Sequence[str]) -> dict[str, float]:
     """Return the controls of NAME=VALUE words; InvalidField for a malformed or repeated one."""
     controls: dict[str, float] = {}
     for pair in pairs:

@@ -6,25 +6,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.constraints import constraint as looking
-from posefield.constraints import gauss_newton, pinned_feet
-from posefield.constraints.constraint import Aim, Place
-from posefield.constraints.motion_variables import Scene
+from posefield.constraints import constraint, gauss_newton, pinned_feet
+from posefield.constraints.constraint import Constraint, PositionConstraint
+from posefield.constraints.motion_variables import MotionVariables
 from posefield.inference import reduced_motion, residual_covariance
-from posefield.inference.reduced_motion import Reduced
-from posefield.inference.residual_covariance import Spread
-from posefield.inference.session import Session, State
+from posefield.inference.reduced_motion import ReducedTensor
+from posefield.inference.residual_covariance import ResidualCovariance
+from posefield.inference.session import PredictionState, Session
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
 from posefield.model_file import subgraph
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import measures, root_travel
-from posefield.motion.measures import Seen
-from posefield.question.results import Met
+from posefield.motion.measures import MeasuredMotion
+from posefield.question.results import ConstraintResult
 
 
 @dataclass(frozen=True)
-class Held:
+class ConstrainedMotion:
     """A motion, predicted or corrected.
 
     numbers: the motion as the variables of the correction. state: the model's prediction. met:
@@ -32,27 +31,27 @@ class Held:
     constraints from the prediction.
     """
 
-    scene: Scene
+    scene: MotionVariables
     numbers: Floats
-    state: State
-    met: tuple[Met, ...]
+    state: PredictionState
+    results: tuple[ConstraintResult, ...]
     steps: int = 0
     distance: float = 0.0
 
     @property
     def duration(self) -> float:
         """Duration of the clip, s."""
-        return float(np.exp(self.scene.beside(self.numbers)[0])) * self._given
+        return float(np.exp(self.scene.duration_and_travel(self.numbers)[0])) * self._fixed_duration
 
     @property
-    def _given(self) -> float:
+    def _fixed_duration(self) -> float:
         # Motions without cycles keep the predicted duration.
         return 1.0 if self.scene.cyclic else self.state.duration
 
     @property
     def travel(self) -> Floats:
         """Travel of a whole cycle (3,): to the left and ahead, m, and change of heading, rad."""
-        return self.scene.beside(self.numbers)[1]
+        return self.scene.duration_and_travel(self.numbers)[1]
 
     def poses(self, frames: Floats) -> tuple[Floats, Floats]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, at canonical frames (S,)."""
@@ -61,53 +60,61 @@ class Held:
         if not scene.cyclic:
             return rotations, roots
         share = frames / (scene.reduced.frames - 1)
-        return root_travel.put_back(rotations, roots, share[:, None] * self.travel)
+        return root_travel.add_travel(rotations, roots, share[:, None] * self.travel)
 
 
 @dataclass(frozen=True)
-class Bench:
+class LevelCorrector:
     """Data for corrections at one level of a model, computed once.
 
     reduced: reduced tensor. spread: covariance of the residuals of captured motions.
     """
 
     card: ModelCard
-    reduced: Reduced
-    spread: Spread
+    reduced: ReducedTensor
+    spread: ResidualCovariance
 
-    def begun(self, state: State) -> Held:
+    def predict(self, state: PredictionState) -> ConstrainedMotion:
         """Return the predicted motion, without constraints."""
-        scene = Scene(self.reduced, self.card.skeleton.parents, state.bones, self.card.cyclic)
+        scene = MotionVariables(
+            self.reduced, self.card.skeleton.parents, state.bones, self.card.cyclic
+        )
         inner = self.reduced.motion(state.coefficients).ravel()
-        beside = [np.log(state.duration), *state.way] if self.card.cyclic else []
-        return Held(scene, np.concatenate([inner, beside]), state, ())
+        beside = [np.log(state.duration), *state.travel] if self.card.cyclic else []
+        return ConstrainedMotion(scene, np.concatenate([inner, beside]), state, ())
 
-    def held(self, begun: Held, aims: Sequence[Aim], pins: Sequence[Aim] = ()) -> Held:
+    def solve(
+        self, begun: ConstrainedMotion, aims: Sequence[Constraint], pins: Sequence[Constraint] = ()
+    ) -> ConstrainedMotion:
         """Return the nearest motion that satisfies the constraints; pins are soft."""
         sigma, numbers = begun.state.sigma, begun.numbers
-        found = gauss_newton.meet(begun.scene, self.spread, sigma, numbers, aims, pins)
-        return Held(begun.scene, found.numbers, begun.state, found.met, found.steps, found.distance)
+        found = gauss_newton.correct(begun.scene, self.spread, sigma, numbers, aims, pins)
+        return ConstrainedMotion(
+            begun.scene, found.numbers, begun.state, found.results, found.steps, found.distance
+        )
 
-    def distance(self, begun: Held, aims: Sequence[Aim]) -> float:
+    def distance(self, begun: ConstrainedMotion, aims: Sequence[Constraint]) -> float:
         """Return the Mahalanobis distance of the constraints from a predicted motion."""
         return gauss_newton.distance(
             begun.scene, self.spread, begun.state.sigma, begun.numbers, aims
         )
 
-    def pins(self, begun: Held) -> list[Place]:
+    def pins(self, begun: ConstrainedMotion) -> list[PositionConstraint]:
         """Return the pins for the feet of a predicted motion."""
-        return pinned_feet.pins(begun.scene, begun.numbers, self.card.feet)
+        return pinned_feet.build_pins(begun.scene, begun.numbers, self.card.feet)
 
-    def measured(self, held: Held) -> dict[str, float]:
+    def measured(self, held: ConstrainedMotion) -> dict[str, float]:
         """Return the values of the card's measured controls on a motion."""
         asked = [(c.name, c.measure, 0.0) for c in self.card.controls if c.measure]
-        moving = [(name, own, goal) for name, own, goal in asked if not own.bodily]
+        moving = [(name, own, goal) for name, own, goal in asked if not own.is_body_measure]
         found = dict[str, float]()
-        for aim in looking.of_controls(moving, self.reduced.frames):
-            values, _ = aim.look(held.scene, held.numbers)
+        for aim in constraint.from_controls(moving, self.reduced.frames):
+            values, _ = aim.evaluate(held.scene, held.numbers)
             found |= dict(zip(aim.names, map(float, values), strict=True))
-        seen = _body(held.scene)
-        found |= {name: measures.value(own, seen) for name, own, _ in asked if own.bodily}
+        seen = _measured_body(held.scene)
+        found |= {
+            name: measures.evaluate(own, seen) for name, own, _ in asked if own.is_body_measure
+        }
         return {
             control.name: found[control.name]
             for control in self.card.controls
@@ -115,29 +122,29 @@ class Bench:
         }
 
 
-def bench(session: Session, level: int) -> Bench:
+def build_corrector(session: Session, level: int) -> LevelCorrector:
     """Return the data for corrections at a level."""
-    weights = subgraph.weights(session.content)
+    weights = subgraph.initializers(session.content)
     own = reduced_motion.read(weights, session.card.levels[level])
-    return Bench(
+    return LevelCorrector(
         session.card,
         own,
-        residual_covariance.of(session.card, weights, session.weigher.samples, own),
+        residual_covariance.estimate(session.card, weights, session.kriging_weights.samples, own),
     )
 
 
-def _body(scene: Scene) -> Seen:
+def _measured_body(scene: MotionVariables) -> MeasuredMotion:
     still = np.zeros((1, len(scene.parents), 3))
-    return Seen(still, 0.0, np.zeros(3), scene.parents, scene.bones)
+    return MeasuredMotion(still, 0.0, np.zeros(3), scene.parents, scene.bones)
 
 
-def of(held: Held) -> Strides:
+def to_strides(held: ConstrainedMotion) -> Strides:
     """Return the cycle of a motion, or its straight line from first to last pose."""
     last = held.scene.reduced.frames - 1.0
-    roots = floor_plane.of(held.poses(np.array([0.0, last]))[1])
+    roots = floor_plane.project(held.poses(np.array([0.0, last]))[1])
     durations, turns = np.array([held.duration]), held.travel[2:]
     if not held.scene.cyclic:
         return Strides(durations, roots[1:] - roots[:1], np.zeros(1), roots[:1])
     gap = np.array([held.travel[1] + 1j * held.travel[0]])
     # A cycle without its travel ends at its start.
-    return Strides(durations, floor_plane.straightened(gap, turns), turns, roots[1:] - gap)
+    return Strides(durations, floor_plane.inverse_arc(gap, turns), turns, roots[1:] - gap)

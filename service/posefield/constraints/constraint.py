@@ -8,15 +8,15 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.units import Floats
-from posefield.constraints.motion_variables import BESIDE, Scene
+from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariables
 from posefield.motion import measures
-from posefield.motion.measures import AXES, TRAVELLED, Measure
+from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
 
-Looked = tuple[Floats, Floats]
+ValuesAndGradients = tuple[Floats, Floats]
 """Values (k,), and their gradients (k, numbers) with respect to the numbers of the motion."""
 
 
-class Aim(Protocol):
+class Constraint(Protocol):
     """A measured quantity with a target value (k,)."""
 
     @property
@@ -28,13 +28,13 @@ class Aim(Protocol):
         """Unit of the values."""
 
     @property
-    def goal(self) -> Floats:
+    def target(self) -> Floats:
         """Target values (k,)."""
 
-    def look(self, scene: Scene, numbers: Floats) -> Looked:
+    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
         """Return the values of a motion and their gradients."""
 
-    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
         """Return the values (n, k) of other reduced motions (n, r2 r1) at the moment of this one.
 
         All other numbers, such as the travel, are those of this motion.
@@ -42,7 +42,7 @@ class Aim(Protocol):
 
 
 @dataclass(frozen=True)
-class Place:
+class PositionConstraint:
     """Constraint on the mean position of joints at a moment, along some axes, m.
 
     names: one for all axes, or one each. moment: rule that determines the moment. axes: indices of
@@ -52,7 +52,7 @@ class Place:
     names: tuple[str, ...]
     moment: Measure
     axes: tuple[int, ...]
-    goal: Floats
+    target: Floats
     at: float = 0.0
     unit: str = "m"
 
@@ -61,108 +61,118 @@ class Place:
         known = {"start": 0.0, "end": last, "landmark": self.at}
         return known.get(self.moment.at or "")
 
-    def look(self, scene: Scene, numbers: Floats) -> Looked:
+    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
         """Return the values and their gradients."""
         joints = self.moment.joints
-        at = _moment(scene, numbers, self.moment, self.at)
-        found = [scene.place(numbers, joint, at) for joint in joints]
+        at = _moment_frame(scene, numbers, self.moment, self.at)
+        found = [scene.position_and_gradient(numbers, joint, at) for joint in joints]
         values = np.mean([value for value, _ in found], axis=0)
         gradients = np.mean([gradient for _, gradient in found], axis=0)
         return values[list(self.axes)], gradients[list(self.axes)]
 
-    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
         """Return the values (n, k) of other motions."""
-        at = _moment(scene, numbers, self.moment, self.at)
-        found = [scene.among(numbers, motions, joint, at) for joint in self.moment.joints]
+        at = _moment_frame(scene, numbers, self.moment, self.at)
+        found = [
+            scene.evaluate_motions(numbers, motions, joint, at) for joint in self.moment.joints
+        ]
         return np.asarray(np.mean(found, axis=0)[:, list(self.axes)], np.float64)
 
 
 @dataclass(frozen=True)
-class Step:
+class StepLengthConstraint:
     """Constraint on the step length: the largest distance of one foot ahead of the other, m."""
 
     names: tuple[str, ...]
     moment: Measure
-    goal: Floats
+    target: Floats
     unit: str = "m"
 
-    def look(self, scene: Scene, numbers: Floats) -> Looked:
+    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
         """Return the value and its gradient."""
-        at = _moment(scene, numbers, self.moment, 0.0)
-        first, second = (scene.place(numbers, joint, at) for joint in self.moment.joints)
+        at = _moment_frame(scene, numbers, self.moment, 0.0)
+        first, second = (
+            scene.position_and_gradient(numbers, joint, at) for joint in self.moment.joints
+        )
         ahead = first[0][2] - second[0][2]
         sign = 1.0 if ahead >= 0.0 else -1.0
         return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
 
-    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
         """Return the values (n, 1) of other motions."""
-        at = _moment(scene, numbers, self.moment, 0.0)
-        first, second = (scene.among(numbers, motions, j, at) for j in self.moment.joints)
+        at = _moment_frame(scene, numbers, self.moment, 0.0)
+        first, second = (
+            scene.evaluate_motions(numbers, motions, j, at) for j in self.moment.joints
+        )
         return np.abs(first - second)[:, 2:]
 
 
 @dataclass(frozen=True)
-class Travelled:
+class TravelConstraint:
     """Constraint on the travel of a cycle: distance, m, speed, m/s, or turn, degrees."""
 
     names: tuple[str, ...]
     quantity: str
-    goal: Floats
+    target: Floats
     unit: str
 
-    def look(self, scene: Scene, numbers: Floats) -> Looked:
+    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
         """Return the value and its gradient."""
-        log_duration, travel = scene.beside(numbers)
+        log_duration, travel = scene.duration_and_travel(numbers)
         duration = float(np.exp(log_duration))
-        value = measures.travelled(self.quantity, travel, duration)
+        value = measures.travel_value(self.quantity, travel, duration)
         gradients = np.zeros((1, len(numbers)))
         way = max(float(np.hypot(*travel[:2])), 1e-9)
         if self.quantity == "turn":
             gradients[0, -1] = np.degrees(1.0)
         else:
             per = duration if self.quantity == "speed" else 1.0
-            gradients[0, -BESIDE + 1 : -1] = travel[:2] / way / per
+            gradients[0, -CYCLE_VARIABLES + 1 : -1] = travel[:2] / way / per
         if self.quantity == "speed":
-            gradients[0, -BESIDE] = -value
+            gradients[0, -CYCLE_VARIABLES] = -value
         return np.array([value]), gradients
 
-    def among(self, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
         """Return the values (n, 1) of other motions: all equal, without their own travel."""
-        return np.repeat(self.look(scene, numbers)[0][None], len(motions), axis=0)
+        return np.repeat(self.evaluate(scene, numbers)[0][None], len(motions), axis=0)
 
 
-def look(aims: Sequence[Aim], scene: Scene, numbers: Floats) -> Looked:
+def evaluate(
+    aims: Sequence[Constraint], scene: MotionVariables, numbers: Floats
+) -> ValuesAndGradients:
     """Return the concatenated values and gradients of several constraints."""
     cancellation.check()
-    found = [aim.look(scene, numbers) for aim in aims]
+    found = [aim.evaluate(scene, numbers) for aim in aims]
     return np.concatenate([v for v, _ in found]), np.vstack([g for _, g in found])
 
 
-def of_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> list[Aim]:
+def from_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> list[Constraint]:
     """Return the constraints of measured controls, given as name, measure and target value.
 
     frames: number of canonical frames. Positions of the same joints at the same moment become one
     constraint, so that its error is one distance.
     """
-    aims: list[Aim] = []
+    aims: list[Constraint] = []
     places: dict[Measure, list[tuple[str, int, float]]] = {}
     for name, own, goal in asked:
-        if own.quantity in TRAVELLED:
-            aims.append(Travelled((name,), own.quantity, np.array([goal]), own.unit))
+        if own.quantity in TRAVEL_QUANTITIES:
+            aims.append(TravelConstraint((name,), own.quantity, np.array([goal]), own.unit))
         elif own.quantity == "step_length":
-            aims.append(Step((name,), own, np.array([goal])))
+            aims.append(StepLengthConstraint((name,), own, np.array([goal])))
         else:
             moment = Measure("height", own.joints, own.at, own.share)
-            places.setdefault(moment, []).append((name, AXES[own.quantity], goal))
+            places.setdefault(moment, []).append((name, POSITION_AXES[own.quantity], goal))
     for moment, parts in places.items():
         names, axes, goals = zip(*parts, strict=True)
         aims.append(
-            Place(names, moment, axes, np.array(goals), (moment.share or 0.0) * (frames - 1))
+            PositionConstraint(
+                names, moment, axes, np.array(goals), (moment.share or 0.0) * (frames - 1)
+            )
         )
     return aims
 
 
-def _moment(scene: Scene, numbers: Floats, own: Measure, given: float) -> float:
+def _moment_frame(scene: MotionVariables, numbers: Floats, own: Measure, given: float) -> float:
     """Return the canonical frame at which a quantity is measured.
 
     given: frame of a landmark.
@@ -179,4 +189,4 @@ def _moment(scene: Scene, numbers: Floats, own: Measure, given: float) -> float:
         away = positions[:, 1:].mean(axis=1) - positions[:, 0]
         return float(np.argmax(np.sum(np.square(away), axis=-1)))
     seen = Measure(own.quantity, tuple(range(len(joints))), own.at)
-    return measures.moment(seen, positions, 0.0)
+    return measures.moment_frame(seen, positions, 0.0)

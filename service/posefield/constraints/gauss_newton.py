@@ -14,28 +14,27 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.units import Floats
-from posefield.constraints import constraint as looking
-from posefield.constraints import reachability
-from posefield.constraints.constraint import Aim, Looked
-from posefield.constraints.motion_variables import Scene
-from posefield.constraints.pinned_feet import LOOSE
-from posefield.inference.residual_covariance import Spread
-from posefield.question.results import Met
+from posefield.constraints import constraint, reachability
+from posefield.constraints.constraint import Constraint, ValuesAndGradients
+from posefield.constraints.motion_variables import MotionVariables
+from posefield.constraints.pinned_feet import PIN_DEVIATION
+from posefield.inference.residual_covariance import ResidualCovariance
+from posefield.question.results import ConstraintResult
 
-STEPS, HALVINGS = 25, 6
+MAX_STEPS, MAX_HALVINGS = 25, 6
 # Convergence, m, m/s or degrees: a hundredth of a millimetre is below the precision of every
 # format.
-CLOSE = 1e-5
+TOLERANCE = 1e-5
 # Factor by which a step must reduce the squared error.
-ENOUGH = 0.98
+SUFFICIENT_DECREASE = 0.98
 # Largest move of a position in one step, m, for which the linearisation is trusted.
-STRIDE = 0.15
+TRUST_RADIUS = 0.15
 # Above this error, in its unit, a target counts as missed.
-MISSED = 1e-3
+MISS_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
-class Corrected:
+class Correction:
     """Result of a correction.
 
     numbers: of the corrected motion. met: error of each constraint. steps: number of iterations.
@@ -43,13 +42,13 @@ class Corrected:
     """
 
     numbers: Floats
-    met: tuple[Met, ...]
+    results: tuple[ConstraintResult, ...]
     steps: int
     distance: float
 
 
 @dataclass(frozen=True)
-class _Task:
+class _Problem:
     """Constraints and metric of one correction.
 
     begun: numbers of the prediction. aims: hard constraints. pins: soft constraints. worth (a,):
@@ -57,84 +56,88 @@ class _Task:
     for a sigma of one metre; zero for the aims.
     """
 
-    scene: Scene
-    spread: Spread
+    scene: MotionVariables
+    spread: ResidualCovariance
     begun: Floats
-    aims: Sequence[Aim]
-    pins: Sequence[Aim]
-    worth: Floats
-    loose: Floats
+    aims: Sequence[Constraint]
+    pins: Sequence[Constraint]
+    weights: Floats
+    pin_variances: Floats
 
     @property
-    def firm(self) -> int:
+    def hard_count(self) -> int:
         """Number of values of hard constraints."""
-        return sum(len(aim.goal) for aim in self.aims)
+        return sum(len(aim.target) for aim in self.aims)
 
-    def look(self, numbers: Floats) -> Looked:
+    def evaluate(self, numbers: Floats) -> ValuesAndGradients:
         """Return values and gradients of aims and pins."""
-        return looking.look([*self.aims, *self.pins], self.scene, numbers)
+        return constraint.evaluate([*self.aims, *self.pins], self.scene, numbers)
 
-    def least(self, gradients: Floats, toward: Floats) -> Floats:
+    def least_change(self, gradients: Floats, toward: Floats) -> Floats:
         """Return the least change (numbers,) that moves values with these gradients by `toward`."""
-        carried = self.spread.shrunk(gradients)
-        return carried @ _solve(gradients @ carried + np.diag(self.loose), toward)
+        carried = self.spread.apply_shrunk(gradients)
+        return carried @ _solve(gradients @ carried + np.diag(self.pin_variances), toward)
 
 
-def meet(
-    scene: Scene,
-    spread: Spread,
+def correct(
+    scene: MotionVariables,
+    spread: ResidualCovariance,
     sigma: float,
     begun: Floats,
-    aims: Sequence[Aim],
-    pins: Sequence[Aim] = (),
-) -> Corrected:
+    aims: Sequence[Constraint],
+    pins: Sequence[Constraint] = (),
+) -> Correction:
     """Return the motion nearest to a prediction that satisfies the constraints.
 
     begun: its numbers. sigma: its standard deviation, m. Constraints beyond the spread of captured
     motions are approached up to it; pins stay near their positions.
     """
-    looked = looking.look([*aims, *pins], scene, begun)
-    found = reachability.of(scene, spread, sigma, begun, aims, looked)
-    loose = np.repeat([0.0, (LOOSE / sigma) ** 2], [len(found.left), 3 * len(pins)])
-    near = looked[0][: len(found.left)] + found.way
-    goal = np.concatenate([near, *(pin.goal for pin in pins)])
-    task = _Task(scene, spread, begun, aims, pins, found.worth, loose)
+    looked = constraint.evaluate([*aims, *pins], scene, begun)
+    found = reachability.assess(scene, spread, sigma, begun, aims, looked)
+    loose = np.repeat([0.0, (PIN_DEVIATION / sigma) ** 2], [len(found.differences), 3 * len(pins)])
+    near = looked[0][: len(found.differences)] + found.reachable
+    goal = np.concatenate([near, *(pin.target for pin in pins)])
+    task = _Problem(scene, spread, begun, aims, pins, found.weights, loose)
     numbers, values, steps = _descend(task, looked, goal)
-    return Corrected(numbers, tuple(_met(aims, values)), steps, found.distance)
+    return Correction(numbers, tuple(_constraint_results(aims, values)), steps, found.distance)
 
 
-def _descend(task: _Task, looked: Looked, goal: Floats) -> tuple[Floats, Floats, int]:
+def _descend(
+    task: _Problem, looked: ValuesAndGradients, goal: Floats
+) -> tuple[Floats, Floats, int]:
     """Return the corrected numbers, their values, and the number of steps."""
     numbers, whole = task.begun, True
-    for step in range(STEPS):
-        if np.abs((goal - looked[0])[: task.firm]).max() < CLOSE:
+    for step in range(MAX_STEPS):
+        if np.abs((goal - looked[0])[: task.hard_count]).max() < TOLERANCE:
             return numbers, looked[0], step
-        moved = _nearer(task, numbers, looked, goal, whole)
+        moved = _next_iterate(task, numbers, looked, goal, whole)
         if moved is None:
             return numbers, looked[0], step
         numbers, looked, whole = moved
-    return numbers, looked[0], STEPS
+    return numbers, looked[0], MAX_STEPS
 
 
-def _nearer(
-    task: _Task, numbers: Floats, looked: Looked, goal: Floats, whole: bool
-) -> tuple[Floats, Looked, bool] | None:
+def _next_iterate(
+    task: _Problem, numbers: Floats, looked: ValuesAndGradients, goal: Floats, whole: bool
+) -> tuple[Floats, ValuesAndGradients, bool] | None:
     """Return the next numbers, their values and gradients, and whether the step was shortened.
 
     whole: correct from the prediction anew, pins included. None if no step reduces the error.
     """
-    (values, gradients), firm = looked, task.firm
+    (values, gradients), hard_count = looked, task.hard_count
     left = goal - values
-    share = min(1.0, STRIDE / max(_apart(task.aims, left), 1e-12))
+    share = min(1.0, TRUST_RADIUS / max(_largest_distance(task.aims, left), 1e-12))
     base = task.begun if whole else numbers
     if not whole:
-        left[firm:] = 0.0
-    for _ in range(HALVINGS):
+        left[hard_count:] = 0.0
+    for _ in range(MAX_HALVINGS):
         cancellation.check()
         toward = share * left + gradients @ (numbers - base)
-        tried = base + task.least(gradients, toward)
-        found = task.look(tried)
-        if _size((goal - found[0])[:firm], task.worth) < ENOUGH * _size(left[:firm], task.worth):
+        tried = base + task.least_change(gradients, toward)
+        found = task.evaluate(tried)
+        if _weighted_error(
+            (goal - found[0])[:hard_count], task.weights
+        ) < SUFFICIENT_DECREASE * _weighted_error(left[:hard_count], task.weights):
             return tried, found, share < 1.0
         share *= 0.5
     return None
@@ -149,33 +152,37 @@ def _solve(matrix: Floats, right: Floats) -> Floats:
     return np.asarray(np.linalg.solve(matrix + ridge, right), np.float64)
 
 
-def _apart(aims: Sequence[Aim], left: Floats) -> float:
+def _largest_distance(aims: Sequence[Constraint], left: Floats) -> float:
     """Return the largest distance, m, among the values (k,) in metres."""
-    units = [aim.unit for aim in aims for _ in aim.goal]
+    units = [aim.unit for aim in aims for _ in aim.target]
     places = zip(left[: len(units)], units, strict=True)
     return max((abs(value) for value, unit in places if unit == "m"), default=0.0)
 
 
-def _size(left: Floats, worth: Floats) -> float:
+def _weighted_error(left: Floats, worth: Floats) -> float:
     return float(np.sum(worth * np.square(left)))
 
 
 def distance(
-    scene: Scene, spread: Spread, sigma: float, numbers: Floats, aims: Sequence[Aim]
+    scene: MotionVariables,
+    spread: ResidualCovariance,
+    sigma: float,
+    numbers: Floats,
+    aims: Sequence[Constraint],
 ) -> float:
     """Return the Mahalanobis distance of the constraints from a motion (numbers,)."""
-    looked = looking.look(aims, scene, numbers)
-    return reachability.of(scene, spread, sigma, numbers, aims, looked).distance
+    looked = constraint.evaluate(aims, scene, numbers)
+    return reachability.assess(scene, spread, sigma, numbers, aims, looked).distance
 
 
-def _met(aims: Sequence[Aim], found: Floats) -> list[Met]:
+def _constraint_results(aims: Sequence[Constraint], found: Floats) -> list[ConstraintResult]:
     said, start = [], 0
     for aim in aims:
-        left = aim.goal - found[start : start + len(aim.goal)]
-        start += len(aim.goal)
+        left = aim.target - found[start : start + len(aim.target)]
+        start += len(aim.target)
         parts = np.abs(left) if len(aim.names) > 1 else [np.linalg.norm(left)]
         said += [
-            Met(name, float(miss), aim.unit, bool(miss <= MISSED))
+            ConstraintResult(name, float(miss), aim.unit, bool(miss <= MISS_TOLERANCE))
             for name, miss in zip(aim.names, parts, strict=True)
         ]
     return said

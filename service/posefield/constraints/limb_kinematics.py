@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import UP, Floats
-from posefield.inference.reduced_motion import Reduced
+from posefield.inference.reduced_motion import ReducedTensor
 from posefield.motion import quat
 
 
 @dataclass(frozen=True)
-class Limb:
+class JointChain:
     """Chain of C joints from the root to one joint.
 
     bones: (C, 3), m. rotations: mean rotation matrices (C, 3, 3). mean (3 + 3 C,), directions (r1,
@@ -25,7 +25,7 @@ class Limb:
     mean: Floats
     directions: Floats
 
-    def posed(self, moves: Floats, gone: Floats) -> "Pose":
+    def compute_poses(self, moves: Floats, gone: Floats) -> "ChainPoses":
         """Return the chain's poses at coefficients (S, r1) of the first mode.
 
         gone (S, 3): travel of the root so far: to the left and ahead, m, and turn, rad.
@@ -34,12 +34,12 @@ class Limb:
         vectors = found[:, 3:].reshape(len(moves), -1, 3)
         turns = self.rotations @ quat.to_matrix(quat.exp(vectors))
         if gone[:, 2].any():
-            turns[:, 0] = quat.to_matrix(quat.about(UP, gone[:, 2])) @ turns[:, 0]
+            turns[:, 0] = quat.to_matrix(quat.from_axis_angle(UP, gone[:, 2])) @ turns[:, 0]
         roots = found[:, :3].copy()
         roots[:, [0, 2]] += gone[:, :2]
         return _forward(self.bones, vectors, turns, roots)
 
-    def gradient(self, pose: "Pose", row: int) -> tuple[Floats, Floats]:
+    def gradient(self, pose: "ChainPoses", row: int) -> tuple[Floats, Floats]:
         """Return the gradients of the last joint's position in one of the poses.
 
         The first is by the coefficients of the first mode (3, r1), m; the second by the turn of the
@@ -53,7 +53,7 @@ class Limb:
 
 
 @dataclass(frozen=True)
-class Pose:
+class ChainPoses:
     """A chain in S poses.
 
     vectors: rotation vectors (S, C, 3). turned: orientations (S, C, 3, 3). positions: (S, C, 3), m.
@@ -64,21 +64,23 @@ class Pose:
     positions: Floats
 
 
-def to(joint: int, parents: tuple[int, ...], bones: Floats, reduced: Reduced) -> Limb:
+def chain_to(
+    joint: int, parents: tuple[int, ...], bones: Floats, reduced: ReducedTensor
+) -> JointChain:
     """Return the chain that ends with a joint; bones (J, 3), m."""
     chain = [joint]
     while chain[0]:
         chain.insert(0, parents[chain[0]])
     numbers = [0, 1, 2, *(3 + 3 * link + axis for link in chain for axis in range(3))]
     mean, directions = reduced.mean[numbers], reduced.directions[:, numbers]
-    return Limb(bones[chain], quat.to_matrix(reduced.rotations[chain]), mean, directions)
+    return JointChain(bones[chain], quat.to_matrix(reduced.rotations[chain]), mean, directions)
 
 
-def _forward(bones: Floats, vectors: Floats, turns: Floats, roots: Floats) -> Pose:
+def _forward(bones: Floats, vectors: Floats, turns: Floats, roots: Floats) -> ChainPoses:
     turned, positions = turns.copy(), np.empty_like(vectors)
     positions[:, 0] = roots
     for link in range(1, len(bones)):
         above = turned[:, link - 1]
         positions[:, link] = positions[:, link - 1] + above @ bones[link]
         turned[:, link] = above @ turns[:, link]
-    return Pose(vectors, turned, positions)
+    return ChainPoses(vectors, turned, positions)

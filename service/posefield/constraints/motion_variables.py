@@ -7,74 +7,84 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.constraints import limb_kinematics
-from posefield.constraints.limb_kinematics import Limb
-from posefield.inference.reduced_motion import Reduced
+from posefield.constraints.limb_kinematics import JointChain
+from posefield.inference.reduced_motion import ReducedTensor
 
-BESIDE = 4
+CYCLE_VARIABLES = 4
 """Variables of a cycle in addition to the reduced motion: logarithm of the duration; travel to the
 left and ahead, m; change of heading, rad.
 """
 
 
 @dataclass(frozen=True)
-class Scene:
+class MotionVariables:
     """Skeleton and model level of a motion.
 
     reduced: reduced tensor. parents: of the joints. bones: (J, 3), m. cyclic: true for cycles,
     which have a travel.
     """
 
-    reduced: Reduced
+    reduced: ReducedTensor
     parents: tuple[int, ...]
     bones: Floats
     cyclic: bool
 
     @cached_property
-    def _limbs(self) -> dict[int, Limb]:
+    def _chains(self) -> dict[int, JointChain]:
         return {}
 
-    def limb(self, joint: int) -> Limb:
+    def chain(self, joint: int) -> JointChain:
         """Return the chain from the root to a joint, cached."""
-        if joint not in self._limbs:
-            self._limbs[joint] = limb_kinematics.to(joint, self.parents, self.bones, self.reduced)
-        return self._limbs[joint]
+        if joint not in self._chains:
+            self._chains[joint] = limb_kinematics.chain_to(
+                joint, self.parents, self.bones, self.reduced
+            )
+        return self._chains[joint]
 
     @property
     def numbers(self) -> int:
         """Number of variables of a motion."""
         r2, r1, _ = self.reduced.core.shape
-        return r2 * r1 + BESIDE * self.cyclic
+        return r2 * r1 + CYCLE_VARIABLES * self.cyclic
 
     def motion(self, numbers: Floats) -> Floats:
         """Return the reduced motion (r2, r1) among the variables."""
         r2, r1, _ = self.reduced.core.shape
         return numbers[: r2 * r1].reshape(r2, r1)
 
-    def beside(self, numbers: Floats) -> tuple[float, Floats]:
+    def duration_and_travel(self, numbers: Floats) -> tuple[float, Floats]:
         """Return the logarithm of the duration and the travel (3,); zeros without a cycle."""
         if not self.cyclic:
             return 0.0, np.zeros(3)
-        return float(numbers[-BESIDE]), numbers[-BESIDE + 1 :]
+        return float(numbers[-CYCLE_VARIABLES]), numbers[-CYCLE_VARIABLES + 1 :]
 
     def positions(self, numbers: Floats, joint: int, places: Floats) -> Floats:
         """Return the positions (S, 3), m, of a joint at canonical frames (S,)."""
         moves = self.reduced.rows(places) @ self.motion(numbers)
-        return self.limb(joint).posed(moves, self._gone(numbers, places)).positions[:, -1]
+        return (
+            self.chain(joint)
+            .compute_poses(moves, self._travel_so_far(numbers, places))
+            .positions[:, -1]
+        )
 
-    def among(self, numbers: Floats, motions: Floats, joint: int, at: float) -> Floats:
+    def evaluate_motions(self, numbers: Floats, motions: Floats, joint: int, at: float) -> Floats:
         """Return a joint's positions (n, 3), m, at a canonical frame of motions (n, r2 r1).
 
         All other variables, such as the travel, are those of this motion.
         """
-        row, gone = self.reduced.row(at), self._gone(numbers, np.full(len(motions), at))
+        row, gone = self.reduced.row(at), self._travel_so_far(numbers, np.full(len(motions), at))
         moves = row @ motions.reshape(len(motions), len(row), -1)
-        return self.limb(joint).posed(moves, gone).positions[:, -1]
+        return self.chain(joint).compute_poses(moves, gone).positions[:, -1]
 
-    def place(self, numbers: Floats, joint: int, at: float) -> tuple[Floats, Floats]:
+    def position_and_gradient(
+        self, numbers: Floats, joint: int, at: float
+    ) -> tuple[Floats, Floats]:
         """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
         places = np.array([at])
-        row, own = self.reduced.row(at), self.limb(joint)
-        pose = own.posed(row[None] @ self.motion(numbers), self._gone(numbers, places))
+        row, own = self.reduced.row(at), self.chain(joint)
+        pose = own.compute_poses(
+            row[None] @ self.motion(numbers), self._travel_so_far(numbers, places)
+        )
         by_freedoms, by_turn = own.gradient(pose, 0)
         inner = (row[:, None] * by_freedoms[:, None, :]).reshape(3, -1)
         if self.cyclic:
@@ -84,7 +94,7 @@ class Scene:
             inner = np.hstack([inner, outer])
         return pose.positions[0, -1], inner
 
-    def _gone(self, numbers: Floats, places: Floats) -> Floats:
+    def _travel_so_far(self, numbers: Floats, places: Floats) -> Floats:
         """Return the travel so far (S, 3) at canonical frames (S,)."""
         share = places / (self.reduced.frames - 1)
-        return share[:, None] * self.beside(numbers)[1]
+        return share[:, None] * self.duration_and_travel(numbers)[1]

@@ -13,41 +13,41 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.units import Floats
-from posefield.constraints.constraint import Aim, Looked
-from posefield.constraints.motion_variables import Scene
-from posefield.inference.residual_covariance import Spread
+from posefield.constraints.constraint import Constraint, ValuesAndGradients
+from posefield.constraints.motion_variables import MotionVariables
+from posefield.inference.residual_covariance import ResidualCovariance
 
 # Weight in the covariance of an equal share for all values of a constraint, so that none has zero
 # variance.
-EVEN = 0.1
+EQUAL_SHARE = 0.1
 # Factor on the covariances between the equal shares of different constraints, such as those of one
 # joint at successive moments.
-ALONG = 0.99
+SHARE_CORRELATION = 0.99
 # Standard deviations that three coordinates of a target may be off: exceeded by one captured clip
 # in 300. At 4, a tenth of the targets 20 cm too far are accepted; at 3.25, one captured clip in 70
 # is not.
-FAR = 3.7
+MAX_DEVIATIONS = 3.7
 
 
 @dataclass(frozen=True)
-class Reach:
+class Reachability:
     """Differences (k,) between constraints and a motion, with their covariance.
 
-    left: differences of the values from their targets. covariance: (k, k). members (k, aims): 1
-    where a value belongs to a constraint, else 0.
+    differences: differences of the values from their targets. covariance: (k, k). members (k,
+    aims): 1 where a value belongs to a constraint, else 0.
     """
 
-    left: Floats
+    differences: Floats
     covariance: Floats
     members: Floats
 
     @cached_property
     def distance(self) -> float:
         """Mahalanobis distance of the constraints."""
-        return float(np.sqrt(self.left @ np.linalg.solve(self.covariance, self.left)))
+        return float(np.sqrt(self.differences @ np.linalg.solve(self.covariance, self.differences)))
 
     @cached_property
-    def worth(self) -> Floats:
+    def weights(self) -> Floats:
         """Weight (k,) of each value in the squared error.
 
         The inverse mean variance of its constraint, so that metres and degrees compare.
@@ -55,18 +55,18 @@ class Reach:
         return 1.0 / (self.members @ _means(self.members, np.diagonal(self.covariance)))
 
     @property
-    def way(self) -> Floats:
+    def reachable(self) -> Floats:
         """Reachable part (k,) of the differences.
 
         All of them within the largest plausible distance; else a share of each constraint's
         difference, chosen for the least remaining error at that distance.
         """
-        limit = far(len(self.left))
+        limit = distance_limit(len(self.differences))
         if self.distance <= limit:
-            return self.left
-        each = self.members * self.left[:, None]
+            return self.differences
+        each = self.members * self.differences[:, None]
         apart = each.T @ np.linalg.solve(self.covariance, each)
-        misses = np.diag(each.T**2 @ self.worth)
+        misses = np.diag(each.T**2 @ self.weights)
         low, high = 0.0, 1.0
         while _length(apart, _shares(apart, misses, high)) > limit:
             low, high = high, 4.0 * high
@@ -77,58 +77,66 @@ class Reach:
         return np.asarray(each @ _shares(apart, misses, high), np.float64)
 
 
-def of(
-    scene: Scene,
-    spread: Spread,
+def assess(
+    scene: MotionVariables,
+    spread: ResidualCovariance,
     sigma: float,
     numbers: Floats,
-    aims: Sequence[Aim],
-    looked: Looked,
-) -> Reach:
+    aims: Sequence[Constraint],
+    looked: ValuesAndGradients,
+) -> Reachability:
     """Return the reachability of constraints from a motion (numbers,).
 
     sigma: standard deviation of the motion, m. looked: its values and gradients, those of `aims`
     first.
     """
-    members = np.repeat(np.eye(len(aims)), [len(aim.goal) for aim in aims], axis=0)
+    members = np.repeat(np.eye(len(aims)), [len(aim.target) for aim in aims], axis=0)
     values, gradients = (seen[: len(members)] for seen in looked)
-    covariance = sigma**2 * _evened(_strays(scene, spread, numbers, aims, gradients), members)
-    return Reach(np.concatenate([aim.goal for aim in aims]) - values, covariance, members)
+    covariance = sigma**2 * _blend_equal_shares(
+        _residual_covariance(scene, spread, numbers, aims, gradients), members
+    )
+    return Reachability(np.concatenate([aim.target for aim in aims]) - values, covariance, members)
 
 
-def far(values: int) -> float:
+def distance_limit(values: int) -> float:
     """Return the largest plausible Mahalanobis distance of a number of values.
 
     Its probability is that of FAR for three values, by the approximation of Wilson and Hilferty
     (1931).
     """
     spread = np.sqrt(2.0 / (9.0 * 3.0))
-    share = ((FAR**2 / 3.0) ** (1.0 / 3.0) - (1.0 - spread**2)) / spread
+    share = ((MAX_DEVIATIONS**2 / 3.0) ** (1.0 / 3.0) - (1.0 - spread**2)) / spread
     own = np.sqrt(2.0 / (9.0 * values))
     return float(np.sqrt(values * (1.0 - own**2 + share * own) ** 3))
 
 
-def _strays(
-    scene: Scene, spread: Spread, numbers: Floats, aims: Sequence[Aim], gradients: Floats
+def _residual_covariance(
+    scene: MotionVariables,
+    spread: ResidualCovariance,
+    numbers: Floats,
+    aims: Sequence[Constraint],
+    gradients: Floats,
 ) -> Floats:
     """Return the covariance (k, k) of leave-one-out residuals in the constrained values.
 
     For a sigma of one metre, with the skeleton and the travel of this motion.
     """
     motions = np.concatenate([spread.captured, spread.predicted])
-    found = np.hstack([_among(aim, scene, numbers, motions) for aim in aims])
+    found = np.hstack([_evaluate_motions(aim, scene, numbers, motions) for aim in aims])
     clips = len(spread.captured)
     strays = (found[:clips] - found[clips:]) / spread.sigmas[:, None]
     beside = gradients[:, motions.shape[1] :]
     return np.asarray(strays.T @ strays + beside @ spread.beside @ beside.T, np.float64)
 
 
-def _among(aim: Aim, scene: Scene, numbers: Floats, motions: Floats) -> Floats:
+def _evaluate_motions(
+    aim: Constraint, scene: MotionVariables, numbers: Floats, motions: Floats
+) -> Floats:
     cancellation.check()
-    return aim.among(scene, numbers, motions)
+    return aim.evaluate_motions(scene, numbers, motions)
 
 
-def _evened(covariance: Floats, members: Floats) -> Floats:
+def _blend_equal_shares(covariance: Floats, members: Floats) -> Floats:
     """Return the covariance blended with equal shares for all values of a constraint.
 
     The shares correlate between constraints as their mean covariances do; otherwise two
@@ -141,8 +149,8 @@ def _evened(covariance: Floats, members: Floats) -> Floats:
     shared = members.T @ (alike * covariance) @ members / sizes
     # A value that never varies has a variance of zero.
     own = np.diag(np.maximum(np.diagonal(shared), 1e-12))
-    shared = ALONG * shared + (1.0 - ALONG) * own
-    return (1.0 - EVEN) * covariance + EVEN * alike * (members @ shared @ members.T)
+    shared = SHARE_CORRELATION * shared + (1.0 - SHARE_CORRELATION) * own
+    return (1.0 - EQUAL_SHARE) * covariance + EQUAL_SHARE * alike * (members @ shared @ members.T)
 
 
 def _means(members: Floats, values: Floats) -> Floats:

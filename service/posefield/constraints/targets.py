@@ -5,19 +5,19 @@ from dataclasses import dataclass
 
 from posefield.common.errors import InvalidField
 from posefield.model_file.model_card import Control, ModelCard
-from posefield.motion.measures import AXES, Measure
+from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import value_validation
 from posefield.question.motion_question import MotionQuestion, Target
 from posefield.validation import input_limits
-from posefield.validation.question_validation import Question
+from posefield.validation.question_validation import ValidatedQuestion
 
 # Largest coordinate of a target, m: beyond any human reach, and well within float32.
-FARTHEST = 100.0
-MOST_TARGETS = 32
+MAX_COORDINATE = 100.0
+MAX_TARGETS = 32
 
 
 @dataclass(frozen=True)
-class Goal:
+class JointTarget:
     """Target position of a joint.
 
     moment: rule that determines the moment. place: (3,), m. time: s, None for a moment without one.
@@ -25,12 +25,12 @@ class Goal:
 
     name: str
     moment: Measure
-    place: tuple[float, float, float]
+    position: tuple[float, float, float]
     time: float | None
 
 
 @dataclass(frozen=True)
-class Goals:
+class ConstraintSet:
     """Constraints of a question.
 
     controls: measured controls with their target values. targets: target positions of joints.
@@ -38,17 +38,19 @@ class Goals:
     """
 
     controls: tuple[tuple[str, Measure, float], ...]
-    targets: tuple[Goal, ...]
+    targets: tuple[JointTarget, ...]
     pin_feet: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.controls or self.targets)
 
 
-NOTHING = Goals((), ())
+NO_CONSTRAINTS = ConstraintSet((), ())
 
 
-def of(card: ModelCard, question: Question, asked: MotionQuestion) -> Goals:
+def from_question(
+    card: ModelCard, question: ValidatedQuestion, asked: MotionQuestion
+) -> ConstraintSet:
     """Return the constraints of a question.
 
     Raises InvalidField for a control that is not measured on a motion, an unknown joint, an invalid
@@ -56,38 +58,43 @@ def of(card: ModelCard, question: Question, asked: MotionQuestion) -> Goals:
     """
     if asked.pin_feet and not card.feet:
         raise InvalidField("pin_feet", "true, but this model's recipe names no feet")
-    targets = tuple(_goal(card, i, target) for i, target in enumerate(asked.targets))
-    _refuse_twins(asked.targets, targets)
+    targets = tuple(_joint_target(card, i, target) for i, target in enumerate(asked.targets))
+    _check_duplicates(asked.targets, targets)
     taken = {goal.moment for goal in targets if goal.time is None}
     named = asked.exact not in ("auto", "none")
     controls = []
-    for control in _exact(card, question, asked):
+    for control in _exact_controls(card, question, asked):
         own = control.measure
         assert own is not None
-        if own.quantity in AXES and Measure("height", own.joints, own.at, own.share) in taken:
+        if (
+            own.quantity in POSITION_AXES
+            and Measure("height", own.joints, own.at, own.share) in taken
+        ):
             # The target of the same joint is more specific than a control that was not named in
             # `exact`.
             if named:
                 raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
             continue
         controls.append((control.name, own, question.controls[control.name]))
-    return Goals(tuple(controls), targets, asked.pin_feet)
+    return ConstraintSet(tuple(controls), targets, asked.pin_feet)
 
 
-def _exact(card: ModelCard, question: Question, asked: MotionQuestion) -> Sequence[Control]:
+def _exact_controls(
+    card: ModelCard, question: ValidatedQuestion, asked: MotionQuestion
+) -> Sequence[Control]:
     """Return the controls whose measured values the answer must match."""
     given = [c for c in card.controls if c.name not in question.inferred]
     if asked.exact == "none":
         return ()
     if asked.exact == "auto":
-        return [control for control in given if _movable(control)]
+        return [control for control in given if _is_measured(control)]
     for name in asked.exact:
         control = card.control(name)
         if control is None:
             known = ", ".join(c.name for c in card.controls)
             raise InvalidField("exact", f"{name!r}, expected controls of this model: {known}")
-        if not _movable(control):
-            movable = ", ".join(c.name for c in card.controls if _movable(c))
+        if not _is_measured(control):
+            movable = ", ".join(c.name for c in card.controls if _is_measured(c))
             raise InvalidField(
                 "exact",
                 f"{name!r} is not measured on a motion, expected some of: {movable or 'none'}",
@@ -97,14 +104,14 @@ def _exact(card: ModelCard, question: Question, asked: MotionQuestion) -> Sequen
     return [control for control in given if control.name in asked.exact]
 
 
-def _movable(control: Control) -> bool:
-    return control.measure is not None and not control.measure.bodily
+def _is_measured(control: Control) -> bool:
+    return control.measure is not None and not control.measure.is_body_measure
 
 
-def _goal(card: ModelCard, index: int, target: Target) -> Goal:
+def _joint_target(card: ModelCard, index: int, target: Target) -> JointTarget:
     field = f"targets/{index}"
-    if index >= MOST_TARGETS:
-        raise InvalidField("targets", f"more than {MOST_TARGETS}")
+    if index >= MAX_TARGETS:
+        raise InvalidField("targets", f"more than {MAX_TARGETS}")
     if target.joint not in card.skeleton.names:
         known = ", ".join(card.skeleton.names)
         raise InvalidField(f"{field}/joint", f"{target.joint!r}, expected one of {known}")
@@ -112,22 +119,27 @@ def _goal(card: ModelCard, index: int, target: Target) -> Goal:
     if len(target.position) != 3:
         raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")
     x, y, z = (
-        value_validation.number(f"{field}/position/{a}", v) for a, v in enumerate(target.position)
+        value_validation.check_number(f"{field}/position/{a}", v)
+        for a, v in enumerate(target.position)
     )
     for axis, value in enumerate((x, y, z)):
-        value_validation.within(f"{field}/position/{axis}", value, -FARTHEST, FARTHEST, "m")
+        value_validation.check_range(
+            f"{field}/position/{axis}", value, -MAX_COORDINATE, MAX_COORDINATE, "m"
+        )
     when = target.when
     if not isinstance(when, str):
-        time = value_validation.number(f"{field}/time", when)
-        if not 0.0 <= time <= input_limits.durations(card)[1]:
+        time = value_validation.check_number(f"{field}/time", when)
+        if not 0.0 <= time <= input_limits.duration_range(card)[1]:
             raise InvalidField(
                 f"{field}/time",
                 f"{time:g} s, expected 0 to the clip's duration; captured clips last at most "
                 f"{card.durations[1]:.3g} s",
             )
         moment = Measure("height", (joint,), "landmark")
-        return Goal(f"{target.joint} at {time:g} s", moment, (x, y, z), time)
-    return Goal(f"{target.joint} at {when}", _moment(card, field, joint, when), (x, y, z), None)
+        return JointTarget(f"{target.joint} at {time:g} s", moment, (x, y, z), time)
+    return JointTarget(
+        f"{target.joint} at {when}", _moment(card, field, joint, when), (x, y, z), None
+    )
 
 
 def _moment(card: ModelCard, field: str, joint: int, when: str) -> Measure:
@@ -140,7 +152,7 @@ def _moment(card: ModelCard, field: str, joint: int, when: str) -> Measure:
     return Measure("height", (joint,), "landmark", card.event.share)
 
 
-def _refuse_twins(targets: Sequence[Target], goals: Sequence[Goal]) -> None:
+def _check_duplicates(targets: Sequence[Target], goals: Sequence[JointTarget]) -> None:
     seen: dict[object, int] = {}
     for index, (target, goal) in enumerate(zip(targets, goals, strict=True)):
         key = (target.joint, goal.time, goal.moment)

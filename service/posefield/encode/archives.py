@@ -12,12 +12,12 @@ Members = Iterable[tuple[str, bytes]]
 """Names in the archive, with / between folders, and contents."""
 
 # The earliest time of the zip format. GNU tar would warn of files from time zero.
-MOMENT = int(datetime(1980, 1, 1, tzinfo=UTC).timestamp())
-END = bytes(2 * tarfile.BLOCKSIZE)
+MODIFICATION_TIME = int(datetime(1980, 1, 1, tzinfo=UTC).timestamp())
+END_BLOCKS = bytes(2 * tarfile.BLOCKSIZE)
 
 
 @dataclass(frozen=True)
-class Pack(Format):
+class ArchiveWriter(Format):
     """Writer of one kind of archive."""
 
     write: Callable[[Members], Iterator[bytes]]
@@ -29,15 +29,15 @@ def tar(members: Members) -> Iterator[bytes]:
     Names too long for ustar have a pax record. Raises ValueError for a name that is not ASCII.
     """
     for name, content in members:
-        yield _header(name, len(content))
+        yield _tar_header(name, len(content))
         yield content
         yield bytes(-len(content) % tarfile.BLOCKSIZE)
-    yield END
+    yield END_BLOCKS
 
 
-def _header(name: str, size: int) -> bytes:
+def _tar_header(name: str, size: int) -> bytes:
     member = tarfile.TarInfo(name.encode("ascii").decode())
-    member.size, member.mtime = size, MOMENT
+    member.size, member.mtime = size, MODIFICATION_TIME
     return member.tobuf(tarfile.PAX_FORMAT)
 
 
@@ -47,10 +47,10 @@ def zip(members: Members) -> Iterator[bytes]:  # noqa: A001  # read as packs.zip
     Each file is below 4 GiB. Beyond 65,534 files or 4 GiB the archive is a Zip64. Raises ValueError
     for a name that is not ASCII.
     """
-    return zip_archive.archive(zip_archive.whole(name, content) for name, content in members)
+    return zip_archive.zip_chunks(zip_archive.whole(name, content) for name, content in members)
 
 
-PACKS = by_extension(
-    Pack("zip", "application/zip", zip),
-    Pack("tar", "application/x-tar", tar),
+ARCHIVE_WRITERS = by_extension(
+    ArchiveWriter("zip", "application/zip", zip),
+    ArchiveWriter("tar", "application/x-tar", tar),
 )

@@ -16,7 +16,7 @@ from posefield.encode.files.file_convention import CENTIMETRES, METRES, Conventi
 from posefield.encode.files.media_types import ARROW, JSON, MSGPACK, NPZ, Format, by_extension
 from posefield.encode.tables import clip_tables, crowd_tables, model_tables
 from posefield.encode.tables import table as tables
-from posefield.encode.tables.arrow import arrow
+from posefield.encode.tables.arrow import arrow_stream
 from posefield.encode.tables.table import Table
 from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer
@@ -26,7 +26,7 @@ from posefield.question.results import ClipAnswer, PoseAnswer, SigmaGrid
 
 def bvh(answer: ClipAnswer, convention: Convention) -> bytes:
     """Return a BVH file; the format cannot store provenance, unit or up axis."""
-    clip = axis_conversion.moved(Convention(1.0, convention.up), answer.clip)
+    clip = axis_conversion.convert_clip(Convention(1.0, convention.up), answer.clip)
     return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
 
 
@@ -34,7 +34,7 @@ A = TypeVar("A", contravariant=True)
 
 
 @dataclass(frozen=True)
-class Encoder(Format):
+class ClipEncoder(Format):
     """Encoder of clips in one format; equal results give equal bytes.
 
     write: returns the files of several results, in their order; those of one model and length are
@@ -45,19 +45,19 @@ class Encoder(Format):
     """
 
     write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
-    per_joint: int
+    bytes_per_joint: int
     usual: Convention = METRES
-    law: bool = False
-    at_once: int = 200
+    convention_fixed: bool = False
+    inline_limit: int = 200
 
     def convention(self, unit: Unit | None, up: Up | None) -> Convention:
         """Return the requested convention; None is the format's default.
 
         Raises InvalidField for a convention that the format does not allow.
         """
-        found = conventions.of(unit, up, self.usual)
-        if self.law:
-            conventions.refuse_other(found, self.usual, self.extension)
+        found = conventions.requested_convention(unit, up, self.usual)
+        if self.convention_fixed:
+            conventions.check_convention(found, self.usual, self.extension)
         return found
 
     def encode(self, answer: ClipAnswer, convention: Convention | None = None) -> bytes:
@@ -65,12 +65,12 @@ class Encoder(Format):
         return self.write([answer], convention or self.usual)[0]
 
 
-def poses_within(size: int, joints: int, per_joint: int) -> int:
+def max_poses(size: int, joints: int, per_joint: int) -> int:
     """Return how many poses fit in `size` bytes; the root position counts as a joint."""
     return size // ((joints + 1) * per_joint)
 
 
-def one_by_one(
+def sequential_writer(
     encode: Callable[[ClipAnswer, Convention], bytes],
 ) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
     """Return a function that encodes several results one after the other."""
@@ -85,14 +85,16 @@ def one_by_one(
     return write
 
 
-def numbers(
+def table_writer(
     write: Callable[[Table], bytes],
 ) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
     """Return a function that encodes several results as tables."""
-    return one_by_one(lambda answer, convention: write(clip_tables.table(answer, convention)))
+    return sequential_writer(
+        lambda answer, convention: write(clip_tables.table(answer, convention))
+    )
 
 
-def _usd(name: str) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+def _lazy_usd_writer(name: str) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
     """Return the USD writer of that name, which imports usd-core when it is first called.
 
     The import takes 0.12 CPU seconds, a seventh of the service's start.
@@ -107,18 +109,18 @@ def _usd(name: str) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
     return write
 
 
-ENCODERS = by_extension(
+CLIP_ENCODERS = by_extension(
     # A template takes 30 ms to make, and each number of frames needs another one.
-    Encoder("usda", "model/vnd.usda", _usd("usda"), 120, at_once=0),
+    ClipEncoder("usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, inline_limit=0),
     # Unlike those of usda and usdz, not registered with IANA, but in common use.
-    Encoder("usdc", "model/vnd.usdc", _usd("usdc"), 48, at_once=0),
-    Encoder("usdz", "model/vnd.usdz+zip", _usd("usdz"), 48, at_once=0),
-    Encoder("json", JSON, one_by_one(clip_tables.json), 96),
-    Encoder("bvh", "application/x-bvh", one_by_one(bvh), 72, CENTIMETRES),
-    Encoder("glb", "model/gltf-binary", one_by_one(glb.glb), 24, law=True),
-    Encoder("npz", NPZ, numbers(tables.npz), 24),
-    Encoder("arrow", ARROW, numbers(arrow), 24),
-    Encoder("msgpack", MSGPACK, numbers(tables.msgpack), 24),
+    ClipEncoder("usdc", "model/vnd.usdc", _lazy_usd_writer("usdc"), 48, inline_limit=0),
+    ClipEncoder("usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0),
+    ClipEncoder("json", JSON, sequential_writer(clip_tables.clip_json), 96),
+    ClipEncoder("bvh", "application/x-bvh", sequential_writer(bvh), 72, CENTIMETRES),
+    ClipEncoder("glb", "model/gltf-binary", sequential_writer(glb.glb), 24, convention_fixed=True),
+    ClipEncoder("npz", NPZ, table_writer(tables.npz_table), 24),
+    ClipEncoder("arrow", ARROW, table_writer(arrow_stream), 24),
+    ClipEncoder("msgpack", MSGPACK, table_writer(tables.msgpack_table), 24),
 )
 
 
@@ -134,8 +136,8 @@ class TableEncoder(Format, Generic[A]):
 
     table: Callable[[A], Table]
     write: Callable[[Table], bytes]
-    at_once: int = 0
-    per_joint: int = 40
+    inline_limit: int = 0
+    bytes_per_joint: int = 40
     most: float = math.inf
 
     def encode(self, answer: A) -> bytes:
@@ -144,27 +146,34 @@ class TableEncoder(Format, Generic[A]):
 
 
 POSE_ENCODERS: dict[str, TableEncoder[PoseAnswer[Any]]] = by_extension(
-    TableEncoder("json", JSON, clip_tables.pose_table, tables.json, at_once=200),
-    TableEncoder("msgpack", MSGPACK, clip_tables.pose_table, tables.msgpack, at_once=2000),
-    TableEncoder("npz", NPZ, clip_tables.pose_table, tables.npz, at_once=2000),
-    TableEncoder("arrow", ARROW, clip_tables.pose_table, arrow, at_once=2000),
+    TableEncoder("json", JSON, clip_tables.pose_table, tables.json_table, inline_limit=200),
+    TableEncoder(
+        "msgpack", MSGPACK, clip_tables.pose_table, tables.msgpack_table, inline_limit=2000
+    ),
+    TableEncoder("npz", NPZ, clip_tables.pose_table, tables.npz_table, inline_limit=2000),
+    TableEncoder("arrow", ARROW, clip_tables.pose_table, arrow_stream, inline_limit=2000),
 )
 
 CROWD_ENCODERS: dict[str, TableEncoder[CrowdPoses]] = by_extension(
-    TableEncoder("arrow", ARROW, crowd_tables.table, arrow),
-    TableEncoder("npz", NPZ, crowd_tables.table, tables.npz),
-    TableEncoder("msgpack", MSGPACK, crowd_tables.table, tables.msgpack),
+    TableEncoder("arrow", ARROW, crowd_tables.table, arrow_stream),
+    TableEncoder("npz", NPZ, crowd_tables.table, tables.npz_table),
+    TableEncoder("msgpack", MSGPACK, crowd_tables.table, tables.msgpack_table),
     TableEncoder(
-        "json", JSON, crowd_tables.table, tables.json, per_joint=150, most=crowd_tables.JSON_LIMIT
+        "json",
+        JSON,
+        crowd_tables.table,
+        tables.json_table,
+        bytes_per_joint=150,
+        most=crowd_tables.MAX_JSON_CHARACTERS,
     ),
 )
 
 GRID_ENCODERS: dict[str, TableEncoder[SigmaGrid]] = by_extension(
-    TableEncoder("json", JSON, model_tables.table, tables.json, at_once=1024),
-    TableEncoder("msgpack", MSGPACK, model_tables.table, tables.msgpack, at_once=1024),
-    TableEncoder("npz", NPZ, model_tables.table, tables.npz, at_once=1024),
+    TableEncoder("json", JSON, model_tables.table, tables.json_table, inline_limit=1024),
+    TableEncoder("msgpack", MSGPACK, model_tables.table, tables.msgpack_table, inline_limit=1024),
+    TableEncoder("npz", NPZ, model_tables.table, tables.npz_table, inline_limit=1024),
     # A stream of rows, one for each point of the grid.
-    TableEncoder("arrow", ARROW, model_tables.points, arrow, at_once=1024),
+    TableEncoder("arrow", ARROW, model_tables.points, arrow_stream, inline_limit=1024),
 )
 
 
@@ -184,4 +193,6 @@ class CrowdWriter(Format):
         return crowd_writer.stream(crowd, self.extension, instancing)
 
 
-CROWD_WRITERS = by_extension(*(CrowdWriter(name, ENCODERS[name].media_type) for name in STREAMS))
+CROWD_WRITERS = by_extension(
+    *(CrowdWriter(name, CLIP_ENCODERS[name].media_type) for name in STREAMS)
+)

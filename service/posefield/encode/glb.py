@@ -16,7 +16,7 @@ import orjson
 from posefield.common.units import Floats, Singles
 from posefield.encode.character import body_mesh, character
 from posefield.encode.character.body_mesh import Integers
-from posefield.encode.character.character import Rest, Rig
+from posefield.encode.character.character import CharacterRig, RestPose
 from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.motion import quat
@@ -30,16 +30,16 @@ VERTICES, CORNERS = 34962, 34963
 """Targets of buffer views, by their OpenGL constants."""
 COMPONENTS = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}
 # The byte 255 stands for a weight of one.
-WHOLE = np.array([255, 0, 0, 0], np.uint8)
-COLORS = np.round(255 * np.pad(body_mesh.TINTS, ((0, 0), (0, 1)), constant_values=1.0)).astype(
+FULL_WEIGHT = np.array([255, 0, 0, 0], np.uint8)
+TINT_COLORS = np.round(255 * np.pad(body_mesh.TINTS, ((0, 0), (0, 1)), constant_values=1.0)).astype(
     np.uint8
 )
-STILL = 1e-9
+CONSTANT_TOLERANCE = 1e-9
 """Largest variation, m, of a joint's translation that is taken as constant."""
 
 
 @dataclass(frozen=True)
-class Store:
+class GlbBuffer:
     """Binary buffer under construction, with its views and accessors."""
 
     views: list[dict[str, Any]] = field(default_factory=list)
@@ -52,10 +52,10 @@ class Store:
         said: further properties of the view.
         """
         last = self.views[-1] if self.views else {"byteOffset": 0, "byteLength": 0}
-        start = last["byteOffset"] + _filled(last["byteLength"])
+        start = last["byteOffset"] + _padded_length(last["byteLength"])
         length = len(content)
         self.views.append({"buffer": 0, "byteOffset": start, "byteLength": length, **said})
-        self.parts.append(content.ljust(_filled(length), b"\0"))
+        self.parts.append(content.ljust(_padded_length(length), b"\0"))
         return len(self.views) - 1
 
     def accessor(self, array: npt.NDArray[Any], kind: str, view: int, **said: Any) -> int:
@@ -72,7 +72,7 @@ class Store:
         """Return the index of an accessor of a whole array; said: properties of its view."""
         return self.accessor(array, kind, self.view(array.tobytes(), **said))
 
-    def bounded(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
+    def add_bounded(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
         """Return the index of an accessor of a whole array, with minimum and maximum.
 
         glTF requires them for positions and times. said: properties of its view.
@@ -87,10 +87,10 @@ def glb(answer: ClipAnswer, said: Convention) -> bytes:
 
     Raises InvalidField for a convention other than metres with Y up.
     """
-    file_convention.refuse_other(said, METRES, "glb")
-    clip, store = answer.clip, Store()
+    file_convention.check_convention(said, METRES, "glb")
+    clip, store = answer.clip, GlbBuffer()
     rig = character.rig(clip.skeleton)
-    resting = character.resting(rig, clip.translations[:1])
+    resting = character.rest_pose(rig, clip.translations[:1])
     offsets = resting.offsets[0]
     joints = len(offsets)
     document = {
@@ -128,16 +128,18 @@ def _joints(clip: Clip, offsets: Floats) -> list[dict[str, Any]]:
     return nodes
 
 
-def _primitive(store: Store, resting: Rest) -> dict[str, Any]:
-    points, normals = (_single(values[0]) for values in body_mesh.mesh(resting.boxes))
-    fixed = _fixed(resting.rig)
+def _primitive(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
+    points, normals = (
+        _as_float32(values[0]) for values in body_mesh.points_and_normals(resting.boxes)
+    )
+    fixed = _mesh_arrays(resting.rig)
     return {
         "attributes": {
-            "POSITION": store.bounded(points, "VEC3", target=VERTICES),
+            "POSITION": store.add_bounded(points, "VEC3", target=VERTICES),
             "NORMAL": store.add(normals, "VEC3", target=VERTICES),
-            "COLOR_0": _shares(store, fixed.colors),
+            "COLOR_0": _normalized_bytes(store, fixed.colors),
             "JOINTS_0": store.add(fixed.joints, "VEC4", target=VERTICES),
-            "WEIGHTS_0": _shares(store, fixed.weights),
+            "WEIGHTS_0": _normalized_bytes(store, fixed.weights),
         },
         "indices": store.add(fixed.corners, "SCALAR", target=CORNERS),
         "material": 0,
@@ -145,7 +147,7 @@ def _primitive(store: Store, resting: Rest) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Fixed:
+class MeshArrays:
     """Arrays of a body mesh that are equal for all bone offsets of a rig.
 
     colors, joints, weights: of the points (P, 4). corners: of the triangles (3 T,).
@@ -158,23 +160,26 @@ class Fixed:
 
 
 @lru_cache(maxsize=64)
-def _fixed(rig: Rig) -> Fixed:
-    owners = np.repeat(rig.bones.joints, body_mesh.POINTS)
-    joints = np.zeros((len(owners), 4), _smallest(len(rig.skeleton)))
+def _mesh_arrays(rig: CharacterRig) -> MeshArrays:
+    owners = np.repeat(rig.bones.joints, body_mesh.POINTS_PER_BOX)
+    joints = np.zeros((len(owners), 4), _smallest_index_type(len(rig.skeleton)))
     joints[:, 0] = owners
-    weights = np.tile(WHOLE, (len(owners), 1))
-    corners = _triangles(*body_mesh.faces(rig.bones)).astype(_smallest(len(owners)))
-    return Fixed(
-        np.repeat(COLORS[rig.bones.tints], body_mesh.POINTS, axis=0), joints, weights, corners
+    weights = np.tile(FULL_WEIGHT, (len(owners), 1))
+    corners = _triangles(*body_mesh.faces(rig.bones)).astype(_smallest_index_type(len(owners)))
+    return MeshArrays(
+        np.repeat(TINT_COLORS[rig.bones.tints], body_mesh.POINTS_PER_BOX, axis=0),
+        joints,
+        weights,
+        corners,
     )
 
 
-def _shares(store: Store, values: Bytes) -> int:
+def _normalized_bytes(store: GlbBuffer, values: Bytes) -> int:
     view = store.view(values.tobytes(), target=VERTICES)
     return store.accessor(values, "VEC4", view, normalized=True)
 
 
-def _skin(store: Store, rest: Floats) -> dict[str, Any]:
+def _skin(store: GlbBuffer, rest: Floats) -> dict[str, Any]:
     # Column-major matrices: the last column translates.
     inverse = np.tile(np.eye(4, dtype=np.float32), (len(rest), 1, 1))
     inverse[:, 3, :3] = -rest
@@ -182,14 +187,14 @@ def _skin(store: Store, rest: Floats) -> dict[str, Any]:
     return {"inverseBindMatrices": bound, "joints": list(range(len(rest))), "skeleton": 0}
 
 
-def _animation(store: Store, clip: Clip) -> dict[str, Any]:
+def _animation(store: GlbBuffer, clip: Clip) -> dict[str, Any]:
     """Return channels of all rotations, and of the translations that are not constant."""
-    when = store.bounded(_single(np.arange(len(clip)) / clip.rate), "SCALAR")
+    when = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
     # Readers interpolate between neighbours, which must lie in one hemisphere.
-    turns = _single(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
+    turns = _as_float32(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
     spread = np.ptp(clip.translations[:, 1:], axis=0).max(axis=-1, initial=0.0)
-    moved = [0, *(np.flatnonzero(spread > STILL) + 1).tolist()]
-    paths = _single(np.moveaxis(clip.translations[:, moved], 1, 0))
+    moved = [0, *(np.flatnonzero(spread > CONSTANT_TOLERANCE) + 1).tolist()]
+    paths = _as_float32(np.moveaxis(clip.translations[:, moved], 1, 0))
     outputs = [
         *((joint, "rotation", o) for joint, o in enumerate(_tracks(store, turns, "VEC4"))),
         *zip(moved, ["translation"] * len(moved), _tracks(store, paths, "VEC3"), strict=True),
@@ -204,7 +209,7 @@ def _animation(store: Store, clip: Clip) -> dict[str, Any]:
     }
 
 
-def _tracks(store: Store, tracks: Singles, kind: str) -> list[int]:
+def _tracks(store: GlbBuffer, tracks: Singles, kind: str) -> list[int]:
     """Return one accessor for the frames of each joint, (J, F, ...), all in one view."""
     view, size = store.view(tracks.tobytes()), tracks[0].nbytes
     return [
@@ -212,7 +217,7 @@ def _tracks(store: Store, tracks: Singles, kind: str) -> list[int]:
     ]
 
 
-def _single(values: Floats | Singles) -> Singles:
+def _as_float32(values: Floats | Singles) -> Singles:
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
@@ -225,7 +230,7 @@ def _triangles(counts: Integers, points: Integers) -> Integers:
     return points[np.stack([first, first + turn + 1, first + turn + 2], axis=-1)].reshape(-1)
 
 
-def _smallest(count: int) -> type[np.unsignedinteger[Any]]:
+def _smallest_index_type(count: int) -> type[np.unsignedinteger[Any]]:
     """Return the smallest unsigned type for `count` values; glTF reserves the largest one."""
     kinds = (np.uint8, np.uint16, np.uint32)
     return next(kind for kind in kinds if count <= np.iinfo(kind).max)
@@ -233,7 +238,7 @@ def _smallest(count: int) -> type[np.unsignedinteger[Any]]:
 
 def _container(document: dict[str, Any], binary: bytes) -> bytes:
     text = orjson.dumps(document)
-    text = text.ljust(_filled(len(text)))
+    text = text.ljust(_padded_length(len(text)))
     total = 12 + 8 + len(text) + 8 + len(binary)
     return b"".join(
         (
@@ -246,5 +251,5 @@ def _container(document: dict[str, Any], binary: bytes) -> bytes:
     )
 
 
-def _filled(length: int) -> int:
+def _padded_length(length: int) -> int:
     return length + -length % 4

@@ -11,48 +11,48 @@ from posefield.http import pages, request_cycle
 from posefield.http.access import access_policy
 from posefield.http.api import contract, problems
 from posefield.http.api.contract import Contract, Operation
-from posefield.http.api.problems import RequestFault
+from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
 from posefield.http.middleware import cors, request_head
 from posefield.http.middleware.request_head import HeadLimits
 from posefield.http.operations import OPERATIONS
 from posefield.http.readiness import Readiness
-from posefield.http.request_cycle import Site
-from posefield.http.routing import Map, Route
+from posefield.http.request_cycle import ServerState
+from posefield.http.routing import Route, RouteTree
 from posefield.http.service import Service
 from posefield.http.steps import Handler, Steps
-from posefield.http.telemetry.telemetry import SILENT, Telling
-from posefield.registry.model_registry import Library
-from posefield.registry.model_reload import Fixed
+from posefield.http.telemetry.telemetry import NO_TELEMETRY, Telemetry
+from posefield.registry.model_registry import ModelRegistry
+from posefield.registry.model_reload import FixedRegistry
 
-Lifespan = Callable[[Site], AbstractAsyncContextManager[None]]
+Lifespan = Callable[[ServerState], AbstractAsyncContextManager[None]]
 
 
-def alone(site: Site) -> AbstractAsyncContextManager[None]:
+def no_background_tasks(site: ServerState) -> AbstractAsyncContextManager[None]:
     """Return a lifespan without background tasks."""
     return nullcontext()
 
 
 def create_app(
-    models: Library | Readiness,
+    models: ModelRegistry | Readiness,
     settings: Settings,
-    telling: Telling = SILENT,
-    lifespan: Lifespan = alone,
+    telling: Telemetry = NO_TELEMETRY,
+    lifespan: Lifespan = no_background_tasks,
 ) -> "App":
     """Return the application of the contract for some models.
 
     telling: log and traces of requests. lifespan: context of the background tasks of the server.
     """
-    return build(contract.load(), OPERATIONS, models, settings, telling, lifespan)
+    return build_app(contract.load_contract(), OPERATIONS, models, settings, telling, lifespan)
 
 
-def build(
+def build_app(
     agreed: Contract,
     handlers: Mapping[str, Handler],
-    models: Library | Readiness,
+    models: ModelRegistry | Readiness,
     settings: Settings,
-    telling: Telling = SILENT,
-    lifespan: Lifespan = alone,
+    telling: Telemetry = NO_TELEMETRY,
+    lifespan: Lifespan = no_background_tasks,
 ) -> "App":
     """Return the application of a contract and the handlers of its operations.
 
@@ -61,21 +61,21 @@ def build(
     for invalid settings of access, origins or hosts.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
-    readiness = Readiness(Fixed(models)) if isinstance(models, Library) else models
-    rules = access_policy.of(settings)
+    readiness = Readiness(FixedRegistry(models)) if isinstance(models, ModelRegistry) else models
+    rules = access_policy.from_settings(settings)
     access_policy.check_exposure(settings, rules)
-    origins = cors.read(settings.origins, f"{PREFIX}ORIGINS")
+    origins = cors.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
     service = Service(
-        readiness, settings, agreed.version, pages.made(agreed), rules, origins, telling
+        readiness, settings, agreed.version, pages.static_pages(agreed), rules, origins, telling
     )
-    places = Map(
+    places = RouteTree(
         route
         for operation in agreed.operations
         for route in _routes(operation, handlers[operation.id])
     )
     hosts = request_head.names(settings.hosts, f"{PREFIX}HOSTS")
     limits = HeadLimits(settings.url_limit, settings.head_limit, hosts)
-    return App(Site(places, service, partial(_missing, places), limits), lifespan)
+    return App(ServerState(places, service, partial(_missing, places), limits), lifespan)
 
 
 def _routes(operation: Operation, handler: Handler) -> Iterator[Route]:
@@ -100,7 +100,7 @@ def _check_formats(operation: Operation, encoders: Mapping[str, str]) -> None:
 class App:
     """ASGI application; see `request_cycle` for a request."""
 
-    def __init__(self, site: Site, lifespan: Lifespan) -> None:
+    def __init__(self, site: ServerState, lifespan: Lifespan) -> None:
         self.site = site
         self._lifespan = lifespan
 
@@ -123,9 +123,9 @@ def _check_complete(agreed: set[str], handled: set[str]) -> None:
         )
 
 
-def _missing(places: Map, path: str) -> Exception:
+def _missing(places: RouteTree, path: str) -> Exception:
     """Return the error of a path that is not in the contract."""
     if found := places.other_formats(path):
         asked, known = found
         return UnknownFormat("format", f"no format {asked!r}; there are {', '.join(known)}")
-    return RequestFault(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")
+    return RequestError(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")

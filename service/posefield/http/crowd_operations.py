@@ -12,14 +12,14 @@ from posefield.encode.formats import (
     CROWD_WRITERS,
     CrowdWriter,
     TableEncoder,
-    poses_within,
+    max_poses,
 )
 from posefield.http import responses
 from posefield.http.concurrency import worker_threads
 from posefield.http.decoding import crowd_query, request_body
 from posefield.http.steps import Context, Steps, from_url
 from posefield.locomotion import crowd_order, gait
-from posefield.locomotion.crowd_order import Order
+from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import crowd_synthesis
@@ -31,7 +31,7 @@ Walks = Context[CrowdWriter]
 
 def places(context: object, task: object) -> AbstractAsyncContextManager[None]:
     """Return the limit on crowds."""
-    return worker_threads.CROWDS
+    return worker_threads.CROWD_LIMITER
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,14 @@ class CrowdTask:
 async def read_crowd(context: Crowds, request: Request) -> bytes:
     """Return the body, whose decoding takes a thread."""
     service = context.service
-    return await request_body.read(request, service.settings.crowd_body_limit, service.bodies)
+    return await request_body.read_body(request, service.settings.crowd_body_limit, service.bodies)
 
 
 async def limit_crowd(context: Crowds, content: bytes) -> CrowdTask:
     """Return the body with the limits of the settings and the format."""
     settings, encoder = context.service.settings, context.form
     joints = len(context.model.session.card.skeleton)
-    fits = poses_within(settings.output_limit, joints, encoder.per_joint)
+    fits = max_poses(settings.output_limit, joints, encoder.bytes_per_joint)
     return CrowdTask(content, min(settings.crowd_limit, encoder.most, fits))
 
 
@@ -62,7 +62,7 @@ async def pose_crowd(context: Crowds, task: CrowdTask) -> CrowdPoses:
 
 
 def _poses(model: Synthesizer, task: CrowdTask) -> CrowdPoses:
-    return crowd_synthesis.poses(model, crowd_query.of_body(task.content, task.most))
+    return crowd_synthesis.synthesize_crowd(model, crowd_query.of_body(task.content, task.most))
 
 
 async def encode_crowd(context: Crowds, task: CrowdTask, answer: CrowdPoses) -> bytes:
@@ -84,7 +84,7 @@ QUERY_CROWD = Steps(
 class WalkTask:
     """A walking crowd within the limits of the settings. instancing: how USD repeats characters."""
 
-    order: Order
+    order: CrowdOrder
     instancing: str
 
 
@@ -92,7 +92,7 @@ async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
     """Return the order of a walking crowd; InvalidField beyond the limits."""
     joints = len(context.model.session.card.skeleton)
     settings = context.service.settings
-    order = crowd_query.walk_order(question, context.form.extension, joints, settings)
+    order = crowd_query.checked_order(question, context.form.extension, joints, settings)
     return WalkTask(order, question.instancing)
 
 
@@ -102,7 +102,7 @@ async def plan_walk(context: Walks, task: WalkTask) -> CrowdClip:
 
 
 def _planned(model: Synthesizer, task: WalkTask) -> CrowdClip:
-    return crowd_order.crowd(model, gait.of(model.session), task.order)
+    return crowd_order.build_crowd(model, gait.fit_gait(model.session), task.order)
 
 
 async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iterator[bytes]:
@@ -114,8 +114,8 @@ def send_walk(context: Walks, answer: CrowdClip, content: Iterator[bytes]) -> Re
     """Return the response that streams the crowd."""
     share = float(answer.facts["outside_share"])
     said = f"{100 * share:.1f} % of the poses have some control outside what was sampled"
-    sent = responses.sent(content, worker_threads.CROWDS)
-    return responses.streamed(sent, context.form, context.model, [said] if share else [])
+    sent = responses.sent(content, worker_threads.CROWD_LIMITER)
+    return responses.stream(sent, context.form, context.model, [said] if share else [])
 
 
 # The default of Accept is binary USD.

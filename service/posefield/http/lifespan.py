@@ -14,18 +14,18 @@ from types import FrameType
 from typing import Any
 
 from posefield.http.readiness import Readiness
-from posefield.http.request_cycle import Site
+from posefield.http.request_cycle import ServerState
 from posefield.http.telemetry import metrics
-from posefield.registry.model_reload import Shelf
+from posefield.registry.model_reload import ReloadingRegistry
 
-BEAT = 1.0
+HEARTBEAT_INTERVAL = 1.0
 """Period of the heartbeat, s."""
-LAST = 5
+FORCED_EXIT_DELAY = 5
 """Seconds until a process is ended by force after the server has shut down."""
 
 
 @dataclass(frozen=True)
-class Announcement:
+class StartAnnouncement:
     """Start message on standard output, written by the first process that is ready.
 
     first: semaphore with value 1, shared by the processes.
@@ -42,21 +42,23 @@ class Announcement:
 
 
 @asynccontextmanager
-async def lifespan(site: Site, shelf: Shelf, announcement: Announcement) -> AsyncIterator[None]:
+async def lifespan(
+    site: ServerState, shelf: ReloadingRegistry, announcement: StartAnnouncement
+) -> AsyncIterator[None]:
     """Run the reload of models, the heartbeat and the SIGTERM handler during the server's life."""
     service = site.service
     _drain_on_sigterm(service.readiness, service.settings.drain)
     beat = asyncio.create_task(_heartbeat(site, service.settings.unresponsive))
-    with shelf.watched(service.settings.reload):
+    with shelf.watch(service.settings.reload):
         announcement.write()
         yield
     beat.cancel()
     service.telling.close()
     # A thread that does not stop must not keep the process alive.
-    faulthandler.dump_traceback_later(LAST, exit=True)
+    faulthandler.dump_traceback_later(FORCED_EXIT_DELAY, exit=True)
 
 
-async def _heartbeat(site: Site, unresponsive: int) -> None:
+async def _heartbeat(site: ServerState, unresponsive: int) -> None:
     """Reset the watchdog, update the gauge of open requests and check the parent, once a second.
 
     A blocked event loop does not reset the watchdog, a C thread that does not need the GIL. After
@@ -68,11 +70,11 @@ async def _heartbeat(site: Site, unresponsive: int) -> None:
     while True:
         if unresponsive:
             faulthandler.dump_traceback_later(unresponsive, exit=True)
-        metrics.open_now(site.open)
+        metrics.set_open_requests(site.open)
         if parent is not None and not parent.is_alive():
             signal.raise_signal(signal.SIGTERM)
             return
-        await asyncio.sleep(BEAT)
+        await asyncio.sleep(HEARTBEAT_INTERVAL)
 
 
 def _drain_on_sigterm(readiness: Readiness, seconds: int) -> None:

@@ -5,7 +5,7 @@ from functools import partial
 from starlette.requests import Request
 from starlette.responses import Response
 
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import (
     clip_operations,
     crowd_operations,
@@ -20,17 +20,17 @@ from posefield.http.telemetry import metrics
 
 async def list_models(service: Service, request: Request) -> Response:
     """Return the list of models."""
-    return responses.document(responses.models(request.scope["library"]))
+    return responses.json_document(responses.model_list(request.scope["library"]))
 
 
 async def get_model(service: Service, request: Request) -> Response:
     """Return the card of a model."""
-    return responses.document(responses.card(request.scope["model"]))
+    return responses.json_document(responses.card_document(request.scope["model"]))
 
 
 async def live(service: Service, request: Request) -> Response:
     """Return the liveness of the process."""
-    return responses.document({"status": "live", "contract": service.contract})
+    return responses.json_document({"status": "live", "contract": service.contract})
 
 
 async def ready(service: Service, request: Request) -> Response:
@@ -38,15 +38,15 @@ async def ready(service: Service, request: Request) -> Response:
 
     Each model was tested within the last second. Raises RequestFault 503 if not ready.
     """
-    return responses.document(service.readiness.document(request.scope["principal"].may_read))
+    return responses.json_document(service.readiness.document(request.scope["principal"].may_read))
 
 
 async def get_metrics(service: Service, request: Request) -> Response:
     """Return the metrics in Prometheus' text format."""
     reloads = service.readiness.models.reloads
     counts = {"looks": reloads.looks, "opened": reloads.opened, "failed": reloads.failed}
-    metrics.models(service.library.identities, {**counts, "faults": len(reloads.faults)})
-    return Response(metrics.page(), headers={"Content-Type": metrics.MEDIA_TYPE})
+    metrics.set_models(service.registry.identities, {**counts, "faults": len(reloads.faults)})
+    return Response(metrics.metrics_text(), headers={"Content-Type": metrics.MEDIA_TYPE})
 
 
 async def get_page(name: str, service: Service, request: Request) -> Response:
@@ -61,7 +61,7 @@ _FORMATTED: dict[str, Handler] = {
     "queryPose": pose_operations.QUERY_POSE,
     "getClip": clip_operations.GET_CLIP,
     "queryClip": clip_operations.QUERY_CLIP,
-    "queryClips": clip_operations.query_clips(ENCODERS),
+    "queryClips": clip_operations.query_clips(CLIP_ENCODERS),
     "getCrowd": crowd_operations.GET_CROWD,
     "queryCrowd": crowd_operations.QUERY_CROWD,
     "getSigma": trust_operations.GET_SIGMA,

@@ -7,7 +7,7 @@ from typing import Any
 
 from starlette.responses import Response
 
-from posefield.constraints.targets import Goals
+from posefield.constraints.targets import ConstraintSet
 from posefield.encode.files.media_types import JSON
 from posefield.encode.formats import POSE_ENCODERS, TableEncoder
 from posefield.http import responses
@@ -16,7 +16,7 @@ from posefield.http.steps import Context, Steps, from_body, from_url
 from posefield.question.motion_question import PoseQuestion
 from posefield.question.results import PoseAnswer
 from posefield.synthesis import poses
-from posefield.synthesis.poses import Moments
+from posefield.synthesis.poses import PreparedPoseQuestion
 
 Poses = Context[TableEncoder[PoseAnswer[Any]]]
 
@@ -25,11 +25,11 @@ Poses = Context[TableEncoder[PoseAnswer[Any]]]
 class PoseTask:
     """A validated question for poses.
 
-    goals: its constraints. apart: true if synthesis and encoding take a thread.
+    constraints: its constraints. apart: true if synthesis and encoding take a thread.
     """
 
-    moments: Moments
-    goals: Goals
+    moments: PreparedPoseQuestion
+    constraints: ConstraintSet
     apart: bool
 
 
@@ -38,32 +38,34 @@ async def validate(context: Poses, question: PoseQuestion) -> PoseTask:
     model = context.model
     if question.targets:
         # Open controls are inferred from predictions of every captured clip, which takes time.
-        asked = await worker_threads.run(
-            poses.moments, model, question, places=worker_threads.SOLVER
+        asked = await worker_threads.run_in_thread(
+            poses.prepare, model, question, places=worker_threads.SOLVER_LIMITER
         )
     else:
-        asked = poses.moments(model, question)
-    goals = model.keeper.goals(asked.question, question)
-    return PoseTask(asked, goals, bool(goals) or len(question.times) > context.form.at_once)
+        asked = poses.prepare(model, question)
+    goals = model.solver.constraints(asked.question, question)
+    return PoseTask(asked, goals, bool(goals) or len(question.times) > context.form.inline_limit)
 
 
 def places(context: Poses, task: PoseTask) -> AbstractAsyncContextManager[None]:
     """Return the limit on requests that take a thread."""
     if not task.apart:
         return nullcontext()
-    return worker_threads.SOLVER if task.goals else worker_threads.WORK
+    return worker_threads.SOLVER_LIMITER if task.constraints else worker_threads.SYNTHESIS_LIMITER
 
 
 async def synthesise(context: Poses, task: PoseTask) -> PoseAnswer[Any]:
     """Return the poses: of the constraint solver, of the graph, or of a batch of requests."""
     model, moments = context.model, task.moments
-    if task.goals:
-        return await worker_threads.within(poses.held, model, moments, task.goals)
+    if task.constraints:
+        return await worker_threads.within(
+            poses.synthesize_constrained, model, moments, task.constraints
+        )
     if task.apart:
-        (row,) = await worker_threads.within(poses.rows, model, [moments])
+        (row,) = await worker_threads.within(poses.run_batch, model, [moments])
     else:
-        row = await context.service.batcher.row(model, moments)
-    return poses.posed(model, moments, row)
+        row = await context.service.pose_batcher.row(model, moments)
+    return poses.build_answer(model, moments, row)
 
 
 async def encode(context: Poses, task: PoseTask, answer: PoseAnswer[Any]) -> bytes:

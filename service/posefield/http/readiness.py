@@ -10,13 +10,13 @@ from datetime import UTC, datetime
 from typing import Any
 
 from posefield.http.api import problems
-from posefield.http.api.problems import RequestFault
-from posefield.registry.model_loading import Fault
-from posefield.registry.model_registry import Library
-from posefield.registry.model_reload import Models, Reloads
+from posefield.http.api.problems import RequestError
+from posefield.registry.model_loading import LoadFailure
+from posefield.registry.model_registry import ModelRegistry
+from posefield.registry.model_reload import RegistryProvider, ReloadStatistics
 from posefield.synthesis.synthesizer import Synthesizer
 
-HELD = 1.0
+TEST_LIFETIME = 1.0
 """Lifetime of a cached test of the models, s."""
 
 
@@ -27,59 +27,65 @@ class Readiness:
     byte, that of the opening of the model. draining: the process is shutting down.
     """
 
-    def __init__(self, models: Models) -> None:
+    def __init__(self, models: RegistryProvider) -> None:
         self.models = models
         self.draining = False
-        self._tried: tuple[Library, float] | None = None
-        self._wrong: list[str] = []
+        self._last_test: tuple[ModelRegistry, float] | None = None
+        self._changed_models: list[str] = []
 
     def document(self, may_read: Callable[[str], bool]) -> dict[str, Any]:
         """Return the status, the models in service and the facts of reloads.
 
         may_read: filter on the names of models. Raises RequestFault 503 when not ready.
         """
-        library = self.models.library
+        library = self.models.registry
         if self.draining:
-            raise RequestFault(problems.NOT_READY, "the service is ending")
+            raise RequestError(problems.NOT_READY, "the service is ending")
         if not library.models:
-            raise RequestFault(problems.NOT_READY, "there is no model")
+            raise RequestError(problems.NOT_READY, "there is no model")
         if wrong := self._tested(library):
             known = ", ".join(name for name in wrong if may_read(name.partition("@")[0]))
             detail = f"not as when opened answers {known or 'a model'}"
-            raise RequestFault(problems.NOT_READY, detail)
+            raise RequestError(problems.NOT_READY, detail)
         return {
             "status": "ready",
             "models": [m.identity for m in library.models.values() if may_read(m.name)],
-            "reload": _told(self.models.reloads, may_read),
+            "reload": _reload_facts(self.models.reloads, may_read),
         }
 
-    def _tested(self, library: Library) -> list[str]:
+    def _tested(self, library: ModelRegistry) -> list[str]:
         """Return the identities of the models whose output has changed."""
         now = time.monotonic()
-        if self._tried is None or self._tried[0] is not library or now > self._tried[1] + HELD:
-            self._wrong = [m.identity for m in library.models.values() if not _answers(m)]
-            self._tried = library, now
-        return self._wrong
+        if (
+            self._last_test is None
+            or self._last_test[0] is not library
+            or now > self._last_test[1] + TEST_LIFETIME
+        ):
+            self._changed_models = [
+                m.identity for m in library.models.values() if not _gives_trial_output(m)
+            ]
+            self._last_test = library, now
+        return self._changed_models
 
 
-def _answers(model: Synthesizer) -> bool:
+def _gives_trial_output(model: Synthesizer) -> bool:
     try:
-        return model.session.trial() == model.session.golden
+        return model.session.run_trial() == model.session.golden
     except Exception:  # onnxruntime's exceptions share no base of their own
         return False
 
 
-def _told(reloads: Reloads, may_read: Callable[[str], bool]) -> dict[str, Any]:
+def _reload_facts(reloads: ReloadStatistics, may_read: Callable[[str], bool]) -> dict[str, Any]:
     return {
         "looks": reloads.looks,
         "opened": reloads.opened,
         "failed": reloads.failed,
         "changed": datetime.fromtimestamp(reloads.changed, UTC).isoformat(timespec="seconds"),
-        "faults": [_fault(fault) for fault in reloads.faults if may_read(fault.name)],
+        "faults": [_fault_facts(fault) for fault in reloads.faults if may_read(fault.name)],
     }
 
 
-def _fault(fault: Fault) -> dict[str, str]:
+def _fault_facts(fault: LoadFailure) -> dict[str, str]:
     # The text after a colon comes from libraries and may contain paths: it is only logged.
     detail = fault.error.message.partition(": ")[0]
     return {"model": fault.name, "version": fault.version, "detail": detail}

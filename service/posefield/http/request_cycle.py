@@ -21,11 +21,11 @@ from starlette.types import Message, Receive, Scope, Send
 
 from posefield.common.errors import QueryError
 from posefield.http.access import access_control
-from posefield.http.access.audit import Call
+from posefield.http.access.audit import AuditedRequest
 from posefield.http.access.principal import EVERYONE
 from posefield.http.api import problems
 from posefield.http.api.contract import Operation
-from posefield.http.api.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestFault
+from posefield.http.api.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestError
 from posefield.http.middleware import (
     caching,
     compression,
@@ -34,13 +34,13 @@ from posefield.http.middleware import (
     negotiation,
     security_headers,
 )
-from posefield.http.middleware.deadline import Watch
+from posefield.http.middleware.deadline import DeadlineTimer
 from posefield.http.middleware.request_head import HeadLimits
-from posefield.http.routing import Map, Place, Route
+from posefield.http.routing import PathRoutes, Route, RouteTree
 from posefield.http.service import Service
 from posefield.http.steps import Context, Handler, Steps
 from posefield.http.telemetry import log, metrics
-from posefield.http.telemetry.telemetry import trace
+from posefield.http.telemetry.telemetry import trace_id
 
 faults = logging.getLogger(__name__)
 
@@ -50,7 +50,7 @@ _PROCESS, _NUMBERS = os.urandom(12).hex(), count(1)
 
 
 @dataclass
-class Site:
+class ServerState:
     """State that all requests share.
 
     places: routes by path. service: state that handlers share. missing: returns the error of an
@@ -58,18 +58,18 @@ class Site:
     deadlines.
     """
 
-    places: Map
+    places: RouteTree
     service: Service
     missing: Callable[[str], Exception]
     head_limits: HeadLimits
     open: int = 0
-    watch: Watch = field(default_factory=Watch)
+    watch: DeadlineTimer = field(default_factory=DeadlineTimer)
 
 
 class Exchange:
     """State of one request and its response, for the common headers and for telemetry."""
 
-    def __init__(self, site: Site, scope: Scope, receive: Receive, send: Send) -> None:
+    def __init__(self, site: ServerState, scope: Scope, receive: Receive, send: Send) -> None:
         self.begun = time.perf_counter()
         self.site, self.service, self.scope, self._send = site, site.service, scope, send
         self.headers: dict[bytes, bytes] = dict(scope["headers"])
@@ -92,7 +92,7 @@ class Exchange:
         await self._send(message)
 
 
-async def handle(site: Site, scope: Scope, receive: Receive, send: Send) -> None:
+async def handle(site: ServerState, scope: Scope, receive: Receive, send: Send) -> None:
     """Send the response to a request, or that of its error, and record it."""
     exchange = Exchange(site, scope, receive, send)
     site.open += 1
@@ -106,7 +106,7 @@ async def handle(site: Site, scope: Scope, receive: Receive, send: Send) -> None
             raise
         faults.exception("request %s failed", exchange.identity)
         exchange.coding = exchange.tag = None
-        await send_response(exchange, problems.internal(exchange.request))
+        await send_response(exchange, problems.internal_error_response(exchange.request))
     finally:
         site.open -= 1
         site.service.bodies.release(scope.get("body_memory", 0))
@@ -117,10 +117,10 @@ async def respond(exchange: Exchange) -> Response:
     """Return the response of an operation, or that of an error."""
     try:
         return await _respond(exchange)
-    except RequestFault as fault:
-        return problems.of_fault(exchange.request, fault)
+    except RequestError as fault:
+        return problems.request_error_response(exchange.request, fault)
     except QueryError as error:
-        return problems.of_query_error(exchange.request, error)
+        return problems.query_error_response(exchange.request, error)
     except caching.NotModified:
         return Response(status_code=304)
 
@@ -137,11 +137,13 @@ async def _respond(exchange: Exchange) -> Response:
     authorise(exchange, route)
     negotiate(exchange, route)
     revalidate(exchange, route)
-    limit = deadline.seconds(exchange.headers.get(b"prefer"), site.service.settings.deadline)
+    limit = deadline.requested_deadline(
+        exchange.headers.get(b"prefer"), site.service.settings.deadline
+    )
     return await site.watch.within(limit, answer(route.handler, site.service, exchange.request))
 
 
-def find(site: Site, scope: Scope) -> Place:
+def find(site: ServerState, scope: Scope) -> PathRoutes:
     """Return the operations of a path, by method, and set the path's parameters.
 
     Raises the error of an unknown path.
@@ -153,37 +155,37 @@ def find(site: Site, scope: Scope) -> Place:
     return place
 
 
-def other_method(exchange: Exchange, place: Place) -> Response:
+def other_method(exchange: Exchange, place: PathRoutes) -> Response:
     """Return the response to OPTIONS; raises RequestFault 405 for other methods."""
     method, allow = exchange.scope["method"], {"Allow": place.allow}
     if method != "OPTIONS":
         detail = f"{method}, expected one of {place.allow}"
-        raise RequestFault(METHOD_NOT_ALLOWED, detail, headers=allow)
+        raise RequestError(METHOD_NOT_ALLOWED, detail, headers=allow)
     response = Response(status_code=204, headers=allow)
     if exchange.service.origins and cors.is_preflight(exchange.headers):
-        response.raw_headers += cors.preflight(place.allow.encode())
+        response.raw_headers += cors.preflight_headers(place.allow.encode())
     return response
 
 
-def check_load(site: Site, operation: Operation) -> None:
+def check_load(site: ServerState, operation: Operation) -> None:
     """Raise RequestFault 503 if too many requests are open for an operation that may wait."""
-    if site.open > site.service.settings.concurrency and operation.sheds:
+    if site.open > site.service.settings.concurrency and operation.sheddable:
         detail = f"{site.open - 1} requests are being answered"
-        raise RequestFault(OVERLOADED, detail, headers={"Retry-After": "1"})
+        raise RequestError(OVERLOADED, detail, headers={"Retry-After": "1"})
 
 
 def authorise(exchange: Exchange, route: Route) -> None:
     """Set the request's principal and the library that it may read; raises RequestFault."""
     scope, service = exchange.scope, exchange.service
-    scope["library"], scope["principal"] = service.library, EVERYONE
-    if service.rules.closed:
-        call = Call(exchange.identity, scope["method"], route.path)
+    scope["library"], scope["principal"] = service.registry, EVERYONE
+    if service.access_policy.requires_credentials:
+        call = AuditedRequest(exchange.identity, scope["method"], route.path)
         needed = route.operation.scope
-        known = access_control.check(service.rules, scope["headers"], needed, call)
+        known = access_control.authorize(service.access_policy, scope["headers"], needed, call)
         scope["principal"] = known
         if needed is not None:
             asked = scope["path_params"].get("model")
-            scope["library"] = access_control.seen(service.library, known, asked, call)
+            scope["library"] = access_control.readable_library(service.registry, known, asked, call)
 
 
 def negotiate(exchange: Exchange, route: Route) -> None:
@@ -196,16 +198,16 @@ def negotiate(exchange: Exchange, route: Route) -> None:
     if scope["query_string"] and not route.operation.open_query:
         _check_parameters(exchange.request, route.operation)
     if route.compresses and b"accept-encoding" in exchange.headers:
-        exchange.coding = compression.preferred(exchange.headers[b"accept-encoding"])
+        exchange.coding = compression.preferred_coding(exchange.headers[b"accept-encoding"])
     if route.offers:
-        scope["format"] = negotiation.format_of(exchange.request, route.offers)
+        scope["format"] = negotiation.negotiated_format(exchange.request, route.offers)
 
 
 def _check_parameters(request: Request, operation: Operation) -> None:
     if unknown := request.query_params.keys() - operation.query:
         name = min(unknown)
         detail = f"{name}: no such query parameter; there are {sorted(operation.query) or 'none'}"
-        raise RequestFault(problems.BAD_PARAMETER, detail, {"parameter": name})
+        raise RequestError(problems.BAD_PARAMETER, detail, {"parameter": name})
 
 
 def revalidate(exchange: Exchange, route: Route) -> None:
@@ -222,15 +224,15 @@ def revalidate(exchange: Exchange, route: Route) -> None:
             parts = model.fingerprint, route.name, scope["query_string"], chosen
             _check_tag(exchange, service.code, *parts)
     elif page := service.pages.get(operation.id):
-        exchange.lifetime = caching.PUBLIC + caching.AGAIN
+        exchange.lifetime = caching.PUBLIC + caching.NO_CACHE
         _check_tag(exchange, page.digest)
 
 
 def _check_tag(exchange: Exchange, *parts: bytes) -> None:
     """Set the entity tag of a response that depends on these parts alone."""
-    exchange.tag = caching.tag(*parts, coding=exchange.coding)
+    exchange.tag = caching.entity_tag(*parts, coding=exchange.coding)
     given = exchange.headers.get(b"if-none-match")
-    if given is not None and caching.held(given.decode("latin-1"), exchange.tag):
+    if given is not None and caching.matches_tag(given.decode("latin-1"), exchange.tag):
         raise caching.NotModified
 
 
@@ -251,20 +253,20 @@ async def answer(handler: Handler, service: Service, request: Request) -> Respon
 async def send_response(exchange: Exchange, response: Response) -> None:
     """Compress a response, add the common headers and send it."""
     if exchange.coding is not None and response.status_code == 200:
-        await compression.apply(response, exchange.coding)
+        await compression.compress_response(response, exchange.coding)
     response.raw_headers += _common_headers(exchange, response)
     await response(exchange.scope, exchange.request.receive, exchange.sent)
 
 
 def _common_headers(exchange: Exchange, response: Response) -> list[tuple[bytes, bytes]]:
     """Return the headers of every response: request id, security, connection, CORS and caching."""
-    kind = security_headers.of(response.media_type, response.status_code)
+    kind = security_headers.headers_for(response.media_type, response.status_code)
     headers = [(b"x-request-id", exchange.identity.encode()), *kind]
     if exchange.service.readiness.draining and "connection" not in response.headers:
         # The client's next request must reach a process that continues to run.
         headers.append((b"connection", b"close"))
     if origins := exchange.service.origins:
-        headers += cors.headers(exchange.headers.get(b"origin"), origins)
+        headers += cors.cors_headers(exchange.headers.get(b"origin"), origins)
     held = response.status_code in (200, 304)
     if held and exchange.route and exchange.route.vary:
         headers.append((b"vary", exchange.route.vary))
@@ -272,7 +274,7 @@ def _common_headers(exchange: Exchange, response: Response) -> list[tuple[bytes,
         tag = exchange.tag.encode()
         headers += [(b"etag", tag), (b"cache-control", exchange.lifetime)]
     elif "cache-control" not in response.headers:
-        headers.append((b"cache-control", caching.ALWAYS_NEW))
+        headers.append((b"cache-control", caching.NO_STORE))
     return headers
 
 
@@ -281,9 +283,9 @@ def record(exchange: Exchange) -> None:
     took = time.perf_counter() - exchange.begun
     operation = exchange.route.operation.id if exchange.route else "none"
     form = exchange.scope.get("format")
-    metrics.answered(operation, form or "", exchange.status, took, exchange.size)
+    metrics.count_request(operation, form or "", exchange.status, took, exchange.size)
     telling = exchange.service.telling
-    if telling.wanted:
+    if telling.enabled:
         telling.end(exchange.span, _log_line(exchange, operation, took))
 
 
@@ -291,9 +293,9 @@ def _log_line(exchange: Exchange, operation: str, took: float) -> dict[str, Any]
     scope = exchange.scope
     model = scope.get("model")
     return {
-        "time": log.moment(time.time()),
+        "time": log.timestamp(time.time()),
         "request": exchange.identity,
-        "trace": trace(exchange.headers),
+        "trace": trace_id(exchange.headers),
         "method": scope["method"],
         "operation": operation,
         "format": scope.get("format"),

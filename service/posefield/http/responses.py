@@ -12,21 +12,21 @@ from posefield.encode.files.media_types import Format
 from posefield.http.concurrency import worker_threads
 from posefield.model_file import model_card as cards
 from posefield.question.results import Trust
-from posefield.registry.model_registry import Library
+from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
 
 
-def document(content: Any) -> Response:
+def json_document(content: Any) -> Response:
     """Return a JSON response of plain values."""
     return Response(orjson.dumps(content), media_type="application/json")
 
 
-def models(library: Library) -> dict[str, Any]:
+def model_list(library: ModelRegistry) -> dict[str, Any]:
     """Return the ModelList (schema of the contract) of a library."""
-    return {"models": [_summary(library.versions(name)) for name in library.models]}
+    return {"models": [_model_summary(library.versions(name)) for name in library.models]}
 
 
-def _summary(versions: Sequence[Synthesizer]) -> dict[str, Any]:
+def _model_summary(versions: Sequence[Synthesizer]) -> dict[str, Any]:
     newest = versions[0]
     return {
         "name": newest.name,
@@ -36,7 +36,7 @@ def _summary(versions: Sequence[Synthesizer]) -> dict[str, Any]:
     }
 
 
-def card(model: Synthesizer) -> dict[str, Any]:
+def card_document(model: Synthesizer) -> dict[str, Any]:
     """Return the ModelCard (schema of the contract) of a model."""
     return {"identity": model.identity, **cards.plain_values(model.session.card)}
 
@@ -46,7 +46,7 @@ def attachment(content: bytes, form: Format, model: str) -> Response:
     return Response(content, headers=_disposition(form, model), media_type=form.media_type)
 
 
-def streamed(
+def stream(
     pieces: AsyncIterator[bytes], form: Format, model: Synthesizer, warnings: Sequence[str]
 ) -> Response:
     """Return a response that streams a file to download.
@@ -55,14 +55,14 @@ def streamed(
     """
     headers = {**_disposition(form, model.name), "Posefield-Model": model.identity}
     sent = StreamingResponse(pieces, headers=headers, media_type=form.media_type)
-    return _warning(sent, warnings)
+    return _add_warnings(sent, warnings)
 
 
 def _disposition(form: Format, model: str) -> dict[str, str]:
     return {"Content-Disposition": f'attachment; filename="{model}.{form.extension}"'}
 
 
-def file(content: bytes, form: Format, trust: Trust) -> Response:
+def clip_file(content: bytes, form: Format, trust: Trust) -> Response:
     """Return a response with a clip to download; headers hold its trust for all formats."""
     headers = {
         **_disposition(form, trust.model.partition("@")[0]),
@@ -79,27 +79,27 @@ def file(content: bytes, form: Format, trust: Trust) -> Response:
         if not met.reached:
             said = {"what": met.what, "miss": met.miss, "unit": met.unit}
             made.headers.append("Posefield-Missed", json.dumps(said))
-    return _warning(made, trust.warnings)
+    return _add_warnings(made, trust.warnings)
 
 
-def _warning(response: Response, warnings: Sequence[str]) -> Response:
+def _add_warnings(response: Response, warnings: Sequence[str]) -> Response:
     for warning in warnings:
         # A JSON string is ASCII, and its quotes protect commas, which separate joined headers.
         response.headers.append("Posefield-Warning", json.dumps(warning))
     return response
 
 
-ENOUGH = 1 << 18
+MIN_CHUNK_SIZE = 1 << 18
 """Minimum bytes of a piece, since a thread switch per piece takes a tenth of a millisecond."""
 
 
-def gathered(pieces: Iterable[bytes]) -> Iterator[bytes]:
+def merged_chunks(pieces: Iterable[bytes]) -> Iterator[bytes]:
     """Yield the same bytes in pieces of at least ENOUGH bytes, except the last; none is empty."""
     held, size = [], 0
     for piece in pieces:
         held.append(piece)
         size += len(piece)
-        if size >= ENOUGH:
+        if size >= MIN_CHUNK_SIZE:
             yield b"".join(held)
             held, size = [], 0
     if size:
@@ -112,5 +112,5 @@ async def sent(pieces: Iterator[bytes], places: CapacityLimiter) -> AsyncIterato
     pieces: none may be empty. When the client disconnects, generation stops after the current
     piece.
     """
-    while piece := await worker_threads.run(next, pieces, b"", places=places):
+    while piece := await worker_threads.run_in_thread(next, pieces, b"", places=places):
         yield piece

@@ -42,7 +42,7 @@ class Route:
         """True if a response may have a content coding."""
         operation = self.operation
         types = [operation.formats[self.format]] if self.format else operation.media_types
-        return any(map(compression.pays, types))
+        return any(map(compression.is_compressible, types))
 
     @cached_property
     def vary(self) -> bytes:
@@ -52,7 +52,7 @@ class Route:
 
 
 @dataclass(frozen=True)
-class Place:
+class PathRoutes:
     """Routes of one path.
 
     template: path template. routes: by method, with HEAD. allow: value of the header Allow.
@@ -64,25 +64,25 @@ class Place:
 
 
 @dataclass
-class _Branch:
+class _TreeNode:
     """Node of the tree.
 
     fixed: children by segment. any: child of a path parameter, and `name` the parameter's name.
     place: routes of the path that ends here.
     """
 
-    fixed: dict[str, "_Branch"] = field(default_factory=dict)
-    any: "_Branch | None" = None
+    fixed: dict[str, "_TreeNode"] = field(default_factory=dict)
+    any: "_TreeNode | None" = None
     name: str = ""
-    place: Place | None = None
+    place: PathRoutes | None = None
 
 
-class Map:
+class RouteTree:
     """Routing table: places by path."""
 
     def __init__(self, routes: Iterable[Route]) -> None:
-        self._root = _Branch()
-        self.places: list[Place] = []
+        self._root = _TreeNode()
+        self.places: list[PathRoutes] = []
         by_path: dict[str, dict[str, Route]] = {}
         self._formats: dict[str, dict[str, None]] = {}
         for route in routes:
@@ -91,16 +91,16 @@ class Map:
                 stem = route.path.removesuffix(f".{route.format}")
                 self._formats.setdefault(stem, {})[route.format] = None
         for path, own in by_path.items():
-            self._add(_place(path, own))
+            self._add(_path_routes(path, own))
 
-    def _add(self, place: Place) -> None:
+    def _add(self, place: PathRoutes) -> None:
         branch = self._root
         for part in place.template.split("/"):
-            branch = _grown(branch, part)
+            branch = _child_node(branch, part)
         branch.place = place
         self.places.append(place)
 
-    def find(self, path: str) -> tuple[Place, dict[str, str]] | None:
+    def find(self, path: str) -> tuple[PathRoutes, dict[str, str]] | None:
         """Return the place of a path and its non-empty path parameters; None if unknown."""
         branch, values = self._root, {}
         for part in path.split("/"):
@@ -121,18 +121,18 @@ class Map:
         return (asked, known) if asked and known else None
 
 
-def _grown(branch: _Branch, part: str) -> _Branch:
+def _child_node(branch: _TreeNode, part: str) -> _TreeNode:
     if not part.startswith("{"):
-        return branch.fixed.setdefault(part, _Branch())
+        return branch.fixed.setdefault(part, _TreeNode())
     if branch.any is None:
-        branch.any, branch.name = _Branch(), part.strip("{}")
+        branch.any, branch.name = _TreeNode(), part.strip("{}")
     if branch.name != part.strip("{}"):
         raise ValueError(f"{part} and {{{branch.name}}} at one place of the contract's paths")
     return branch.any
 
 
-def _place(path: str, routes: dict[str, Route]) -> Place:
+def _path_routes(path: str, routes: dict[str, Route]) -> PathRoutes:
     own: dict[str, Any] = dict(routes)
     if "GET" in own:
         own["HEAD"] = own["GET"]
-    return Place(path, own, ", ".join(sorted({*own, "OPTIONS"})))
+    return PathRoutes(path, own, ", ".join(sorted({*own, "OPTIONS"})))

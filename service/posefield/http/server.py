@@ -23,25 +23,25 @@ from threadpoolctl import threadpool_limits
 from uvicorn.supervisors import Multiprocess
 from uvicorn.supervisors.multiprocess import Process
 
-from posefield.common.cpu_cores import ALONE
+from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
 from posefield.http.api.settings import Settings
 from posefield.http.app import App, create_app
-from posefield.http.lifespan import Announcement, lifespan
+from posefield.http.lifespan import StartAnnouncement, lifespan
 from posefield.http.middleware.coalescing import CoalescingProtocol
 from posefield.http.readiness import Readiness
 from posefield.http.telemetry import log, metrics, tracing
-from posefield.http.telemetry.telemetry import Telling
-from posefield.inference.trial_process import LIMITS, Limits
-from posefield.registry.model_registry import Bounds
-from posefield.registry.model_reload import Shelf
+from posefield.http.telemetry.telemetry import Telemetry
+from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
+from posefield.registry.model_registry import VersionLimits
+from posefield.registry.model_reload import ReloadingRegistry
 
 faults = logging.getLogger(__name__)
 
-QUOTA = Path("/sys/fs/cgroup/cpu.max")
+CPU_QUOTA_FILE = Path("/sys/fs/cgroup/cpu.max")
 BACKLOG = 2048
 """Maximum length of the queue of connections to accept."""
-NEVER = 86_400
+SPAWN_TIMEOUT = 86_400
 """Timeout of a disabled health check, s."""
 
 
@@ -52,23 +52,25 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
     unavailable address and WorkerDied if worker processes cannot start.
     """
     # Also needed after uvicorn has returned: it raises the signal that ended it again.
-    signal.signal(signal.SIGTERM, _exit)
+    signal.signal(signal.SIGTERM, _exit_on_signal)
     _raise_open_files()
     named = tuple(map(str, places))
     shelf = open_models(named, settings)
     shelf.check()
-    names = ", ".join(shelf.library.models)
-    count = settings.workers or processors(QUOTA)
+    names = ", ".join(shelf.registry.models)
+    count = settings.workers or usable_processors(CPU_QUOTA_FILE)
     with ExitStack() as stack, suppress(KeyboardInterrupt):
-        sockets = _listening(stack, settings.host, settings.port)
+        sockets = _listening_sockets(stack, settings.host, settings.port)
         first = multiprocessing.get_context("spawn").Semaphore(1) if count > 1 else Semaphore(1)
-        announcement = Announcement(f"posefield: {names} at {_url(sockets[0])}", first)
+        announcement = StartAnnouncement(f"posefield: {names} at {_url(sockets[0])}", first)
         if count > 1:
-            stack.enter_context(metrics.shared())
+            stack.enter_context(metrics.shared_folder())
             _set_threads()
-            tried = frozenset(name.partition("@")[2] for name in shelf.library.identities)
-            app = partial(worker_application, named, settings, announcement, Limits(tried=tried))
-            Workers(_config(app, settings, count), sockets).run_until_told()
+            tried = frozenset(name.partition("@")[2] for name in shelf.registry.identities)
+            app = partial(
+                worker_application, named, settings, announcement, TrialLimits(passed=tried)
+            )
+            WorkerSupervisor(_config(app, settings, count), sockets).run_until_signalled()
         else:
             limit_threads()
             app = partial(_application, shelf, settings, announcement)
@@ -76,7 +78,10 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
 
 
 def worker_application(
-    places: tuple[str, ...], settings: Settings, announcement: Announcement, limits: Limits
+    places: tuple[str, ...],
+    settings: Settings,
+    announcement: StartAnnouncement,
+    limits: TrialLimits,
 ) -> App:
     """Return the application of a worker process.
 
@@ -87,15 +92,23 @@ def worker_application(
     return _application(open_models(places, settings, limits), settings, announcement)
 
 
-def open_models(places: tuple[str, ...], settings: Settings, limits: Limits = LIMITS) -> Shelf:
+def open_models(
+    places: tuple[str, ...], settings: Settings, limits: TrialLimits = DEFAULT_LIMITS
+) -> ReloadingRegistry:
     """Open the models of files, folders and URLs; `Shelf.check` raises their errors."""
-    return Shelf(places, Bounds(settings.versions, settings.versions_memory), limits)
+    return ReloadingRegistry(
+        places, VersionLimits(settings.versions, settings.versions_memory), limits
+    )
 
 
-def _application(shelf: Shelf, settings: Settings, announcement: Announcement) -> App:
+def _application(
+    shelf: ReloadingRegistry, settings: Settings, announcement: StartAnnouncement
+) -> App:
     lines = log.to_standard_error() if settings.log == "on" else None
     beside = partial(lifespan, shelf=shelf, announcement=announcement)
-    return create_app(Readiness(shelf), settings, Telling(lines, tracing.of()), beside)
+    return create_app(
+        Readiness(shelf), settings, Telemetry(lines, tracing.from_environment()), beside
+    )
 
 
 def _config(app: partial[App], settings: Settings, count: int) -> uvicorn.Config:
@@ -116,22 +129,22 @@ def _config(app: partial[App], settings: Settings, count: int) -> uvicorn.Config
         workers=count,
         timeout_keep_alive=settings.idle_time,
         timeout_graceful_shutdown=settings.grace,
-        timeout_worker_healthcheck=settings.unresponsive or NEVER,
+        timeout_worker_healthcheck=settings.unresponsive or SPAWN_TIMEOUT,
     )
 
 
-class Workers(Multiprocess):
+class WorkerSupervisor(Multiprocess):
     """uvicorn's supervisor of workers, with logging and early closing of its sockets.
 
-    told: a signal has requested the shutdown.
+    shutdown_requested: a signal has requested the shutdown.
     """
 
     told = False
 
-    def run_until_told(self) -> None:
+    def run_until_signalled(self) -> None:
         """Run the workers until a signal; raises WorkerDied if the supervisor ends without one."""
         self.run()
-        if not self.told:
+        if not self.shutdown_requested:
             raise WorkerDied("a worker process could not be started; see the log")
 
     def handle_term(self) -> None:
@@ -140,14 +153,14 @@ class Workers(Multiprocess):
         This process closes its sockets first: an open one would accept connections that no worker
         serves.
         """
-        self.told = True
+        self.shutdown_requested = True
         for own in self.sockets:
             own.close()
         super().handle_term()
 
     def handle_int(self) -> None:
         """Shut the workers down at once; a terminal sends SIGINT to them as well."""
-        self.told = True
+        self.shutdown_requested = True
         super().handle_int()
 
     def init_processes(self) -> None:
@@ -167,10 +180,10 @@ class Workers(Multiprocess):
             interrupted = signal.SIGINT in (*self.signal_queue, *signal.sigpending())
         for old, new in zip(before, self.processes, strict=True):
             if old is not new:
-                metrics.gone(old.pid or 0)
+                metrics.remove_process(old.pid or 0)
                 # Workers that SIGINT has ended are replaced until this process handles it, too.
                 if not interrupted:
-                    faults.warning("%s; process %d takes its place", _ending(old), new.pid)
+                    faults.warning("%s; process %d takes its place", _exit_reason(old), new.pid)
 
 
 @contextmanager
@@ -187,13 +200,13 @@ def _interrupt_pending() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _ending(process: Process) -> str:
+def _exit_reason(process: Process) -> str:
     code = process.exitcode or 0
     how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit code {code}"
     return f"worker process {process.pid} ended {how}"
 
 
-def processors(quota: Path) -> int:
+def usable_processors(quota: Path) -> int:
     """Return the number of processors for this process, by affinity and cgroup CPU quota.
 
     quota: path of the file cpu.max.
@@ -207,7 +220,7 @@ def processors(quota: Path) -> int:
         return allowed
 
 
-def _listening(stack: ExitStack, host: str, port: int) -> list[socket.socket]:
+def _listening_sockets(stack: ExitStack, host: str, port: int) -> list[socket.socket]:
     """Return sockets that listen on each address of a host; port 0 takes a free port for all."""
     sockets: list[socket.socket] = []
     kind, passive = socket.SOCK_STREAM, socket.AI_PASSIVE
@@ -230,8 +243,8 @@ def _url(listener: socket.socket) -> str:
 
 def _set_threads() -> None:
     """Set one BLAS thread per worker, unless the environment sets a number of threads."""
-    if not ALONE.keys() & os.environ.keys():
-        os.environ.update(ALONE)
+    if not SINGLE_THREAD_ENV.keys() & os.environ.keys():
+        os.environ.update(SINGLE_THREAD_ENV)
 
 
 def _raise_open_files() -> None:
@@ -240,7 +253,7 @@ def _raise_open_files() -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
-def _exit(number: int, frame: FrameType | None) -> NoReturn:
+def _exit_on_signal(number: int, frame: FrameType | None) -> NoReturn:
     raise SystemExit(0)
 
 
@@ -251,5 +264,5 @@ def limit_threads() -> None:
     (decision 0027). The last bits of results depend on the number of threads, and worker processes
     and exports have one.
     """
-    if not ALONE.keys() & os.environ.keys():
+    if not SINGLE_THREAD_ENV.keys() & os.environ.keys():
         threadpool_limits(1, user_api="blas")

@@ -4,16 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from posefield.http.access.access_policy import Policy
+from posefield.http.access.access_policy import AccessPolicy
 from posefield.http.api.settings import Settings
-from posefield.http.concurrency.clip_batching import Desk
-from posefield.http.concurrency.pose_batching import Batcher
+from posefield.http.concurrency.clip_batching import ClipBatcher
+from posefield.http.concurrency.pose_batching import PoseBatcher
 from posefield.http.decoding.request_body import BodyMemory
 from posefield.http.middleware import caching
-from posefield.http.pages.static_page import Page
+from posefield.http.pages.static_page import StaticPage
 from posefield.http.readiness import Readiness
-from posefield.http.telemetry.telemetry import SILENT, Telling
-from posefield.registry.model_registry import Library
+from posefield.http.telemetry.telemetry import NO_TELEMETRY, Telemetry
+from posefield.registry.model_registry import ModelRegistry
 
 
 @dataclass(frozen=True)
@@ -28,13 +28,13 @@ class Service:
     readiness: Readiness
     settings: Settings
     contract: str
-    pages: Mapping[str, Page]
-    rules: Policy
+    pages: Mapping[str, StaticPage]
+    access_policy: AccessPolicy
     origins: frozenset[bytes] = frozenset()
-    telling: Telling = SILENT
-    code: bytes = field(default_factory=caching.code)
-    batcher: Batcher = field(default_factory=Batcher)
-    desk: Desk = field(default_factory=Desk)
+    telling: Telemetry = NO_TELEMETRY
+    code: bytes = field(default_factory=caching.code_digest)
+    pose_batcher: PoseBatcher = field(default_factory=PoseBatcher)
+    clip_batcher: ClipBatcher = field(default_factory=ClipBatcher)
 
     @cached_property
     def bodies(self) -> BodyMemory:
@@ -46,9 +46,11 @@ class Service:
 
         model: key in the path, a name with or without a hash.
         """
-        return caching.lifetime(model, self.settings.alias_seconds, self.rules.closed)
+        return caching.cache_control(
+            model, self.settings.alias_seconds, self.access_policy.requires_credentials
+        )
 
     @property
-    def library(self) -> Library:
+    def registry(self) -> ModelRegistry:
         """Current models; a reload can replace them, so read this once per request."""
-        return self.readiness.models.library
+        return self.readiness.models.registry

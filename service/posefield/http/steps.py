@@ -19,7 +19,7 @@ from posefield.synthesis.synthesizer import Synthesizer
 _ESCAPES = re.compile("[%+]")
 
 Form = TypeVar("Form")
-Asked = TypeVar("Asked", bound=Struct)
+QuestionStruct = TypeVar("QuestionStruct", bound=Struct)
 Question = TypeVar("Question")
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -35,7 +35,7 @@ class Context(Generic[Form]):
     form: Form
 
 
-Plain = Callable[[Service, Request], Awaitable[Response]]
+PlainHandler = Callable[[Service, Request], Awaitable[Response]]
 """Handler of an operation that asks no model: pages, lists, health."""
 
 
@@ -69,36 +69,40 @@ class Steps(Generic[Form, Question, Task, Answer, Content]):
     respond: Callable[[Context[Form], Answer, Content], Response]
 
 
-Handler = Plain | Steps[Any, Any, Any, Any, Any]
+Handler = PlainHandler | Steps[Any, Any, Any, Any, Any]
 
 
-def from_url(form: type[Asked]) -> Callable[[Context[Any], Request], Awaitable[Asked]]:
+def from_url(
+    form: type[QuestionStruct],
+) -> Callable[[Context[Any], Request], Awaitable[QuestionStruct]]:
     """Return the step that decodes a question of this type from the query parameters.
 
     It raises as `text_decoding.question`.
     """
 
-    async def decode(context: Context[Any], request: Request) -> Asked:
-        return text_decoding.question(form, pairs(request.scope["query_string"]))
+    async def decode(context: Context[Any], request: Request) -> QuestionStruct:
+        return text_decoding.decode_question(form, query_pairs(request.scope["query_string"]))
 
     return decode
 
 
-def from_body(form: type[Asked]) -> Callable[[Context[Any], Request], Awaitable[Asked]]:
+def from_body(
+    form: type[QuestionStruct],
+) -> Callable[[Context[Any], Request], Awaitable[QuestionStruct]]:
     """Return the step that decodes a question of this type from a JSON body.
 
     It raises as `request_body.read` and `json_decoding.question`.
     """
 
-    async def decode(context: Context[Any], request: Request) -> Asked:
+    async def decode(context: Context[Any], request: Request) -> QuestionStruct:
         service = context.service
-        content = await request_body.read(request, service.settings.body_limit, service.bodies)
-        return json_decoding.question(form, content)
+        content = await request_body.read_body(request, service.settings.body_limit, service.bodies)
+        return json_decoding.decode_question(form, content)
 
     return decode
 
 
-def pairs(query_string: bytes) -> list[tuple[str, str]]:
+def query_pairs(query_string: bytes) -> list[tuple[str, str]]:
     """Return the decoded names and values of a query string."""
     text = query_string.decode("latin-1")
     if _ESCAPES.search(text):

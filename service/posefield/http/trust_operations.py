@@ -13,10 +13,10 @@ from posefield.http import responses
 from posefield.http.concurrency import worker_threads
 from posefield.http.steps import Context, Steps, from_body, from_url, unchecked
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
-from posefield.question.results import Reasons, SigmaGrid, Suggestions
+from posefield.question.results import Explanation, SigmaGrid, Suggestions
 from posefield.synthesis import sigma_grid
 from posefield.synthesis.capture_suggestions import suggest
-from posefield.synthesis.explanation import why
+from posefield.synthesis.explanation import explain_result
 
 Grids = Context[TableEncoder[SigmaGrid]]
 Model = Context[None]
@@ -36,19 +36,23 @@ async def limit_grid(context: Grids, question: SigmaQuestion) -> SigmaQuestion:
 
 def grid_places(context: Grids, question: SigmaQuestion) -> AbstractAsyncContextManager[None]:
     """Return the limit on grids that take a thread."""
-    return worker_threads.WORK if len(question) > context.form.at_once else nullcontext()
+    return (
+        worker_threads.SYNTHESIS_LIMITER
+        if len(question) > context.form.inline_limit
+        else nullcontext()
+    )
 
 
 async def compute_grid(context: Grids, question: SigmaQuestion) -> SigmaGrid:
     """Return sigma and support on the grid."""
-    if len(question) > context.form.at_once:
+    if len(question) > context.form.inline_limit:
         return await worker_threads.within(sigma_grid.grid, context.model, question)
     return sigma_grid.grid(context.model, question)
 
 
 async def encode_grid(context: Grids, question: SigmaQuestion, answer: SigmaGrid) -> bytes:
     """Return the grid as bytes."""
-    if len(question) > context.form.at_once:
+    if len(question) > context.form.inline_limit:
         return await worker_threads.within(context.form.encode, answer)
     return context.form.encode(answer)
 
@@ -74,28 +78,28 @@ QUERY_SIGMA = _grid(decode=from_body(SigmaQuestion))
 def why_places(context: Model, question: WhyQuestion) -> AbstractAsyncContextManager[None]:
     """Return the limit on explanations by models of many clips."""
     quick = context.model.session.card.samples <= CLIPS_AT_ONCE
-    return nullcontext() if quick else worker_threads.WORK
+    return nullcontext() if quick else worker_threads.SYNTHESIS_LIMITER
 
 
-async def explain(context: Model, question: WhyQuestion) -> Reasons:
+async def explain(context: Model, question: WhyQuestion) -> Explanation:
     """Return the captured clips behind an answer."""
     if context.model.session.card.samples <= CLIPS_AT_ONCE:
-        return why(context.model, question)
-    return await worker_threads.within(why, context.model, question)
+        return explain_result(context.model, question)
+    return await worker_threads.within(explain_result, context.model, question)
 
 
-async def encode_why(context: Model, question: WhyQuestion, answer: Reasons) -> dict[str, Any]:
+async def encode_why(context: Model, question: WhyQuestion, answer: Explanation) -> dict[str, Any]:
     """Return the explanation as plain values."""
     return model_tables.explanation(answer)
 
 
 def send_document(context: Model, answer: object, content: dict[str, Any]) -> Response:
     """Return the response."""
-    return responses.document(content)
+    return responses.json_document(content)
 
 
 _why = partial(
-    Steps[None, WhyQuestion, WhyQuestion, Reasons, dict[str, Any]],
+    Steps[None, WhyQuestion, WhyQuestion, Explanation, dict[str, Any]],
     {},
     validate=unchecked,
     places=why_places,
@@ -111,7 +115,7 @@ def suggestion_places(
     context: Model, question: SuggestQuestion
 ) -> AbstractAsyncContextManager[None]:
     """Return the limit on rankings: a thousand candidates take a tenth of a second and more."""
-    return worker_threads.WORK
+    return worker_threads.SYNTHESIS_LIMITER
 
 
 async def rank(context: Model, question: SuggestQuestion) -> Suggestions:

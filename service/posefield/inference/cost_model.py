@@ -21,29 +21,31 @@ def seconds_per_pose(session: Session) -> tuple[float, ...]:
     Each is the median of the rounds. The costs never increase from a level to the next coarser one,
     since a finer level that is cheaper can be used instead.
     """
-    return falling(in_turn([(session, level) for level in range(len(session.runtimes))], ROUNDS))
+    return monotone_costs(
+        benchmark_levels([(session, level) for level in range(len(session.runtimes))], ROUNDS)
+    )
 
 
-def in_turn(asked: Sequence[tuple[Session, int]], rounds: int) -> Floats:
+def benchmark_levels(asked: Sequence[tuple[Session, int]], rounds: int) -> Floats:
     """Return the seconds per pose (N,) of levels of sessions: the median of the rounds.
 
     rounds: an odd number. Every round measures each level once, so that a slowdown of the machine
     affects all of them.
     """
-    calls = [(session, _question(session), level) for session, level in asked]
+    calls = [(session, _sample_inputs(session), level) for session, level in asked]
     for call in calls:
-        _ask(*call)
-    taken = [[_ask(*call) for call in calls] for _ in range(rounds)]
+        _time_call(*call)
+    taken = [[_time_call(*call) for call in calls] for _ in range(rounds)]
     # np.median imports masked arrays on first use, which takes longer than this measurement.
     return np.sort(taken, axis=0)[rounds // 2] / BATCH
 
 
-def falling(costs: Floats) -> tuple[float, ...]:
+def monotone_costs(costs: Floats) -> tuple[float, ...]:
     """Return the costs (L,), each lowered to the minimum of itself and those before it."""
     return tuple(np.minimum.accumulate(costs).tolist())
 
 
-def _question(session: Session) -> tuple[Floats, Floats, Floats]:
+def _sample_inputs(session: Session) -> tuple[Floats, Floats, Floats]:
     """Return controls (B, d) and times (B, 1), s, across the ranges, and zero labels (B, p)."""
     card = session.card
     low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))
@@ -51,7 +53,7 @@ def _question(session: Session) -> tuple[Floats, Floats, Floats]:
     return np.linspace(low, high, BATCH), times, np.zeros((BATCH, len(card.performers)))
 
 
-def _ask(session: Session, question: tuple[Floats, Floats, Floats], level: int) -> float:
+def _time_call(session: Session, question: tuple[Floats, Floats, Floats], level: int) -> float:
     """Return the seconds of one call."""
     controls, times, labels = question
     start = time.perf_counter()

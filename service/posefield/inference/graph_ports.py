@@ -26,17 +26,17 @@ def check(runtime: Any, card: ModelCard, source: str) -> None:
     Raises ModelError, which names `source`, where inputs or outputs do not fit the card.
     """
     for level in range(len(card.levels)):
-        _check_answer(runtime, card, source, level)
+        _check_outputs(runtime, card, source, level)
 
 
-def middle(card: ModelCard) -> Floats:
+def default_controls(card: ModelCard) -> Floats:
     """Return the controls (1, d) at their defaults."""
     return np.array([[control.default for control in card.controls]])
 
 
-def _check_answer(runtime: Any, card: ModelCard, source: str, level: int) -> None:
+def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> None:
     """Check poses at three times of two clips; two rows and three times reveal mixed-up axes."""
-    points = np.vstack([middle(card), card.examples[0]]).astype(np.float32)
+    points = np.vstack([default_controls(card), card.examples[0]]).astype(np.float32)
     times = np.tile(np.linspace(0.0, card.durations[0], 3, dtype=np.float32), (2, 1))
     feed = {"controls": points, "time": times, LEVEL: np.array(level)}
     if card.performers:

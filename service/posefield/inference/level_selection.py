@@ -19,9 +19,9 @@ from posefield.common.units import Floats, Indices, Singles
 
 HYSTERESIS = 0.2
 """A coarser level than the previous one is chosen if its error is below the limit by this share."""
-FARTHEST = 1e6
+MAX_COORDINATE = 1e6
 """Largest coordinate, m: the float32 of poses resolves 6 cm at this distance."""
-NARROWEST, TALLEST = 1e-6, 1e6
+MIN_FOV, MAX_HEIGHT = 1e-6, 1e6
 """Smallest field of view, rad, and tallest image, pixels, for which the size of a pixel is
 finite.
 """
@@ -40,14 +40,14 @@ class Camera:
 
     def __post_init__(self) -> None:
         # Written so that NaN is refused too.
-        if self.position.shape != (3,) or not (np.abs(self.position) <= FARTHEST).all():
-            expected = f"expected three numbers of at most {FARTHEST:g} m"
+        if self.position.shape != (3,) or not (np.abs(self.position) <= MAX_COORDINATE).all():
+            expected = f"expected three numbers of at most {MAX_COORDINATE:g} m"
             raise InvalidField("camera/position", f"{self.position.tolist()}, {expected}")
-        if not NARROWEST <= self.fov < math.pi:
-            expected = f"expected {NARROWEST:g} to less than pi rad"
+        if not MIN_FOV <= self.fov < math.pi:
+            expected = f"expected {MIN_FOV:g} to less than pi rad"
             raise InvalidField("camera/fov", f"{self.fov:g} rad, {expected}")
-        if not 1.0 <= self.height <= TALLEST:
-            expected = f"expected 1 to {TALLEST:g} pixels"
+        if not 1.0 <= self.height <= MAX_HEIGHT:
+            expected = f"expected 1 to {MAX_HEIGHT:g} pixels"
             raise InvalidField("camera/height", f"{self.height:g} pixels, {expected}")
 
     @property
@@ -57,7 +57,7 @@ class Camera:
 
 
 @dataclass(frozen=True)
-class View:
+class LevelCriteria:
     """Limits by which levels of detail are chosen.
 
     pixels: largest error as seen by the camera. budget: seconds that all poses together may take;
@@ -71,7 +71,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Ladder:
+class LevelTable:
     """Levels of detail, finest first: errors (L,), m, and costs (L,), seconds per pose.
 
     Costs never increase from a level to the next. The error of a level counts as at least that of
@@ -83,7 +83,7 @@ class Ladder:
 
 
 @dataclass(frozen=True)
-class Choice:
+class LevelChoice:
     """Chosen levels (N,), and the pixel limit that they meet.
 
     limit: None if even the coarsest level exceeds the budget; all characters are then at the
@@ -112,18 +112,20 @@ def pixels_per_metre(camera: Camera, centres: Floats, radius: float) -> Floats:
     return camera.pixels / distances
 
 
-def see(ladder: Ladder, scale: Floats, view: View) -> Choice:
+def select_levels(ladder: LevelTable, scale: Floats, view: LevelCriteria) -> LevelChoice:
     """Return the coarsest levels within the view's limit; within its budget, if that is tighter.
 
     scale: pixels (N,) that a metre covers on each character.
     """
-    levels = choose(ladder.errors, scale, view.pixels, view.previous)
+    levels = select_by_error(ladder.errors, scale, view.pixels, view.previous)
     if view.budget is None or _seconds(levels, ladder) <= view.budget:
-        return Choice(levels, view.pixels)
-    return fit(ladder, scale, view.budget, view.previous)
+        return LevelChoice(levels, view.pixels)
+    return select_by_budget(ladder, scale, view.budget, view.previous)
 
 
-def warnings(choice: Choice, ladder: Ladder, view: View) -> tuple[str, ...]:
+def budget_warnings(
+    choice: LevelChoice, ladder: LevelTable, view: LevelCriteria
+) -> tuple[str, ...]:
     """Return a warning if the budget, not the requested pixels, determined the levels."""
     if view.budget is None or choice.limit == view.pixels:
         return ()
@@ -134,7 +136,9 @@ def warnings(choice: Choice, ladder: Ladder, view: View) -> tuple[str, ...]:
     return (f"{budget} asks for errors of up to {choice.limit:.3g} pixels, not {view.pixels:g}",)
 
 
-def choose(errors: Floats, scale: Floats, limit: float, previous: Indices | None = None) -> Indices:
+def select_by_error(
+    errors: Floats, scale: Floats, limit: float, previous: Indices | None = None
+) -> Indices:
     """Return the coarsest levels (N,) whose errors cover at most `limit` pixels; else the finest.
 
     errors: (L,), m. scale: (N,), pixels per metre. previous: (N,); a coarser level than these must
@@ -143,7 +147,9 @@ def choose(errors: Floats, scale: Floats, limit: float, previous: Indices | None
     return _levels(_thresholds(errors, scale, previous), limit)
 
 
-def fit(ladder: Ladder, scale: Floats, budget: float, previous: Indices | None = None) -> Choice:
+def select_by_budget(
+    ladder: LevelTable, scale: Floats, budget: float, previous: Indices | None = None
+) -> LevelChoice:
     """Return the levels at the smallest limit whose poses take at most `budget` seconds.
 
     Exact, including hysteresis: the limit is one of the thresholds at which a character changes
@@ -161,8 +167,8 @@ def fit(ladder: Ladder, scale: Floats, budget: float, previous: Indices | None =
     if fits(0.0):
         limits.append(0.0)
     if not limits:
-        return Choice(np.full(len(scale), len(ladder.errors) - 1), None)
-    return Choice(_levels(thresholds, min(limits)), min(limits))
+        return LevelChoice(np.full(len(scale), len(ladder.errors) - 1), None)
+    return LevelChoice(_levels(thresholds, min(limits)), min(limits))
 
 
 def _thresholds(errors: Floats, scale: Floats, previous: Indices | None) -> Floats:
@@ -181,12 +187,12 @@ def _levels(thresholds: Floats, limit: float) -> Indices:
     return np.count_nonzero(thresholds <= limit, axis=0)
 
 
-def _seconds(levels: Indices, ladder: Ladder) -> float:
+def _seconds(levels: Indices, ladder: LevelTable) -> float:
     count = len(ladder.errors)
     return float(np.bincount(levels, minlength=count) @ ladder.costs)
 
 
-def _total(reached: Indices, ladder: Ladder) -> float:
+def _total(reached: Indices, ladder: LevelTable) -> float:
     """Return the seconds of all poses for counts (L,) of characters at each level or coarser."""
     return float((reached - np.append(reached[1:], 0)) @ ladder.costs)
 

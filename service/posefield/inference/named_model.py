@@ -8,10 +8,10 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.inference import cost_model
-from posefield.inference.level_selection import Ladder
+from posefield.inference.level_selection import LevelTable
 from posefield.inference.session import Session
 from posefield.motion import joint_roles
-from posefield.motion.joint_roles import Names
+from posefield.motion.joint_roles import NamingConvention
 from posefield.motion.skeleton import Skeleton
 
 
@@ -34,20 +34,20 @@ class NamedModel:
         It differs between machines on which the model's answers or the correction differ in the
         last digits.
         """
-        parts = self.identity.encode() + self.session.golden + mark()
+        parts = self.identity.encode() + self.session.golden + rounding_fingerprint()
         return blake2b(parts, digest_size=16).digest()
 
     @cached_property
-    def ladder(self) -> Ladder:
+    def level_table(self) -> LevelTable:
         """Errors and costs of the levels of detail, from which a view chooses.
 
         An error is that of the worst measured pose. Costs are measured on first use.
         """
         errors = np.array([level.pose for level in self.session.card.levels])
-        return Ladder(errors, np.array(cost_model.seconds_per_pose(self.session)))
+        return LevelTable(errors, np.array(cost_model.seconds_per_pose(self.session)))
 
     @property
-    def middle(self) -> Floats:
+    def rest_position(self) -> Floats:
         """Root position at rest (3,), m."""
         return self.session.card.skeleton.offsets[0]
 
@@ -59,15 +59,15 @@ class NamedModel:
         return float(np.linalg.norm(rest - rest[0], axis=-1).max())
 
     @cached_property
-    def _skeletons(self) -> dict[Names, Skeleton]:
+    def _skeletons(self) -> dict[NamingConvention, Skeleton]:
         """Cache of skeletons by naming convention."""
         return {"own": self.session.card.skeleton}
 
-    def skeleton(self, names: Names) -> Skeleton:
+    def skeleton(self, names: NamingConvention) -> Skeleton:
         """Return the skeleton with these names; InvalidField if the model has no roles for them."""
         card = self.session.card
         if names not in self._skeletons:
-            self._skeletons[names] = joint_roles.renamed(card.skeleton, card.roles, names)
+            self._skeletons[names] = joint_roles.rename_joints(card.skeleton, card.roles, names)
         return self._skeletons[names]
 
 
@@ -76,7 +76,7 @@ ROWS, COLUMNS = 29, 37
 
 
 @cache
-def mark() -> bytes:
+def rounding_fingerprint() -> bytes:
     """Return a matrix product, a solution and sines of fixed numbers as bytes.
 
     They differ between processors whose rounding differs.

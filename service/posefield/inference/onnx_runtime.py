@@ -8,28 +8,28 @@ import onnxruntime
 from posefield.common.errors import ModelError
 
 
-class Runtimes(Sequence[Any]):
+class LazySessions(Sequence[Any]):
     """Sessions, one for each level of detail, each opened on first use.
 
     Two threads that open a level at the same time each open a session; one of them is kept.
     """
 
     def __init__(self, opened: Callable[[int], Any], count: int) -> None:
-        self._opened = opened
-        self._held: list[Any] = [None] * count
+        self._open = opened
+        self._sessions: list[Any] = [None] * count
 
     def __len__(self) -> int:
-        return len(self._held)
+        return len(self._sessions)
 
     # Typed for single levels: slices are not used.
     def __getitem__(self, level: Any) -> Any:
-        held = self._held[level]
+        held = self._sessions[level]
         if held is None:
-            held = self._held[level] = self._opened(level)
+            held = self._sessions[level] = self._open(level)
         return held
 
 
-def start(content: bytes, source: str) -> Any:
+def open_session(content: bytes, source: str) -> Any:
     """Return a session on an ONNX file; ModelError names `source` and onnxruntime's reason."""
     options = onnxruntime.SessionOptions()
     # A pose takes microseconds: the overhead of threads would exceed their gain.

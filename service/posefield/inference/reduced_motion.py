@@ -11,12 +11,12 @@ from posefield.common.units import Floats
 from posefield.model_file.level_of_detail import Level
 from posefield.motion import blend, quat
 
-Weights = Mapping[str, npt.NDArray[Any]]
+GraphConstants = Mapping[str, npt.NDArray[Any]]
 """Constants of a model's graph by name."""
 
 
 @dataclass(frozen=True)
-class Reduced:
+class ReducedTensor:
     """Core and bases of one level of detail.
 
     core: (r2, r1, r3), modes of time, degrees of freedom and samples. time: (T, r2). directions:
@@ -48,7 +48,7 @@ class Reduced:
 
     def rows(self, places: Floats) -> Floats:
         """Return the time coefficients (S, r2) at canonical frames (S,)."""
-        return blend.between(self.time, places)
+        return blend.interpolate_rows(self.time, places)
 
     def poses(self, motion: Floats, places: Floats) -> tuple[Floats, Floats]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
@@ -57,14 +57,14 @@ class Reduced:
         return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
 
 
-def read(weights: Weights, level: Level) -> Reduced:
+def read(weights: GraphConstants, level: Level) -> ReducedTensor:
     """Return the reduced tensor of a level; KeyError for a missing constant."""
     r1, r2, r3 = level.ranks
     rotations = weights["mean_rotations"][:, :, 0].astype(np.float64)
     moves = np.zeros((1 + len(rotations), 1))
     moves[[0, *(1 + joint for joint in level.joints)]] = 1.0
     directions = _directions(weights)[:, :r1] * np.repeat(moves, 3, axis=0)
-    return Reduced(
+    return ReducedTensor(
         weights["core"][:r2, :r1, :r3].astype(np.float64),
         weights["time_basis"][:r2].T.astype(np.float64),
         directions.T.copy(),
@@ -73,7 +73,7 @@ def read(weights: Weights, level: Level) -> Reduced:
     )
 
 
-def _directions(weights: Weights) -> Floats:
+def _directions(weights: GraphConstants) -> Floats:
     """Return the directions (D, r1), with zeros for degrees of freedom that never vary."""
     stored = weights["directions"]
     whole = np.vstack([stored, np.zeros((1, stored.shape[1]))])
@@ -81,7 +81,7 @@ def _directions(weights: Weights) -> Floats:
     return found
 
 
-def _mean_vectors(weights: Weights, rotations: Floats) -> Floats:
+def _mean_vectors(weights: GraphConstants, rotations: Floats) -> Floats:
     """Return the mean rotation vectors (J, 3); the graph stores mean rotation · vector / 2."""
     turned = weights["rotation_mean"].reshape(-1, 4).astype(np.float64)
     if "joint_order" in weights:

@@ -11,17 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats, Indices
-from posefield.inference.reduced_motion import Reduced, Weights
+from posefield.inference.reduced_motion import GraphConstants, ReducedTensor
 from posefield.kriging import kriging_model, leave_one_out
 from posefield.model_file.model_card import ModelCard
 
 # Weight of the marginals. On real motion, weights from 0.3 to 1 are equally accurate; smaller ones
 # are less smooth.
-SHRUNK = 0.7
+MARGINAL_WEIGHT = 0.7
 
 
 @dataclass(frozen=True)
-class Spread:
+class ResidualCovariance:
     """Covariance of a reduced motion (r2, r1) and of the variables beside it.
 
     All for a sigma of one metre. residuals: (r2 r1, r3), a root of the covariance of residuals.
@@ -40,29 +40,31 @@ class Spread:
     predicted: Floats
     sigmas: Floats
 
-    def shrunk(self, gradients: Floats) -> Floats:
+    def apply_shrunk(self, gradients: Floats) -> Floats:
         """Return the shrunk covariance times gradients (k, r2 r1 + b): (r2 r1 + b, k)."""
         inner = gradients[:, : len(self.residuals)]
         r2, r1 = len(self.time), len(self.freedoms)
         blocks = self.time @ inner.reshape(-1, r2, r1) @ self.freedoms
         even = blocks.reshape(len(gradients), -1)
         own = (inner @ self.residuals) @ self.residuals.T
-        both = SHRUNK * even + (1.0 - SHRUNK) * own
+        both = MARGINAL_WEIGHT * even + (1.0 - MARGINAL_WEIGHT) * own
         return np.hstack([both, gradients[:, len(self.residuals) :] @ self.beside]).T
 
 
-def of(card: ModelCard, weights: Weights, samples: Floats, reduced: Reduced) -> Spread:
+def estimate(
+    card: ModelCard, weights: GraphConstants, samples: Floats, reduced: ReducedTensor
+) -> ResidualCovariance:
     """Return the covariance for a model's level.
 
     samples: (n, d + p), points of the captured clips. Their coefficients are recovered from the
     dual weights: the kriging system times the weights gives the samples.
     """
     hyper = card.kriging
-    left_out = leave_one_out.leave_out(hyper, samples, groups(card, samples))
+    left_out = leave_one_out.leave_out(hyper, samples, leave_out_groups(card, samples))
     variances = leave_one_out.left_out_variances(hyper, samples, left_out)
     sill = np.mean(np.square(card.left_out) / variances)
     r3 = reduced.core.shape[2]
-    held = coefficients(card, weights, samples)[:, :r3]
+    held = sample_coefficients(card, weights, samples)[:, :r3]
     missed = left_out @ held
     sigmas = np.sqrt(sill * variances * len(samples))
     # Standardised residuals, of a kriging model whose sill is one square metre.
@@ -75,14 +77,14 @@ def of(card: ModelCard, weights: Weights, samples: Floats, reduced: Reduced) -> 
     marginals = time / np.trace(time), freedoms
     flat = reduced.core.reshape(-1, r3).T
     motions = held @ flat, (held - missed) @ flat
-    return Spread(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
+    return ResidualCovariance(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
 
 
-def coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
+def sample_coefficients(card: ModelCard, weights: GraphConstants, samples: Floats) -> Floats:
     """Return the sample coefficients (n, r3) of the captured clips, in the card's order."""
     hyper = card.kriging
     r3 = weights["core"].shape[2]
-    order = order_of(card, weights, samples)
+    order = importance_order(card, weights, samples)
     held = samples[order]
     dual = weights["pose_weights"].astype(np.float64)
     trend = weights["drift_weights"][:, -r3:].astype(np.float64)
@@ -92,7 +94,7 @@ def coefficients(card: ModelCard, weights: Weights, samples: Floats) -> Floats:
     return found
 
 
-def order_of(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
+def importance_order(card: ModelCard, weights: GraphConstants, samples: Floats) -> Indices:
     """Return the index on the card (n,) of each sample, in the file's order of importance."""
     held = weights["samples"][0].T
     listed = samples[:, : len(card.controls)].astype(np.float32)
@@ -103,7 +105,7 @@ def order_of(card: ModelCard, weights: Weights, samples: Floats) -> Indices:
     return place
 
 
-def groups(card: ModelCard, samples: Floats) -> Indices:
+def leave_out_groups(card: ModelCard, samples: Floats) -> Indices:
     """Return indices (n,) of the groups of captured clips that are left out together.
 
     Clips of one file form a group; each clip is a group of its own if the other groups could not
@@ -113,6 +115,6 @@ def groups(card: ModelCard, samples: Floats) -> Indices:
     files = [source.partition(", frames ")[0] for source in card.sources]
     takes = np.unique(files, return_inverse=True)[1]
     functions = kriging_model.drift(samples, len(card.controls), max(hyper.drifts))
-    if kriging_model.needed(takes, functions) is not None:
+    if kriging_model.find_required_group(takes, functions) is not None:
         return np.arange(len(samples))
     return np.asarray(takes, dtype=np.int64)

@@ -12,29 +12,29 @@ import numpy as np
 from posefield.common.units import Floats, Singles
 from posefield.inference import graph_ports, onnx_runtime
 from posefield.inference.graph_ports import OUTPUTS, PERFORMER
-from posefield.inference.onnx_runtime import Runtimes
-from posefield.inference.trial_process import LIMITS, Limits
+from posefield.inference.onnx_runtime import LazySessions
+from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
-from posefield.kriging.kriging_model import Weigher
+from posefield.kriging.kriging_model import KrigingWeights
 from posefield.model_file import checked_file, subgraph
 from posefield.model_file.model_card import ModelCard
 
 # Estimate of memory: a model of 114 kB with four levels in use takes 3.1 MB, for twelve sessions
 # with weights.
-OWN_MEMORY, COPIES = 2 << 20, 12
+BASE_MEMORY, COPIES = 2 << 20, 12
 
 
 @dataclass(frozen=True)
-class State:
+class PredictionState:
     """Intermediate values of the graph from which the poses of one question are computed.
 
     coefficients: sample coefficients (r3,). frames: canonical frames (S,) of the question's times.
-    way: travel (3,) of a cycle. bones: bone offsets (J, 3), m. duration: s. sigma: m.
+    travel: travel (3,) of a cycle. bones: bone offsets (J, 3), m. duration: s. sigma: m.
     """
 
     coefficients: Floats
     frames: Floats
-    way: Floats
+    travel: Floats
     bones: Floats
     duration: float
     sigma: float
@@ -53,10 +53,10 @@ class Session:
     card: ModelCard
     digest: str
     runtimes: Sequence[Any]
-    clocks: Sequence[Any]
-    gauges: Sequence[Any]
+    duration_sessions: Sequence[Any]
+    sigma_sessions: Sequence[Any]
     size: int
-    states: Sequence[Any] = ()
+    state_sessions: Sequence[Any] = ()
     content: bytes = field_of(default=b"", repr=False)
     golden: bytes = b""
 
@@ -81,48 +81,51 @@ class Session:
         self, controls: Floats | Singles, labels: Floats | Singles | None = None, level: int = 0
     ) -> Singles:
         """Return the durations (B,), s, of `run`, in a quarter of its time."""
-        answers: list[Singles] = self.clocks[level].run(["duration"], self._feed(controls, labels))
+        answers: list[Singles] = self.duration_sessions[level].run(
+            ["duration"], self._feed(controls, labels)
+        )
         return answers[0]
 
     def state(
         self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
-    ) -> State:
+    ) -> PredictionState:
         """Return the intermediate values for one question: controls (1, d), times (S,)."""
         feed = self._feed(controls, labels)
         feed["time"] = time[None].astype(np.float32, copy=False)
-        found = self.states[level].run(list(self._parts), feed)
+        found = self.state_sessions[level].run(list(self._state_outputs), feed)
         coefficients, frames, bones, durations, sigmas, *ways = (a.astype(float) for a in found)
         way = ways[0][0] if ways else np.zeros(3)
         numbers = float(durations[0]), float(sigmas[0])
-        return State(coefficients[0], frames[0, :, 0], way, bones[0], *numbers)
+        return PredictionState(coefficients[0], frames[0, :, 0], way, bones[0], *numbers)
 
     @property
-    def _parts(self) -> tuple[str, ...]:
-        return parts(self.card)
+    def _state_outputs(self) -> tuple[str, ...]:
+        return state_outputs(self.card)
 
     def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
         """Return the sigmas (B,), m, of `run` at level 0, in half of its time."""
-        answers: list[Singles] = self.gauges[0].run(["sigma"], self._feed(controls, labels))
+        answers: list[Singles] = self.sigma_sessions[0].run(["sigma"], self._feed(controls, labels))
         return answers[0]
 
     @cached_property
-    def weigher(self) -> Weigher:
+    def kriging_weights(self) -> KrigingWeights:
         """Kriging weights of the captured clips."""
         own = self.card
         low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
         points = kriging_model.half_ranges(np.array(own.examples), low, high)
-        return Weigher(own.kriging, np.hstack([points, own.labels]))
+        return KrigingWeights(own.kriging, np.hstack([points, own.labels]))
 
     @property
     def memory(self) -> int:
         """Estimated memory in bytes with all levels open."""
-        return OWN_MEMORY + COPIES * self.size
+        return BASE_MEMORY + COPIES * self.size
 
-    def trial(self) -> bytes:
+    def run_trial(self) -> bytes:
         """Return the answer at the default controls; equals `golden` for a sound model."""
-        answers = self.run(graph_ports.middle(self.card), np.zeros((1, 1)), *OUTPUTS)
+        answers = self.run(graph_ports.default_controls(self.card), np.zeros((1, 1)), *OUTPUTS)
         return b"".join(
-            answer.tobytes() for answer in (*answers, self.durations(graph_ports.middle(self.card)))
+            answer.tobytes()
+            for answer in (*answers, self.durations(graph_ports.default_controls(self.card)))
         )
 
     def _feed(
@@ -134,7 +137,7 @@ class Session:
         return feed
 
 
-def parts(card: ModelCard) -> tuple[str, ...]:
+def state_outputs(card: ModelCard) -> tuple[str, ...]:
     """Return the names of the graph's values that a State holds."""
     own = ("coefficients", "frame", "bone_offsets", "duration", "sigma")
     return (*own, "way") if card.cyclic else own
@@ -145,43 +148,43 @@ def load(path: Path) -> Session:
     return load_bytes(checked_file.read(path), str(path))
 
 
-def load_bytes(content: bytes, source: str, limits: Limits = LIMITS) -> Session:
+def load_bytes(content: bytes, source: str, limits: TrialLimits = DEFAULT_LIMITS) -> Session:
     """Return a session on untrusted bytes, which a child process opens first.
 
     source: path or URL for messages. Raises ModelError for a file that cannot be served.
     """
     limits.check(content, source)
-    return of(content, checked_file.checked(content, source), source)
+    return open_checked(content, checked_file.load_card(content, source), source)
 
 
 def open_bytes(content: bytes, source: str) -> Session:
     """Return a session on bytes that this program wrote, checked without a child process."""
-    card = checked_file.checked(content, source)
-    graph_ports.check(onnx_runtime.start(content, source), card, source)
-    return of(content, card, source)
+    card = checked_file.load_card(content, source)
+    graph_ports.check(onnx_runtime.open_session(content, source), card, source)
+    return open_checked(content, card, source)
 
 
-def of(content: bytes, card: ModelCard, source: str) -> Session:
+def open_checked(content: bytes, card: ModelCard, source: str) -> Session:
     """Return a session on a checked file, with the finest level and its clock open."""
 
     def whole(level: int) -> Any:
-        return onnx_runtime.start(subgraph.at_level(content, level), source)
+        return onnx_runtime.open_session(subgraph.fix_level(content, level), source)
 
     def telling(*outputs: str) -> Callable[[int], Any]:
-        return lambda level: onnx_runtime.start(
-            subgraph.for_outputs(subgraph.at_level(content, level), *outputs), source
+        return lambda level: onnx_runtime.open_session(
+            subgraph.select_outputs(subgraph.fix_level(content, level), *outputs), source
         )
 
     count = len(card.levels)
     session = Session(
         card,
         checked_file.digest(content),
-        runtimes=Runtimes(whole, count),
-        clocks=Runtimes(telling("duration"), count),
-        gauges=Runtimes(telling("sigma"), 1),
+        runtimes=LazySessions(whole, count),
+        duration_sessions=LazySessions(telling("duration"), count),
+        sigma_sessions=LazySessions(telling("sigma"), 1),
         size=len(content),
-        states=Runtimes(telling(*parts(card)), count),
+        state_sessions=LazySessions(telling(*state_outputs(card)), count),
         content=content,
     )
     # The trial runs the finest level and its clock, which opens them.
-    return replace(session, golden=session.trial())
+    return replace(session, golden=session.run_trial())

@@ -26,14 +26,14 @@ from posefield.common.errors import ModelError
 from posefield.inference import graph_ports, onnx_runtime
 from posefield.model_file import checked_file
 
-LONGEST = 1_000
+MAX_MESSAGE = 1_000
 """Longest message, characters."""
 OUT_OF_MEMORY = ("bad_alloc", "Failed to allocate memory")
 """Texts of onnxruntime's out-of-memory errors."""
 
 
 @dataclass(frozen=True)
-class Limits:
+class TrialLimits:
     """Limits on opening one file.
 
     cpu: CPU time, s. wall: wall time, s. memory: bytes beyond those of the process. tried: digests
@@ -43,26 +43,26 @@ class Limits:
     cpu: int = 10
     wall: float = 60.0
     memory: int = 512 << 20
-    tried: frozenset[str] = frozenset()
+    passed: frozenset[str] = frozenset()
 
     def check(self, content: bytes, source: str) -> None:
         """Raise ModelError for a file that cannot be served; OSError if no process can be started.
 
         source: path or URL of the file, for messages.
         """
-        message = "" if checked_file.digest(content) in self.tried else _tried(content, self)
+        message = "" if checked_file.digest(content) in self.passed else _run_trial(content, self)
         if message:
             raise ModelError(source, message)
 
 
-LIMITS = Limits()
+DEFAULT_LIMITS = TrialLimits()
 
 
-def _tried(content: bytes, limits: Limits) -> str:
+def _run_trial(content: bytes, limits: TrialLimits) -> str:
     """Return the reason for which a child process cannot open a file, or an empty text."""
     context = _context()
     own, other = context.Pipe()
-    child = context.Process(target=_try, args=(other, limits), daemon=True)
+    child = context.Process(target=_run_child, args=(other, limits), daemon=True)
     # Python warns of a fork in a process with threads of libraries. OpenBLAS ends its own before a
     # fork.
     with own, other, warnings.catch_warnings(action="ignore", category=DeprecationWarning):
@@ -81,7 +81,7 @@ def _context() -> Any:
     return multiprocessing.get_context("fork" if copied else "spawn")
 
 
-def _message(child: BaseProcess, own: Connection, content: bytes, limits: Limits) -> str:
+def _message(child: BaseProcess, own: Connection, content: bytes, limits: TrialLimits) -> str:
     """Return the reason for which the child cannot open a file, or an empty text."""
     alarm = threading.Timer(limits.wall, child.kill)
     alarm.start()
@@ -90,11 +90,15 @@ def _message(child: BaseProcess, own: Connection, content: bytes, limits: Limits
         # once.
         own.send_bytes(content)
         # Bytes, not pickle, which runs code: a malicious file may control the child process.
-        return own.recv_bytes(4 * LONGEST).decode()
+        return own.recv_bytes(4 * MAX_MESSAGE).decode()
     except (EOFError, OSError, UnicodeDecodeError):
         late = alarm.finished.is_set()
         child.join()
-        return f"was not open after {limits.wall:g} s" if late else _ending(child.exitcode, limits)
+        return (
+            f"was not open after {limits.wall:g} s"
+            if late
+            else _exit_reason(child.exitcode, limits)
+        )
     finally:
         alarm.cancel()
         alarm.join()
@@ -103,7 +107,7 @@ def _message(child: BaseProcess, own: Connection, content: bytes, limits: Limits
         child.close()
 
 
-def _ending(code: int | None, limits: Limits) -> str:
+def _exit_reason(code: int | None, limits: TrialLimits) -> str:
     code = code or 0
     if code == -signal.SIGXCPU:
         return f"takes more than {limits.cpu} s of CPU time to open"
@@ -111,34 +115,34 @@ def _ending(code: int | None, limits: Limits) -> str:
     return f"ended the process that opened it {how}"
 
 
-def _try(other: Connection, limits: Limits) -> None:
+def _run_child(other: Connection, limits: TrialLimits) -> None:
     """Receive a file, open it in this process, and send the reason of a failure or ""."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     content = other.recv_bytes()
-    _limit(limits)
+    _set_limits(limits)
     message = ""
     try:
-        card = checked_file.checked(content, "")
-        graph_ports.check(onnx_runtime.start(content, ""), card, "")
+        card = checked_file.load_card(content, "")
+        graph_ports.check(onnx_runtime.open_session(content, ""), card, "")
     except ModelError as fault:
         message = fault.message
     except MemoryError:
         message = OUT_OF_MEMORY[0]
     if any(sign in message for sign in OUT_OF_MEMORY):
         message = f"takes more than {limits.memory >> 20} MB of memory to open"
-    other.send_bytes(message[:LONGEST].encode())
+    other.send_bytes(message[:MAX_MESSAGE].encode())
 
 
-def _limit(limits: Limits) -> None:
+def _set_limits(limits: TrialLimits) -> None:
     """Limit CPU time and memory of this process, in addition to its present use."""
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    _limit_soft(resource.RLIMIT_CPU, math.ceil(time.process_time()) + limits.cpu)
+    _set_soft_limit(resource.RLIMIT_CPU, math.ceil(time.process_time()) + limits.cpu)
     with suppress(FileNotFoundError):
         pages = int(Path("/proc/self/statm").read_text().split()[0])
-        _limit_soft(resource.RLIMIT_AS, pages * resource.getpagesize() + limits.memory)
+        _set_soft_limit(resource.RLIMIT_AS, pages * resource.getpagesize() + limits.memory)
 
 
-def _limit_soft(kind: int, limit: int) -> None:
+def _set_soft_limit(kind: int, limit: int) -> None:
     most = resource.getrlimit(kind)[1]
     lower = limit if most == resource.RLIM_INFINITY else min(limit, most)
     resource.setrlimit(kind, (lower, most))

@@ -13,55 +13,59 @@ from posefield.common import cancellation
 from posefield.common.units import Floats, Indices
 from posefield.kriging.support import NUGGET, covariances
 
-ASKED = 500
+AVERAGED_CANDIDATES = 500
 """Number of candidates over which the variance is averaged."""
 
 
 @dataclass(frozen=True)
-class Worth:
+class VarianceReduction:
     """Value of a point: the share by which the mean variance falls, and the variance there."""
 
     gain: float
     variance: float
 
 
-def rank(candidates: Floats, samples: Floats, count: int) -> list[tuple[int, Worth]]:
+def rank_candidates(
+    candidates: Floats, samples: Floats, count: int
+) -> list[tuple[int, VarianceReduction]]:
     """Return the candidates (C, d) of the largest gains, by index, in greedy order.
 
     samples (n, d): captured, in half-ranges like the candidates. Each gain assumes the candidates
     before it as captured.
     """
-    known = _Field.of(candidates, samples)
-    found: list[tuple[int, Worth]] = []
+    known = _ConditionedField.conditioned_on(candidates, samples)
+    found: list[tuple[int, VarianceReduction]] = []
     for _ in range(min(count, len(candidates))):
         cancellation.check()
         gains = known.gains()
         gains[[at for at, _ in found]] = -1.0
         at = int(np.argmax(gains))
-        found.append((at, Worth(float(gains[at]), float(known.variances[at]))))
-        known.capture(at)
+        found.append((at, VarianceReduction(float(gains[at]), float(known.variances[at]))))
+        known.condition_on(at)
     return found
 
 
 @dataclass
-class _Field:
+class _ConditionedField:
     """Kriging field over candidates (C, d), conditioned on the captured points.
 
-    known: k rows (C,), the whitened covariances of each captured point with the candidates.
+    whitened: k rows (C,), the whitened covariances of each captured point with the candidates.
     variances (C,): remaining variances. toward (C, G): remaining covariances with the candidates
     over which the variance is averaged, `averaged`.
     """
 
     candidates: Floats
-    known: list[Floats]
+    whitened: list[Floats]
     variances: Floats
-    toward: Floats
+    remaining: Floats
     averaged: Indices
 
     @classmethod
-    def of(cls, candidates: Floats, samples: Floats) -> "_Field":
+    def conditioned_on(cls, candidates: Floats, samples: Floats) -> "_ConditionedField":
         """Return the field conditioned on samples (n, d)."""
-        averaged = np.unique(np.linspace(0, len(candidates) - 1, ASKED).astype(np.int64))
+        averaged = np.unique(
+            np.linspace(0, len(candidates) - 1, AVERAGED_CANDIDATES).astype(np.int64)
+        )
         own = covariances(samples, samples) + NUGGET * np.eye(len(samples))
         known = np.linalg.solve(np.linalg.cholesky(own), covariances(samples, candidates))
         toward = covariances(candidates, candidates[averaged]) - known.T @ known[:, averaged]
@@ -70,14 +74,14 @@ class _Field:
 
     def gains(self) -> Floats:
         """Return the share by which the mean variance falls if each candidate (C,) is captured."""
-        falls = np.mean(np.square(self.toward), axis=1) / (self.variances + NUGGET)
+        falls = np.mean(np.square(self.remaining), axis=1) / (self.variances + NUGGET)
         return np.asarray(falls / self.variances[self.averaged].mean())
 
-    def capture(self, at: int) -> None:
+    def condition_on(self, at: int) -> None:
         """Condition the field on one of the candidates as well."""
-        known = np.stack(self.known)
+        known = np.stack(self.whitened)
         own = covariances(self.candidates, self.candidates[[at]])[:, 0] - known.T @ known[:, at]
         said = own / np.sqrt(self.variances[at] + NUGGET)
-        self.known.append(said)
+        self.whitened.append(said)
         self.variances = self.variances - np.square(said)
-        self.toward = self.toward - said[:, None] * said[self.averaged]
+        self.remaining = self.remaining - said[:, None] * said[self.averaged]

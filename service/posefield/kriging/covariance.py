@@ -42,7 +42,7 @@ def matern52(squared: Floats) -> Floats:
     return (1.0 + a + RATE52**2 / 3.0 * squared) * np.exp(-a)
 
 
-FORMULAS: dict[str, Callable[[Floats], Floats]] = {
+COVARIANCE_MODELS: dict[str, Callable[[Floats], Floats]] = {
     formula.__name__: formula for formula in (exponential, gaussian, spherical, matern32, matern52)
 }
 """Covariance models by the names that recipes and cards use."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common.bounded_types import Degree, NonNegative
 from posefield.common.units import Floats, Indices
-from posefield.kriging.covariance import FORMULAS
+from posefield.kriging.covariance import COVARIANCE_MODELS
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Hyper:
 
 
 @dataclass(frozen=True)
-class Weigher:
+class KrigingWeights:
     """Kriging weights of samples (n, d + p): d controls in half-ranges and p performer labels.
 
     The label of a sample's performer is one and the others zero; all are zero for an unseen
@@ -43,13 +43,13 @@ class Weigher:
     samples: Floats
 
     @cached_property
-    def weighing(self) -> Floats:
+    def weight_matrix(self) -> Floats:
         """Return the matrix (n + k, n) from covariances and drift functions to sample weights."""
-        return weighing(self.hyper, self.samples)
+        return weight_matrix(self.hyper, self.samples)
 
     def weights(self, points: Floats) -> Floats:
         """Return the kriging weights (B, n) of the samples: they sum to one and may be negative."""
-        return basis(self.hyper, points, self.samples) @ self.weighing
+        return basis_functions(self.hyper, points, self.samples) @ self.weight_matrix
 
     def distances(self, points: Floats) -> Floats:
         """Return the distances (B, n) to the samples.
@@ -80,7 +80,7 @@ def squared_distances(hyper: Hyper, a: Floats, b: Floats) -> Floats:
 
 def covariances(hyper: Hyper, a: Floats, b: Floats) -> Floats:
     """Return the covariances (A, B) between points (A, d + p) and (B, d + p)."""
-    return FORMULAS[hyper.covariance](squared_distances(hyper, a, b))
+    return COVARIANCE_MODELS[hyper.covariance](squared_distances(hyper, a, b))
 
 
 def drift(points: Floats, controls: int, degree: int) -> Floats:
@@ -92,7 +92,7 @@ def drift(points: Floats, controls: int, degree: int) -> Floats:
     return np.hstack([one, points[:, :controls]]) if degree else one
 
 
-def needed(groups: Indices, functions: Floats) -> int | None:
+def find_required_group(groups: Indices, functions: Floats) -> int | None:
     """Return the first group of samples that cannot be left out; None if there is none.
 
     A group is needed if the drift functions (n, k) of the other samples do not determine a drift.
@@ -104,7 +104,7 @@ def needed(groups: Indices, functions: Floats) -> int | None:
     return None
 
 
-def basis(hyper: Hyper, points: Floats, samples: Floats) -> Floats:
+def basis_functions(hyper: Hyper, points: Floats, samples: Floats) -> Floats:
     """Return covariances with all samples and drift functions (B, n + k) at points (B, d + p)."""
     near = covariances(hyper, points, samples)
     return np.hstack([near, drift(points, len(hyper.scales), max(hyper.drifts))])
@@ -115,7 +115,7 @@ def noisy(hyper: Hyper, samples: Floats) -> Floats:
     return covariances(hyper, samples, samples) + hyper.nugget * np.eye(len(samples))
 
 
-def invert(hyper: Hyper, samples: Floats, degree: int) -> Floats:
+def invert_system(hyper: Hyper, samples: Floats, degree: int) -> Floats:
     """Return the inverse (n + k, n + k) of the kriging system with a drift of one degree."""
     f = drift(samples, len(hyper.scales), degree)
     n, k = f.shape
@@ -125,7 +125,7 @@ def invert(hyper: Hyper, samples: Floats, degree: int) -> Floats:
     return np.linalg.inv(system)
 
 
-def weighing(hyper: Hyper, samples: Floats) -> Floats:
+def weight_matrix(hyper: Hyper, samples: Floats) -> Floats:
     """Return the matrix (n + k, n) from covariances and drift functions to sample weights.
 
     With more than one drift the weights are averaged.
@@ -133,6 +133,6 @@ def weighing(hyper: Hyper, samples: Floats) -> Floats:
     n, functions = len(samples), 1 + max(hyper.drifts) * len(hyper.scales)
     found = np.zeros((n + functions, n))
     for degree in hyper.drifts:
-        own = invert(hyper, samples, degree)[:, :n]
+        own = invert_system(hyper, samples, degree)[:, :n]
         found[: len(own)] += own / len(hyper.drifts)
     return found

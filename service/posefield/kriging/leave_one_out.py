@@ -11,7 +11,7 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
-from posefield.kriging.covariance import FORMULAS
+from posefield.kriging.covariance import COVARIANCE_MODELS
 from posefield.kriging.kriging_model import Hyper
 
 
@@ -20,7 +20,7 @@ class LeaveOneOut:
     """Leave-one-out of fields of any parameters over the same samples.
 
     Distances per control, drift functions and groups do not depend on a field's parameters and are
-    computed once: the search for scales and nugget calls `matrix` several hundred times.
+    computed once: the search for scales and nugget calls `residual_matrix` several hundred times.
 
     samples (n, d + p): d controls in half-ranges and p performer labels. controls: d. groups (n,):
     samples of one group, such as strides cut from one take, are left out together.
@@ -30,7 +30,7 @@ class LeaveOneOut:
     controls: int
     groups: Indices
 
-    def matrix(self, hyper: Hyper) -> Floats:
+    def residual_matrix(self, hyper: Hyper) -> Floats:
         """Return the matrix (n, n) from values to residuals.
 
         A residual is a sample's value minus its prediction from all other groups; with more than
@@ -51,7 +51,7 @@ class LeaveOneOut:
         squared = np.sum(np.square(gaps, out=gaps), axis=0)
         if hyper.label:
             squared += hyper.label**2 * self._others
-        covariance = FORMULAS[hyper.covariance](squared)
+        covariance = COVARIANCE_MODELS[hyper.covariance](squared)
         covariance.flat[:: len(covariance) + 1] += hyper.nugget
         return covariance
 
@@ -103,7 +103,7 @@ def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
 
     samples (n, d + p) and groups (n,) as for `LeaveOneOut`.
     """
-    return LeaveOneOut(samples, len(hyper.scales), groups).matrix(hyper)
+    return LeaveOneOut(samples, len(hyper.scales), groups).residual_matrix(hyper)
 
 
 def left_out_variances(hyper: Hyper, samples: Floats, left_out: Floats) -> Floats:

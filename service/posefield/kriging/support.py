@@ -14,18 +14,18 @@ from functools import cached_property
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.units import Floats, Singles, Truths
+from posefield.common.units import Booleans, Floats, Singles
 from posefield.kriging.kriging_model import half_ranges
 
-BEYOND = 0.1
+RANGE_MARGIN = 0.1
 """Share of a control's range by which a supported query may lie beyond it."""
-QUANTILE = 0.95
+SUPPORT_QUANTILE = 0.95
 """Share of the captured clips whose leave-one-out variance is within the limit."""
 # The field: standard deviation of its Gaussian covariance in half-ranges, and its nugget in sills.
 SCALE, NUGGET = 1.0, 0.05
 RATE = 0.5 / SCALE**2
 # Largest error of a variance in single precision; nearer to the limit it is computed in double.
-DOUBT = 1e-3
+FLOAT32_ERROR = 1e-3
 # Rows whose intermediate arrays fit the cache of a core.
 BATCH = 512
 
@@ -53,21 +53,21 @@ class Support:
         near = covariances(self.scaled(points), self.samples)
         return 1.0 - np.sum(near @ self._inverse * near, axis=1)
 
-    def holds(self, points: Floats) -> Truths:
+    def supported(self, points: Floats) -> Booleans:
         """Return whether each of the points (B, d) is supported, as (B,)."""
-        low, high = np.transpose(self._box)
+        low, high = np.transpose(self._bounds)
         inside = ((low <= points) & (points <= high)).all(axis=1)
         found = np.zeros(len(points), dtype=bool)
         own = points[inside]
-        room = self.limit - self._roughly(own)
-        close = np.abs(room) < DOUBT
+        room = self.limit - self._float32_variance(own)
+        close = np.abs(room) < FLOAT32_ERROR
         room[close] = self.limit - self.variance(own[close])
         found[inside] = room >= 0.0
         return found
 
-    def held(self, point: Sequence[float]) -> bool:
-        """Return whether a point (d,) is supported: `holds` for a single point."""
-        if not all(a <= x <= b for x, (a, b) in zip(point, self._box, strict=True)):
+    def is_supported(self, point: Sequence[float]) -> bool:
+        """Return whether a point (d,) is supported: `supported` for a single point."""
+        if not all(a <= x <= b for x, (a, b) in zip(point, self._bounds, strict=True)):
             return False
         slopes, offsets = self._exponents
         near = np.exp(slopes @ np.array(point) + offsets)
@@ -83,7 +83,7 @@ class Support:
     @cached_property
     def limit(self) -> float:
         """Return the largest variance at which a point is supported."""
-        return float(np.quantile(self.left_out, QUANTILE))
+        return float(np.quantile(self.left_out, SUPPORT_QUANTILE))
 
     @cached_property
     def _inverse(self) -> Floats:
@@ -91,8 +91,8 @@ class Support:
         return np.asarray(np.linalg.inv(own))
 
     @cached_property
-    def _box(self) -> list[tuple[float, float]]:
-        room = BEYOND * (self.high - self.low)
+    def _bounds(self) -> list[tuple[float, float]]:
+        room = RANGE_MARGIN * (self.high - self.low)
         return list(zip((self.low - room).tolist(), (self.high + room).tolist(), strict=True))
 
     @cached_property
@@ -106,7 +106,7 @@ class Support:
     def _exponents(self) -> tuple[Floats, Floats]:
         """Return slopes (n, d) and offsets (n,) of the log covariance between samples and a point.
 
-        The term of the point's own square is left out: `held` multiplies by it once.
+        The term of the point's own square is left out: `is_supported` multiplies by it once.
         """
         factors, offsets = np.transpose(self._scale)
         slopes = 2.0 * RATE * self.samples
@@ -114,16 +114,16 @@ class Support:
         return slopes * factors, -slopes @ offsets - own
 
     @cached_property
-    def _single(self) -> tuple[Singles, Singles, Singles]:
+    def _float32_factors(self) -> tuple[Singles, Singles, Singles]:
         """Return in float32 `_exponents` for half-ranges, (d, n) and (n,), and the inverse."""
         own = RATE * np.sum(np.square(self.samples), axis=1)
         parts = (2.0 * RATE * self.samples.T, -own, self._inverse)
         slopes, offsets, inverse = (np.ascontiguousarray(part, dtype=np.float32) for part in parts)
         return slopes, offsets, inverse
 
-    def _roughly(self, points: Floats) -> Floats:
+    def _float32_variance(self, points: Floats) -> Floats:
         """Return `variance` (B,) in single precision, for points near the range."""
-        slopes, offsets, inverse = self._single
+        slopes, offsets, inverse = self._float32_factors
         scaled = self.scaled(points).astype(np.float32)
         found = np.empty(len(points))
         for rows in (slice(at, at + BATCH) for at in range(0, len(points), BATCH)):
@@ -140,7 +140,7 @@ class Support:
         return half_ranges(points, self.low, self.high)
 
 
-def of(controls: Floats) -> Support:
+def fit_support(controls: Floats) -> Support:
     """Return the support of captured clips' controls (n, d); each control must vary."""
     low, high = controls.min(axis=0), controls.max(axis=0)
     return Support(low, high, half_ranges(controls, low, high))

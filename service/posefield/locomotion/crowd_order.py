@@ -10,19 +10,19 @@ from posefield.inference.level_selection import Camera
 from posefield.inference.named_model import NamedModel
 from posefield.locomotion import level_transitions, random_paths, walking_crowd
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.level_transitions import Detail
-from posefield.locomotion.locomotion_plan import Plan
+from posefield.locomotion.level_transitions import LevelSchedule
+from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.routes import Route
 from posefield.motion.crowd_clip import CrowdClip
-from posefield.question.walk_question import FOV, HEIGHT, WalkQuestion
+from posefield.question.walk_question import DEFAULT_FOV, DEFAULT_HEIGHT, WalkQuestion
 
-MOST = 1_000_000
+MAX_CHARACTERS = 1_000_000
 """Largest number of characters of one crowd, which may share motions."""
-FPS, PIXELS = 30.0, 1.0
+DEFAULT_FPS, DEFAULT_PIXELS = 30.0, 1.0
 
 
 @dataclass(frozen=True)
-class Order:
+class CrowdOrder:
     """Parameters of a walking crowd.
 
     count: characters, each on its own path; with routes, their number. routes: given routes.
@@ -35,15 +35,15 @@ class Order:
     routes: Sequence[Route] = ()
     motions: int | None = None
     seconds: float = 10.0
-    fps: float = FPS
+    fps: float = DEFAULT_FPS
     seed: int = 0
     level: int | None = None
     camera: Camera | None = None
-    pixels: float = PIXELS
+    pixels: float = DEFAULT_PIXELS
 
     def __post_init__(self) -> None:
-        if not 1 <= self.count <= MOST:
-            raise InvalidField("count", f"{self.count}, expected 1 to {MOST} characters")
+        if not 1 <= self.count <= MAX_CHARACTERS:
+            raise InvalidField("count", f"{self.count}, expected 1 to {MAX_CHARACTERS} characters")
         if self.level is not None and self.camera is not None:
             raise InvalidField("level", f"{self.level}, expected none: the camera chooses it")
         if self.motions is not None and not 1 <= self.motions <= self.count:
@@ -58,14 +58,14 @@ class Order:
             raise InvalidField("pixels", f"{self.pixels:g}, expected 0 or more")
 
 
-def of(asked: WalkQuestion, routes: Sequence[Route] = ()) -> Order:
+def from_question(asked: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrder:
     """Return the order of a question; its characters follow the routes if there are any."""
     camera = None
     if asked.camera is not None:
-        fov = FOV if asked.fov is None else asked.fov
-        height = HEIGHT if asked.height is None else asked.height
+        fov = DEFAULT_FOV if asked.fov is None else asked.fov
+        height = DEFAULT_HEIGHT if asked.height is None else asked.height
         camera = Camera(np.array(asked.camera), fov, height)
-    return Order(
+    return CrowdOrder(
         count=asked.count,
         routes=routes,
         motions=asked.motions,
@@ -74,39 +74,41 @@ def of(asked: WalkQuestion, routes: Sequence[Route] = ()) -> Order:
         seed=asked.seed,
         level=asked.level,
         camera=camera,
-        pixels=PIXELS if asked.pixels is None else asked.pixels,
+        pixels=DEFAULT_PIXELS if asked.pixels is None else asked.pixels,
     )
 
 
-def crowd(model: NamedModel, gait: Gait, order: Order) -> CrowdClip:
+def build_crowd(model: NamedModel, gait: Gait, order: CrowdOrder) -> CrowdClip:
     """Return the crowd of an order, whose motions are computed on demand.
 
     Raises InvalidField for parameters that the model or the limits do not permit.
     """
-    plan = _plan(gait, order)
-    return _crowd(gait, plan, _detail(model, plan, order), order)
+    plan = _build_plan(gait, order)
+    return _build_motions(gait, plan, _build_schedule(model, plan, order), order)
 
 
-def _crowd(gait: Gait, plan: Plan, shown: Detail, order: Order) -> CrowdClip:
+def _build_motions(
+    gait: Gait, plan: LocomotionPlan, shown: LevelSchedule, order: CrowdOrder
+) -> CrowdClip:
     if order.motions is None:
-        return walking_crowd.crowd(gait.session, plan, shown)
-    return walking_crowd.sharing(
-        gait.session, plan, shown, random_paths.stands(order.count, order.seed)
+        return walking_crowd.build_crowd(gait.session, plan, shown)
+    return walking_crowd.share_motions(
+        gait.session, plan, shown, random_paths.initial_placement(order.count, order.seed)
     )
 
 
-def _plan(gait: Gait, order: Order) -> Plan:
+def _build_plan(gait: Gait, order: CrowdOrder) -> LocomotionPlan:
     span = order.seconds, order.fps, order.seed
     if order.routes:
-        return walking_crowd.following(gait, order.routes, *span)
-    return walking_crowd.wandering(gait, order.motions or order.count, *span)
+        return walking_crowd.plan_routes(gait, order.routes, *span)
+    return walking_crowd.plan_random(gait, order.motions or order.count, *span)
 
 
-def _detail(model: NamedModel, plan: Plan, order: Order) -> Detail:
+def _build_schedule(model: NamedModel, plan: LocomotionPlan, order: CrowdOrder) -> LevelSchedule:
     level, coarsest = order.level or 0, len(model.session.card.levels) - 1
     if not 0 <= level <= coarsest:
         raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
     if order.camera is None:
-        return level_transitions.constant(level, plan.phases.shape)
-    scale = level_transitions.scale(order.camera, plan.roots + model.middle, model.radius)
-    return level_transitions.seen(model.ladder, scale, order.pixels, order.fps)
+        return level_transitions.constant_schedule(level, plan.phases.shape)
+    scale = level_transitions.scale(order.camera, plan.roots + model.rest_position, model.radius)
+    return level_transitions.schedule_levels(model.level_table, scale, order.pixels, order.fps)

@@ -10,48 +10,48 @@ import numpy.typing as npt
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 
-Plane = npt.NDArray[np.complex128]
+FloorVectors = npt.NDArray[np.complex128]
 
 
-def of(points: Floats) -> Plane:
+def project(points: Floats) -> FloorVectors:
     """Return the floor points (...) below points (..., 3), m."""
     return points[..., 2] + 1j * points[..., 0]
 
 
-def at_height(places: Plane, height: Floats) -> Floats:
+def at_height(places: FloorVectors, height: Floats) -> Floats:
     """Return points (..., 3), m, at a height above floor points (...)."""
     return np.stack(np.broadcast_arrays(places.imag, height, places.real), axis=-1)
 
 
-def facing(headings: Floats) -> Plane:
+def unit_vectors(headings: Floats) -> FloorVectors:
     """Return the unit vectors (...) of headings, rad."""
     return np.exp(1j * headings)
 
 
-def arc(way: Plane | Floats, turn: Floats) -> Plane:
+def arc_displacement(way: FloorVectors | Floats, turn: Floats) -> FloorVectors:
     """Return the displacement of a path of constant speed and constant rate of turning.
 
     way: length and direction of the path at its start. turn: change of heading, rad. This is the
     exponential map of rigid motion in the plane: a straight line for no turn, else an arc of the
     same length.
     """
-    return way * _bent(turn)
+    return way * _arc_factor(turn)
 
 
-def straightened(gap: Plane, turn: Floats) -> Plane:
-    """Return the way whose arc covers a displacement: the inverse of `arc`.
+def inverse_arc(gap: FloorVectors, turn: Floats) -> FloorVectors:
+    """Return the way whose arc covers a displacement: the inverse of `arc_displacement`.
 
     turn: of less than a whole turn, rad.
     """
-    return gap / _bent(turn)
+    return gap / _arc_factor(turn)
 
 
-def _bent(turn: Floats) -> Plane:
+def _arc_factor(turn: Floats) -> FloorVectors:
     # sin(h) / h is np.sinc(h / pi), and exact at zero.
     return np.exp(0.5j * turn) * np.sinc(turn / (2.0 * np.pi))
 
 
-def turned(rotations: Floats, headings: Floats) -> Floats:
+def turn_roots(rotations: Floats, headings: Floats) -> Floats:
     """Return rotations (..., J, 4) with the roots turned by headings (...), rad, about +Y."""
-    root = quat.mul(quat.about(UP, headings), rotations[..., 0, :])
+    root = quat.mul(quat.from_axis_angle(UP, headings), rotations[..., 0, :])
     return np.concatenate([root[..., None, :], rotations[..., 1:, :]], axis=-2)

@@ -12,12 +12,12 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.inference.session import Session
 from posefield.locomotion import gait_region, stride
-from posefield.locomotion.gait_region import Region
+from posefield.locomotion.gait_region import GaitRegion
 
 # A lower speed does not count as travel, and speeds closer than this count as equal, m/s.
-STILL = 0.05
+MIN_SPEED = 0.05
 # Iterations that correct the requested rates by the resulting ones.
-ROUNDS = 3
+ITERATIONS = 3
 
 
 @dataclass(frozen=True)
@@ -33,29 +33,29 @@ class Gait:
     session: Session
     rates: Floats
     slopes: Floats
-    manners: Floats
-    region: Region
+    performer_offsets: Floats
+    region: GaitRegion
 
-    def typical(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
+    def mean_controls(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
         """Return the conditional mean of the controls (K, d) at given rates.
 
         speeds: (K,), m/s. turning: (K,), rad/s. who: performers (K,) by index on the card, -1 for
         an unseen performer. The mean is a linear regression over the captured clips, which also
         determines controls that do not affect speed or turning, such as the stride length.
         """
-        return _design(speeds, turning) @ self.slopes + self.manners[who]
+        return _design_matrix(speeds, turning) @ self.slopes + self.performer_offsets[who]
 
     def controls(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
         """Return the controls (K, d), along the regression, that lead to these rates."""
         labels = stride.PerformerLabels(self.session, who)
         speed, turn = speeds, turning
-        for _ in range(ROUNDS):
-            done = stride.strides(self.session, self.typical(speed, turn, who), labels)
+        for _ in range(ITERATIONS):
+            done = stride.strides(self.session, self.mean_controls(speed, turn, who), labels)
             speed, turn = speed + speeds - done.speeds, turn + turning - done.turning
-        return self.typical(speed, turn, who)
+        return self.mean_controls(speed, turn, who)
 
 
-def of(session: Session) -> Gait:
+def fit_gait(session: Session) -> Gait:
     """Return the gait of a model.
 
     Raises InvalidField if it is not cyclic, stays in place or has one speed.
@@ -66,25 +66,29 @@ def of(session: Session) -> Gait:
     if card.root != "travelling":
         raise InvalidField("model", f"{card.name} stays in place, expected one that travels")
     controls = np.array(card.examples)
-    who = stride.movers(card)
+    who = stride.clip_performers(card)
     own = stride.strides(session, controls, stride.labels(session, who))
     rates = np.column_stack([own.speeds, own.turning])
-    _refuse_one_speed(card.name, rates[:, 0])
-    slopes = np.linalg.lstsq(_design(*rates.T), controls, rcond=None)[0]
-    manners = mean_residuals(controls - _design(*rates.T) @ slopes, who, len(card.performers))
-    return Gait(session, rates, slopes, manners, gait_region.hull(_with_straight(rates)))
+    _check_speeds(card.name, rates[:, 0])
+    slopes = np.linalg.lstsq(_design_matrix(*rates.T), controls, rcond=None)[0]
+    manners = mean_residuals(
+        controls - _design_matrix(*rates.T) @ slopes, who, len(card.performers)
+    )
+    return Gait(
+        session, rates, slopes, manners, gait_region.convex_hull(_add_straight_rates(rates))
+    )
 
 
-def _refuse_one_speed(name: str, speeds: Floats) -> None:
+def _check_speeds(name: str, speeds: Floats) -> None:
     low, high = speeds.min(), speeds.max()
-    if low < STILL or high - low < STILL:
+    if low < MIN_SPEED or high - low < MIN_SPEED:
         raise InvalidField(
             "model",
             f"{name} goes {low:.3f} to {high:.3f} m/s, expected one that travels at several speeds",
         )
 
 
-def _with_straight(rates: Floats) -> Floats:
+def _add_straight_rates(rates: Floats) -> Floats:
     """Return the rates with straight walking added at the slowest and the fastest speed.
 
     A stride cut from a straight walk turns by a few degrees, which is no lower bound of the
@@ -94,7 +98,7 @@ def _with_straight(rates: Floats) -> Floats:
     return np.vstack([rates, np.column_stack([ends, np.zeros(2)])])
 
 
-def _design(speeds: Floats, turning: Floats) -> Floats:
+def _design_matrix(speeds: Floats, turning: Floats) -> Floats:
     return np.column_stack([np.ones(len(speeds)), speeds, turning])
 
 

@@ -12,7 +12,7 @@ SLACK = 1e-6
 
 
 @dataclass(frozen=True)
-class Region:
+class GaitRegion:
     """Convex region of speeds, m/s, and rates of turning, rad/s.
 
     normals: (E, 2) and limits: (E,); a pair is inside where normals times it are at most the
@@ -23,7 +23,7 @@ class Region:
     limits: Floats
     speeds: tuple[float, float]
 
-    def holds(self, speeds: Floats, turning: Floats) -> npt.NDArray[np.bool_]:
+    def contains(self, speeds: Floats, turning: Floats) -> npt.NDArray[np.bool_]:
         """Return whether pairs (...) are inside the region."""
         pairs = np.stack(np.broadcast_arrays(speeds, turning), axis=-1)
         return np.all(pairs @ self.normals.T <= self.limits + SLACK, axis=-1)
@@ -31,22 +31,24 @@ class Region:
     def turning(self, speeds: Floats) -> tuple[Floats, Floats]:
         """Return the smallest and the largest rate of turning (...), rad/s, at speeds (...)."""
         right, left = self.normals[:, 1] < 0.0, self.normals[:, 1] > 0.0
-        return self._ends(speeds, right).max(axis=-1), self._ends(speeds, left).min(axis=-1)
+        return self._edge_rates(speeds, right).max(axis=-1), self._edge_rates(speeds, left).min(
+            axis=-1
+        )
 
-    def _ends(self, speeds: Floats, edges: npt.NDArray[np.bool_]) -> Floats:
+    def _edge_rates(self, speeds: Floats, edges: npt.NDArray[np.bool_]) -> Floats:
         """Return the rates of turning (..., E) at which the edges lie at speeds (...)."""
         along, across = self.normals[edges].T
         return (self.limits[edges] - speeds[..., None] * along) / across
 
 
-def hull(pairs: Floats) -> Region:
+def convex_hull(pairs: Floats) -> GaitRegion:
     """Return the convex hull of pairs (N, 2) of speed and rate of turning."""
     corners = _corners(np.unique(pairs, axis=0))
     edges = np.roll(corners, -1, axis=0) - corners
     normals = np.column_stack([edges[:, 1], -edges[:, 0]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     limits = np.sum(normals * corners, axis=1)
-    return Region(normals, limits, (float(pairs[:, 0].min()), float(pairs[:, 0].max())))
+    return GaitRegion(normals, limits, (float(pairs[:, 0].min()), float(pairs[:, 0].max())))
 
 
 def _corners(ordered: Floats) -> Floats:

@@ -11,15 +11,15 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices
 from posefield.inference import level_selection
-from posefield.inference.level_selection import HYSTERESIS, Camera, Ladder
+from posefield.inference.level_selection import HYSTERESIS, Camera, LevelTable
 from posefield.motion import blend
 
-SWITCH = 0.25
+TRANSITION_SECONDS = 0.25
 """Duration of a transition between levels, s."""
 
 
 @dataclass(frozen=True)
-class Detail:
+class LevelSchedule:
     """Levels of detail of N characters in F frames.
 
     levels: (N, F). before: (N, F), previous levels. shares: (N, F), completed share of the
@@ -27,23 +27,23 @@ class Detail:
     """
 
     levels: Indices
-    before: Indices
+    previous: Indices
     shares: Floats
 
-    def of(self, who: Indices) -> "Detail":
+    def select(self, who: Indices) -> "LevelSchedule":
         """Return the levels of some characters (M,)."""
-        return Detail(self.levels[who], self.before[who], self.shares[who])
+        return LevelSchedule(self.levels[who], self.previous[who], self.shares[who])
 
-    def rows(self, rows: slice) -> "Detail":
+    def rows(self, rows: slice) -> "LevelSchedule":
         """Return the levels of some of all frames (N F,), character by character."""
-        levels, before, shares = self.levels.ravel(), self.before.ravel(), self.shares.ravel()
-        return Detail(levels[rows], before[rows], shares[rows])
+        levels, before, shares = self.levels.ravel(), self.previous.ravel(), self.shares.ravel()
+        return LevelSchedule(levels[rows], before[rows], shares[rows])
 
 
-def constant(level: int, shape: tuple[int, ...]) -> Detail:
+def constant_schedule(level: int, shape: tuple[int, ...]) -> LevelSchedule:
     """Return one level for all characters and frames (N, F)."""
     levels = np.full(shape, level)
-    return Detail(levels, levels, np.ones(shape))
+    return LevelSchedule(levels, levels, np.ones(shape))
 
 
 def scale(camera: Camera, centres: Floats, radius: float) -> Floats:
@@ -59,17 +59,17 @@ def scale(camera: Camera, centres: Floats, radius: float) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def seen(ladder: Ladder, scale: Floats, limit: float, rate: float) -> Detail:
+def schedule_levels(ladder: LevelTable, scale: Floats, limit: float, rate: float) -> LevelSchedule:
     """Return the coarsest levels with errors of at most `limit` pixels, transitions included.
 
     scale: (N, F), pixels per metre. rate: frames a second. The finest level where none is within
     the limit.
     """
-    switch = max(1, round(SWITCH * rate))
+    switch = max(1, round(TRANSITION_SECONDS * rate))
     # Two transitions: one that has just begun ends before the next one.
     ahead = 2 * switch
-    needed = _least_ahead(_levels(ladder, scale, limit), ahead)
-    spare = _least_ahead(_levels(ladder, scale, limit * (1.0 - HYSTERESIS)), ahead)
+    needed = _finest_ahead(_levels(ladder, scale, limit), ahead)
+    spare = _finest_ahead(_levels(ladder, scale, limit * (1.0 - HYSTERESIS)), ahead)
     held, before = needed[:, 0], needed[:, 0]
     age, columns = np.full(len(held), switch), []
     for need, may in zip(needed.T, spare.T, strict=True):
@@ -81,14 +81,14 @@ def seen(ladder: Ladder, scale: Floats, limit: float, rate: float) -> Detail:
         held = wanted
         columns.append((held, before, np.minimum((age + 1) / (switch + 1), 1.0)))
     levels, origins, shares = (np.stack(column, axis=1) for column in zip(*columns, strict=True))
-    return Detail(levels, origins, blend.eased(shares))
+    return LevelSchedule(levels, origins, blend.smoothstep(shares))
 
 
-def _levels(ladder: Ladder, scale: Floats, limit: float) -> Indices:
-    return level_selection.choose(ladder.errors, scale.ravel(), limit).reshape(scale.shape)
+def _levels(ladder: LevelTable, scale: Floats, limit: float) -> Indices:
+    return level_selection.select_by_error(ladder.errors, scale.ravel(), limit).reshape(scale.shape)
 
 
-def _least_ahead(levels: Indices, frames: int) -> Indices:
+def _finest_ahead(levels: Indices, frames: int) -> Indices:
     """Return the finest level (N, F) from each frame on, over `frames` frames ahead."""
     padded = np.pad(levels, ((0, 0), (0, frames)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, frames + 1, axis=1)

@@ -13,16 +13,16 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane, stride
-from posefield.locomotion.floor_plane import Plane
+from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.paths import STEP, Paths
-from posefield.locomotion.stride import Poses, Strides
+from posefield.locomotion.paths import POINT_SPACING, Paths
+from posefield.locomotion.stride import RelativePoses, Strides
 
-Numbers = TypeVar("Numbers", Floats, Plane)
+Numbers = TypeVar("Numbers", Floats, FloorVectors)
 
 
 @dataclass(frozen=True)
-class Plan:
+class LocomotionPlan:
     """Locomotion of N characters at F frames, without their poses.
 
     controls: (N, F, d). who: (N,), performers by index on the card or -1. phases: (N, F), of the
@@ -33,7 +33,7 @@ class Plan:
     controls: Floats
     who: Indices
     phases: Floats
-    places: Plane
+    places: FloorVectors
     headings: Floats
     rate: float
 
@@ -42,37 +42,37 @@ class Plan:
         """Points (N, F, 3), m, on the floor under the characters."""
         return floor_plane.at_height(self.places, np.zeros(self.places.shape))
 
-    def at_home(self) -> "Plan":
+    def relative_to_start(self) -> "LocomotionPlan":
         """Return the plan with each character in the frame of its start."""
         first, facing = self.places[:, :1], self.headings[:, :1]
-        places = (self.places - first) * floor_plane.facing(-facing)
+        places = (self.places - first) * floor_plane.unit_vectors(-facing)
         return replace(self, places=places, headings=self.headings - facing)
 
 
-def roam(
+def plan_from_controls(
     gait: Gait,
     controls: Floats,
     who: Indices,
     phases: Floats,
-    starts: tuple[Plane, Floats],
+    starts: tuple[FloorVectors, Floats],
     rate: float,
-) -> Plan:
+) -> LocomotionPlan:
     """Return the plan of controls (N, F, d); the trajectories follow from the model's travel.
 
     phases: (N,) and starts: places (N,) and headings (N,), rad, at the first frame.
     """
-    own = _strides(gait, controls, who)
-    turns = _steps(own.turning, rate)
-    ways = _steps(own.ways / own.durations, rate)
-    headings = starts[1][:, None] + _summed(turns)
-    steps = floor_plane.facing(headings[:, :-1]) * floor_plane.arc(ways, turns)
-    places = starts[0][:, None] + _summed(steps)
-    return Plan(controls, who, _phases(own, phases, rate), places, headings, rate)
+    own = _measure_strides(gait, controls, who)
+    turns = _increments(own.turning, rate)
+    ways = _increments(own.travels / own.durations, rate)
+    headings = starts[1][:, None] + _cumulative_sums(turns)
+    steps = floor_plane.unit_vectors(headings[:, :-1]) * floor_plane.arc_displacement(ways, turns)
+    places = starts[0][:, None] + _cumulative_sums(steps)
+    return LocomotionPlan(controls, who, _phases(own, phases, rate), places, headings, rate)
 
 
-def follow(
+def plan_along_paths(
     gait: Gait, paths: Paths, who: Indices, phases: Floats, frames: int, rate: float
-) -> Plan:
+) -> LocomotionPlan:
     """Return the plan of characters along paths, at the speed of the synthesised gait.
 
     phases: (N,), of the cycle at the first frame. Raises InvalidField for a path that ends too
@@ -80,29 +80,35 @@ def follow(
     """
     known = paths.speeds.shape
     everyone = np.repeat(who, known[1])
-    turning = (paths.speeds * paths.bends).ravel()
+    turning = (paths.speeds * paths.curvatures).ravel()
     wanted = gait.controls(paths.speeds.ravel(), turning, everyone)
     labels = stride.PerformerLabels(gait.session, everyone)
     speeds = stride.strides(gait.session, wanted, labels).speeds.reshape(known)
-    gone = _gone(speeds, frames, rate)
-    _refuse_short(paths, gone, (frames - 1) / rate)
-    controls = paths.along(wanted.reshape(*known, -1), gone)
-    own = _strides(gait, controls, who)
+    gone = _distances(speeds, frames, rate)
+    _check_path_lengths(paths, gone, (frames - 1) / rate)
+    controls = paths.interpolate(wanted.reshape(*known, -1), gone)
+    own = _measure_strides(gait, controls, who)
     places, tangents = paths.at(gone)
-    return Plan(controls, who, _phases(own, phases, rate), places, tangents - own.drifts, rate)
+    return LocomotionPlan(
+        controls, who, _phases(own, phases, rate), places, tangents - own.drifts, rate
+    )
 
 
-def pose(session: Session, plan: Plan, who: Indices, frames: Indices, level: int = 0) -> Poses:
+def synthesize_poses(
+    session: Session, plan: LocomotionPlan, who: Indices, frames: Indices, level: int = 0
+) -> RelativePoses:
     """Return the poses of K pairs of a character (K,) and a frame (K,) of the plan."""
     performers = stride.labels(session, plan.who[who])
     pair = who, frames
-    own = stride.poses(session, plan.controls[pair], performers, plan.phases[pair], level)
+    own = stride.synthesize_poses(
+        session, plan.controls[pair], performers, plan.phases[pair], level
+    )
     headings = plan.headings[pair]
-    places = plan.places[pair] + own.places * floor_plane.facing(headings)
-    return Poses(floor_plane.turned(own.rotations, headings), own.heights, places)
+    places = plan.places[pair] + own.places * floor_plane.unit_vectors(headings)
+    return RelativePoses(floor_plane.turn_roots(own.rotations, headings), own.heights, places)
 
 
-def _strides(gait: Gait, controls: Floats, who: Indices) -> Strides:
+def _measure_strides(gait: Gait, controls: Floats, who: Indices) -> Strides:
     """Return the cycles of controls (N, F, d), with fields (N, F)."""
     frames = controls.shape[:2]
     labels = stride.PerformerLabels(gait.session, np.repeat(who, frames[1]))
@@ -110,31 +116,31 @@ def _strides(gait: Gait, controls: Floats, who: Indices) -> Strides:
     return Strides(*(value.reshape(frames) for value in vars(own).values()))
 
 
-def _steps(paces: Numbers, rate: float) -> Numbers:
+def _increments(paces: Numbers, rate: float) -> Numbers:
     """Return the increments (N, F - 1) of rates (N, F) per second, by the trapezoidal rule."""
     return 0.5 * (paces[:, 1:] + paces[:, :-1]) / rate
 
 
-def _summed(steps: Numbers) -> Numbers:
+def _cumulative_sums(steps: Numbers) -> Numbers:
     return np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
 
 
 def _phases(own: Strides, first: Floats, rate: float) -> Floats:
-    return (first[:, None] + _summed(_steps(1.0 / own.durations, rate))) % 1.0
+    return (first[:, None] + _cumulative_sums(_increments(1.0 / own.durations, rate))) % 1.0
 
 
-def _gone(speeds: Floats, frames: int, rate: float) -> Floats:
+def _distances(speeds: Floats, frames: int, rate: float) -> Floats:
     """Return the distances (N, F), m, along paths with speeds (N, K) at their known points."""
-    arrived = _summed(0.5 * STEP * (1.0 / speeds[:, 1:] + 1.0 / speeds[:, :-1]))
+    arrived = _cumulative_sums(0.5 * POINT_SPACING * (1.0 / speeds[:, 1:] + 1.0 / speeds[:, :-1]))
     # One interpolation for all rows: each row's times are offset beyond those of the row before.
     apart = np.arange(len(speeds))[:, None] * (2.0 * arrived.max())
-    ways = np.tile(STEP * np.arange(speeds.shape[1]), len(speeds))
+    ways = np.tile(POINT_SPACING * np.arange(speeds.shape[1]), len(speeds))
     # A character that has arrived stays there; the gap between two rows must not be interpolated.
     when = np.minimum(np.arange(frames) / rate, arrived[:, -1:])
     return np.interp((when + apart).ravel(), (arrived + apart).ravel(), ways).reshape(-1, frames)
 
 
-def _refuse_short(paths: Paths, gone: Floats, seconds: float) -> None:
+def _check_path_lengths(paths: Paths, gone: Floats, seconds: float) -> None:
     for index in np.flatnonzero(gone[:, -1] >= paths.lengths)[:1]:
         raise InvalidField(
             f"paths/{index}",

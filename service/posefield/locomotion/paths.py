@@ -6,10 +6,10 @@ import numpy as np
 
 from posefield.common.units import Floats, Indices
 from posefield.locomotion import floor_plane
-from posefield.locomotion.floor_plane import Plane
+from posefield.locomotion.floor_plane import FloorVectors
 
 # Distance between known points of a path, m. Heading is linear between them.
-STEP = 0.1
+POINT_SPACING = 0.1
 
 
 @dataclass(frozen=True)
@@ -20,32 +20,36 @@ class Paths:
     points a path is an arc. speeds: (N, K), m/s. lengths: (N,), m.
     """
 
-    starts: Plane
+    starts: FloorVectors
     headings: Floats
     speeds: Floats
     lengths: Floats
 
     @property
-    def bends(self) -> Floats:
+    def curvatures(self) -> Floats:
         """Curvature (N, K), 1/m, positive to the left."""
-        return np.gradient(self.headings, STEP, axis=1)
+        return np.gradient(self.headings, POINT_SPACING, axis=1)
 
     @property
-    def places(self) -> Plane:
+    def places(self) -> FloorVectors:
         """Known points of the paths (N, K)."""
         turns = np.diff(self.headings, axis=1)
-        steps = floor_plane.facing(self.headings[:, :-1]) * floor_plane.arc(np.array(STEP), turns)
+        steps = floor_plane.unit_vectors(self.headings[:, :-1]) * floor_plane.arc_displacement(
+            np.array(POINT_SPACING), turns
+        )
         return self.starts[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
 
-    def at(self, gone: Floats) -> tuple[Plane, Floats]:
+    def at(self, gone: Floats) -> tuple[FloorVectors, Floats]:
         """Return points (N, F) and headings (N, F), rad, of the tangents after (N, F) metres."""
         before, share = self._between(gone)
         turns = share * np.take_along_axis(np.diff(self.headings, axis=1), before, axis=1)
         first = np.take_along_axis(self.headings, before, axis=1)
-        along = floor_plane.facing(first) * floor_plane.arc(STEP * share, turns)
+        along = floor_plane.unit_vectors(first) * floor_plane.arc_displacement(
+            POINT_SPACING * share, turns
+        )
         return np.take_along_axis(self.places, before, axis=1) + along, first + turns
 
-    def along(self, values: Floats, gone: Floats) -> Floats:
+    def interpolate(self, values: Floats, gone: Floats) -> Floats:
         """Return values (N, K, ...) of the known points after (N, F) metres: (N, F, ...)."""
         before, share = self._between(gone)
         rows = np.arange(len(values))[:, None]
@@ -53,5 +57,5 @@ class Paths:
         return (1.0 - share) * values[rows, before] + share * values[rows, before + 1]
 
     def _between(self, gone: Floats) -> tuple[Indices, Floats]:
-        before = np.minimum((gone / STEP).astype(np.int64), self.headings.shape[1] - 2)
-        return before, gone / STEP - before
+        before = np.minimum((gone / POINT_SPACING).astype(np.int64), self.headings.shape[1] - 2)
+        return before, gone / POINT_SPACING - before

@@ -8,15 +8,15 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
-from posefield.inference.level_selection import FARTHEST
+from posefield.inference.level_selection import MAX_COORDINATE
 from posefield.locomotion import floor_plane
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.paths import STEP, Paths
+from posefield.locomotion.paths import POINT_SPACING, Paths
 
 # Points of a curve per STEP of the straight lines between its waypoints.
-DENSE = 10
+POINTS_PER_STEP = 10
 # Largest length, m, which takes hours to walk, and most waypoints, whose spline takes seconds.
-LONGEST, MOST_WAYPOINTS = 10_000.0, 1_000
+MAX_LENGTH, MAX_WAYPOINTS = 10_000.0, 1_000
 
 
 @dataclass(frozen=True)
@@ -27,17 +27,17 @@ class Route:
     speed: float
 
 
-def parse(plain: Any) -> list[Route]:
+def parse_routes(plain: Any) -> list[Route]:
     """Return the routes of [{"waypoints": [[x, z], ...], "speed": v}, ...].
 
     Raises InvalidField for malformed values.
     """
     if not isinstance(plain, list) or not plain:
         raise InvalidField("paths", "expected a list of one or more routes")
-    return [_parsed(f"paths/{index}", entry) for index, entry in enumerate(plain)]
+    return [_parse_route(f"paths/{index}", entry) for index, entry in enumerate(plain)]
 
 
-def _parsed(field: str, entry: Any) -> Route:
+def _parse_route(field: str, entry: Any) -> Route:
     if not isinstance(entry, dict) or set(entry) != {"waypoints", "speed"}:
         raise InvalidField(field, "expected an object of waypoints and speed")
     try:
@@ -49,7 +49,7 @@ def _parsed(field: str, entry: Any) -> Route:
         raise InvalidField(field, "expected pairs of numbers and a number") from fault
 
 
-def through(gait: Gait, routes: Sequence[Route]) -> Paths:
+def paths_through(gait: Gait, routes: Sequence[Route]) -> Paths:
     """Return the paths of routes: natural cubic splines through all waypoints.
 
     Curvature is continuous, and the speed is constant. Raises InvalidField, which names the route
@@ -57,7 +57,7 @@ def through(gait: Gait, routes: Sequence[Route]) -> Paths:
     sampled range, and for unusable waypoints.
     """
     for index, route in enumerate(routes):
-        _check(gait, index, route)
+        _check_route(gait, index, route)
     curves = [_headings(route.waypoints) for route in routes]
     places = max(len(headings) for headings, _ in curves) + 1
     # Padding beyond the end of a path is not walked.
@@ -68,36 +68,36 @@ def through(gait: Gait, routes: Sequence[Route]) -> Paths:
         np.tile([[route.speed] for route in routes], places).astype(np.float64),
         np.array([length for _, length in curves]),
     )
-    _refuse_sharp(gait, paths)
+    _check_turning(gait, paths)
     return paths
 
 
-def _check(gait: Gait, index: int, route: Route) -> None:
+def _check_route(gait: Gait, index: int, route: Route) -> None:
     points, (low, high) = route.waypoints, gait.region.speeds
     field = f"paths/{index}/waypoints"
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2 or not np.isfinite(points).all():
         raise InvalidField(
             field, f"numbers {points.shape}, expected two or more pairs of finite ones"
         )
-    if len(points) > MOST_WAYPOINTS or not (np.abs(points) <= FARTHEST).all():
+    if len(points) > MAX_WAYPOINTS or not (np.abs(points) <= MAX_COORDINATE).all():
         raise InvalidField(
             field,
             f"{len(points)} up to {np.abs(points).max():g} m away, expected at most "
-            f"{MOST_WAYPOINTS} up to {FARTHEST:g} m",
+            f"{MAX_WAYPOINTS} up to {MAX_COORDINATE:g} m",
         )
     length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    if length > LONGEST:
-        raise InvalidField(field, f"{length:.0f} m from one to the last, expected {LONGEST:g} m")
+    if length > MAX_LENGTH:
+        raise InvalidField(field, f"{length:.0f} m from one to the last, expected {MAX_LENGTH:g} m")
     if not low <= route.speed <= high:
         raise InvalidField(
             f"paths/{index}/speed", f"{route.speed:g} m/s, expected {low:.3g} to {high:.3g} m/s"
         )
-    short = np.linalg.norm(np.diff(points, axis=0), axis=1) < STEP
+    short = np.linalg.norm(np.diff(points, axis=0), axis=1) < POINT_SPACING
     if short.any():
         at = int(np.argmax(short))
         raise InvalidField(
             f"paths/{index}/waypoints/{at + 1}",
-            f"less than {STEP:g} m from the one before, expected a way to it",
+            f"less than {POINT_SPACING:g} m from the one before, expected a way to it",
         )
 
 
@@ -107,11 +107,11 @@ def _headings(waypoints: Floats) -> tuple[Floats, float]:
     waypoints: (P, 2), m, on the spline.
     """
     knots = np.pad(np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)), (1, 0))
-    count = DENSE * int(np.ceil(knots[-1] / STEP)) + 1
+    count = POINTS_PER_STEP * int(np.ceil(knots[-1] / POINT_SPACING)) + 1
     points, slopes = _spline(knots, waypoints, np.linspace(0.0, knots[-1], count))
     gone = np.pad(np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)), (1, 0))
-    along = np.arange(int(gone[-1] / STEP) + 1) * STEP
-    headings = np.unwrap(np.angle(floor_plane.of(np.insert(slopes, 1, 0.0, axis=1))))
+    along = np.arange(int(gone[-1] / POINT_SPACING) + 1) * POINT_SPACING
+    headings = np.unwrap(np.angle(floor_plane.project(np.insert(slopes, 1, 0.0, axis=1))))
     return np.interp(along, gone, headings), float(gone[-1])
 
 
@@ -134,10 +134,10 @@ def _spline(knots: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
     return a * values[piece] + b * values[piece + 1] + bulge, chords[piece] + lean
 
 
-def _refuse_sharp(gait: Gait, paths: Paths) -> None:
-    turning = paths.speeds * paths.bends
-    walked = STEP * np.arange(turning.shape[1]) <= paths.lengths[:, None]
-    sharp = walked & ~gait.region.holds(paths.speeds, turning)
+def _check_turning(gait: Gait, paths: Paths) -> None:
+    turning = paths.speeds * paths.curvatures
+    walked = POINT_SPACING * np.arange(turning.shape[1]) <= paths.lengths[:, None]
+    sharp = walked & ~gait.region.contains(paths.speeds, turning)
     for index in np.flatnonzero(sharp.any(axis=1))[:1]:
         at = int(np.argmax(np.where(sharp[index], np.abs(turning[index]), -1.0)))
         place, speed = paths.places[index, at], paths.speeds[index, at]

@@ -14,14 +14,14 @@ from posefield.common import cancellation
 from posefield.common.units import Floats, Indices, Singles
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane
-from posefield.locomotion.floor_plane import Plane
+from posefield.locomotion.floor_plane import FloorVectors
 from posefield.model_file.model_card import ModelCard
 
 # For larger batches onnxruntime's buffers outgrow the caches, and a pose costs up to eight times as
 # much.
 BATCH = 1000
 # A time after the end of every clip, s; the graph limits times to the end.
-AFTER = 1e9
+AFTER_END = 1e9
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,14 @@ class Strides:
     """
 
     durations: Floats
-    ways: Plane
+    travels: FloorVectors
     turns: Floats
-    starts: Plane
+    starts: FloorVectors
 
     @property
     def speeds(self) -> Floats:
         """Speed (B,) along the arc, m/s."""
-        return np.abs(self.ways) / self.durations
+        return np.abs(self.travels) / self.durations
 
     @property
     def turning(self) -> Floats:
@@ -50,7 +50,7 @@ class Strides:
     @property
     def drifts(self) -> Floats:
         """Direction of travel (B,) relative to the heading, positive to the left, rad."""
-        return np.angle(self.ways)
+        return np.angle(self.travels)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class PerformerLabels:
 
 
 @dataclass(frozen=True)
-class Poses:
+class RelativePoses:
     """K poses in frames that travel with the characters.
 
     rotations: (K, J, 4). heights: (K,), of the root, m. places: (K,), of the root over the floor.
@@ -77,61 +77,67 @@ class Poses:
 
     rotations: Floats
     heights: Floats
-    places: Plane
+    places: FloorVectors
 
 
 def strides(
     session: Session, controls: Floats, labels: Floats | PerformerLabels, level: int = 0
 ) -> Strides:
     """Return the cycles of controls (B, d) for performer labels (B, p), at a level of detail."""
-    ends = np.full((len(controls), 1), AFTER)
+    ends = np.full((len(controls), 1), AFTER_END)
     asked = ("duration", "travel", "root_position")
-    durations, travel, roots = _ask(session, controls, ends, labels, level, *asked)
+    durations, travel, roots = _run_batches(session, controls, ends, labels, level, *asked)
     gap, turns = travel[:, 0, 1] + 1j * travel[:, 0, 0], travel[:, 0, 2]
     # A cycle without its travel ends at its start.
-    starts = floor_plane.of(roots[:, 0]) - gap
-    return Strides(durations, floor_plane.straightened(gap, turns), turns, starts)
+    starts = floor_plane.project(roots[:, 0]) - gap
+    return Strides(durations, floor_plane.inverse_arc(gap, turns), turns, starts)
 
 
-def straight(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
+def straight_strides(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
     """Return the straight line from first to last pose of clips that are not cyclic."""
-    times = np.tile([0.0, AFTER], (len(controls), 1))
+    times = np.tile([0.0, AFTER_END], (len(controls), 1))
     asked = ("duration", "root_position")
-    durations, roots = _ask(session, controls, times, labels, level, *asked)
-    begin, end = floor_plane.of(roots).T
+    durations, roots = _run_batches(session, controls, times, labels, level, *asked)
+    begin, end = floor_plane.project(roots).T
     return Strides(durations, end - begin, np.zeros(len(begin)), begin)
 
 
-def poses(
+def synthesize_poses(
     session: Session, controls: Floats, labels: Floats, phases: Floats, level: int = 0
-) -> Poses:
+) -> RelativePoses:
     """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
     own = strides(session, controls, labels, level)
     times = (phases * own.durations)[:, None]
     asked = ("rotations", "root_position")
-    rotations, roots = _ask(session, controls, times, labels, level, *asked)
-    return beside(own, phases, rotations[:, 0], roots[:, 0])
+    rotations, roots = _run_batches(session, controls, times, labels, level, *asked)
+    return relative_poses(own, phases, rotations[:, 0], roots[:, 0])
 
 
-def beside(own: Strides, phases: Floats, rotations: Floats, roots: Floats) -> Poses:
+def relative_poses(own: Strides, phases: Floats, rotations: Floats, roots: Floats) -> RelativePoses:
     """Return poses relative to the travel, at phases (K,) of the cycle.
 
     own: K strides, or one for all. rotations: (K, J, 4) and roots: (K, 3), m, of the poses.
     """
     turned = phases * own.turns
-    gone = floor_plane.of(roots) - own.starts - floor_plane.arc(phases * own.ways, turned)
-    return Poses(
-        floor_plane.turned(rotations, -turned), roots[:, 1], gone * floor_plane.facing(-turned)
+    gone = (
+        floor_plane.project(roots)
+        - own.starts
+        - floor_plane.arc_displacement(phases * own.travels, turned)
+    )
+    return RelativePoses(
+        floor_plane.turn_roots(rotations, -turned),
+        roots[:, 1],
+        gone * floor_plane.unit_vectors(-turned),
     )
 
 
 def bones(session: Session, controls: Floats, labels: Floats) -> Singles:
     """Return the bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
     begin = np.zeros((len(controls), 1))
-    return _ask(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
+    return _run_batches(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
 
 
-def movers(card: ModelCard) -> Indices:
+def clip_performers(card: ModelCard) -> Indices:
     """Return the performers (N,) of the captured clips by index on the card; -1 without any."""
     return np.array(card.moved_by or [-1] * len(card.examples))
 
@@ -142,7 +148,7 @@ def labels(session: Session, who: Indices) -> Floats:
     return np.vstack([np.eye(performers), np.zeros(performers)])[who]
 
 
-def _ask(
+def _run_batches(
     session: Session,
     controls: Floats,
     times: Floats,

@@ -19,64 +19,70 @@ from posefield.locomotion import (
 )
 from posefield.locomotion import routes as given
 from posefield.locomotion.gait import Gait
-from posefield.locomotion.level_transitions import Detail
-from posefield.locomotion.locomotion_plan import Plan
+from posefield.locomotion.level_transitions import LevelSchedule
+from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.routes import Route
-from posefield.locomotion.stride import Poses
+from posefield.locomotion.stride import RelativePoses
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import blend, foot_skate, skeleton
 from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 
 # Poses of one batch of motions: 8 MB at 31 joints, or one longer motion.
-TOGETHER = 8_000
+POSES_PER_BATCH = 8_000
 # Poses computed at once in double precision: 25 MB at 31 joints.
-POSED = 16_000
+POSES_PER_CALL = 16_000
 
 
 # Largest number of poses of one plan, which takes a few hundred bytes for each.
-MOST_POSES = 20_000_000
+MAX_POSES = 20_000_000
 # Longest interval between planned points of a path, s, for crowds with few frames a second.
-PLANNED = 0.05
-LARGEST_SEED = 2**63
+MAX_PLAN_STEP = 0.05
+SEED_LIMIT = 2**63
 Pairs = tuple[Indices, Indices]
 """Indices of characters (K,) and frames (K,)."""
-RATES = (1.0, 1000.0)
+FPS_RANGE = (1.0, 1000.0)
 
 
-def wandering(gait: Gait, count: int, seconds: float, rate: float, seed: int) -> Plan:
+def plan_random(gait: Gait, count: int, seconds: float, rate: float, seed: int) -> LocomotionPlan:
     """Return a plan of `count` characters on random paths.
 
     Raises InvalidField for numbers out of range.
     """
     frames = _frames(count, seconds, rate, seed)
-    characters = random_paths.cast(gait, count, seed)
-    ways = random_paths.paths(gait, characters, seconds)
-    return locomotion_plan.follow(gait, ways, characters.who, characters.phases, frames, rate)
+    characters = random_paths.draw_characters(gait, count, seed)
+    ways = random_paths.draw_paths(gait, characters, seconds)
+    return locomotion_plan.plan_along_paths(
+        gait, ways, characters.who, characters.phases, frames, rate
+    )
 
 
-def following(gait: Gait, routes: Sequence[Route], seconds: float, rate: float, seed: int) -> Plan:
+def plan_routes(
+    gait: Gait, routes: Sequence[Route], seconds: float, rate: float, seed: int
+) -> LocomotionPlan:
     """Return a plan of characters that follow routes; performers and phases depend on the seed.
 
-    Raises InvalidField as `wandering` and `given.through` do, and for a route that is too short.
+    Raises InvalidField as `plan_random` and `given.through` do, and for a route that is too short.
     """
     frames = _frames(len(routes), seconds, rate, seed)
-    characters = random_paths.cast(gait, len(routes), seed)
-    ways = given.through(gait, routes)
-    return locomotion_plan.follow(gait, ways, characters.who, characters.phases, frames, rate)
+    characters = random_paths.draw_characters(gait, len(routes), seed)
+    ways = given.paths_through(gait, routes)
+    return locomotion_plan.plan_along_paths(
+        gait, ways, characters.who, characters.phases, frames, rate
+    )
 
 
 def _frames(count: int, seconds: float, rate: float, seed: int) -> int:
     if count < 1:
         raise InvalidField("count", f"{count}, expected at least 1 character")
-    if not 0 <= seed < LARGEST_SEED:
-        raise InvalidField("seed", f"{seed}, expected 0 to less than {LARGEST_SEED}")
-    if not RATES[0] <= rate <= RATES[1]:
-        raise InvalidField("fps", f"{rate:g}, expected {RATES[0]:g} to {RATES[1]:g}")
+    if not 0 <= seed < SEED_LIMIT:
+        raise InvalidField("seed", f"{seed}, expected 0 to less than {SEED_LIMIT}")
+    if not FPS_RANGE[0] <= rate <= FPS_RANGE[1]:
+        raise InvalidField("fps", f"{rate:g}, expected {FPS_RANGE[0]:g} to {FPS_RANGE[1]:g}")
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InvalidField("seconds", f"{seconds:g}, expected a time above 0")
     most = poses(count, seconds, rate)
-    if most > MOST_POSES:
-        raise InvalidField("count", f"{most:.3g} poses, expected {MOST_POSES} at most")
+    if most > MAX_POSES:
+        raise InvalidField("count", f"{most:.3g} poses, expected {MAX_POSES} at most")
     return frames(seconds, rate)
 
 
@@ -88,10 +94,10 @@ def frames(seconds: float, rate: float) -> int:
 
 def poses(count: int, seconds: float, rate: float) -> float:
     """Return the number of poses of a crowd, or of planned points if these are more."""
-    return count * (seconds * max(rate, 1.0 / PLANNED) + 1.0)
+    return count * (seconds * max(rate, 1.0 / MAX_PLAN_STEP) + 1.0)
 
 
-def crowd(session: Session, plan: Plan, shown: Detail) -> CrowdClip:
+def build_crowd(session: Session, plan: LocomotionPlan, shown: LevelSchedule) -> CrowdClip:
     """Return the crowd of a plan, each character with its own motion in the frame of its start."""
     characters, frames = plan.phases.shape
     return CrowdClip(
@@ -100,55 +106,57 @@ def crowd(session: Session, plan: Plan, shown: Detail) -> CrowdClip:
         frames,
         Placement(plan.roots[:, 0], plan.headings[:, 0]),
         np.arange(characters),
-        _batches(session, plan.at_home(), shown),
-        {**_facts(session, plan), "level_shares": _shares(session, shown)},
+        _batches(session, plan.relative_to_start(), shown),
+        {**_facts(session, plan), "level_shares": _level_shares(session, shown)},
     )
 
 
-def sharing(session: Session, plan: Plan, shown: Detail, stands: Placement) -> CrowdClip:
+def share_motions(
+    session: Session, plan: LocomotionPlan, shown: LevelSchedule, stands: Placement
+) -> CrowdClip:
     """Return a crowd at given placements, whose characters reuse the plan's motions in turn."""
-    one_each = crowd(session, plan, shown)
+    one_each = build_crowd(session, plan, shown)
     return replace(one_each, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
 
 
-def _facts(session: Session, plan: Plan) -> dict[str, Any]:
+def _facts(session: Session, plan: LocomotionPlan) -> dict[str, Any]:
     card = session.card
     return {
         "model": f"{card.name}@{session.digest}",
         "performers": [card.performers[who] if who >= 0 else None for who in plan.who],
-        "outside_share": _outside(card, plan),
+        "outside_share": _outside_share(card, plan),
     }
 
 
-def _shares(session: Session, shown: Detail) -> list[float]:
+def _level_shares(session: Session, shown: LevelSchedule) -> list[float]:
     """Return the share of the poses that has each level."""
     counts = np.bincount(shown.levels.ravel(), minlength=len(session.card.levels))
     return [float(f"{share:.4g}") for share in counts / shown.levels.size]
 
 
-def _outside(card: ModelCard, plan: Plan) -> float:
+def _outside_share(card: ModelCard, plan: LocomotionPlan) -> float:
     """Return the share of the poses with some control outside its sampled range."""
     low, high = [c.minimum for c in card.controls], [c.maximum for c in card.controls]
     return float(np.mean(np.any((plan.controls < low) | (plan.controls > high), axis=-1)))
 
 
-def _batches(session: Session, plan: Plan, shown: Detail) -> Iterator[Motions]:
+def _batches(session: Session, plan: LocomotionPlan, shown: LevelSchedule) -> Iterator[Motions]:
     count, frames = plan.phases.shape
-    together = max(1, TOGETHER // frames)
+    together = max(1, POSES_PER_BATCH // frames)
     for first in range(0, count, together):
         who = np.arange(first, min(first + together, count))
-        yield motions(session, plan, who, shown.of(who))
+        yield motions(session, plan, who, shown.select(who))
 
 
-def motions(session: Session, plan: Plan, who: Indices, shown: Detail) -> Motions:
+def motions(session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule) -> Motions:
     """Return the motions of characters (M,) of the plan, at their levels of detail."""
     shape = (len(who), plan.phases.shape[1])
     count, joints = shape[0] * shape[1], len(session.card.skeleton)
     rotations = np.empty((count, joints, 4), np.float32)
     roots = np.empty((count, 3), np.float32)
-    for rows in (slice(first, first + POSED) for first in range(0, count, POSED)):
+    for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
         character, frame = np.divmod(np.arange(count)[rows], shape[1])
-        posed = _posed(session, plan, (who[character], frame), shown.rows(rows))
+        posed = _blended_poses(session, plan, (who[character], frame), shown.rows(rows))
         rotations[rows] = posed.rotations
         roots[rows] = floor_plane.at_height(posed.places, posed.heights)
     # Bone lengths must not vary with the speed: they are those at the mean controls.
@@ -158,7 +166,9 @@ def motions(session: Session, plan: Plan, who: Indices, shown: Detail) -> Motion
     return Motions(turns, roots.reshape(*shape, 3), bones, shown.levels)
 
 
-def _posed(session: Session, plan: Plan, pairs: Pairs, shown: Detail) -> Poses:
+def _blended_poses(
+    session: Session, plan: LocomotionPlan, pairs: Pairs, shown: LevelSchedule
+) -> RelativePoses:
     """Return the poses of K pairs of a character and a frame, blended where levels change.
 
     shown: levels of the pairs, in arrays (K,).
@@ -167,25 +177,29 @@ def _posed(session: Session, plan: Plan, pairs: Pairs, shown: Detail) -> Poses:
     between = np.flatnonzero(shares < 1.0)
     if len(between):
         some = pairs[0][between], pairs[1][between]
-        before = _at_levels(session, plan, some, shown.before[between])
+        before = _at_levels(session, plan, some, shown.previous[between])
         for name, whole in vars(after).items():
-            mix = blend.rotations if name == "rotations" else blend.straight
+            mix = blend.nlerp if name == "rotations" else blend.lerp
             whole[between] = mix(getattr(before, name), whole[between], shares[between])
     return after
 
 
-def _at_levels(session: Session, plan: Plan, pairs: Pairs, levels: Indices) -> Poses:
+def _at_levels(
+    session: Session, plan: LocomotionPlan, pairs: Pairs, levels: Indices
+) -> RelativePoses:
     joints, count = len(session.card.skeleton), len(levels)
-    poses = Poses(np.empty((count, joints, 4)), np.empty(count), np.empty(count, dtype=complex))
+    poses = RelativePoses(
+        np.empty((count, joints, 4)), np.empty(count), np.empty(count, dtype=complex)
+    )
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
-        own = locomotion_plan.pose(session, plan, pairs[0][rows], pairs[1][rows], level)
+        own = locomotion_plan.synthesize_poses(session, plan, pairs[0][rows], pairs[1][rows], level)
         for name, whole in vars(poses).items():
             whole[rows] = getattr(own, name)
     return poses
 
 
-def foot_skate_of(card: ModelCard, motions: Motions, rate: float) -> Floats:
+def measure_foot_skate(card: ModelCard, motions: Motions, rate: float) -> Floats:
     """Return the mean foot skate (M, strides), m/s, of motions cut into lengths of a mean stride.
 
     The ground is at the lowest height of each stride, as for captured clips. A remainder at the end
@@ -200,25 +214,27 @@ def foot_skate_of(card: ModelCard, motions: Motions, rate: float) -> Floats:
     local = skeleton.translations(bones, roots)
     joints = skeleton.positions(card.skeleton.parents, rotations, local)
     feet = joints[:, : frames // length * length, list(card.feet)]
-    return foot_skate.skate(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
+    return foot_skate.mean_skate_speed(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
 
 
-def stride_skate(gait: Gait, rate: float) -> Floats:
+def foot_skate_per_clip(gait: Gait, rate: float) -> Floats:
     """Return the foot skate (N, 1), m/s, of one stride at each captured clip's controls."""
     card = gait.session.card
     controls = np.array(card.examples)
     length = round(float(np.mean(card.durations)) * rate) + 1
-    who = stride.movers(card)
+    who = stride.clip_performers(card)
     nowhere = np.zeros(len(controls))
-    origin = floor_plane.of(np.zeros((len(controls), 3)))
+    origin = floor_plane.project(np.zeros((len(controls), 3)))
     held = np.repeat(controls[:, None], length, axis=1)
-    plan = locomotion_plan.roam(gait, held, who, nowhere, (origin, nowhere), rate)
-    finest = level_transitions.constant(0, plan.phases.shape)
-    return foot_skate_of(card, motions(gait.session, plan, np.arange(len(controls)), finest), rate)
+    plan = locomotion_plan.plan_from_controls(gait, held, who, nowhere, (origin, nowhere), rate)
+    finest = level_transitions.constant_schedule(0, plan.phases.shape)
+    return measure_foot_skate(
+        card, motions(gait.session, plan, np.arange(len(controls)), finest), rate
+    )
 
 
-def usual_skate(gait: Gait, rate: float) -> float:
+def mean_foot_skate(gait: Gait, rate: float) -> float:
     """Return the mean foot skate of the model's strides, m/s, performers weighted equally."""
-    speeds = stride_skate(gait, rate)[:, 0]
-    moved_by = stride.movers(gait.session.card)
+    speeds = foot_skate_per_clip(gait, rate)[:, 0]
+    moved_by = stride.clip_performers(gait.session.card)
     return float(np.mean([speeds[moved_by == one].mean() for one in np.unique(moved_by)]))

@@ -8,25 +8,25 @@ from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sized
 from itertools import pairwise
 
-from posefield.kriging.covariance import FORMULAS
+from posefield.kriging.covariance import COVARIANCE_MODELS
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.joint_roles import ROLES
-from posefield.motion.measures import AXES, TRAVELLED, Measure
+from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
 
-MOST = {"controls": 64, "levels": 16, "skeleton": 4096}
+MAX_ENTRIES = {"controls": 64, "levels": 16, "skeleton": 4096}
 """Largest number of entries of lists that need at least one."""
-DURATIONS = 1e-3, 1e4
+DURATION_RANGE = 1e-3, 1e4
 """Shortest and longest clip, s."""
-FARTHEST = 1e3
+MAX_LENGTH = 1e3
 """Longest bone, m, and largest entry of `beside`."""
-BESIDE = 4
+CYCLE_VARIABLES = 4
 """Rows and columns of a cycle's `beside`: logarithm of the duration, and travel."""
-SHOWN = 60
+MAX_SHOWN = 60
 """Largest number of characters of a value in a message."""
 
-ANY = -1
+ANY_SIZE = -1
 """A size that the card does not determine."""
-PARTS = ("coefficients", "frame")
+REQUIRED_VALUES = ("coefficients", "frame")
 """Values inside the graph that corrections start from; a cyclic model has `way` as well."""
 
 
@@ -35,7 +35,7 @@ def check(card: ModelCard) -> None:
 
     The message names path, value and expectation.
     """
-    for name, most in MOST.items():
+    for name, most in MAX_ENTRIES.items():
         found = len(getattr(card, name))
         _expect(1 <= found <= most, name, found, f"1 to {most}")
     _check_lengths(card)
@@ -44,7 +44,7 @@ def check(card: ModelCard) -> None:
     _check_kriging(card)
     _check_skeleton(card)
     _check_levels(card)
-    _check_making(card)
+    _check_training_parameters(card)
 
 
 def check_graph(
@@ -57,13 +57,13 @@ def check_graph(
     """
     for name, expected in _shapes(card).items():
         found = shapes.get(name, ())
-        fits = [b in (a, ANY) for a, b in zip(found, expected, strict=False)]
+        fits = [b in (a, ANY_SIZE) for a, b in zip(found, expected, strict=False)]
         if len(found) != len(expected) or not all(fits):
-            wanted = str(expected).replace(str(ANY), "any")
+            wanted = str(expected).replace(str(ANY_SIZE), "any")
             raise ValueError(
                 f"its graph's constant {name!r} has shape {found}, expected {wanted} by its card"
             )
-    for name in (*PARTS, "way") if card.cyclic else PARTS:
+    for name in (*REQUIRED_VALUES, "way") if card.cyclic else REQUIRED_VALUES:
         if name not in values:
             raise ValueError(f"its graph computes no value {name!r}, expected one")
 
@@ -71,7 +71,7 @@ def check_graph(
 def _expect(right: bool, path: str, found: object, expected: str) -> None:
     if not right:
         text = str(found)
-        shown = text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+        shown = text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
         raise ValueError(f"its card's {path} is {shown}, expected {expected}")
 
 
@@ -95,7 +95,7 @@ def _check_lengths(card: ModelCard) -> None:
     """Check the lengths of lists that have an entry for each clip, joint or control."""
     clips, joints, controls = len(card.examples), len(card.skeleton), len(card.controls)
     _expect(clips > 0, "examples", [], "captured clips")
-    size = BESIDE if card.cyclic else 0
+    size = CYCLE_VARIABLES if card.cyclic else 0
     rows: list[tuple[str, Sized, int]]
     rows = [(f"examples[{i}]", row, controls) for i, row in enumerate(card.examples)]
     rows += [(f"beside[{i}]", row, size) for i, row in enumerate(card.beside)]
@@ -129,7 +129,7 @@ def _check_controls(card: ModelCard) -> None:
 def _check_measure(path: str, own: Measure, card: ModelCard) -> None:
     _expect_joints(own.joints, f"{path}.joints", card)
     count = len(own.joints)
-    if own.quantity in AXES:
+    if own.quantity in POSITION_AXES:
         _expect(own.at is not None, f"{path}.at", None, f"a moment of {own.quantity}")
         _expect(count > 0, f"{path}.joints", [], f"joints of {own.quantity}")
     if own.quantity == "step_length":
@@ -138,7 +138,7 @@ def _check_measure(path: str, own: Measure, card: ModelCard) -> None:
         _expect(count > 0, f"{path}.joints", [], "the joints of a leg")
     if own.at == "landmark":
         _expect(own.share is not None, f"{path}.share", None, "the place of the landmark")
-    of_cycles = own.quantity in (*TRAVELLED, "step_length")
+    of_cycles = own.quantity in (*TRAVEL_QUANTITIES, "step_length")
     _expect(card.cyclic or not of_cycles, path, own.quantity, "another, for it is of cycles")
 
 
@@ -149,7 +149,7 @@ def _check_clips(card: ModelCard) -> None:
     most = max(card.moved_by, default=0)
     _expect(most < max(performers, 1), "moved_by", most, f"performers below {performers}")
     low, high = card.durations
-    shortest, longest = DURATIONS
+    shortest, longest = DURATION_RANGE
     right = shortest <= low <= high <= longest
     _expect(right, "durations", [low, high], f"two in order, from {shortest} to {longest} s")
     tensor = card.diagnostics["tensor"]
@@ -159,20 +159,25 @@ def _check_clips(card: ModelCard) -> None:
 
 def _check_kriging(card: ModelCard) -> None:
     own = card.kriging
-    _expect(own.covariance in FORMULAS, "kriging.covariance", own.covariance, f"of {[*FORMULAS]}")
+    _expect(
+        own.covariance in COVARIANCE_MODELS,
+        "kriging.covariance",
+        own.covariance,
+        f"of {[*COVARIANCE_MODELS]}",
+    )
     _expect(len(own.drifts) > 0, "kriging.drifts", [], "degrees")
     right = own.scales.ndim == 1 and bool((own.scales > 0.0).all())
     _expect(right, "kriging.scales", own.scales.tolist(), "numbers above 0")
     for index, row in enumerate(card.beside):
-        right = max(map(abs, row)) <= FARTHEST
-        _expect(right, f"beside[{index}]", list(row), f"at most {FARTHEST:g}")
+        right = max(map(abs, row)) <= MAX_LENGTH
+        _expect(right, f"beside[{index}]", list(row), f"at most {MAX_LENGTH:g}")
 
 
 def _check_skeleton(card: ModelCard) -> None:
     joints = card.skeleton
     for name, offsets in (("offsets", joints.offsets), ("tip_offsets", joints.tip_offsets)):
         most = float(abs(offsets).max(initial=0.0))
-        _expect(most <= FARTHEST, f"skeleton.{name}", most, f"at most {FARTHEST:g} m")
+        _expect(most <= MAX_LENGTH, f"skeleton.{name}", most, f"at most {MAX_LENGTH:g} m")
     _expect_joints(card.feet, "feet", card)
     _expect_joints((card.event.joint,) if card.event else (), "event.joint", card)
     for role, joint in card.roles.items():
@@ -195,7 +200,7 @@ def _check_levels(card: ModelCard) -> None:
         _expect(all(a <= b for a, b in ranks), f"{path}.ranks", level.ranks, "no higher ones")
 
 
-def _check_making(card: ModelCard) -> None:
+def _check_training_parameters(card: ModelCard) -> None:
     for name, own in card.making.fields.items():
         right = len(own) > 1 and {*own[1:]} <= {0, 1}
         _expect(right, f"making.fields.{name}", list(own), "a nugget, and degrees 0 or 1")
@@ -208,14 +213,14 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     joints, controls, performers = len(card.skeleton), len(card.controls), len(card.performers)
     r1, r2, r3 = card.levels[0].ranks
     shapes = {
-        "ladder": (len(card.levels), ANY),
+        "ladder": (len(card.levels), ANY_SIZE),
         "samples": (1, controls, card.samples),
         "pose_weights": (card.samples, r3),
-        "drift_weights": (1 + controls, ANY),
+        "drift_weights": (1 + controls, ANY_SIZE),
         "core": (r2, r1, r3),
         "time_basis": (r2, card.frames),
         "root_mean": (3,),
-        "directions": (ANY, r1),
+        "directions": (ANY_SIZE, r1),
         "mean_rotations": (joints, 4, 1),
         "rotation_mean": (4 * joints, 1),
         "offset_mean": (3 * joints,),

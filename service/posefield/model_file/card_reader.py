@@ -12,7 +12,7 @@ from posefield.common.units import Floats
 from posefield.model_file import card_check
 from posefield.model_file.model_card import FORMAT, PREFIX, UNITS, ModelCard
 
-MOST_BYTES = 4 << 20
+MAX_BYTES = 4 << 20
 """Largest size of all texts together. A card of 50 clips has 9 kB, and each further clip adds about
 100 bytes.
 """
@@ -81,10 +81,12 @@ def decode(entries: Mapping[str, bytes]) -> ModelCard:
     """
     own = {key: text for key, text in entries.items() if key.startswith(PREFIX)}
     _check_format(own)
-    if (size := sum(map(len, own.values()))) > MOST_BYTES:
-        raise ValueError(f"its card has {size} bytes, expected at most {MOST_BYTES}")
-    _entry(own, "units", Units)
-    card = ModelCard(**{f.name: _entry(own, f.name, _TYPES[f.name]) for f in fields(ModelCard)})
+    if (size := sum(map(len, own.values()))) > MAX_BYTES:
+        raise ValueError(f"its card has {size} bytes, expected at most {MAX_BYTES}")
+    _decode_entry(own, "units", Units)
+    card = ModelCard(
+        **{f.name: _decode_entry(own, f.name, _TYPES[f.name]) for f in fields(ModelCard)}
+    )
     card_check.check(card)
     return card
 
@@ -98,17 +100,17 @@ def _check_format(own: Mapping[str, bytes]) -> None:
         raise ValueError(f"model format {shown}, this version reads format {FORMAT}")
 
 
-def _entry(own: Mapping[str, bytes], name: str, kind: Any) -> Any:
+def _decode_entry(own: Mapping[str, bytes], name: str, kind: Any) -> Any:
     text = own.get(PREFIX + name)
     if text is None:
         raise ValueError(f"its card has no entry {name!r}")
     try:
-        return msgspec.json.decode(text, type=kind, dec_hook=_array)
+        return msgspec.json.decode(text, type=kind, dec_hook=_decode_array)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as fault:
         raise ValueError(f"its card's entry {name!r} is wrong: {fault}") from fault
 
 
-def _array(kind: Any, found: Any) -> Floats:
+def _decode_array(kind: Any, found: Any) -> Floats:
     """Return an array of numbers (n,), or of triples (n, 3)."""
     rows = isinstance(found, list) and all(isinstance(row, list) for row in found)
     numbers = msgspec.convert(found, list[Triple] if rows else list[Number])

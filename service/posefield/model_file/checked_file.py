@@ -12,9 +12,9 @@ from posefield.common.errors import ModelError
 from posefield.model_file import card_check, card_reader, checksum, onnx_check
 from posefield.model_file.model_card import ModelCard
 
-MOST_BYTES = 64 << 20
+MAX_BYTES = 64 << 20
 """Largest size of a file. A model of 92 clips has 110 kB, one of 2,000 about 20 MB."""
-UNSEALED = (
+NO_CHECKSUM = (
     "does not end with its checksum: it is damaged, another program has written it, or it is older "
     "than checksums; expected a file as posefield wrote it"
 )
@@ -23,7 +23,7 @@ UNSEALED = (
 def read(path: Path) -> bytes:
     """Return the content of a model file; ModelError if it cannot be read or is too large."""
     try:
-        with open(path, "rb", opener=_at_once) as it:
+        with open(path, "rb", opener=_open_nonblocking) as it:
             facts = os.fstat(it.fileno())
             if not stat.S_ISREG(facts.st_mode):
                 raise ModelError(path, "cannot be read: not a regular file")
@@ -33,25 +33,25 @@ def read(path: Path) -> bytes:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
 
 
-def _at_once(path: str, flags: int) -> int:
+def _open_nonblocking(path: str, flags: int) -> int:
     """Open a file without blocking, so that a named pipe does not wait for its writer."""
     return os.open(path, flags | os.O_NONBLOCK)
 
 
 def check_size(size: int, source: str | Path) -> None:
     """Raise ModelError for a size above MOST_BYTES."""
-    if size > MOST_BYTES:
-        raise ModelError(source, f"cannot be read: {size} bytes, expected at most {MOST_BYTES}")
+    if size > MAX_BYTES:
+        raise ModelError(source, f"cannot be read: {size} bytes, expected at most {MAX_BYTES}")
 
 
-def checked(content: bytes, source: str) -> ModelCard:
+def load_card(content: bytes, source: str) -> ModelCard:
     """Return the card of a file with a valid checksum, graph and card; ModelError for any other.
 
     source: path or URL of the file, for messages.
     """
     check_size(len(content), source)
-    if not checksum.holds(content):
-        raise ModelError(source, UNSEALED)
+    if not checksum.is_valid(content):
+        raise ModelError(source, NO_CHECKSUM)
     try:
         onnx = onnx_check.check(content)
         card = card_reader.decode(onnx.metadata)

@@ -2,7 +2,7 @@
 
 The entry is one of ONNX's `metadata_props`. A protocol buffer may be extended at its end, so every
 ONNX engine reads the file, and the checksum is verified without parsing: the last `SIZE` bytes must
-be those that `sealed` would append to the bytes before them.
+be those that `append_checksum` would append to the bytes before them.
 """
 
 import hashlib
@@ -18,12 +18,12 @@ SIZE = len(_HEAD) + 64
 """Bytes of the entry."""
 
 
-def sealed(content: bytes) -> bytes:
+def append_checksum(content: bytes) -> bytes:
     """Return an ONNX file, which must not have a checksum yet, with its checksum appended."""
     return content + _entry(memoryview(content))
 
 
-def holds(content: bytes) -> bool:
+def is_valid(content: bytes) -> bool:
     """Return whether a file ends with the checksum of the bytes before it."""
     return content[-SIZE:] == _entry(memoryview(content)[:-SIZE])
 

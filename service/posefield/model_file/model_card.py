@@ -69,7 +69,7 @@ class Event:
 
 
 @dataclass(frozen=True)
-class Making:
+class TrainingParameters:
     """Parameters of training that the graph does not hold and that adapting a model needs.
 
     fields: nugget and degrees of the drifts of each kriged quantity but the pose. landmarks:
@@ -124,7 +124,7 @@ class ModelCard:
     kriging: Hyper
     left_out: tuple[NonNegative, ...]
     joint_sigma: tuple[NonNegative, ...]
-    making: Making
+    making: TrainingParameters
     roles: Mapping[Name, Name] = field(default_factory=dict)
     event: Event | None = None
     beside: tuple[tuple[Number, ...], ...] = ()
@@ -157,7 +157,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
     for control, own in zip(plain["controls"], card.controls, strict=True):
         control.pop("measure", None)
         if own.measure:
-            control["measure"] = measures.plain(own.measure)
+            control["measure"] = measures.to_dict(own.measure)
     joints = plain["skeleton"]
     # To the micrometre.
     joints["offsets"] = np.round(card.skeleton.offsets, 6).tolist()

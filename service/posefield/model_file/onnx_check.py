@@ -17,27 +17,27 @@ OPERATORS = frozenset(
     " Unsqueeze".split()
 )
 
-Fields = Mapping[int, Any]
+AllowedFields = Mapping[int, Any]
 """Fields that a message may have, each with the fields of its nested message; empty for other
 values.
 """
 
-_DIMENSION: Fields = {1: {}, 2: {}}
-_TENSOR_TYPE: Fields = {1: {}, 2: {1: _DIMENSION}}
-_VALUE: Fields = {1: {}, 2: {1: _TENSOR_TYPE}}
-_ATTRIBUTE: Fields = {1: {}, 3: {}, 8: {}, 20: {}}
+_DIMENSION: AllowedFields = {1: {}, 2: {}}
+_TENSOR_TYPE: AllowedFields = {1: {}, 2: {1: _DIMENSION}}
+_VALUE: AllowedFields = {1: {}, 2: {1: _TENSOR_TYPE}}
+_ATTRIBUTE: AllowedFields = {1: {}, 3: {}, 8: {}, 20: {}}
 """Name, type, integer and list of integers; no tensor (5), no graph (6, 11)."""
-_NODE: Fields = {1: {}, 2: {}, 4: {}, 5: _ATTRIBUTE}
+_NODE: AllowedFields = {1: {}, 2: {}, 4: {}, 5: _ATTRIBUTE}
 """No domain (7)."""
-_CONSTANT: Fields = {1: {}, 2: {}, 8: {}, 9: {}}
+_CONSTANT: AllowedFields = {1: {}, 2: {}, 8: {}, 9: {}}
 """No data in other files (13, 14)."""
-_GRAPH: Fields = {1: _NODE, 2: {}, 5: _CONSTANT, 11: _VALUE, 12: _VALUE}
-MODEL: Fields = {1: {}, 2: {}, 3: {}, 7: _GRAPH, 8: {1: {}, 2: {}}, 14: {1: {}, 2: {}}}
+_GRAPH: AllowedFields = {1: _NODE, 2: {}, 5: _CONSTANT, 11: _VALUE, 12: _VALUE}
+MODEL: AllowedFields = {1: {}, 2: {}, 3: {}, 7: _GRAPH, 8: {1: {}, 2: {}}, 14: {1: {}, 2: {}}}
 """No functions (25)."""
 
 
 @dataclass(frozen=True)
-class Onnx:
+class CheckedGraph:
     """Parts of an ONNX file that has passed the check.
 
     metadata: texts by key. shapes: shapes of the constants by name. values: names of all values
@@ -49,16 +49,16 @@ class Onnx:
     values: frozenset[str]
 
 
-def check(content: bytes) -> Onnx:
+def check(content: bytes) -> CheckedGraph:
     """Return the parts of a file; ValueError names the first field or operator not on the lists."""
     _check_fields(content, MODEL, "")
     used = {field.content.decode() for field in protobuf_wire.at(content, 7, 1, 4)}
     if others := used - OPERATORS:
         operator = min(others)[:40]
         raise ValueError(f"its graph has an operator {operator!r}, which posefield does not use")
-    shapes = {name: array.shape for name, array in subgraph.weights(content).items()}
+    shapes = {name: array.shape for name, array in subgraph.initializers(content).items()}
     values = frozenset(field.content.decode() for field in protobuf_wire.at(content, 7, 1, 2))
-    return Onnx(_metadata(content), shapes, values)
+    return CheckedGraph(_metadata(content), shapes, values)
 
 
 def _metadata(content: bytes) -> dict[str, bytes]:
@@ -72,7 +72,7 @@ def _metadata(content: bytes) -> dict[str, bytes]:
     return found
 
 
-def _check_fields(message: bytes, allowed: Fields, path: str) -> None:
+def _check_fields(message: bytes, allowed: AllowedFields, path: str) -> None:
     for field in protobuf_wire.fields(message):
         own = f"{path}{field.number}"
         inner = allowed.get(field.number)

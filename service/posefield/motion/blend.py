@@ -11,7 +11,7 @@ Numbers = npt.NDArray[Any]
 """Array of any precision; results have the precision of the arguments."""
 
 
-def between(rows: Floats, places: Floats) -> Floats:
+def interpolate_rows(rows: Floats, places: Floats) -> Floats:
     """Return rows (F, k) interpolated linearly at fractional indices (...) from 0 to F - 1.
 
     Shape of the result: (..., k).
@@ -21,25 +21,25 @@ def between(rows: Floats, places: Floats) -> Floats:
     return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
-def straight(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
+def lerp(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
     """Return linear interpolations (N, ...) from `before` to `after` by shares (N,), 0 to 1."""
     way = shares.reshape(-1, *(1 for _ in before.shape[1:]))
     return before + way * (after - before)
 
 
-def rotations(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
+def nlerp(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
     """Return unit quaternions (N, ..., 4) interpolated by shares (N,) along the shorter arc.
 
     Normalised linear interpolation: for rotations a few degrees apart it differs from slerp by a
     share of 1e-4.
     """
     same = np.sum(before * after, axis=-1, keepdims=True) >= 0.0
-    mixed = straight(before, np.where(same, after, -after), shares)
+    mixed = lerp(before, np.where(same, after, -after), shares)
     turns: Numbers = mixed / np.linalg.norm(mixed, axis=-1, keepdims=True)
     return turns
 
 
-def eased(shares: Numbers) -> Numbers:
+def smoothstep(shares: Numbers) -> Numbers:
     """Return shares mapped by the smoothstep 3 s² - 2 s³, whose slope is zero at 0 and 1."""
     gentle: Numbers = shares * shares * (3.0 - 2.0 * shares)
     return gentle

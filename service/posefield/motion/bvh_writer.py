@@ -17,12 +17,12 @@ WORD = re.compile(r"[^\s{}]+", re.ASCII)
 AXES = "ZYX"
 ROTATIONS = "Zrotation Yrotation Xrotation"
 POSITIONS = "Xposition Yposition Zposition"
-STILL = 1e-9
+CONSTANT_TOLERANCE = 1e-9
 """Largest variation, m, of a translation that is written as OFFSET, without channels."""
 
-MOST_STEPS = 1e18
-FINEST = 1e-8
-FEWEST_DECIMALS = 7
+MAX_STEPS = 1e18
+LENGTH_STEP = 1e-8
+MIN_DECIMALS = 7
 """Step of written lengths in metres, and digits of an angle in degrees.
 
 Six digits hold each joint within 1e-6, but not the hand at the end of a chain: its error is the sum
@@ -39,13 +39,13 @@ def dumps(clip: Clip, *, metres_per_unit: float) -> bytes:
     recover the exact rate where it lies within 1e-4 of a whole or broadcast rate. Raises ValueError
     for a name that the grammar cannot hold and for numbers that are not finite.
     """
-    refuse_unwritable(clip, metres_per_unit)
-    sheet = Sheet(clip, metres_per_unit)
+    check_writable(clip, metres_per_unit)
+    sheet = BvhLayout(clip, metres_per_unit)
     header = f"MOTION\nFrames: {len(clip)}\nFrame Time: {1.0 / clip.rate:.10g}\n"
-    return ("HIERARCHY\n" + sheet.hierarchy() + header).encode() + sheet.rows()
+    return ("HIERARCHY\n" + sheet.hierarchy() + header).encode() + sheet.motion_lines()
 
 
-def refuse_unwritable(clip: Clip, metres_per_unit: float) -> None:
+def check_writable(clip: Clip, metres_per_unit: float) -> None:
     """Raise ValueError for a unit, names or numbers that a BVH file cannot hold."""
     if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
         raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
@@ -59,7 +59,7 @@ def refuse_unwritable(clip: Clip, metres_per_unit: float) -> None:
 
 
 @dataclass(frozen=True)
-class Sheet:
+class BvhLayout:
     """Clip laid out as the sections of a BVH file."""
 
     clip: Clip
@@ -71,10 +71,10 @@ class Sheet:
         return self.clip.skeleton
 
     @cached_property
-    def moving(self) -> list[bool]:
+    def has_position_channels(self) -> list[bool]:
         """Return whether each joint has position channels."""
         spread = np.ptp(self.clip.translations, axis=0).max(axis=-1)
-        return [True, *(spread[1:] > STILL).tolist()]
+        return [True, *(spread[1:] > CONSTANT_TOLERANCE).tolist()]
 
     @cached_property
     def offsets(self) -> Floats:
@@ -90,31 +90,33 @@ class Sheet:
         for joint, level in depth_first(self.skeleton):
             while levels and levels[-1] >= level:
                 lines.append("\t" * levels.pop() + "}")
-            lines += ["\t" * level + line for line in self.joint(joint)]
+            lines += ["\t" * level + line for line in self.joint_lines(joint)]
             levels.append(level)
         lines += ["\t" * level + "}" for level in reversed(levels)]
         return "\n".join(lines) + "\n"
 
-    def joint(self, joint: int) -> list[str]:
+    def joint_lines(self, joint: int) -> list[str]:
         """Return the lines of one joint and its end sites, without children and closing brace."""
-        channels = f"6 {POSITIONS} {ROTATIONS}" if self.moving[joint] else f"3 {ROTATIONS}"
+        channels = (
+            f"6 {POSITIONS} {ROTATIONS}" if self.has_position_channels[joint] else f"3 {ROTATIONS}"
+        )
         lines = [
             f"{'JOINT' if joint else 'ROOT'} {self.skeleton.names[joint]}",
             "{",
-            f"\tOFFSET {self.numbers(self.offsets[joint])}",
+            f"\tOFFSET {self.format_lengths(self.offsets[joint])}",
             f"\tCHANNELS {channels}",
         ]
-        for tip in self.tips(joint):
-            lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {self.numbers(tip)}", "\t}"]
+        for tip in self.end_sites(joint):
+            lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {self.format_lengths(tip)}", "\t}"]
         return lines
 
-    def tips(self, joint: int) -> list[Floats]:
+    def end_sites(self, joint: int) -> list[Floats]:
         """Return the offsets of the joint's end sites; one of zero length for a bare leaf."""
         sites = zip(self.skeleton.tip_joints, self.skeleton.tip_offsets, strict=True)
         tips = [offset for owner, offset in sites if owner == joint]
         return tips if tips or joint in self.skeleton.parents else [np.zeros(3)]
 
-    def numbers(self, metres: Floats) -> str:
+    def format_lengths(self, metres: Floats) -> str:
         """Return three lengths as text, in the unit of the file."""
         # Without a negative zero.
         lengths = np.round(metres / self.metres_per_unit, self.decimals) + 0.0
@@ -123,20 +125,20 @@ class Sheet:
     @property
     def decimals(self) -> int:
         """Return the digits after the decimal point: more for a unit above a decimetre."""
-        return max(FEWEST_DECIMALS, int(np.ceil(np.log10(self.metres_per_unit / FINEST))))
+        return max(MIN_DECIMALS, int(np.ceil(np.log10(self.metres_per_unit / LENGTH_STEP))))
 
-    def rows(self) -> bytes:
+    def motion_lines(self) -> bytes:
         """Return the motion lines, one per frame."""
-        angles = np.rad2deg(continuous(quat.to_euler(self.clip.rotations, AXES)))
+        angles = np.rad2deg(unwrap_euler(quat.to_euler(self.clip.rotations, AXES)))
         lengths = self.clip.translations / self.metres_per_unit
         blocks = []
         for joint, _ in depth_first(self.skeleton):
-            blocks += [lengths[:, joint]] if self.moving[joint] else []
+            blocks += [lengths[:, joint]] if self.has_position_channels[joint] else []
             blocks.append(angles[:, joint])
-        return written(np.concatenate(blocks, axis=1), self.decimals)
+        return format_numbers(np.concatenate(blocks, axis=1), self.decimals)
 
 
-def written(values: Floats, decimals: int) -> bytes:
+def format_numbers(values: Floats, decimals: int) -> bytes:
     """Return numbers (rows, columns) as text with fixed decimals and without a negative zero.
 
     The same bytes as %f in a fifth of the time: the digits of all numbers are computed at once, one
@@ -144,7 +146,7 @@ def written(values: Floats, decimals: int) -> bytes:
     end. Raises ValueError for numbers of more digits than 64 bits hold.
     """
     scaled = np.rint(np.abs(values) * 10.0**decimals)
-    if scaled.max() > MOST_STEPS:
+    if scaled.max() > MAX_STEPS:
         raise ValueError(f"numbers of up to {np.abs(values).max():g}, expected fewer digits")
     steps = scaled.astype(np.int64)
     places = max(len(str(steps.max())), decimals + 1)
@@ -174,7 +176,7 @@ def depth_first(skeleton: Skeleton) -> list[tuple[int, int]]:
     return order
 
 
-def continuous(angles: Floats) -> Floats:
+def unwrap_euler(angles: Floats) -> Floats:
     """Return equal rotations as ZYX angles (frames, ..., 3), rad, without jumps between frames.
 
     Besides whole turns there is a second triple for each rotation: the outer angles half a turn on,
@@ -182,7 +184,7 @@ def continuous(angles: Floats) -> Floats:
     either triple, so the parity of all tests so far selects the triple of each frame.
     """
     mirrored = np.array([1.0, -1.0, 1.0]) * angles + np.pi
-    same, other = (_squared(both[1:] - angles[:-1]) for both in (angles, mirrored))
+    same, other = (_squared_wrapped(both[1:] - angles[:-1]) for both in (angles, mirrored))
     crossed = np.zeros(angles.shape[:-1], bool)
     crossed[1:] = other < same
     chosen = np.where(np.cumsum(crossed, axis=0)[..., None] % 2, mirrored, angles)
@@ -190,7 +192,7 @@ def continuous(angles: Floats) -> Floats:
     return chosen - 2.0 * np.pi * np.cumsum(turns, axis=0)
 
 
-def _squared(apart: Floats) -> Floats:
+def _squared_wrapped(apart: Floats) -> Floats:
     """Return squared lengths (...) of differences of angles (..., 3), rad, each wrapped to pi."""
     nearest = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
     return np.einsum("...k,...k->...", nearest, nearest)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from posefield.common.units import UP, Floats, Indices, Singles, Truths
+from posefield.common.units import UP, Booleans, Floats, Indices, Singles
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 
@@ -25,14 +25,14 @@ class Placement:
     def __len__(self) -> int:
         return len(self.headings)
 
-    def of(self, some: Indices) -> "Placement":
+    def select(self, some: Indices) -> "Placement":
         """Return the placement of the characters of some indices (M,)."""
         return Placement(self.positions[some], self.headings[some])
 
     @property
     def turns(self) -> Floats:
         """Return the quaternions (N, 4) of the headings."""
-        return quat.about(UP, self.headings)
+        return quat.from_axis_angle(UP, self.headings)
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class CrowdPoses:
     error_px: Singles | None
     duration: Singles
     sigma: Singles
-    supported: Truths
+    supported: Booleans
     warnings: tuple[str, ...]
 
     def __len__(self) -> int:

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 from posefield.common.errors import InvalidField
 from posefield.motion.skeleton import Skeleton
 
-Names = Literal["own", "mixamo", "ue5", "vrm", "humanik"]
+NamingConvention = Literal["own", "mixamo", "ue5", "vrm", "humanik"]
 """Naming convention of joints: the motion files' own names, or those of another tool."""
 
 # Named as the bones of a VRM humanoid; fingers, eyes and jaw are left out.
@@ -61,22 +61,24 @@ _SIDE = (
     ("Foot", "Foot", "foot"),
     ("Toes", "ToeBase", "ball"),
 )
-_ALL = (
+_ROLE_NAMES = (
     *_TRUNK,
     *(("left" + role, "Left" + humanik, ue5 + "_l") for role, humanik, ue5 in _SIDE),
     *(("right" + role, "Right" + humanik, ue5 + "_r") for role, humanik, ue5 in _SIDE),
 )
 
-TABLES: dict[str, dict[str, str]] = {
-    "mixamo": {role: "mixamorig:" + humanik for role, humanik, _ in _ALL},
-    "ue5": {role: ue5 for role, _, ue5 in _ALL},
-    "vrm": {role: role for role, _, _ in _ALL},
-    "humanik": {role: humanik for role, humanik, _ in _ALL},
+NAMES_BY_CONVENTION: dict[str, dict[str, str]] = {
+    "mixamo": {role: "mixamorig:" + humanik for role, humanik, _ in _ROLE_NAMES},
+    "ue5": {role: ue5 for role, _, ue5 in _ROLE_NAMES},
+    "vrm": {role: role for role, _, _ in _ROLE_NAMES},
+    "humanik": {role: humanik for role, humanik, _ in _ROLE_NAMES},
 }
 """Each convention's name for each role."""
 
 
-def renamed(skeleton: Skeleton, roles: Mapping[str, str], names: Names) -> Skeleton:
+def rename_joints(
+    skeleton: Skeleton, roles: Mapping[str, str], names: NamingConvention
+) -> Skeleton:
     """Return the skeleton with a convention's names for the joints that have a role.
 
     roles: joint name by role. The other joints keep their names, with the ending _2, _3 and so on
@@ -89,18 +91,20 @@ def renamed(skeleton: Skeleton, roles: Mapping[str, str], names: Names) -> Skele
         raise InvalidField(
             "names", f"{names!r}, expected 'own': this model's recipe gives its joints no [roles]"
         )
-    said = {joint: TABLES[names][role] for role, joint in roles.items()}
-    return replace(skeleton, names=_unique(skeleton.names, said))
+    said = {joint: NAMES_BY_CONVENTION[names][role] for role, joint in roles.items()}
+    return replace(skeleton, names=_unique_names(skeleton.names, said))
 
 
-def _unique(names: Iterable[str], said: Mapping[str, str]) -> tuple[str, ...]:
+def _unique_names(names: Iterable[str], said: Mapping[str, str]) -> tuple[str, ...]:
     given, taken = list(names), set(said.values())
     # Names that are not taken are kept first, so that no ending of another joint takes them.
     taken |= (kept := {name for name in given if name not in said and name not in taken})
-    return tuple(said.get(name) or (name if name in kept else _free(name, taken)) for name in given)
+    return tuple(
+        said.get(name) or (name if name in kept else _unused_name(name, taken)) for name in given
+    )
 
 
-def _free(name: str, taken: set[str]) -> str:
+def _unused_name(name: str, taken: set[str]) -> str:
     found = next(ending for n in count(2) if (ending := f"{name}_{n}") not in taken)
     taken.add(found)
     return found

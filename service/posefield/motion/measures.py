@@ -26,18 +26,18 @@ Quantity = Literal[
     "leg_length",
     "stature",
 ]
-At = Literal["start", "end", "highest", "lowest", "farthest", "landmark"]
+MeasureMoment = Literal["start", "end", "highest", "lowest", "farthest", "landmark"]
 
-AXES = {"left": 0, "height": 1, "forward": 2}
+POSITION_AXES = {"left": 0, "height": 1, "forward": 2}
 """Quantities of a joint's position, m, and the axis of each in the frame of the clip."""
-TRAVELLED = ("stride_length", "speed", "turn")
+TRAVEL_QUANTITIES = ("stride_length", "speed", "turn")
 """Quantities of a whole clip: m, m/s, degrees to the left."""
-BODILY = ("leg_length", "stature")
+BODY_QUANTITIES = ("leg_length", "stature")
 """Quantities of the performer, not of the motion, m."""
 UNITS = {"speed": "m/s", "turn": "deg"}
 """Units of the quantities that are not in metres."""
 QUANTITIES: tuple[str, ...] = get_args(Quantity)
-MOMENTS: tuple[str, ...] = get_args(At)
+MOMENTS: tuple[str, ...] = get_args(MeasureMoment)
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Measure:
 
     quantity: Quantity
     joints: tuple[Index, ...] = ()
-    at: At | None = None
+    at: MeasureMoment | None = None
     share: Share | None = None
 
     @property
@@ -61,13 +61,13 @@ class Measure:
         return UNITS.get(self.quantity, "m")
 
     @property
-    def bodily(self) -> bool:
+    def is_body_measure(self) -> bool:
         """Return whether the quantity is the performer's, independent of the motion."""
-        return self.quantity in BODILY
+        return self.quantity in BODY_QUANTITIES
 
 
 @dataclass(frozen=True)
-class Seen:
+class MeasuredMotion:
     """Motion as input of a measure.
 
     positions: of the joints (F, J, 3), m, at equal steps of time. duration: s. travel (3,): to the
@@ -83,24 +83,24 @@ class Seen:
     landmark: float = 0.0
 
 
-def value(measure: Measure, seen: Seen) -> float:
+def evaluate(measure: Measure, seen: MeasuredMotion) -> float:
     """Return the value of a quantity, in its unit."""
     match measure.quantity:
         case "stride_length" | "speed" | "turn":
-            return travelled(measure.quantity, seen.travel, seen.duration)
+            return travel_value(measure.quantity, seen.travel, seen.duration)
         case "leg_length":
             return float(np.linalg.norm(seen.offsets[list(measure.joints)], axis=-1).sum())
         case "stature":
             return _stature(seen)
         case "step_length":
-            return float(np.abs(_stride_out(measure, seen.positions)).max())
+            return float(np.abs(_foot_separation(measure, seen.positions)).max())
         case _:
-            at = moment(measure, seen.positions, seen.landmark)
-            place = blend.between(_middle(measure, seen.positions), np.array(at))
-            return float(place[AXES[measure.quantity]])
+            at = moment_frame(measure, seen.positions, seen.landmark)
+            place = blend.interpolate_rows(_mean_positions(measure, seen.positions), np.array(at))
+            return float(place[POSITION_AXES[measure.quantity]])
 
 
-def travelled(quantity: str, travel: Floats, duration: float) -> float:
+def travel_value(quantity: str, travel: Floats, duration: float) -> float:
     """Return the distance, m, the speed, m/s, or the change of heading, degrees, of a travel (3,).
 
     duration: s.
@@ -111,7 +111,7 @@ def travelled(quantity: str, travel: Floats, duration: float) -> float:
     return way / duration if quantity == "speed" else way
 
 
-def moment(measure: Measure, positions: Floats, landmark: float) -> float:
+def moment_frame(measure: Measure, positions: Floats, landmark: float) -> float:
     """Return the fractional frame index, 0 to F - 1, at which a quantity is measured.
 
     positions: (F, J, 3), m. landmark: fractional frame index of the landmark.
@@ -125,27 +125,27 @@ def moment(measure: Measure, positions: Floats, landmark: float) -> float:
         case "landmark":
             return landmark
         case "highest":
-            return float(np.argmax(_middle(measure, positions)[:, 1]))
+            return float(np.argmax(_mean_positions(measure, positions)[:, 1]))
         case "lowest":
-            return float(np.argmin(_middle(measure, positions)[:, 1]))
+            return float(np.argmin(_mean_positions(measure, positions)[:, 1]))
         case "farthest":
-            away = _middle(measure, positions) - positions[:, 0]
+            away = _mean_positions(measure, positions) - positions[:, 0]
             return float(np.argmax(np.sum(np.square(away), axis=-1)))
         case _:
-            return float(np.argmax(np.abs(_stride_out(measure, positions))))
+            return float(np.argmax(np.abs(_foot_separation(measure, positions))))
 
 
-def _middle(measure: Measure, positions: Floats) -> Floats:
+def _mean_positions(measure: Measure, positions: Floats) -> Floats:
     return positions[:, list(measure.joints)].mean(axis=1)
 
 
-def _stride_out(measure: Measure, positions: Floats) -> Floats:
+def _foot_separation(measure: Measure, positions: Floats) -> Floats:
     """Return the distance (F,) of the first foot ahead of the second, m."""
     first, second = measure.joints
     return positions[:, first, 2] - positions[:, second, 2]
 
 
-def _stature(seen: Seen) -> float:
+def _stature(seen: MeasuredMotion) -> float:
     """Return the height of the highest joint above the lowest in the rest pose, m."""
     still = np.zeros((len(seen.parents), 4))
     still[:, 0] = 1.0
@@ -153,7 +153,7 @@ def _stature(seen: Seen) -> float:
     return float(np.ptp(positions[:, 1]))
 
 
-def words(measure: Measure, names: Sequence[str]) -> str:
+def describe(measure: Measure, names: Sequence[str]) -> str:
     """Return a measure as text: "height of rhand at end". names: of all joints."""
     own = " and ".join(names[joint] for joint in measure.joints)
     of = f" of {own}" if own else ""
@@ -162,12 +162,12 @@ def words(measure: Measure, names: Sequence[str]) -> str:
     return f"{measure.quantity.replace('_', ' ')}{of}{at}{when}"
 
 
-def plain(measure: Measure) -> dict[str, Any]:
+def to_dict(measure: Measure) -> dict[str, Any]:
     """Return a measure as plain values for JSON, without empty fields."""
     known = {"joints": list(measure.joints), "at": measure.at, "share": measure.share}
     return {"quantity": measure.quantity, **{k: v for k, v in known.items() if v not in (None, [])}}
 
 
-def parse(found: Mapping[str, Any]) -> Measure:
-    """Return the measure of the plain values of `plain`."""
+def from_dict(found: Mapping[str, Any]) -> Measure:
+    """Return the measure of the plain values of `to_dict`."""
     return Measure(**{**found, "joints": tuple(found.get("joints", ()))})

@@ -93,7 +93,7 @@ def twist(q: Floats, axis: Floats) -> Floats:
     return np.arctan2(np.sin(angle), np.cos(angle))
 
 
-def about(axis: Floats, angle: Floats) -> Floats:
+def from_axis_angle(axis: Floats, angle: Floats) -> Floats:
     """Return the quaternion of a rotation by angle (...), rad, about the unit axis (3,)."""
     half = 0.5 * np.asarray(angle)[..., None]
     return np.concatenate([np.cos(half), np.sin(half) * axis], axis=-1)
@@ -133,7 +133,7 @@ def from_euler(angles: Floats, axes: str) -> Floats:
     """
     q = np.broadcast_to(IDENTITY, (*angles.shape[:-1], 4))
     for index, axis in enumerate(axes):
-        q = mul(q, about(np.eye(3)["XYZ".index(axis)], angles[..., index]))
+        q = mul(q, from_axis_angle(np.eye(3)["XYZ".index(axis)], angles[..., index]))
     return q
 
 

@@ -6,12 +6,12 @@ from posefield.common.units import UP, Floats
 from posefield.motion import quat
 
 
-def put_back(rotations: Floats, roots: Floats, gone: Floats) -> tuple[Floats, Floats]:
+def add_travel(rotations: Floats, roots: Floats, gone: Floats) -> tuple[Floats, Floats]:
     """Return rotations (..., J, 4) and root positions (..., 3), m, moved by a travel (..., 3).
 
     gone: travel to the left and ahead, m, and change of heading, rad.
     """
     moved = roots + gone[..., :2] @ np.eye(3)[[0, 2]]
     turned = rotations.copy()
-    turned[..., 0, :] = quat.mul(quat.about(UP, gone[..., 2]), rotations[..., 0, :])
+    turned[..., 0, :] = quat.mul(quat.from_axis_angle(UP, gone[..., 2]), rotations[..., 0, :])
     return turned, moved

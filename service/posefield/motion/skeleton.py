@@ -10,7 +10,7 @@ from posefield.common.units import Floats
 from posefield.motion import quat_planes
 
 # Poses that are computed at once: their planes take 7 MB for 31 joints.
-BLOCK = 2000
+POSES_PER_BLOCK = 2000
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def translations(offsets: Floats, root_path: Floats) -> Floats:
     return local
 
 
-def forward(
+def forward_kinematics(
     parents: tuple[int, ...], rotations: Floats, translations: Floats
 ) -> tuple[Floats, Floats]:
     """Return joint positions (..., J, 3) and orientations (..., J, 4) in the character's frame.
@@ -85,17 +85,17 @@ def forward(
     places, turns = np.empty((*lead, len(parents), 3)), np.empty((*lead, len(parents), 4))
     turning = frozenset(range(len(parents)))
     for block, own_turns, own_arms in _blocks(lead, rotations, translations):
-        placed, turned = _along_tree(parents, own_turns, own_arms, turning)
-        _rows(places)[block], _rows(turns)[block] = _columns(placed), _columns(turned)
+        placed, turned = _accumulate(parents, own_turns, own_arms, turning)
+        _rows(places)[block], _rows(turns)[block] = _from_planes(placed), _from_planes(turned)
     return places, turns
 
 
 def positions(parents: tuple[int, ...], rotations: Floats, translations: Floats) -> Floats:
-    """Return the joint positions (..., J, 3) alone; arguments as for `forward`."""
+    """Return the joint positions (..., J, 3) alone; arguments as for `forward_kinematics`."""
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
     places = np.empty((*lead, len(parents), 3))
     for block, own_turns, own_arms in _blocks(lead, rotations, translations):
-        _rows(places)[block] = _columns(position_planes(parents, own_turns, own_arms))
+        _rows(places)[block] = _from_planes(position_planes(parents, own_turns, own_arms))
     return places
 
 
@@ -107,7 +107,7 @@ def position_planes(
     rotations (J, 4, ...) and J translations (3, ...), which broadcast against the former, are local
     to the parent.
     """
-    return _along_tree(parents, rotations, translations, frozenset(parents))[0]
+    return _accumulate(parents, rotations, translations, frozenset(parents))[0]
 
 
 def _blocks(
@@ -117,9 +117,9 @@ def _blocks(
     joints = rotations.shape[-2]
     turns = _rows(np.broadcast_to(rotations, (*lead, joints, 4)))
     arms = _rows(np.broadcast_to(translations, (*lead, joints, 3)))
-    for start in range(0, len(turns), BLOCK):
-        block = slice(start, start + BLOCK)
-        yield block, _planes(turns[block], joints), _planes(arms[block], joints)
+    for start in range(0, len(turns), POSES_PER_BLOCK):
+        block = slice(start, start + POSES_PER_BLOCK)
+        yield block, _to_planes(turns[block], joints), _to_planes(arms[block], joints)
 
 
 def _rows(values: Floats) -> Floats:
@@ -127,17 +127,17 @@ def _rows(values: Floats) -> Floats:
     return values.reshape(-1, values.shape[-2] * values.shape[-1])
 
 
-def _planes(rows: Floats, joints: int) -> Floats:
+def _to_planes(rows: Floats, joints: int) -> Floats:
     """Return rows (P, J k) as planes (J, k, P)."""
     return np.ascontiguousarray(rows.T).reshape(joints, -1, len(rows))
 
 
-def _columns(planes: Floats) -> Floats:
+def _from_planes(planes: Floats) -> Floats:
     """Return planes (J, k, P) as rows (P, J k)."""
     return planes.reshape(-1, planes.shape[-1]).T
 
 
-def _along_tree(
+def _accumulate(
     parents: tuple[int, ...],
     rotations: Floats,
     translations: Floats | Sequence[Floats],
@@ -155,7 +155,7 @@ def _along_tree(
     return places, turns
 
 
-def chain(parents: tuple[int, ...], joint: int) -> tuple[int, ...]:
+def joint_chain(parents: tuple[int, ...], joint: int) -> tuple[int, ...]:
     """Return the joints from the root to a joint, each the parent of the next."""
     found = [joint]
     while parents[found[-1]] >= 0:
@@ -163,7 +163,7 @@ def chain(parents: tuple[int, ...], joint: int) -> tuple[int, ...]:
     return tuple(reversed(found))
 
 
-def descendants(parents: tuple[int, ...]) -> Floats:
+def descendant_matrix(parents: tuple[int, ...]) -> Floats:
     """Return the matrix (J, J) with 1 where the column's joint is the row's or a descendant."""
     below = np.eye(len(parents))
     for joint in range(len(parents) - 1, 0, -1):

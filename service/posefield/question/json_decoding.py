@@ -13,13 +13,13 @@ from posefield.common.errors import FormError
 Question = TypeVar("Question")
 _PATH = " - at `$"
 _FIELD = "Object contains unknown field `", "Object missing required field `"
-LONGEST_PLAIN = 1 << 20
+MAX_PLAIN_BYTES = 1 << 20
 """Bytes of the largest body that is decoded again to Python objects, twenty times its size."""
 _ANY_KEY = "..."
 """Placeholder of msgspec's messages for the key of a mapping."""
 
 
-def question(form: type[Question], content: bytes) -> Question:
+def decode_question(form: type[Question], content: bytes) -> Question:
     """Return the query of a JSON body.
 
     Raises FormError for an invalid body, and the errors of the query's own checks.
@@ -28,7 +28,7 @@ def question(form: type[Question], content: bytes) -> Question:
         found: Question = _decoder(cast(Any, form)).decode(content)
         return found
     except msgspec.ValidationError as fault:
-        return _of_plain(form, content, fault)
+        return _decode_plain(form, content, fault)
     except (msgspec.DecodeError, UnicodeDecodeError) as fault:
         raise FormError("", f"expected UTF-8 JSON; {fault}") from None
     except RecursionError:
@@ -40,12 +40,12 @@ def _decoder(form: Any) -> msgspec.json.Decoder[Any]:
     return msgspec.json.Decoder(form)
 
 
-def _of_plain(form: type[Question], content: bytes, fault: msgspec.ValidationError) -> Question:
+def _decode_plain(form: type[Question], content: bytes, fault: msgspec.ValidationError) -> Question:
     """Return the query of a rejected body with whole floats as integers: in JSON 1.0 equals 1.
 
     Raises FormError if it is still invalid.
     """
-    if len(content) > LONGEST_PLAIN:
+    if len(content) > MAX_PLAIN_BYTES:
         raise _form_error(str(fault), None) from None
     try:
         plain, said = json.loads(content.decode()), str(fault)
@@ -62,13 +62,13 @@ def _of_plain(form: type[Question], content: bytes, fault: msgspec.ValidationErr
 
 def _form_error(said: str, plain: Any) -> FormError:
     """Return the error of msgspec's message about a body; plain: its value, if known."""
-    path, found = list(itertools.takewhile(_ANY_KEY.__ne__, steps(said))), dict[str, Any]()
+    path, found = list(itertools.takewhile(_ANY_KEY.__ne__, error_path(said))), dict[str, Any]()
     if plain is not None:
-        path, found = _followed(steps(said), plain)
+        path, found = _resolve_path(error_path(said), plain)
     message = said.rpartition(_PATH)[0] or said
     typed = said.startswith("Expected") and not isinstance(found, dict | list)
     shown = f" {found!r}" if typed else ""
-    return FormError(pointer(*path).removeprefix("/"), message + shown)
+    return FormError(json_pointer(*path).removeprefix("/"), message + shown)
 
 
 def _with_whole_numbers(node: Any) -> Any:
@@ -79,7 +79,7 @@ def _with_whole_numbers(node: Any) -> Any:
     return int(node) if isinstance(node, float) and node.is_integer() else node
 
 
-def _followed(path: list[str], node: Any) -> tuple[list[str], Any]:
+def _resolve_path(path: list[str], node: Any) -> tuple[list[str], Any]:
     """Return the path with the invalid key for each placeholder, and the value at its end."""
     named = []
     for step in path:
@@ -105,12 +105,12 @@ def _is_numeric(value: Any) -> bool:
     return all(type(each) in (int, float) and abs(each) <= sys.float_info.max for each in values)
 
 
-def pointer(*parts: str) -> str:
+def json_pointer(*parts: str) -> str:
     """Return the JSON pointer of keys and indices, RFC 6901."""
     return "".join("/" + part.replace("~", "~0").replace("/", "~1") for part in parts)
 
 
-def steps(message: str) -> list[str]:
+def error_path(message: str) -> list[str]:
     """Return the keys and indices of the invalid value in a message of msgspec.
 
     The message repeats the client's input, so it is parsed from its two ends: "Object contains

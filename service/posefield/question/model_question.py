@@ -6,11 +6,11 @@ from msgspec import Meta, Struct
 
 from posefield.common.errors import InvalidField
 from posefield.question.motion_question import Controls, Extrapolate, Performer
-from posefield.question.value_validation import within
+from posefield.question.value_validation import check_range
 
-FEWEST, MOST_STEPS, WIDEST = 2, 1024, 1.0
+MIN_VALUES, MAX_VALUES, MAX_MARGIN = 2, 1024, 1.0
 """Limits of the values per axis of a grid, and of its margin as a share of a control's range."""
-MOST_NEAREST, MOST_SUGGESTED = 10_000, 200
+MAX_NEAREST, MAX_SUGGESTIONS = 10_000, 200
 
 
 class SigmaQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -32,8 +32,8 @@ class SigmaQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         if self.across == self.along:
             raise InvalidField("along", f"{self.along!r}, expected another control than across")
         for name in ("columns", "rows"):
-            within(name, getattr(self, name), FEWEST, MOST_STEPS, "values")
-        within("margin", self.margin, 0.0, WIDEST, "of the range")
+            check_range(name, getattr(self, name), MIN_VALUES, MAX_VALUES, "values")
+        check_range("margin", self.margin, 0.0, MAX_MARGIN, "of the range")
 
     def __len__(self) -> int:
         return self.columns * self.rows
@@ -48,7 +48,7 @@ class WhyQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     nearest: Annotated[int, Meta(description="number of captured clips to list")] = 10
 
     def __post_init__(self) -> None:
-        within("nearest", self.nearest, 1, MOST_NEAREST, "clips")
+        check_range("nearest", self.nearest, 1, MAX_NEAREST, "clips")
 
 
 class SuggestQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -61,4 +61,4 @@ class SuggestQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     ] = None
 
     def __post_init__(self) -> None:
-        within("count", self.count, 1, MOST_SUGGESTED, "points")
+        check_range("count", self.count, 1, MAX_SUGGESTIONS, "points")

@@ -6,17 +6,17 @@ from typing import Annotated, Literal, cast
 import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-from posefield.motion.joint_roles import Names
+from posefield.motion.joint_roles import NamingConvention
 
-Policy = Literal["ok", "warn", "refuse"]
-Root = Literal["travelling", "in_place"]
+ExtrapolationPolicy = Literal["ok", "warn", "refuse"]
+RootMode = Literal["travelling", "in_place"]
 Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
 """Moment of the motion; "farthest" is from the root."""
-When = float | Moment
+TargetTime = float | Moment
 """Time of a target: seconds from the start of the clip, or a moment of the motion."""
-Exact = Literal["auto", "none"] | Annotated[tuple[str, ...], Meta(min_length=1)]
-Unit = Literal["m", "cm"]
-Up = Literal["y", "z"]
+ExactControls = Literal["auto", "none"] | Annotated[tuple[str, ...], Meta(min_length=1)]
+LengthUnit = Literal["m", "cm"]
+UpAxis = Literal["y", "z"]
 LEGAL_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}", re.ASCII)
 """Names that are legal as file names on all systems."""
 Name = Annotated[str, Meta(pattern=rf"^{LEGAL_NAME.pattern}\Z")]
@@ -31,7 +31,7 @@ Controls = Annotated[
     ),
 ]
 Extrapolate = Annotated[
-    Policy,
+    ExtrapolationPolicy,
     Meta(
         description="policy for controls without similar captured clips and for targets out of "
         "reach: ok, warn or refuse"
@@ -59,7 +59,7 @@ class Target(Struct, frozen=True, forbid_unknown_fields=True):
             raise ValueError(f"{said}, expected one of them")
 
     @property
-    def when(self) -> When:
+    def when(self) -> TargetTime:
         """Return seconds from the start of the clip, or a moment of the motion."""
         return cast(Moment, self.at) if isinstance(self.time, UnsetType) else self.time
 
@@ -73,7 +73,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     level: Annotated[int, Meta(description="level of detail; 0 is the finest")] = 0
     joint_sigma: Annotated[bool, Meta(description="include sigma of each joint, m")] = False
     exact: Annotated[
-        Exact,
+        ExactControls,
         Meta(
             description="measured controls to match exactly: auto (all given), none, or names",
             extra={"metavar": "auto|none|NAME,NAME"},
@@ -90,7 +90,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     pin_feet: Annotated[bool, Meta(description="keep the positions of planted feet")] = False
 
     @property
-    def corrects(self) -> bool:
+    def has_constraints(self) -> bool:
         """Return whether there are constraints besides the given controls."""
         return self.exact != "auto" or bool(self.targets) or self.pin_feet
 
@@ -132,8 +132,8 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
             extra={"unit": "s"},
         ),
     ] = None
-    names: Annotated[Names, Meta(description="naming convention of the joints")] = "own"
-    root: Annotated[Root, Meta(description="whether the root travels or stays in place")] = (
+    names: Annotated[NamingConvention, Meta(description="naming convention of the joints")] = "own"
+    root: Annotated[RootMode, Meta(description="whether the root travels or stays in place")] = (
         "travelling"
     )
     loop: Annotated[
@@ -145,9 +145,11 @@ class FileQuestion(ClipQuestion, frozen=True, kw_only=True):
     """Query for a clip in a file; unit and up are None for the format's defaults."""
 
     unit: Annotated[
-        Unit | None, Meta(description="unit of length in the file; default: the format's")
+        LengthUnit | None, Meta(description="unit of length in the file; default: the format's")
     ] = None
-    up: Annotated[Up | None, Meta(description="up axis of the file; default: the format's")] = None
+    up: Annotated[UpAxis | None, Meta(description="up axis of the file; default: the format's")] = (
+        None
+    )
 
 
 class NamedClipQuestion(ClipQuestion, frozen=True, kw_only=True):
@@ -161,8 +163,8 @@ class ClipsQuestion(Struct, frozen=True, forbid_unknown_fields=True):
 
     format: str
     clips: list[NamedClipQuestion]
-    unit: Unit | None = None
-    up: Up | None = None
+    unit: LengthUnit | None = None
+    up: UpAxis | None = None
 
 
 replace = msgspec.structs.replace

@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from posefield.common.units import Floats, Singles, Truths
+from posefield.common.units import Booleans, Floats, Singles
 from posefield.model_file.model_card import Control
 from posefield.motion.clip import Clip
 
@@ -15,7 +15,7 @@ Number = TypeVar("Number", bound=np.floating[Any])
 
 
 @dataclass(frozen=True)
-class Met:
+class ConstraintResult:
     """Residual of one constraint: a measured control or a target.
 
     what: a control's name, or joint and moment of a target. miss: distance between the requested
@@ -57,7 +57,7 @@ class Trust:
     performer_seen: bool | None = None
     inferred: tuple[str, ...] = ()
     measured: Mapping[str, float] = field(default_factory=dict)
-    targets: tuple[Met, ...] = ()
+    targets: tuple[ConstraintResult, ...] = ()
     joint_sigma: tuple[float, ...] = ()
 
     def facts(self) -> dict[str, Any]:
@@ -71,10 +71,10 @@ class Trust:
             "sigma": self.sigma,
             "supported": self.supported,
             "warnings": list(self.warnings),
-            **self._more(),
+            **self._optional_facts(),
         }
 
-    def _more(self) -> dict[str, Any]:
+    def _optional_facts(self) -> dict[str, Any]:
         seen = {} if self.performer_seen is None else {"performer_seen": self.performer_seen}
         more = {
             "inferred": list(self.inferred),
@@ -108,7 +108,7 @@ class ClipAnswer:
 
 
 @dataclass(frozen=True)
-class Axis:
+class GridAxis:
     """Axis of a grid: a control and its values (n,), in the control's unit."""
 
     control: Control
@@ -125,17 +125,17 @@ class SigmaGrid:
     """
 
     model: str
-    across: Axis
-    along: Axis
+    across: GridAxis
+    along: GridAxis
     controls: dict[str, float]
     performer: str | None
     sigma: Singles
-    inside: Truths
-    supported: Truths
+    inside: Booleans
+    supported: Booleans
 
 
 @dataclass(frozen=True)
-class Captured:
+class CapturedClip:
     """Captured clip and its contribution to a result.
 
     source: its file and frames. distance: between its controls and the requested ones, in the
@@ -151,7 +151,7 @@ class Captured:
 
 
 @dataclass(frozen=True)
-class Backing:
+class SupportReport:
     """Support of a query by the captured clips, and the quantities that decide it.
 
     beyond: distance of each control beyond its sampled range, as a share of the range; at most
@@ -168,7 +168,7 @@ class Backing:
 
 
 @dataclass(frozen=True)
-class Reasons:
+class Explanation:
     """Explanation of a result: the nearest captured clips, the nearest first, and their weights.
 
     model: name@contenthash. warnings, inferred: as in Trust. others, others_weight: count and total
@@ -179,8 +179,8 @@ class Reasons:
     controls: dict[str, float]
     performer: str | None
     warnings: tuple[str, ...]
-    backing: Backing
-    nearest: tuple[Captured, ...]
+    backing: SupportReport
+    nearest: tuple[CapturedClip, ...]
     others: int
     others_weight: float
     inferred: tuple[str, ...] = ()

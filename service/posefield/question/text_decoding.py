@@ -25,14 +25,14 @@ from typing import (
 from msgspec import NODEFAULT, Meta, Struct, structs
 
 from posefield.common.errors import FormError
-from posefield.question.motion_question import Exact, Moment, Target
+from posefield.question.motion_question import ExactControls, Moment, Target
 
 Question = TypeVar("Question", bound=Struct)
 MOMENTS: tuple[Moment, ...] = get_args(Moment)
 # The number syntax of JSON, the same as in a body: no nan, inf, 1_000 or blanks.
 NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?", re.ASCII)
 FLAGS = {"true": True, "false": False}
-CONTROLS = "controls"
+CONTROLS_FIELD = "controls"
 
 
 @dataclass(frozen=True)
@@ -64,12 +64,14 @@ def parameters(form: type[Struct]) -> Mapping[str, Parameter]:
     """Return the parameters of a query by name, without the controls."""
     hints = get_type_hints(form, include_extras=True)
     found = [
-        _parameter(each, hints[each.name]) for each in structs.fields(form) if each.name != CONTROLS
+        _parameter(each, hints[each.name])
+        for each in structs.fields(form)
+        if each.name != CONTROLS_FIELD
     ]
     return {each.word: each for each in found}
 
 
-def question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Question:
+def decode_question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Question:
     """Return the query of names and texts; a name that is not a parameter is a control.
 
     Raises FormError for an invalid text, a name that occurs twice and one that is missing, and the
@@ -81,40 +83,42 @@ def question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Question
         where = controls if parameter is None else said
         field = name if parameter is None else parameter.field
         if parameter is not None and parameter.repeated:
-            said.setdefault(field, []).append(value(parameter, text))
+            said.setdefault(field, []).append(parse_value(parameter, text))
         elif field in where:
             raise FormError(name, "given twice, expected once")
         else:
             where[field] = (
-                _read(name, number, text) if parameter is None else value(parameter, text)
+                _parse(name, parse_number, text)
+                if parameter is None
+                else parse_value(parameter, text)
             )
     for parameter in known.values():
         if parameter.required and parameter.field not in said:
             expected = parameter.help or "the name of a control"
             raise FormError(parameter.word, f"missing, expected {expected}")
-    if CONTROLS in form.__struct_fields__:
-        said[CONTROLS] = controls
+    if CONTROLS_FIELD in form.__struct_fields__:
+        said[CONTROLS_FIELD] = controls
     if "targets" in said:
         said["targets"] = tuple(said["targets"])
     return form(**said)
 
 
-def value(parameter: Parameter, text: str) -> Any:
+def parse_value(parameter: Parameter, text: str) -> Any:
     """Return the value of a parameter's text.
 
     Raises FormError for an invalid text.
     """
-    return _read(parameter.word, parameter.read, text)
+    return _parse(parameter.word, parameter.read, text)
 
 
-def _read(name: str, read: Callable[[str], Any], text: str) -> Any:
+def _parse(name: str, read: Callable[[str], Any], text: str) -> Any:
     try:
         return read(text)
     except ValueError as fault:
         raise FormError(name, str(fault)) from None
 
 
-def number(text: str) -> float:
+def parse_number(text: str) -> float:
     """Return the finite number of a text.
 
     Raises ValueError for any other text.
@@ -125,7 +129,7 @@ def number(text: str) -> float:
     return found
 
 
-def whole(text: str) -> int:
+def parse_integer(text: str) -> int:
     """Return the whole number of a text.
 
     Raises ValueError for any other text.
@@ -136,7 +140,7 @@ def whole(text: str) -> int:
     return int(text)
 
 
-def choice(choices: tuple[str, ...]) -> Callable[[str], str]:
+def choice_parser(choices: tuple[str, ...]) -> Callable[[str], str]:
     """Return a function that accepts one of the choices, and raises ValueError for others."""
 
     def read(text: str) -> str:
@@ -147,40 +151,40 @@ def choice(choices: tuple[str, ...]) -> Callable[[str], str]:
     return read
 
 
-def position(text: str) -> tuple[float, float, float]:
+def parse_position(text: str) -> tuple[float, float, float]:
     """Return the three numbers of a text, separated by commas, m.
 
     Raises ValueError for any other text.
     """
     try:
-        x, y, z = map(number, text.split(","))
+        x, y, z = map(parse_number, text.split(","))
     except ValueError:
         raise ValueError(f"{text!r}, expected x,y,z in metres") from None
     return x, y, z
 
 
-def flag(text: str) -> bool:
+def parse_flag(text: str) -> bool:
     """Return the boolean of "true" or "false".
 
     Raises ValueError for any other text.
     """
-    return FLAGS[choice(tuple(FLAGS))(text)]
+    return FLAGS[choice_parser(tuple(FLAGS))(text)]
 
 
-def exact(text: str) -> Exact:
+def parse_exact(text: str) -> ExactControls:
     """Return auto, none, or names of controls separated by commas.
 
     Raises ValueError for any other text.
     """
     if text in ("auto", "none"):
-        return cast(Exact, text)
+        return cast(ExactControls, text)
     names = tuple(text.split(","))
     if "" in names:
         raise ValueError(f"{text!r}, expected auto, none or names of controls, commas between")
     return names
 
 
-def target(text: str) -> Target:
+def parse_target(text: str) -> Target:
     """Return the target of a text.
 
     Raises ValueError for an invalid text.
@@ -188,8 +192,8 @@ def target(text: str) -> Target:
     mark = max(text.rfind(":"), text.rfind("="))
     joint, _, moment = text[: max(mark, 0)].rpartition("@")
     try:
-        place = position(text[mark + 1 :])
-        when = {"at": moment} if moment in MOMENTS else {"time": number(moment)}
+        place = parse_position(text[mark + 1 :])
+        when = {"at": moment} if moment in MOMENTS else {"time": parse_number(moment)}
     except ValueError:
         joint = ""
     if not joint:
@@ -200,14 +204,14 @@ def target(text: str) -> Target:
     return Target(joint, place, **when)
 
 
-READERS: Mapping[Any, Callable[[str], Any]] = {
-    float: number,
-    int: whole,
-    bool: flag,
+PARSERS: Mapping[Any, Callable[[str], Any]] = {
+    float: parse_number,
+    int: parse_integer,
+    bool: parse_flag,
     str: str,
-    Exact: exact,
-    Target: target,
-    tuple[float, float, float]: position,
+    ExactControls: parse_exact,
+    Target: parse_target,
+    tuple[float, float, float]: parse_position,
 }
 """Function that reads a text, by type of field; literals have their choices instead."""
 
@@ -217,9 +221,13 @@ def _parameter(field: structs.FieldInfo, hint: Any) -> Parameter:
     if get_origin(hint) is Annotated and isinstance(get_args(hint)[1], Meta):
         kind, meta = get_args(hint)
     kind = _without_none(kind)
-    repeated = get_origin(kind) in (list, tuple) and kind not in READERS
+    repeated = get_origin(kind) in (list, tuple) and kind not in PARSERS
     one = get_args(kind)[0] if repeated else kind
-    read = choice(get_args(one)) if get_origin(one) is Literal else READERS[_bare(one)]
+    read = (
+        choice_parser(get_args(one))
+        if get_origin(one) is Literal
+        else PARSERS[_without_annotations(one)]
+    )
     extra = meta.extra or {}
     return Parameter(
         field.name,
@@ -241,6 +249,6 @@ def _without_none(kind: Any) -> Any:
     return rest[0] if len(rest) == 1 else Union[tuple(rest)]  # noqa: UP007  # built at run time
 
 
-def _bare(kind: Any) -> Any:
+def _without_annotations(kind: Any) -> Any:
     """Return a type without its annotations, as in READERS."""
     return get_args(kind)[0] if get_origin(kind) is Annotated else kind

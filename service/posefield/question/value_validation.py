@@ -4,11 +4,11 @@ import math
 
 from posefield.common.errors import InvalidField
 
-ROUNDING = 2.0**-23
+FLOAT32_EPSILON = 2.0**-23
 """Relative error of a number in single precision."""
 
 
-def number(field: str, value: object) -> float:
+def check_number(field: str, value: object) -> float:
     """Return a finite number, 0 for -0.
 
     Raises InvalidField for any other value.
@@ -24,20 +24,20 @@ def number(field: str, value: object) -> float:
     return found + 0.0
 
 
-def within(field: str, value: float, low: float, high: float, unit: str) -> None:
+def check_range(field: str, value: float, low: float, high: float, unit: str) -> None:
     """Raise InvalidField for a value outside low to high."""
     if not low <= value <= high:
         # Nine digits tell any two numbers of single precision apart.
         raise InvalidField(field, f"{value:.9g} {unit}, expected {low:.9g} to {high:.9g} {unit}")
 
 
-def rounded_within(field: str, value: float, low: float, high: float, unit: str) -> float:
+def check_rounded_range(field: str, value: float, low: float, high: float, unit: str) -> float:
     """Return the value, or `high` for a value that is `high` rounded to single precision.
 
     Clients read durations from responses, and many keep them as float32. Raises InvalidField for a
     value outside low to high.
     """
-    if high < value <= high * (1.0 + ROUNDING):
+    if high < value <= high * (1.0 + FLOAT32_EPSILON):
         return high
-    within(field, value, low, high, unit)
+    check_range(field, value, low, high, unit)
     return value

@@ -8,7 +8,7 @@ from msgspec import Meta, Struct
 from posefield.common.errors import InvalidField
 
 Instancing = Literal["references", "scenegraph", "flatten"]
-FOV, HEIGHT = math.pi / 3.0, 1080.0
+DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
 
 
 class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -7,12 +7,12 @@ from itertools import accumulate, chain, takewhile
 from pathlib import Path
 
 from posefield.common.errors import UnknownModel
-from posefield.registry.model_loading import Intake
+from posefield.registry.model_loading import ModelLoader
 from posefield.synthesis.synthesizer import Synthesizer
 
 
 @dataclass(frozen=True)
-class Library:
+class ModelRegistry:
     """Models of a service by name, and older versions.
 
     models: the newest model of each name. older: versions that still answer under name@contenthash,
@@ -40,10 +40,10 @@ class Library:
         newest = self.models.get(name)
         return (newest, *(m for m in self.older if m.name == name)) if newest else ()
 
-    def of(self, may_read: Callable[[str], bool]) -> "Library":
+    def restricted_to(self, may_read: Callable[[str], bool]) -> "ModelRegistry":
         """Return the library reduced to the names for which `may_read` is true."""
         models = {name: model for name, model in self.models.items() if may_read(name)}
-        return Library(models, tuple(model for model in self.older if may_read(model.name)))
+        return ModelRegistry(models, tuple(model for model in self.older if may_read(model.name)))
 
     @property
     def identities(self) -> tuple[str, ...]:
@@ -57,7 +57,7 @@ class Library:
 
 
 @dataclass(frozen=True)
-class Bounds:
+class VersionLimits:
     """Limits on older versions.
 
     older: versions of a name beside the newest. memory: bytes of all older versions together.
@@ -67,22 +67,22 @@ class Bounds:
     memory: int = 64 << 20
 
 
-def load(places: Iterable[str | Path]) -> Library:
+def load(places: Iterable[str | Path]) -> ModelRegistry:
     """Return the library of .onnx files, folders of them and URLs of object stores.
 
     It has the newest version of each name; the name is the file's stem or the folder of the
     versions. Raises ModelError for a place without a model, a file that cannot be served, a name
     that cannot stand in a URL, and two places with one name.
     """
-    intake = Intake(places, most=1)
-    intake.look()
+    intake = ModelLoader(places, most=1)
+    intake.scan()
     intake.check()
-    return Library({name: versions[0] for name, versions in intake.versions().items()})
+    return ModelRegistry({name: versions[0] for name, versions in intake.versions().items()})
 
 
-def arranged(
-    declared: Mapping[str, Sequence[Synthesizer]], before: Library, bounds: Bounds
-) -> Library:
+def merge_versions(
+    declared: Mapping[str, Sequence[Synthesizer]], before: ModelRegistry, bounds: VersionLimits
+) -> ModelRegistry:
     """Return the library of the versions declared now, and of older ones within the bounds.
 
     declared: versions by name, the newest first. Versions of `before` rank ahead of those that
@@ -98,4 +98,4 @@ def arranged(
     ranked.sort(key=lambda entry: entry[0])
     taken = accumulate(model.session.memory for _, model in ranked)
     fits = takewhile(lambda entry: entry[1] <= bounds.memory, zip(ranked, taken, strict=True))
-    return Library(models, tuple(model for (_, model), _ in fits))
+    return ModelRegistry(models, tuple(model for (_, model), _ in fits))

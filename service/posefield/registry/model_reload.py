@@ -13,19 +13,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from posefield.inference.trial_process import LIMITS, Limits
+from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.registry import model_registry
-from posefield.registry.model_loading import Fault, Intake
-from posefield.registry.model_registry import Bounds, Library
+from posefield.registry.model_loading import LoadFailure, ModelLoader
+from posefield.registry.model_registry import ModelRegistry, VersionLimits
 
 log = logging.getLogger(__name__)
 
-SETTLING = 0.5
+SETTLE_SECONDS = 0.5
 """Seconds until a changing file is looked at again."""
 
 
 @dataclass(frozen=True)
-class Reloads:
+class ReloadStatistics:
     """Statistics of looking at the sources.
 
     looks: number of looks. opened, failed: versions opened and failed attempts since the start.
@@ -36,34 +36,34 @@ class Reloads:
     looks: int = 0
     opened: int = 0
     failed: int = 0
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[LoadFailure, ...] = ()
     changed: float = 0.0
     last_error: str = ""
 
 
-class Models(Protocol):
-    """Models that may be replaced: read `library` once per request."""
+class RegistryProvider(Protocol):
+    """Models that may be replaced: read `registry` once per request."""
 
     @property
-    def library(self) -> Library:
+    def registry(self) -> ModelRegistry:
         """Current library."""
 
     @property
-    def reloads(self) -> Reloads:
+    def reloads(self) -> ReloadStatistics:
         """Statistics of looking at the sources."""
 
 
-class Fixed:
+class FixedRegistry:
     """Models that are never replaced."""
 
-    reloads = Reloads()
+    reloads = ReloadStatistics()
 
-    def __init__(self, library: Library) -> None:
-        self.library = library
+    def __init__(self, library: ModelRegistry) -> None:
+        self.registry = library
 
 
-class Shelf:
-    """Models of places; `library` is their state at the last look.
+class ReloadingRegistry:
+    """Models of places; `registry` is their state at the last look.
 
     A file that cannot be used, and a source that cannot be reached or contains no model, leave the
     models as they were. A name that its source no longer lists is removed with all its versions; a
@@ -71,45 +71,48 @@ class Shelf:
     """
 
     def __init__(
-        self, places: Iterable[str | Path], bounds: Bounds, limits: Limits = LIMITS
+        self,
+        places: Iterable[str | Path],
+        bounds: VersionLimits,
+        limits: TrialLimits = DEFAULT_LIMITS,
     ) -> None:
         """Open everything that can be opened within the limits; `check` raises the first fault."""
-        self.library = Library({})
-        self.reloads = Reloads()
+        self.registry = ModelRegistry({})
+        self.reloads = ReloadStatistics()
         self._bounds = bounds
-        self._intake = Intake(places, 1 + bounds.older, limits)
+        self._loader = ModelLoader(places, 1 + bounds.older, limits)
         self._logged: set[str] = set()
-        self._take()
+        self._refresh()
 
     def check(self) -> None:
         """Raise ModelError for the first place that could not be opened."""
-        self._intake.check()
+        self._loader.check()
 
-    def look(self) -> bool:
+    def scan(self) -> bool:
         """Update the library from the sources, and log each new fault.
 
         Returns False while a file is changing, so that another look must follow. Not thread-safe.
         """
-        settled = self._take()
+        settled = self._refresh()
         found = {str(fault.error) for fault in self.reloads.faults}
         for message in sorted(found - self._logged):
             log.warning("%s", message)
         self._logged = found
         return settled
 
-    def _take(self) -> bool:
-        settled = self._intake.look()
-        found = model_registry.arranged(self._intake.versions(), self.library, self._bounds)
-        self._intake.release(found.identities)
-        if changed := found.identities != self.library.identities:
-            self.library = found
+    def _refresh(self) -> bool:
+        settled = self._loader.scan()
+        found = model_registry.merge_versions(self._loader.versions(), self.registry, self._bounds)
+        self._loader.release(found.identities)
+        if changed := found.identities != self.registry.identities:
+            self.registry = found
         self.reloads = self._reloads(changed)
         return settled
 
-    def _reloads(self, changed: bool) -> Reloads:
-        before, intake = self.reloads, self._intake
+    def _reloads(self, changed: bool) -> ReloadStatistics:
+        before, intake = self.reloads, self._loader
         faults = tuple(intake.faults.values())
-        return Reloads(
+        return ReloadStatistics(
             before.looks + 1,
             intake.opened,
             intake.failed,
@@ -119,10 +122,10 @@ class Shelf:
         )
 
     @contextmanager
-    def watched(self, seconds: float) -> Iterator[None]:
+    def watch(self, seconds: float) -> Iterator[None]:
         """Look every `seconds` in a thread while the context lasts; never if `seconds` is 0."""
         ended = threading.Event()
-        thread = threading.Thread(target=self._watch, args=(seconds, ended), daemon=True)
+        thread = threading.Thread(target=self._scan_repeatedly, args=(seconds, ended), daemon=True)
         if seconds:
             thread.start()
         try:
@@ -130,11 +133,11 @@ class Shelf:
         finally:
             ended.set()
 
-    def _watch(self, seconds: float, ended: threading.Event) -> None:
+    def _scan_repeatedly(self, seconds: float, ended: threading.Event) -> None:
         settled = True
-        while not ended.wait(_until_next(seconds) if settled else min(seconds, SETTLING)):
+        while not ended.wait(_until_next(seconds) if settled else min(seconds, SETTLE_SECONDS)):
             try:
-                settled = self.look()
+                settled = self.scan()
             except Exception:
                 log.exception("looking for models failed")
 

@@ -14,7 +14,7 @@ from urllib.parse import unquote, urlsplit
 
 from posefield.common.errors import ModelError
 from posefield.model_file import checked_file
-from posefield.registry.listed_models import ENDING, Found, named
+from posefield.registry.listed_models import MODEL_SUFFIX, ModelFile, parse_model_path
 
 URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.IGNORECASE)
 
@@ -22,56 +22,56 @@ URL = re.compile(r"[a-z][a-z0-9+.-]*://", re.IGNORECASE)
 class Source(Protocol):
     """Source of model files."""
 
-    def look(self) -> list[Found]:
+    def scan(self) -> list[ModelFile]:
         """Return the present files; ModelError if there are none or the source fails."""
 
 
 @dataclass(frozen=True)
-class File:
+class FileSource:
     """Source of one model file."""
 
     path: Path
 
-    def look(self) -> list[Found]:
+    def scan(self) -> list[ModelFile]:
         """Return the file."""
-        return [_found(self.path, self.path.stem, "")]
+        return [_model_file(self.path, self.path.stem, "")]
 
 
 @dataclass(frozen=True)
-class Folder:
+class FolderSource:
     """Folder of model files and of folders with versions of one model each."""
 
     path: Path
 
-    def look(self) -> list[Found]:
+    def scan(self) -> list[ModelFile]:
         """Return the model files in the folder; ModelError if there are none."""
         patterns = ("", "*/", "*/*/")
-        paths = [p for deep in patterns for p in sorted(self.path.glob(f"{deep}*{ENDING}"))]
-        placed = [(p, named(p.relative_to(self.path).as_posix())) for p in paths]
-        found = [_found(path, *place) for path, place in placed if place]
+        paths = [p for deep in patterns for p in sorted(self.path.glob(f"{deep}*{MODEL_SUFFIX}"))]
+        placed = [(p, parse_model_path(p.relative_to(self.path).as_posix())) for p in paths]
+        found = [_model_file(path, *place) for path, place in placed if place]
         if not found:
-            raise ModelError(self.path, f"no {ENDING} file in this folder")
+            raise ModelError(self.path, f"no {MODEL_SUFFIX} file in this folder")
         return found
 
 
-def source(place: str | Path) -> Source:
+def open_source(place: str | Path) -> Source:
     """Return the source of a path, a file:/// URL or, through obstore, an object store's URL."""
     text = str(place)
     if URL.match(text):
         url = urlsplit(text)
         if url.scheme != "file":
             # Imported here because obstore is an optional extra.
-            from posefield.registry.object_store import Objects
+            from posefield.registry.object_store import ObjectStoreSource
 
-            return Objects(text)
+            return ObjectStoreSource(text)
         place = unquote(url.path)
     path = Path(place)
-    return Folder(path) if path.is_dir() else File(path)
+    return FolderSource(path) if path.is_dir() else FileSource(path)
 
 
-def by_name(found: Iterable[Found]) -> dict[str, list[Found]]:
+def group_by_name(found: Iterable[ModelFile]) -> dict[str, list[ModelFile]]:
     """Return the versions of each name, the newest first."""
-    grouped: dict[str, list[Found]] = {}
+    grouped: dict[str, list[ModelFile]] = {}
     for one in found:
         grouped.setdefault(one.name, []).append(one)
     return {
@@ -80,11 +80,11 @@ def by_name(found: Iterable[Found]) -> dict[str, list[Found]]:
     }
 
 
-def _found(path: Path, name: str, version: str) -> Found:
+def _model_file(path: Path, name: str, version: str) -> ModelFile:
     try:
         facts = path.stat()
     except OSError as fault:
         raise ModelError(path, f"cannot be read: {fault.strerror}") from fault
     # Replacing a file by renaming changes its inode; writing into it changes its time.
     signature = f"{facts.st_ino} {facts.st_size} {facts.st_mtime_ns}"
-    return Found(str(path), name, version, signature, partial(checked_file.read, path))
+    return ModelFile(str(path), name, version, signature, partial(checked_file.read, path))

@@ -7,16 +7,16 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.kriging import acquisition
-from posefield.kriging.acquisition import Worth
+from posefield.kriging.acquisition import VarianceReduction
 from posefield.kriging.support import Support
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.question.model_question import SuggestQuestion
 from posefield.question.results import Suggestion, Suggestions
-from posefield.question.value_validation import within
+from posefield.question.value_validation import check_range
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import input_limits, question_validation
 
-DRAWN, GIVEN = 1000, 10_000
+DRAWN_CANDIDATES, MAX_CANDIDATES = 1000, 10_000
 """Number of drawn candidates, and the largest number of given ones."""
 
 
@@ -31,25 +31,25 @@ def suggest(
     assumes that the points before it were captured. Raises InvalidField for an unknown performer
     and for an unusable candidate.
     """
-    card, own = model.session.card, model.door.support
+    card, own = model.session.card, model.validator.support
     question_validation.labels(card.performers, asked.performer)
-    points = _drawn(own) if candidates is None else _given(model, candidates)
-    captured = _captured(card, asked.performer)
-    ranked = acquisition.rank(own.scaled(points), own.samples[captured], asked.count)
+    points = _drawn_points(own) if candidates is None else _given_points(model, candidates)
+    captured = _captured_indices(card, asked.performer)
+    ranked = acquisition.rank_candidates(own.scaled(points), own.samples[captured], asked.count)
     found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)
     return Suggestions(model.identity, asked.performer, len(points), found)
 
 
-def _captured(card: ModelCard, performer: str | None) -> Indices:
+def _captured_indices(card: ModelCard, performer: str | None) -> Indices:
     """Return the indices of the performer's captured clips; of all clips for None."""
     if performer is None:
         return np.arange(len(card.examples))
     return np.flatnonzero(np.array(card.moved_by) == card.performers.index(performer))
 
 
-def _given(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:
+def _given_points(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:
     """Return the points (C, d) of candidates, in the card's order."""
-    within("candidates", len(candidates), 1, GIVEN, "points")
+    check_range("candidates", len(candidates), 1, MAX_CANDIDATES, "points")
     card = model.session.card
     rows = []
     for index, controls in enumerate(candidates):
@@ -65,10 +65,10 @@ def _value(control: Control, controls: Mapping[str, float]) -> float:
     """Return the value of a candidate's control; InvalidField if it is missing or unusable."""
     if control.name not in controls:
         raise InvalidField(f"controls/{control.name}", f"missing; give a number in {control.unit}")
-    return question_validation.checked(control, controls[control.name])
+    return question_validation.check_control(control, controls[control.name])
 
 
-def _drawn(own: Support) -> Floats:
+def _drawn_points(own: Support) -> Floats:
     """Return points (DRAWN, d) across the sampled ranges by Roberts' additive recurrence."""
     d = len(own.low)
     ratio = 2.0
@@ -76,12 +76,12 @@ def _drawn(own: Support) -> Floats:
         # The root of x^(d + 1) = x + 1; for one control, the golden ratio.
         ratio = (1.0 + ratio) ** (1.0 / (d + 1))
     steps = ratio ** -np.arange(1.0, d + 1.0)
-    share = np.mod(0.5 + np.arange(1, DRAWN + 1)[:, None] * steps, 1.0)
+    share = np.mod(0.5 + np.arange(1, DRAWN_CANDIDATES + 1)[:, None] * steps, 1.0)
     return own.low + share * (own.high - own.low)
 
 
 def _suggestion(
-    card: ModelCard, own: Support, captured: Indices, point: Floats, found: Worth
+    card: ModelCard, own: Support, captured: Indices, point: Floats, found: VarianceReduction
 ) -> Suggestion:
     """Return a point with its nearest captured clip and the control in which that differs most."""
     gaps = 0.5 * np.abs(own.samples[captured] - own.scaled(point[None]))

@@ -7,7 +7,7 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.constraints import constrained_motion
-from posefield.constraints.targets import NOTHING, Goals
+from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
 from posefield.locomotion import stride
 from posefield.locomotion.stride import Strides
 from posefield.motion.clip import assemble
@@ -15,9 +15,9 @@ from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer
 from posefield.synthesis import frame_times
-from posefield.synthesis.poses import ANSWERED
+from posefield.synthesis.poses import POSE_OUTPUTS
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation.question_validation import Question
+from posefield.validation.question_validation import ValidatedQuestion
 
 OPEN_COST, PIN_COST = 4, 4
 """Cost of a target of a clip with open controls, and of pinned feet, relative to the cost of a
@@ -26,7 +26,7 @@ target.
 
 
 @dataclass(frozen=True)
-class Prospect:
+class ClipPreview:
     """Properties of a clip that are known before its synthesis.
 
     frames: number of frames. warnings: as in the answer. missed: true if the clip misses a target.
@@ -37,7 +37,9 @@ class Prospect:
     missed: bool = False
 
 
-def clip(model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MOST_POSES) -> ClipAnswer:
+def synthesize_clip(
+    model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MAX_POSES
+) -> ClipAnswer:
     """Return the clip of a question; frame i is the pose at start + i / fps.
 
     most: largest number of frames. The N steps of a loop share the duration evenly, but are played
@@ -45,38 +47,38 @@ def clip(model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MOST_P
     for joint names without roles and for more than `most` frames.
     """
     question = model.question(asked)
-    joints = _joints(model, asked)
-    goals = model.keeper.goals(question, asked)
+    joints = _named_skeleton(model, asked)
+    goals = model.solver.constraints(question, asked)
     if goals:
-        answer = _held(model, question, goals, asked, most)
+        answer = _constrained(model, question, goals, asked, most)
     else:
-        answer = _plain(model, question, asked, most)
+        answer = _unconstrained(model, question, asked, most)
     turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
     return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
 
 
 def check(model: Synthesizer, asked: ClipQuestion) -> None:
-    """Raise the errors of `clip` that are known before the duration of the clip is."""
-    model.keeper.goals(model.question(asked), asked)
-    _joints(model, asked)
-    frame_times.window(asked, model.durations[1])
+    """Raise the errors of `synthesize_clip` that are known before the duration of the clip is."""
+    model.solver.constraints(model.question(asked), asked)
+    _named_skeleton(model, asked)
+    frame_times.time_window(asked, model.durations[1])
 
 
-def prospect(
-    model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MOST_POSES
-) -> Prospect:
+def preview_clip(
+    model: Synthesizer, asked: ClipQuestion, most: int = frame_times.MAX_POSES
+) -> ClipPreview:
     """Return frame count, warnings and misses of a clip, without synthesising its frames.
 
-    The duration comes from a call with this question alone, as in `clip`: in a batch it differs in
-    the last digit, and a question that ends with the clip could pass here and be refused later.
-    Raises as `clip` does.
+    The duration comes from a call with this question alone, as in `synthesize_clip`: in a batch it
+    differs in the last digit, and a question that ends with the clip could pass here and be refused
+    later. Raises as `synthesize_clip` does.
     """
     question = model.question(asked)
-    _joints(model, asked)
-    duration, misses = _outlook(model, question, asked)
-    times = frame_times.times(asked, duration, most)
+    _named_skeleton(model, asked)
+    duration, misses = _duration_and_misses(model, question, asked)
+    times = frame_times.sample_times(asked, duration, most)
     # A loop ends with its first frame again.
-    return Prospect(len(times) + asked.loop, question.warnings, misses)
+    return ClipPreview(len(times) + asked.loop, question.warnings, misses)
 
 
 def solver_cost(model: Synthesizer, asked: ClipQuestion) -> int:
@@ -89,7 +91,7 @@ def solver_cost(model: Synthesizer, asked: ClipQuestion) -> int:
     return each * targets + PIN_COST * asked.pin_feet
 
 
-def _joints(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
+def _named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
     """Return the skeleton with the requested names.
 
     Raises InvalidField for names of a convention without roles, and for a loop of a model that is
@@ -102,71 +104,83 @@ def _joints(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
     return model.skeleton(asked.names)
 
 
-def _plain(
-    model: Synthesizer, question: Question, asked: ClipQuestion, most: int
+def _unconstrained(
+    model: Synthesizer, question: ValidatedQuestion, asked: ClipQuestion, most: int
 ) -> PoseAnswer[np.float64]:
     """Return the frames of a clip without constraints."""
-    when = frame_times.times(asked, _duration(model, question), most)
-    answer = _answer(model, question, asked, when)
-    if model.keeper.measures:
-        predicted = model.keeper.held(question, NOTHING)
-        measured = model.keeper.measured(question, predicted)
+    when = frame_times.sample_times(asked, _duration(model, question), most)
+    answer = _predict(model, question, asked, when)
+    if model.solver.measures:
+        predicted = model.solver.solve(question, NO_CONSTRAINTS)
+        measured = model.solver.measured(question, predicted)
         answer = replace(answer, trust=replace(answer.trust, measured=measured))
     if asked.loop or asked.root == "in_place":
         card = model.session.card
-        measure = stride.strides if card.cyclic else stride.straight
+        measure = stride.strides if card.cyclic else stride.straight_strides
         way = measure(model.session, question.point, question.labels, question.level)
-        answer = _routed(model, answer, way, asked)
+        answer = _apply_root_options(model, answer, way, asked)
     return answer
 
 
-def _held(
-    model: Synthesizer, question: Question, goals: Goals, asked: ClipQuestion, most: int
+def _constrained(
+    model: Synthesizer,
+    question: ValidatedQuestion,
+    goals: ConstraintSet,
+    asked: ClipQuestion,
+    most: int,
 ) -> PoseAnswer[np.float64]:
     """Return the frames of a clip that meets constraints."""
-    held = model.meeting(question, goals, asked.extrapolate)
-    when = frame_times.times(asked, model.sensible(held.duration), most)
-    trust = model.held_trust(asked, question, held)
-    answer = model.keeper.poses(question, held, when, trust)
+    held = model.solve_constraints(question, goals, asked.extrapolate)
+    when = frame_times.sample_times(asked, model.check_duration(held.duration), most)
+    trust = model.constrained_trust(asked, question, held)
+    answer = model.solver.poses(question, held, when, trust)
     routed = asked.loop or asked.root == "in_place"
-    return _routed(model, answer, constrained_motion.of(held), asked) if routed else answer
+    return (
+        _apply_root_options(model, answer, constrained_motion.to_strides(held), asked)
+        if routed
+        else answer
+    )
 
 
-def _outlook(model: Synthesizer, question: Question, asked: ClipQuestion) -> tuple[float, bool]:
+def _duration_and_misses(
+    model: Synthesizer, question: ValidatedQuestion, asked: ClipQuestion
+) -> tuple[float, bool]:
     """Return the duration of a clip, s, and whether it misses a target.
 
     Constraints can change the duration, as a target speed does.
     """
-    goals = model.keeper.goals(question, asked)
+    goals = model.solver.constraints(question, asked)
     strict = asked.extrapolate == "refuse" or model.session.card.cyclic
     if not (goals.targets or (goals and strict)):
         return _duration(model, question), False
-    held = model.meeting(question, goals, asked.extrapolate)
-    targets = held.met[len(held.met) - len(goals.targets) :]
+    held = model.solve_constraints(question, goals, asked.extrapolate)
+    targets = held.results[len(held.results) - len(goals.targets) :]
     misses = asked.extrapolate != "ok" and not all(met.reached for met in targets)
-    return model.sensible(held.duration), misses
+    return model.check_duration(held.duration), misses
 
 
-def _duration(model: Synthesizer, question: Question) -> float:
+def _duration(model: Synthesizer, question: ValidatedQuestion) -> float:
     """Return the duration of the clip, s; OutsideSamples if extrapolation makes it implausible."""
     durations = model.session.durations(question.point, question.labels, question.level)
-    return model.sensible(float(durations[0]))
+    return model.check_duration(float(durations[0]))
 
 
-def _routed(
+def _apply_root_options(
     model: Synthesizer, answer: PoseAnswer[np.float64], way: Strides, asked: ClipQuestion
 ) -> PoseAnswer[np.float64]:
     """Return the answer in place, or closed to a loop, as the question requests."""
     stays = asked.root == "in_place" and model.session.card.root == "travelling"
-    answer = frame_times.in_place(answer, way) if stays else answer
-    return frame_times.closed(answer, None if stays else way) if asked.loop else answer
+    answer = frame_times.remove_travel(answer, way) if stays else answer
+    return frame_times.close_loop(answer, None if stays else way) if asked.loop else answer
 
 
-def _answer(
-    model: Synthesizer, question: Question, asked: ClipQuestion, when: Floats
+def _predict(
+    model: Synthesizer, question: ValidatedQuestion, asked: ClipQuestion, when: Floats
 ) -> PoseAnswer[np.float64]:
     labels, level = question.labels, question.level
-    answers = model.session.run(question.point, when[None], *ANSWERED, labels=labels, level=level)
+    answers = model.session.run(
+        question.point, when[None], *POSE_OUTPUTS, labels=labels, level=level
+    )
     rotations, root, offsets, duration, sigma = (a[0].astype(np.float64) for a in answers)
     trust = model.trust(asked, question, float(duration), float(sigma))
     return PoseAnswer(when, rotations, root, offsets, trust)

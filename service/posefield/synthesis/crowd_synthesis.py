@@ -13,7 +13,7 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.units import Floats, Indices, Singles
 from posefield.inference import level_selection
-from posefield.inference.level_selection import Ladder, View
+from posefield.inference.level_selection import LevelCriteria, LevelTable
 from posefield.motion import blend
 from posefield.motion.crowd_clip import CrowdPoses, Placement
 from posefield.synthesis.synthesizer import Synthesizer
@@ -23,7 +23,7 @@ from posefield.validation.crowd_question import Blending, CrowdQuestion
 # Poses of one call: the fewest, the most, and the number of calls to aim for in between. Smaller
 # calls are dominated by their overhead; larger ones exceed a core's cache between operators. The
 # number of calls is fixed, not the number of cores: rounding depends on it.
-FEWEST, BATCH, CALLS = 256, 1536, 8
+MIN_BATCH, BATCH, CALLS = 256, 1536, 8
 # Share of a clip's duration: the float32 rounding of a time that a client read from an answer.
 SLACK = 1e-5
 # Durations differ between levels, and a client does not know the level that its time is checked
@@ -35,7 +35,7 @@ _WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _GraphInputs:
     """Inputs of the graph: controls (N, d), times (N, 1) and labels (N, p)."""
 
     controls: Singles
@@ -45,13 +45,13 @@ class _Asked:
     def __len__(self) -> int:
         return len(self.times)
 
-    def rows(self, which: Indices) -> "_Asked":
+    def rows(self, which: Indices) -> "_GraphInputs":
         """Return the rows at these indices."""
-        return _Asked(*(column[which] for column in vars(self).values()))
+        return _GraphInputs(*(column[which] for column in vars(self).values()))
 
 
 @dataclass(frozen=True)
-class _Block:
+class _GraphOutputs:
     """Outputs of the graph for N characters, each in the frame of its own clip."""
 
     rotations: Singles
@@ -62,7 +62,7 @@ class _Block:
     travel: Singles
 
 
-def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
+def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     """Return the poses of a crowd, placed where its characters stand.
 
     With a view, distances are measured to the characters' placements. Raises InvalidField and
@@ -70,22 +70,30 @@ def poses(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     fault.
     """
     card = model.session.card
-    controls, supported, said = crowd_validation.controls(card, model.door.support, question)
+    controls, supported, said = crowd_validation.check_controls(
+        card, model.validator.support, question
+    )
     labels = crowd_question.labels(question, card.performers)
     crowd_question.check_levels(question, len(card.levels))
     early = question.times < 0.0
-    crowd_validation.refuse("time", question.times, early, "s, expected 0 s or later")
+    crowd_validation.raise_for_first("time", question.times, early, "s, expected 0 s or later")
     levels, error_px, sentences = _levels(model, question)
-    asked = _Asked(controls.astype(np.float32), question.times.astype(np.float32)[:, None], labels)
-    block = _answers(model, asked, levels)
+    asked = _GraphInputs(
+        controls.astype(np.float32), question.times.astype(np.float32)[:, None], labels
+    )
+    block = _run_graph(model, asked, levels)
     if question.blending is not None:
         _blend(model, asked, block, levels, question.blending)
     crowd_validation.check_durations(card, block.duration)
-    exact = (levels == 0) & (not isinstance(question.detail, View)) & (question.blending is None)
+    exact = (
+        (levels == 0)
+        & (not isinstance(question.detail, LevelCriteria))
+        & (question.blending is None)
+    )
     slack = np.where(exact, SLACK, COARSE_SLACK)
     crowd_validation.check_times(question.times, block.duration, slack)
     if question.root == "in_place":
-        _stay(block)
+        _remove_travel(block)
     _place(block, question.placement)
     return CrowdPoses(
         model.identity,
@@ -106,21 +114,23 @@ def _levels(
     model: Synthesizer, question: CrowdQuestion
 ) -> tuple[Indices, Singles | None, tuple[str, ...]]:
     """Return levels (N,), the pixels (N,) of their errors (None without a view), and warnings."""
-    if not isinstance(question.detail, View):
+    if not isinstance(question.detail, LevelCriteria):
         return question.detail, None, ()
-    ladder, asked = model.ladder, question.detail
-    middle = question.placement.positions + model.middle
+    ladder, asked = model.level_table, question.detail
+    middle = question.placement.positions + model.rest_position
     scale = level_selection.pixels_per_metre(asked.camera, middle, model.radius)
     if question.blending is None or asked.previous is None:
-        choice = level_selection.see(ladder, scale, asked)
-        levels, said = choice.levels, level_selection.warnings(choice, ladder, asked)
+        choice = level_selection.select_levels(ladder, scale, asked)
+        levels, said = choice.levels, level_selection.budget_warnings(choice, ladder, asked)
     else:
-        levels, said = _held(ladder, scale, asked, asked.previous, question.blending)
+        levels, said = _levels_in_transition(
+            ladder, scale, asked, asked.previous, question.blending
+        )
     return levels, level_selection.error_pixels(ladder.errors, scale, levels), said
 
 
-def _held(
-    ladder: Ladder, scale: Floats, asked: View, previous: Indices, blending: Blending
+def _levels_in_transition(
+    ladder: LevelTable, scale: Floats, asked: LevelCriteria, previous: Indices, blending: Blending
 ) -> tuple[Indices, tuple[str, ...]]:
     """Return levels (N,) and warnings where some characters are in a transition between two levels.
 
@@ -135,47 +145,51 @@ def _held(
     if not free.any():
         return levels, ()
     rest = replace(asked, previous=previous[free], budget=budget)
-    choice = level_selection.see(ladder, scale[free], rest)
+    choice = level_selection.select_levels(ladder, scale[free], rest)
     levels[free] = choice.levels
-    return levels, level_selection.warnings(choice, ladder, rest)
+    return levels, level_selection.budget_warnings(choice, ladder, rest)
 
 
-def _answers(model: Synthesizer, asked: _Asked, levels: Indices) -> _Block:
+def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _GraphOutputs:
     joints = len(model.session.card.skeleton)
     shapes = ((joints, 4), (3,), (joints, 3), (), (), (3,))
-    block = _Block(*(np.empty((len(asked), *shape), np.float32) for shape in shapes))
+    block = _GraphOutputs(*(np.empty((len(asked), *shape), np.float32) for shape in shapes))
 
     def fill(part: tuple[int, Indices | slice]) -> None:
         level, rows = part
         given, labels = (asked.controls[rows], asked.times[rows]), asked.labels[rows]
         answers = model.session.run(*given, *vars(block), labels=labels, level=level)
         for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
-            whole[rows] = answer[:, 0] if name in _TIMED else answer
+            whole[rows] = answer[:, 0] if name in _PER_TIME else answer
 
     # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
-    list(_WORKERS.map(cancellation.carried(fill), list(_parts(levels))))
+    list(_WORKERS.map(cancellation.bind_context(fill), list(_calls(levels))))
     return block
 
 
 def _blend(
-    model: Synthesizer, asked: _Asked, block: _Block, levels: Indices, blending: Blending
+    model: Synthesizer,
+    asked: _GraphInputs,
+    block: _GraphOutputs,
+    levels: Indices,
+    blending: Blending,
 ) -> None:
     """Blend poses of the previous levels into those of characters in transition, in place."""
     rows = np.flatnonzero((blending.shares < 1.0) & (blending.levels != levels))
     if len(rows):
-        before = _answers(model, asked.rows(rows), blending.levels[rows])
+        before = _run_graph(model, asked.rows(rows), blending.levels[rows])
         shares = blending.shares[rows].astype(np.float32)
         for name, whole in vars(block).items():
-            mixing = blend.rotations if name == "rotations" else blend.straight
+            mixing = blend.nlerp if name == "rotations" else blend.lerp
             whole[rows] = mixing(getattr(before, name), whole[rows], shares)
 
 
-_TIMED = ("rotations", "root_position", "travel")
+_PER_TIME = ("rotations", "root_position", "travel")
 
 
-def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
+def _calls(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
     """Yield the level and rows of each call; contiguous rows as a slice."""
-    most = min(max(len(levels) // CALLS, FEWEST), BATCH)
+    most = min(max(len(levels) // CALLS, MIN_BATCH), BATCH)
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
         for part in np.array_split(rows, -(-len(rows) // most)):
@@ -183,13 +197,13 @@ def _parts(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
             yield level, slice(part[0], part[-1] + 1) if together else part
 
 
-def _stay(block: _Block) -> None:
+def _remove_travel(block: _GraphOutputs) -> None:
     """Subtract the travel within the cycle from the poses, in place."""
     block.root_position[:, [0, 2]] -= block.travel[:, :2]
     _turn_roots(block, -block.travel[:, 2])
 
 
-def _place(block: _Block, placement: Placement) -> None:
+def _place(block: _GraphOutputs, placement: Placement) -> None:
     """Move the poses to the characters' positions and headings, in place."""
     # Within one turn, where float32 still resolves small angles.
     angles = np.remainder(placement.headings, 2.0 * np.pi).astype(np.float32)
@@ -198,14 +212,14 @@ def _place(block: _Block, placement: Placement) -> None:
     np.add(block.root_position, placement.positions, out=block.root_position, casting="same_kind")
 
 
-def _turn_paths(block: _Block, angles: Singles) -> None:
+def _turn_paths(block: _GraphOutputs, angles: Singles) -> None:
     """Rotate the root positions about the vertical through each origin, in place."""
     cos, sin = np.cos(angles), np.sin(angles)
     x, z = block.root_position[:, 0].copy(), block.root_position[:, 2].copy()
     block.root_position[:, 0], block.root_position[:, 2] = cos * x + sin * z, cos * z - sin * x
 
 
-def _turn_roots(block: _Block, angles: Singles) -> None:
+def _turn_roots(block: _GraphOutputs, angles: Singles) -> None:
     """Rotate the root orientations about the vertical, in place."""
     cos, sin = np.cos(0.5 * angles)[:, None], np.sin(0.5 * angles)[:, None]
     root = block.rotations[:, 0]

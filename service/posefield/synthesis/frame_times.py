@@ -13,36 +13,36 @@ from posefield.question import value_validation
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import PoseAnswer
 
-RATES = (1.0, 1000.0)
-MOST_POSES = 10_000
+FPS_RANGE = (1.0, 1000.0)
+MAX_POSES = 10_000
 
 
-def window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
+def time_window(asked: ClipQuestion, duration: float) -> tuple[float, float, float]:
     """Return frames a second, start (s) and end (s) of a clip of at most `duration` seconds.
 
     Raises InvalidField for values out of range, and for a loop with a start or an end.
     """
-    rate = value_validation.number("fps", asked.fps)
-    value_validation.within("fps", rate, *RATES, "frames a second")
+    rate = value_validation.check_number("fps", asked.fps)
+    value_validation.check_range("fps", rate, *FPS_RANGE, "frames a second")
     last = duration
     if asked.end is not None:
-        end = value_validation.number("end", asked.end)
-        last = value_validation.rounded_within("end", end, 0.0, duration, "s")
-    start = value_validation.number("start", asked.start)
-    start = value_validation.rounded_within("start", start, 0.0, last, "s")
+        end = value_validation.check_number("end", asked.end)
+        last = value_validation.check_rounded_range("end", end, 0.0, duration, "s")
+    start = value_validation.check_number("start", asked.start)
+    start = value_validation.check_rounded_range("start", start, 0.0, last, "s")
     if asked.loop and (start > 0.0 or asked.end is not None):
         field, value = ("start", start) if start > 0.0 else ("end", last)
         raise InvalidField(field, f"{value:g} s with loop, expected none: a loop is a whole cycle")
     return rate, start, last
 
 
-def times(asked: ClipQuestion, duration: float, most: int = MOST_POSES) -> Floats:
+def sample_times(asked: ClipQuestion, duration: float, most: int = MAX_POSES) -> Floats:
     """Return the times (F,), s, of the requested frames of a clip that lasts `duration` seconds.
 
     A loop's times lack the last frame, which equals the first. Raises InvalidField for more frames
     than `most`.
     """
-    rate, start, last = window(asked, duration)
+    rate, start, last = time_window(asked, duration)
     if asked.loop:
         steps = max(1, round(duration * rate))
         _check_count(steps + 1, most)
@@ -53,19 +53,23 @@ def times(asked: ClipQuestion, duration: float, most: int = MOST_POSES) -> Float
     return np.minimum(start + np.arange(frames) / rate, duration)
 
 
-def in_place(answer: PoseAnswer[np.float64], way: Strides) -> PoseAnswer[np.float64]:
+def remove_travel(answer: PoseAnswer[np.float64], way: Strides) -> PoseAnswer[np.float64]:
     """Return the poses in the frame that travels along the way, placed at the start of the clip."""
-    poses = stride.beside(way, answer.times / way.durations, answer.rotations, answer.root_position)
+    poses = stride.relative_poses(
+        way, answer.times / way.durations, answer.rotations, answer.root_position
+    )
     root = floor_plane.at_height(way.starts + poses.places, poses.heights)
     return replace(answer, rotations=poses.rotations, root_position=root)
 
 
-def closed(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswer[np.float64]:
+def close_loop(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswer[np.float64]:
     """Return the poses with the first one appended, moved by the cycle's travel if any."""
     rotations, root = answer.rotations[:1], answer.root_position[:1]
     if way is not None:
-        rotations = floor_plane.turned(rotations, way.turns)
-        root = root + floor_plane.at_height(floor_plane.arc(way.ways, way.turns), np.zeros(1))
+        rotations = floor_plane.turn_roots(rotations, way.turns)
+        root = root + floor_plane.at_height(
+            floor_plane.arc_displacement(way.travels, way.turns), np.zeros(1)
+        )
     return replace(
         answer,
         times=np.append(answer.times, answer.trust.duration),

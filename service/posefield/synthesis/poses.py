@@ -8,39 +8,39 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Singles
-from posefield.constraints.targets import Goals
+from posefield.constraints.targets import ConstraintSet
 from posefield.question import value_validation
 from posefield.question.motion_question import PoseQuestion
 from posefield.question.results import PoseAnswer
 from posefield.synthesis import frame_times
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation.question_validation import Question
+from posefield.validation.question_validation import ValidatedQuestion
 
-ANSWERED = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
+POSE_OUTPUTS = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 """Outputs that poses are made of."""
 
-Row = tuple[Singles, ...]
+OutputRow = tuple[Singles, ...]
 """Values of ANSWERED for one question: (S, J, 4), (S, 3), (J, 3), and two numbers."""
 
-SAMPLE = 17
+SAMPLE_SIZE = 17
 """Number of questions that show whether a row depends on its batch: odd, and more than a kernel's
 rows.
 """
 
 
 @dataclass(frozen=True)
-class Moments:
+class PreparedPoseQuestion:
     """A question for poses with its validated part and its times.
 
     given: the question as received. question: its validated part. when: times (S,), s, as given.
-    asked: times (S,), s, limited to the longest plausible clip, as the graph's input. first, last:
-    the smallest and the largest time given.
+    graph_times: times (S,), s, limited to the longest plausible clip, as the graph's input. first,
+    last: the smallest and the largest time given.
     """
 
     given: PoseQuestion
-    question: Question
+    question: ValidatedQuestion
     when: Floats
-    asked: Floats
+    graph_times: Floats
     first: float
     last: float
 
@@ -50,98 +50,105 @@ class Moments:
         return self.question.level
 
 
-def pose(model: Synthesizer, asked: PoseQuestion) -> PoseAnswer[Any]:
+def synthesize_poses(model: Synthesizer, asked: PoseQuestion) -> PoseAnswer[Any]:
     """Return the poses (S,) of the question, constrained where it has targets.
 
     Raises InvalidField for a control, time, performer or level that cannot be used, and for
     constraints that do not fit the model. Where `extrapolate` is "refuse", raises OutsideSamples
     for controls without similar captured clips and OutOfReach for a missed target.
     """
-    checked = moments(model, asked)
-    goals = model.keeper.goals(checked.question, asked)
+    checked = prepare(model, asked)
+    goals = model.solver.constraints(checked.question, asked)
     if goals:
-        return held(model, checked, goals)
-    return posed(model, checked, rows(model, [checked])[0])
+        return synthesize_constrained(model, checked, goals)
+    return build_answer(model, checked, run_batch(model, [checked])[0])
 
 
-def moments(model: Synthesizer, asked: PoseQuestion) -> Moments:
-    """Return the question of `pose` after the validation that needs no call of the model.
+def prepare(model: Synthesizer, asked: PoseQuestion) -> PreparedPoseQuestion:
+    """Return the question of `synthesize_poses`, validated without a call of the model.
 
     Raises InvalidField and OutsideSamples.
     """
     question, times = model.question(asked), asked.times
-    if not 1 <= len(times) <= frame_times.MOST_POSES:
-        raise InvalidField("times", f"{len(times)} times, expected 1 to {frame_times.MOST_POSES}")
-    when = [value_validation.number(f"times/{i}", value) for i, value in enumerate(times)]
+    if not 1 <= len(times) <= frame_times.MAX_POSES:
+        raise InvalidField("times", f"{len(times)} times, expected 1 to {frame_times.MAX_POSES}")
+    when = [value_validation.check_number(f"times/{i}", value) for i, value in enumerate(times)]
     # The duration is known only after the call of the graph; times beyond the longest plausible
     # clip are limited because they may overflow float32.
     longest = model.durations[1]
     first, last, given = min(when), max(when), np.array(when)
     fits = 0.0 <= first and last <= longest
     within = given if fits else np.clip(given, 0.0, longest)
-    return Moments(asked, question, given, within, first, last)
+    return PreparedPoseQuestion(asked, question, given, within, first, last)
 
 
-def held(model: Synthesizer, asked: Moments, goals: Goals) -> PoseAnswer[np.float64]:
-    """Return the poses of a motion that meets constraints; raises as `pose` does."""
+def synthesize_constrained(
+    model: Synthesizer, asked: PreparedPoseQuestion, goals: ConstraintSet
+) -> PoseAnswer[np.float64]:
+    """Return the poses of a motion that meets constraints; raises as `synthesize_poses` does."""
     question, given = asked.question, asked.given
-    found = model.meeting(question, goals, given.extrapolate)
-    when = _times(asked, model.sensible(found.duration))
-    trust = model.held_trust(given, question, found)
-    return model.keeper.poses(question, found, when, trust)
+    found = model.solve_constraints(question, goals, given.extrapolate)
+    when = _check_times(asked, model.check_duration(found.duration))
+    trust = model.constrained_trust(given, question, found)
+    return model.solver.poses(question, found, when, trust)
 
 
-def rows(model: Synthesizer, asked: Sequence[Moments]) -> list[Row]:
+def run_batch(model: Synthesizer, asked: Sequence[PreparedPoseQuestion]) -> list[OutputRow]:
     """Return the graph's outputs for questions of one level and equal numbers of times.
 
-    One call of the graph. Where `exact` is true, a question's bytes do not depend on the others in
-    the call.
+    One call of the graph. Where `is_batch_exact` is true, a question's bytes do not depend on the
+    others in the call.
     """
     first = asked[0].question
     if len(asked) == 1 and len(asked[0].when) == 1:
         # A matrix product with one row sums in another order, so a single question is duplicated.
-        arrays = (first.point, first.labels, asked[0].asked[None])
+        arrays = (first.point, first.labels, asked[0].graph_times[None])
         points, labels, when = (array.repeat(2, axis=0) for array in arrays)
     else:
         points = np.concatenate([each.question.point for each in asked])
         labels = np.concatenate([each.question.labels for each in asked])
-        when = np.array([each.asked for each in asked])
-    answers = model.session.run(points, when, *ANSWERED, labels=labels, level=first.level)
+        when = np.array([each.graph_times for each in asked])
+    answers = model.session.run(points, when, *POSE_OUTPUTS, labels=labels, level=first.level)
     return [tuple(answer[row] for answer in answers) for row in range(len(asked))]
 
 
-def posed(model: Synthesizer, asked: Moments, row: Row) -> PoseAnswer[np.float32]:
-    """Return the answer of one row of `rows`; raises as `pose` does for a time outside the clip."""
+def build_answer(
+    model: Synthesizer, asked: PreparedPoseQuestion, row: OutputRow
+) -> PoseAnswer[np.float32]:
+    """Return the answer of one row of `run_batch`.
+
+    Raises as `synthesize_poses` does for a time outside the clip.
+    """
     rotations, root, offsets, length, sigma = row
-    duration = model.sensible(float(length))
+    duration = model.check_duration(float(length))
     # The graph limits times to the end of the clip.
-    when = _times(asked, duration)
+    when = _check_times(asked, duration)
     trust = model.trust(asked.given, asked.question, duration, float(sigma))
     return PoseAnswer(when, rotations, root, offsets, trust)
 
 
-def exact(model: Synthesizer, level: int) -> bool:
-    """Return whether `rows` gives each question of a batch the bytes that it gets alone.
+def is_batch_exact(model: Synthesizer, level: int) -> bool:
+    """Return whether `run_batch` gives each question of a batch the bytes that it gets alone.
 
     Measured once per level with a sample of questions: graphs of earlier versions sum in an order
     that depends on the row's position.
     """
     known = model.exact_levels
     if level not in known:
-        asked = [_sample(model, share, level) for share in np.linspace(0.0, 1.0, SAMPLE)]
-        alone = (rows(model, [each])[0] for each in asked)
-        both = zip(rows(model, asked), alone, strict=True)
+        asked = [_sample(model, share, level) for share in np.linspace(0.0, 1.0, SAMPLE_SIZE)]
+        alone = (run_batch(model, [each])[0] for each in asked)
+        both = zip(run_batch(model, asked), alone, strict=True)
         known[level] = all(
             np.array_equal(a, b) for row, own in both for a, b in zip(row, own, strict=True)
         )
     return known[level]
 
 
-def _sample(model: Synthesizer, share: float, level: int) -> Moments:
+def _sample(model: Synthesizer, share: float, level: int) -> PreparedPoseQuestion:
     """Return a question at a share of each control's range and of the shortest clip."""
     card = model.session.card
     controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
-    return moments(
+    return prepare(
         model,
         PoseQuestion(
             controls=controls, times=[share * card.durations[0]], extrapolate="ok", level=level
@@ -149,11 +156,14 @@ def _sample(model: Synthesizer, share: float, level: int) -> Moments:
     )
 
 
-def _times(asked: Moments, duration: float) -> Floats:
+def _check_times(asked: PreparedPoseQuestion, duration: float) -> Floats:
     """Return the times (S,), s; InvalidField for a time outside a clip of this duration."""
     if asked.first >= 0.0 and asked.last <= duration:
         return asked.when
     times = enumerate(asked.when.tolist())
     return np.array(
-        [value_validation.rounded_within(f"times/{i}", t, 0.0, duration, "s") for i, t in times]
+        [
+            value_validation.check_rounded_range(f"times/{i}", t, 0.0, duration, "s")
+            for i, t in times
+        ]
     )

@@ -6,10 +6,10 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Singles, Truths
+from posefield.common.units import Booleans, Floats, Singles
 from posefield.model_file.model_card import ModelCard
 from posefield.question.model_question import SigmaQuestion
-from posefield.question.results import Axis, SigmaGrid
+from posefield.question.results import GridAxis, SigmaGrid
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import input_limits, question_validation
 
@@ -40,7 +40,7 @@ def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
         asked.performer,
         sigma.reshape(shape),
         _inside(card, points).reshape(shape),
-        model.door.support.holds(points).reshape(shape),
+        model.validator.support.supported(points).reshape(shape),
     )
 
 
@@ -53,7 +53,7 @@ def _sigmas(model: Synthesizer, points: Floats, labels: Floats) -> Singles:
     return np.concatenate(found)
 
 
-def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuestion) -> Axis:
+def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuestion) -> GridAxis:
     control = card.control(name)
     if control is None:
         known = ", ".join(c.name for c in card.controls)
@@ -61,20 +61,22 @@ def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuesti
     if name in asked.controls:
         raise InvalidField(f"controls/{name}", f"given, and {field} the grid too; expected one")
     room = asked.margin * (control.maximum - control.minimum)
-    return Axis(control, np.linspace(control.minimum - room, control.maximum + room, count))
+    return GridAxis(control, np.linspace(control.minimum - room, control.maximum + room, count))
 
 
 def _fixed(card: ModelCard, asked: SigmaQuestion) -> dict[str, float]:
     """Return the values of the controls that are not axes, in the card's order."""
     usual = {control.name: control.default for control in card.controls} | dict(asked.controls)
     return {
-        control.name: question_validation.checked(control, usual[control.name])
+        control.name: question_validation.check_control(control, usual[control.name])
         for control in card.controls
         if control.name not in (asked.across, asked.along)
     }
 
 
-def _points(card: ModelCard, across: Axis, along: Axis, fixed: Mapping[str, float]) -> Floats:
+def _points(
+    card: ModelCard, across: GridAxis, along: GridAxis, fixed: Mapping[str, float]
+) -> Floats:
     """Return the controls (R C, d) of the grid points in the card's order, row by row."""
     right, up = np.meshgrid(across.values, along.values)
     columns = {across.control.name: right.ravel(), along.control.name: up.ravel()}
@@ -82,6 +84,6 @@ def _points(card: ModelCard, across: Axis, along: Axis, fixed: Mapping[str, floa
     return np.stack(list(full), axis=1)
 
 
-def _inside(card: ModelCard, points: Floats) -> Truths:
-    low, high = np.transpose([input_limits.sampled(control) for control in card.controls])
+def _inside(card: ModelCard, points: Floats) -> Booleans:
+    low, high = np.transpose([input_limits.sampled_range(control) for control in card.controls])
     return np.all((points >= low) & (points <= high), axis=1)

@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from posefield.common.errors import OutOfReach, OutsideSamples
-from posefield.constraints.constrained_motion import Held
-from posefield.constraints.constraint_solver import Keeper
-from posefield.constraints.targets import Goals
+from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.constraint_solver import ConstraintSolver
+from posefield.constraints.targets import ConstraintSet
 from posefield.inference.named_model import NamedModel
-from posefield.question.motion_question import MotionQuestion, Policy
-from posefield.question.results import Met, Trust
+from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion
+from posefield.question.results import ConstraintResult, Trust
 from posefield.validation import input_limits
-from posefield.validation.question_validation import Door, Question
+from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
 MICROMETRES = 6
 """Decimals of a length in metres."""
@@ -23,14 +23,14 @@ class Synthesizer(NamedModel):
     """A named model, from which `poses`, `clips` and others compute answers."""
 
     @cached_property
-    def keeper(self) -> Keeper:
+    def solver(self) -> ConstraintSolver:
         """Constraint solver of this model."""
-        return Keeper(self.session)
+        return ConstraintSolver(self.session)
 
     @cached_property
-    def door(self) -> Door:
+    def validator(self) -> QuestionValidator:
         """Validation of questions for one character."""
-        return Door(self.session.card)
+        return QuestionValidator(self.session.card)
 
     @cached_property
     def exact_levels(self) -> dict[int, bool]:
@@ -40,41 +40,45 @@ class Synthesizer(NamedModel):
     @cached_property
     def durations(self) -> tuple[float, float]:
         """Shortest and longest plausible duration, s."""
-        return input_limits.durations(self.session.card)
+        return input_limits.duration_range(self.session.card)
 
-    def question(self, asked: MotionQuestion) -> Question:
+    def question(self, asked: MotionQuestion) -> ValidatedQuestion:
         """Return the validated question; open controls are conditional means.
 
         The means are conditional on the given controls and the targets. Raises InvalidField and
         OutsideSamples as the validation does.
         """
         policy, who, level = asked.extrapolate, asked.performer, asked.level
-        given = self.door.question(asked.controls, policy, who, level)
-        found = self.keeper.controls(given, asked, self.door.chooser)
+        given = self.validator.question(asked.controls, policy, who, level)
+        found = self.solver.controls(given, asked, self.validator.imputer)
         if found is None:
             return given
-        every = self.door.question(found, policy, who, level)
+        every = self.validator.question(found, policy, who, level)
         return replace(every, inferred=given.inferred)
 
-    def meeting(self, question: Question, goals: Goals, extrapolate: Policy) -> Held:
+    def solve_constraints(
+        self, question: ValidatedQuestion, goals: ConstraintSet, extrapolate: ExtrapolationPolicy
+    ) -> ConstrainedMotion:
         """Return the motion that meets its targets.
 
         Raises OutOfReach for a missed target if `extrapolate` is "refuse".
         """
-        held = self.keeper.held(question, goals)
+        held = self.solver.solve(question, goals)
         if extrapolate == "refuse":
-            refuse(goals, held.met)
+            check_targets(goals, held.results)
         return held
 
-    def sensible(self, duration: float) -> float:
+    def check_duration(self, duration: float) -> float:
         """Return the duration, s; OutsideSamples if extrapolation makes it implausible."""
         low, high = self.durations
         if not low <= duration <= high:
-            raise OutsideSamples("controls", input_limits.senseless(self.session.card, duration))
+            raise OutsideSamples(
+                "controls", input_limits.implausible_duration(self.session.card, duration)
+            )
         return duration
 
     def trust(
-        self, asked: MotionQuestion, question: Question, duration: float, sigma: float
+        self, asked: MotionQuestion, question: ValidatedQuestion, duration: float, sigma: float
     ) -> Trust:
         """Return the trust of an answer with this duration, s, and sigma, m."""
         who = question.performer
@@ -94,34 +98,36 @@ class Synthesizer(NamedModel):
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
         )
 
-    def held_trust(self, asked: MotionQuestion, question: Question, held: Held) -> Trust:
+    def constrained_trust(
+        self, asked: MotionQuestion, question: ValidatedQuestion, held: ConstrainedMotion
+    ) -> Trust:
         """Return the trust of a constrained answer, with the errors of its targets."""
         own = self.trust(asked, question, held.duration, held.state.sigma)
-        measured = self.keeper.measured(question, held)
-        said = () if asked.extrapolate == "ok" else sentences(held.met)
+        measured = self.solver.measured(question, held)
+        said = () if asked.extrapolate == "ok" else miss_warnings(held.results)
         warnings = (*own.warnings, *said)
-        return replace(own, warnings=warnings, measured=measured, targets=held.met)
+        return replace(own, warnings=warnings, measured=measured, targets=held.results)
 
 
-def sentences(met: Sequence[Met]) -> tuple[str, ...]:
+def miss_warnings(met: Sequence[ConstraintResult]) -> tuple[str, ...]:
     """Return a sentence for each constraint that is not met."""
-    return tuple(_sentence(each) for each in met if not each.reached)
+    return tuple(_miss_warning(each) for each in met if not each.reached)
 
 
-def refuse(goals: Goals, met: Sequence[Met]) -> None:
+def check_targets(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> None:
     """Raise OutOfReach, which names the first, if a constraint is not met."""
-    for field, each in zip(_fields(goals, met), met, strict=True):
+    for field, each in zip(_constraint_fields(goals, met), met, strict=True):
         if not each.reached:
-            raise OutOfReach(field, "; ".join(sentences(met)))
+            raise OutOfReach(field, "; ".join(miss_warnings(met)))
 
 
-def _fields(goals: Goals, met: Sequence[Met]) -> Iterator[str]:
+def _constraint_fields(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> Iterator[str]:
     """Yield the field of each constraint in the question; controls precede targets."""
     first = len(met) - len(goals.targets)
     for index, each in enumerate(met):
         yield f"controls/{each.what}" if index < first else f"targets/{index - first}"
 
 
-def _sentence(met: Met) -> str:
+def _miss_warning(met: ConstraintResult) -> str:
     miss = f"{100.0 * met.miss:.1f} cm" if met.unit == "m" else f"{met.miss:.3g} {met.unit}"
     return f"{met.what} stays {miss} from its target: out of reach"

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats, Indices, Singles, Truths
-from posefield.inference.level_selection import FARTHEST, View
+from posefield.common.units import Booleans, Floats, Indices, Singles
+from posefield.inference.level_selection import MAX_COORDINATE, LevelCriteria
 from posefield.motion.crowd_clip import Placement
-from posefield.question.motion_question import Policy, Root
+from posefield.question.motion_question import ExtrapolationPolicy, RootMode
 from posefield.validation import input_limits
 
 
@@ -39,9 +39,9 @@ class CrowdQuestion:
     placement: Placement
     performers: tuple[str | None, ...]
     performer: Indices
-    detail: Indices | View
-    root: Root
-    extrapolate: Policy
+    detail: Indices | LevelCriteria
+    root: RootMode
+    extrapolate: ExtrapolationPolicy
     blending: "Blending | None" = None
 
     def __post_init__(self) -> None:
@@ -49,8 +49,8 @@ class CrowdQuestion:
             if len(column) != len(self):
                 raise InvalidField(field, f"{len(column)} characters, expected {len(self)}")
             _check(field, column, np.isfinite(column), "a finite number")
-        near = np.abs(self.placement.positions) <= FARTHEST
-        _check("position", self.placement.positions, near, f"at most {FARTHEST:g} m")
+        near = np.abs(self.placement.positions) <= MAX_COORDINATE
+        _check("position", self.placement.positions, near, f"at most {MAX_COORDINATE:g} m")
         if self.blending is not None:
             shares = self.blending.shares
             _check("blend", shares, (shares >= 0.0) & (shares <= 1.0), "0 to 1")
@@ -59,8 +59,8 @@ class CrowdQuestion:
         return len(self.times)
 
     def _columns(self) -> dict[str, Floats | Indices]:
-        seen = isinstance(self.detail, View)
-        levels = self.detail.previous if isinstance(self.detail, View) else self.detail
+        seen = isinstance(self.detail, LevelCriteria)
+        levels = self.detail.previous if isinstance(self.detail, LevelCriteria) else self.detail
         own = self.blending
         return {
             **{f"controls/{name}": values for name, values in self.controls.items()},
@@ -75,7 +75,7 @@ class CrowdQuestion:
 
 def check_levels(question: CrowdQuestion, count: int) -> None:
     """Raise InvalidField for the first character with a level outside 0 to count - 1."""
-    if isinstance(question.detail, View):
+    if isinstance(question.detail, LevelCriteria):
         field, levels = "previous_level", question.detail.previous
     else:
         field, levels = "level", question.detail
@@ -97,13 +97,13 @@ def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:
         if name is not None and name not in known:
             first = int(np.argmax(question.performer == index))
             raise InvalidField(
-                "performer", f"{name!r}, expected {input_limits.known(known)}", first
+                "performer", f"{name!r}, expected {input_limits.accepted_names(known)}", first
             )
     rows = [[name == other for other in known] for name in question.performers]
     return np.array(rows, dtype=np.float32)[question.performer]
 
 
-def _check(field: str, column: Floats | Indices, good: Truths, expected: str) -> None:
+def _check(field: str, column: Floats | Indices, good: Booleans, expected: str) -> None:
     """Raise InvalidField for the first character with an entry of `good` (N, ...) that is false."""
     bad = np.flatnonzero(~good.reshape(len(column), -1).all(axis=1))
     if len(bad):

@@ -3,16 +3,16 @@
 import numpy as np
 
 from posefield.common.errors import InvalidField, OutsideSamples
-from posefield.common.units import Floats, Indices, Singles, Truths
+from posefield.common.units import Booleans, Floats, Indices, Singles
 from posefield.kriging.support import Support
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.validation import input_limits, question_validation
 from posefield.validation.crowd_question import CrowdQuestion
 
 
-def controls(
+def check_controls(
     card: ModelCard, support: Support, question: CrowdQuestion
-) -> tuple[Floats, Truths, tuple[str, ...]]:
+) -> tuple[Floats, Booleans, tuple[str, ...]]:
     """Return controls (N, d) in the card's order, the support flags (N,), and warnings.
 
     Warnings name each control with values outside the sampled range, and points in a gap between
@@ -22,10 +22,12 @@ def controls(
     input_limits.check_names(card, question.controls)
     columns = [_column(control, question) for control in card.controls]
     points = np.stack(columns, axis=1)
-    supported = support.holds(points)
+    supported = support.supported(points)
     pairs = zip(card.controls, columns, strict=True)
-    found = [_outside(question, *pair) for pair in pairs]
-    found.append(_gap(card, support, question, points[~supported], np.flatnonzero(~supported)))
+    found = [_range_warning(question, *pair) for pair in pairs]
+    found.append(
+        _gap_warning(card, support, question, points[~supported], np.flatnonzero(~supported))
+    )
     said = tuple(filter(None, found)) if question.extrapolate == "warn" else ()
     return points, supported, said
 
@@ -39,19 +41,19 @@ def _column(control: Control, question: CrowdQuestion) -> Floats:
             f"missing; give numbers in {control.unit}, sampled from {low:g} to {high:g}",
         )
     values = question.controls[control.name]
-    least, most = input_limits.reach(control)
+    least, most = input_limits.accepted_range(control)
     far = (values < least) | (values > most)
     expected = f"{control.unit}, expected {least:g} to {most:g} {control.unit}"
-    refuse(field, values, far, expected)
+    raise_for_first(field, values, far, expected)
     return values
 
 
-def _outside(question: CrowdQuestion, control: Control, values: Floats) -> str | None:
+def _range_warning(question: CrowdQuestion, control: Control, values: Floats) -> str | None:
     """Return the warning for values of a control outside the sampled range, or None.
 
     Raises OutsideSamples instead where `extrapolate` is "refuse".
     """
-    low, high = input_limits.sampled(control)
+    low, high = input_limits.sampled_range(control)
     beyond = (values < low) | (values > high)
     if not beyond.any():
         return None
@@ -66,7 +68,7 @@ def _outside(question: CrowdQuestion, control: Control, values: Floats) -> str |
     return said
 
 
-def _gap(
+def _gap_warning(
     card: ModelCard, support: Support, question: CrowdQuestion, points: Floats, who: Indices
 ) -> str | None:
     """Return the warning for unsupported points (U, d) within the sampled ranges, or None.
@@ -74,20 +76,20 @@ def _gap(
     who: their characters' indices (U,). Raises OutsideSamples instead where `extrapolate` is
     "refuse".
     """
-    low, high = np.transpose([input_limits.sampled(control) for control in card.controls])
+    low, high = np.transpose([input_limits.sampled_range(control) for control in card.controls])
     inside = np.all((points >= low) & (points <= high), axis=1)
     if not inside.any():
         return None
     first = int(who[inside][0])
     variance = float(support.variance(points[inside][:1])[0])
     count = f"{np.count_nonzero(inside)} characters; the first, character {first}, lies"
-    said = question_validation.gap(count, variance, support.limit)
+    said = question_validation.gap_warning(count, variance, support.limit)
     if question.extrapolate == "refuse":
         raise OutsideSamples("controls", said, first)
     return said
 
 
-def refuse(field: str, values: Floats, bad: Truths, expected: str) -> None:
+def raise_for_first(field: str, values: Floats, bad: Booleans, expected: str) -> None:
     """Raise InvalidField for the first character whose entry of `bad` (N,) is true."""
     if bad.any():
         first = int(np.argmax(bad))
@@ -108,8 +110,10 @@ def check_times(times: Floats, durations: Singles, slack: Floats) -> None:
 
 def check_durations(card: ModelCard, durations: Singles) -> None:
     """Raise OutsideSamples for the first character with an implausible duration, s."""
-    low, high = input_limits.durations(card)
+    low, high = input_limits.duration_range(card)
     senseless = ~((durations >= low) & (durations <= high))
     if senseless.any():
         first = int(np.argmax(senseless))
-        raise OutsideSamples("controls", input_limits.senseless(card, durations[first]), first)
+        raise OutsideSamples(
+            "controls", input_limits.implausible_duration(card, durations[first]), first
+        )

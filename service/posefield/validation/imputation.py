@@ -11,7 +11,7 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Control, ModelCard
 
-SHRUNK = 0.1
+SHRINKAGE = 0.1
 """Shrinkage of the correlations: few samples correlate by chance. On left-out samples of three
 families, the best shares are 0.1 to 0.4, and the error hardly depends on the share.
 """
@@ -20,7 +20,7 @@ DIGITS = 6
 
 
 @dataclass(frozen=True)
-class Typical:
+class ConditionalGaussian:
     """Gaussian fitted to samples, in units of each column's standard deviation.
 
     mean, deviation: (k,). correlation: (k, k).
@@ -42,7 +42,7 @@ class Typical:
         return row
 
 
-def fit(samples: Floats, shrunk: float = SHRUNK) -> Typical:
+def fit_gaussian(samples: Floats, shrunk: float = SHRINKAGE) -> ConditionalGaussian:
     """Return the Gaussian of samples (n, k), with off-diagonal correlations reduced by `shrunk`."""
     mean = samples.mean(axis=0)
     deviation = samples.std(axis=0)
@@ -51,41 +51,41 @@ def fit(samples: Floats, shrunk: float = SHRUNK) -> Typical:
     correlation = (1.0 - shrunk) * (apart.T @ apart) / len(samples)
     # A constant column must neither inform other columns nor make the matrix singular.
     np.fill_diagonal(correlation, 1.0)
-    return Typical(mean, deviation, correlation)
+    return ConditionalGaussian(mean, deviation, correlation)
 
 
-class Chooser:
+class ControlImputer:
     """Imputation of a model's controls that a question leaves open."""
 
     def __init__(self, card: ModelCard) -> None:
         self._controls = card.controls
         self._samples = np.hstack([np.array(card.examples), card.labels])
-        self._typical = fit(self._samples)
+        self._gaussian = fit_gaussian(self._samples)
 
-    def fill_seen(
+    def impute_with_measures(
         self, given: Mapping[str, float], labels: Floats, seen: Floats, wanted: Floats
     ) -> dict[str, float]:
-        """Return all controls as `fill` does, conditional also on further measured quantities.
+        """Return all controls as `impute` does, conditional also on further measured quantities.
 
         seen: their values for the captured clips (n, m). wanted: their target values (m,).
         """
         start = self._samples.shape[1]
-        typical = fit(np.hstack([self._samples, seen]))
+        typical = fit_gaussian(np.hstack([self._samples, seen]))
         beside = {start + i: float(value) for i, value in enumerate(wanted)}
-        return self._fill(typical, given, labels, beside)
+        return self._impute(typical, given, labels, beside)
 
-    def fill(self, given: Mapping[str, float], labels: Floats) -> dict[str, float]:
+    def impute(self, given: Mapping[str, float], labels: Floats) -> dict[str, float]:
         """Return all controls in the card's order, those not given as their conditional mean.
 
         labels (1, p): of the performer, on whom the mean is conditional as well; all zero for none.
         A discrete control takes the nearest sampled value before the others are computed; every
         imputed control is limited to its sampled range.
         """
-        return self._fill(self._typical, given, labels, {})
+        return self._impute(self._gaussian, given, labels, {})
 
-    def _fill(
+    def _impute(
         self,
-        typical: Typical,
+        typical: ConditionalGaussian,
         given: Mapping[str, float],
         labels: Floats,
         beside: dict[int, float],
@@ -99,7 +99,7 @@ class Chooser:
         known |= {i: _nearest(self._controls[i].values, row[i]) for i in steps}
         row = typical(known | beside)
         return {
-            control.name: known[i] if i in known else _within(control, row[i])
+            control.name: known[i] if i in known else _round_and_clip(control, row[i])
             for i, control in enumerate(self._controls)
         }
 
@@ -108,7 +108,7 @@ def _nearest(values: Sequence[float], value: float) -> float:
     return min(values, key=lambda one: abs(one - value))
 
 
-def _within(control: Control, value: float) -> float:
+def _round_and_clip(control: Control, value: float) -> float:
     """Return the value rounded to DIGITS and limited to the sampled range."""
     short = float(f"{value:.{DIGITS}g}")
     return min(max(short, control.minimum), control.maximum)

@@ -6,18 +6,20 @@ from posefield.common.errors import InvalidField
 from posefield.model_file.model_card import Control, ModelCard
 
 # A clip this many times longer or shorter than any captured one is no plausible motion.
-FARTHEST = 10.0
+DURATION_FACTOR = 10.0
 
 
 def check_names(card: ModelCard, names: Iterable[str]) -> None:
     """Raise InvalidField for the first name that is not a control of the model."""
     for name in names:
         if card.control(name) is None:
-            known = ", ".join(c.name for c in card.controls)
-            raise InvalidField(f"controls/{name}", f"no such control; this model has {known}")
+            accepted_names = ", ".join(c.name for c in card.controls)
+            raise InvalidField(
+                f"controls/{name}", f"no such control; this model has {accepted_names}"
+            )
 
 
-def reach(control: Control) -> tuple[float, float]:
+def accepted_range(control: Control) -> tuple[float, float]:
     """Return the lowest and the highest accepted value of a control.
 
     The limits prevent overflow of float32.
@@ -26,7 +28,7 @@ def reach(control: Control) -> tuple[float, float]:
     return control.minimum - room, control.maximum + room
 
 
-def sampled(control: Control) -> tuple[float, float]:
+def sampled_range(control: Control) -> tuple[float, float]:
     """Return the lowest and the highest sampled value of a control.
 
     A slack of a millionth of the range allows for rounding of values that a client read from the
@@ -36,13 +38,13 @@ def sampled(control: Control) -> tuple[float, float]:
     return control.minimum - slack, control.maximum + slack
 
 
-def durations(card: ModelCard) -> tuple[float, float]:
+def duration_range(card: ModelCard) -> tuple[float, float]:
     """Return the shortest and the longest plausible duration of a clip, s."""
     low, high = card.durations
-    return low / FARTHEST, high * FARTHEST
+    return low / DURATION_FACTOR, high * DURATION_FACTOR
 
 
-def senseless(card: ModelCard, duration: float) -> str:
+def implausible_duration(card: ModelCard, duration: float) -> str:
     """Return the message for controls that lead to an implausible duration, s."""
     low, high = card.durations
     return (
@@ -51,6 +53,6 @@ def senseless(card: ModelCard, duration: float) -> str:
     )
 
 
-def known(performers: tuple[str, ...]) -> str:
+def accepted_names(performers: tuple[str, ...]) -> str:
     """Return the accepted performers as text for a message."""
     return f"one of {', '.join(performers)}" if performers else "none: this model knows none"

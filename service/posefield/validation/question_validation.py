@@ -11,13 +11,13 @@ from posefield.common.units import Floats
 from posefield.kriging import support
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.question import value_validation
-from posefield.question.motion_question import Policy
+from posefield.question.motion_question import ExtrapolationPolicy
 from posefield.validation import input_limits
-from posefield.validation.imputation import Chooser
+from posefield.validation.imputation import ControlImputer
 
 
 @dataclass(frozen=True)
-class Question:
+class ValidatedQuestion:
     """A validated question.
 
     controls: all controls in the card's order. performer: name, None for an unseen performer.
@@ -36,19 +36,25 @@ class Question:
     inferred: tuple[str, ...] = ()
 
 
-class Door:
+class QuestionValidator:
     """Validation of the questions to one model."""
 
     def __init__(self, card: ModelCard) -> None:
         self._card = card
-        self._ranges = [(control.name, *input_limits.sampled(control)) for control in card.controls]
+        self._ranges = [
+            (control.name, *input_limits.sampled_range(control)) for control in card.controls
+        ]
         self._names = {control.name for control in card.controls}
-        self._nobody = labels(card.performers, None)
-        self.support = support.of(np.array(card.examples))
+        self._unseen_labels = labels(card.performers, None)
+        self.support = support.fit_support(np.array(card.examples))
 
     def question(
-        self, controls: Mapping[str, float], extrapolate: Policy, performer: str | None, level: int
-    ) -> Question:
+        self,
+        controls: Mapping[str, float],
+        extrapolate: ExtrapolationPolicy,
+        performer: str | None,
+        level: int,
+    ) -> ValidatedQuestion:
         """Return the validated question; controls that are not given are the conditional mean.
 
         The mean is conditional on the given controls and the performer. Raises InvalidField for a
@@ -57,58 +63,62 @@ class Door:
         """
         if not controls.keys() <= self._names:
             input_limits.check_names(self._card, controls)
-        own = self._nobody if performer is None else labels(self._card.performers, performer)
+        own = self._unseen_labels if performer is None else labels(self._card.performers, performer)
         coarsest = len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
-        plain = self._plain(controls)
-        every = controls if plain else self._every(controls, own)
+        plain = self._is_within_ranges(controls)
+        every = controls if plain else self._complete_controls(controls, own)
         # Equal questions have equal bytes: controls in the card's order, and 0 for -0.
         given = {name: float(every[name]) + 0.0 for name, _, _ in self._ranges}
         point = list(given.values())
-        found = () if plain else outside(self._card.controls, point)
-        supported = self.support.held(point)
-        warnings = () if supported and not found else self._said(extrapolate, found, point)
+        found = () if plain else range_warnings(self._card.controls, point)
+        supported = self.support.is_supported(point)
+        warnings = (
+            ()
+            if supported and not found
+            else self._extrapolation_warnings(extrapolate, found, point)
+        )
         inferred = tuple(name for name in given if name not in controls)
         array = np.array([point])
-        return Question(given, performer, level, array, own, warnings, supported, inferred)
+        return ValidatedQuestion(given, performer, level, array, own, warnings, supported, inferred)
 
-    def _plain(self, controls: Mapping[str, float]) -> bool:
+    def _is_within_ranges(self, controls: Mapping[str, float]) -> bool:
         """Return whether all controls are floats within the sampled ranges: the fast path."""
         if controls.keys() != self._names:
             return False
         values = ((controls[name], low, high) for name, low, high in self._ranges)
         return all(type(value) is float and low <= value <= high for value, low, high in values)
 
-    def _every(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
+    def _complete_controls(self, controls: Mapping[str, float], own: Floats) -> Mapping[str, float]:
         """Return all controls: the given ones checked, the others as conditional means."""
         given = {
-            control.name: checked(control, controls[control.name])
+            control.name: check_control(control, controls[control.name])
             for control in self._card.controls
             if control.name in controls
         }
-        return given if len(given) == len(self._names) else self.chooser.fill(given, own)
+        return given if len(given) == len(self._names) else self.imputer.impute(given, own)
 
     @cached_property
-    def chooser(self) -> Chooser:
+    def imputer(self) -> ControlImputer:
         """Conditional means for controls that are not given."""
-        return Chooser(self._card)
+        return ControlImputer(self._card)
 
-    def _said(
-        self, extrapolate: Policy, found: tuple[str, ...], point: Sequence[float]
+    def _extrapolation_warnings(
+        self, extrapolate: ExtrapolationPolicy, found: tuple[str, ...], point: Sequence[float]
     ) -> tuple[str, ...]:
         """Return warnings for controls outside the sampled ranges or in a gap between samples.
 
         found: warnings for the ranges. Raises OutsideSamples where `extrapolate` is "refuse".
         """
-        said = found or (self._gap(point),)
+        said = found or (self._gap_warning(point),)
         if extrapolate == "refuse":
             raise OutsideSamples("controls", "; ".join(said))
         return said if extrapolate == "warn" else ()
 
-    def _gap(self, point: Sequence[float]) -> str:
+    def _gap_warning(self, point: Sequence[float]) -> str:
         variance = float(self.support.variance(np.array([point]))[0])
-        return gap("these controls lie", variance, self.support.limit)
+        return gap_warning("these controls lie", variance, self.support.limit)
 
 
 def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
@@ -117,28 +127,30 @@ def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
     Raises InvalidField for a name that is not among the performers.
     """
     if asked is not None and asked not in performers:
-        raise InvalidField("performer", f"{asked!r}, expected {input_limits.known(performers)}")
+        raise InvalidField(
+            "performer", f"{asked!r}, expected {input_limits.accepted_names(performers)}"
+        )
     return np.array([[float(name == asked) for name in performers]])
 
 
-def checked(control: Control, given: float) -> float:
+def check_control(control: Control, given: float) -> float:
     """Return the value of a control; InvalidField if it is not a number or out of range."""
     field = f"controls/{control.name}"
-    value = value_validation.number(field, given)
-    value_validation.within(field, value, *input_limits.reach(control), control.unit)
+    value = value_validation.check_number(field, given)
+    value_validation.check_range(field, value, *input_limits.accepted_range(control), control.unit)
     return value
 
 
-def outside(controls: Sequence[Control], point: Sequence[float]) -> tuple[str, ...]:
+def range_warnings(controls: Sequence[Control], point: Sequence[float]) -> tuple[str, ...]:
     """Return a warning for each control whose value is outside its sampled range.
 
     point: values (d,) in the order of the controls.
     """
-    found = (_outside(control, value) for control, value in zip(controls, point, strict=True))
+    found = (_range_warning(control, value) for control, value in zip(controls, point, strict=True))
     return tuple(filter(None, found))
 
 
-def gap(who: str, variance: float, limit: float) -> str:
+def gap_warning(who: str, variance: float, limit: float) -> str:
     """Return the warning for controls in a gap between the captured clips.
 
     who: subject of the sentence. variance, limit: kriging variance there, and its largest value
@@ -150,8 +162,8 @@ def gap(who: str, variance: float, limit: float) -> str:
     )
 
 
-def _outside(control: Control, value: float) -> str | None:
-    low, high = input_limits.sampled(control)
+def _range_warning(control: Control, value: float) -> str | None:
+    low, high = input_limits.sampled_range(control)
     if low <= value <= high:
         return None
     return (

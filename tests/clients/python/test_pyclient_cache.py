@@ -320,7 +320,7 @@ def test_the_real_service_says_that_nothing_changed(address, controls, tmp_path)
 
 @pytest.mark.system
 def test_a_key_of_the_real_service_sees_its_own(models):
-    one, two = api_keys.make(), api_keys.make()
+    one, two = api_keys.generate_key(), api_keys.generate_key()
     told = ";".join(
         [api_keys.line("one", ["read:*"], one), api_keys.line("two", ["read:walk"], two)]
     )

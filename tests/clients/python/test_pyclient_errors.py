@@ -19,7 +19,7 @@ from scripted import Pause, answer, chunked
 from posefield.common.errors import UnknownModel
 from posefield.http.access import api_keys
 from posefield.http.api import problems
-from posefield.http.api.problems import KINDS
+from posefield.http.api.problems import PROBLEM_KINDS
 from posefield.http.pages import problems_page as page
 
 LIST = b'{"models": []}'
@@ -54,16 +54,16 @@ def raised_later(address, ask=lambda client: client.models(), **given):
 
 
 def refusal(kind):
-    content = json.dumps(page.example(kind)).encode()
+    content = json.dumps(page.problem_example(kind)).encode()
     return answer(content, problems.MEDIA_TYPE, kind.status)
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", PROBLEM_KINDS, ids=lambda kind: kind.name)
 def test_every_kind_of_problem_is_a_class_of_its_own(kind):
     version = answer(json.dumps({"contract": CONTRACT}).encode())
     with scripted.serving(refusal(kind), version) as server:
         fault = raised(server.address)
-    said = page.example(kind)
+    said = page.problem_example(kind)
     assert type(fault) is Problem.kinds[kind.name]
     assert type(fault).__name__.lower() == kind.name.replace("-", "")
     assert (fault.kind, fault.status) == (kind.name, kind.status)
@@ -74,11 +74,14 @@ def test_every_kind_of_problem_is_a_class_of_its_own(kind):
 
 
 def test_there_are_no_classes_of_kinds_that_are_not():
-    assert set(Problem.kinds) == {kind.name for kind in KINDS}
+    assert set(Problem.kinds) == {kind.name for kind in PROBLEM_KINDS}
 
 
 def test_a_kind_that_is_newer_than_the_client_is_a_problem():
-    said = page.example(KINDS[0]) | {"type": "urn:posefield:problem:moon-too-full", "phase": 0.5}
+    said = page.problem_example(PROBLEM_KINDS[0]) | {
+        "type": "urn:posefield:problem:moon-too-full",
+        "phase": 0.5,
+    }
     with scripted.serving(answer(json.dumps(said).encode(), problems.MEDIA_TYPE, 400)) as server:
         fault = raised(server.address)
     assert type(fault) is Problem
@@ -92,7 +95,7 @@ def test_the_tree_is_drawn_in_the_head_of_the_module():
 
 def test_what_can_help_to_ask_again_is_asked_again():
     again = {each.__name__ for each in subclasses(PosefieldError) if each.again}
-    busy = {kind.name.replace("-", "") for kind in problems.OF_LOAD} | {"busy"}
+    busy = {kind.name.replace("-", "") for kind in problems.LOAD_PROBLEMS} | {"busy"}
     network = {"unreachable", "timedout", "broken", "incompleteanswer"}
     assert {name.lower() for name in again} == busy | network
 
@@ -131,7 +134,7 @@ def test_the_service_itself_is_understood(ask, kind, address, controls):
 
 @pytest.mark.system
 def test_a_service_that_wants_keys(models):
-    key, other = api_keys.make(), api_keys.make()
+    key, other = api_keys.generate_key(), api_keys.generate_key()
     told = api_keys.line("one", ["read:walk"], key)
     with serving.process(models, POSEFIELD_KEYS=told) as child:
         place = serving.address(child)
@@ -255,7 +258,10 @@ def test_an_answer_of_another_version_says_of_which(said):
     ("said", "kind"),
     [
         (b'{"title": "Busy"}', errors.Unreachable),
-        (json.dumps(page.example(KINDS[0]) | {"type": "about:blank"}).encode(), errors.Busy),
+        (
+            json.dumps(page.problem_example(PROBLEM_KINDS[0]) | {"type": "about:blank"}).encode(),
+            errors.Busy,
+        ),
     ],
 )
 def test_a_gateways_own_problem_is_asked_again(said, kind, status):
@@ -337,7 +343,7 @@ def test_a_path_that_an_older_service_does_not_have_is_noted():
 
 def test_errors_travel_between_processes():
     version = answer(b'{"contract": "9.1.0"}')
-    with scripted.serving(refusal(KINDS[0]), answer(b"{}"), version) as server:
+    with scripted.serving(refusal(PROBLEM_KINDS[0]), answer(b"{}"), version) as server:
         for fault in (raised(server.address), raised(server.address)):
             again = pickle.loads(pickle.dumps(fault))
             assert type(again) is type(fault)
@@ -345,7 +351,7 @@ def test_errors_travel_between_processes():
 
 
 def test_a_model_that_disappears(address, controls):
-    gone = refusal(problems.TABLE[UnknownModel])
+    gone = refusal(problems.QUERY_ERROR_PROBLEMS[UnknownModel])
     with scripted.serving(gone) as server:
         fault = raised(server.address, lambda client: client.model("reach").pose(0, **controls))
     assert type(fault) is errors.UnknownModel

@@ -73,7 +73,7 @@ def positions(client, path, question):
     rotations, roots, offsets = arrays.values()
     local = np.broadcast_to(offsets, (*rotations.shape[:-1], 3)).copy()
     local[:, 0] = roots
-    return skeleton.forward(parents, rotations, local)[0].tolist()
+    return skeleton.forward_kinematics(parents, rotations, local)[0].tolist()
 
 
 _ARRAYS = ("rotations", "root_position", "bone_offsets")

@@ -8,9 +8,9 @@ import pytest
 @pytest.fixture(scope="session")
 def steps():
     """Training steps with their times."""
-    from posefield_train.report.provenance import Step
+    from posefield_train.report.provenance import TrainingStep
 
-    return (Step("reading <recipe>", 0.25), Step("fitting the fields", 1.5))
+    return (TrainingStep("reading <recipe>", 0.25), TrainingStep("fitting the fields", 1.5))
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +31,7 @@ def alternatives(small_recipe, trained, exported):
     """Alternatives to the small model's levels of detail."""
     from posefield_train.report import levels_of_detail
 
-    return levels_of_detail.alternatives(small_recipe, trained, exported.card)
+    return levels_of_detail.build_alternatives(small_recipe, trained, exported.card)
 
 
 @pytest.fixture(scope="session")
@@ -39,7 +39,7 @@ def levels(exported, alternatives):
     """The small model's levels of detail, measured once."""
     from posefield_train.report import levels_of_detail
 
-    return levels_of_detail.of(exported, alternatives)
+    return levels_of_detail.time_levels(exported, alternatives)
 
 
 @pytest.fixture(scope="session")

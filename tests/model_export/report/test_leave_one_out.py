@@ -28,14 +28,16 @@ def predicted(trained, kept, clip):
 
 @pytest.fixture(scope="module", params=["worst", "first", "last"])
 def clip(request, trained):
-    return {"worst": int(np.argmax(trained.missed)), "first": 0, "last": len(trained.missed) - 1}[
-        request.param
-    ]
+    return {
+        "worst": int(np.argmax(trained.left_out_errors)),
+        "first": 0,
+        "last": len(trained.left_out_errors) - 1,
+    }[request.param]
 
 
 def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
     everyone = np.arange(len(trained.examples))
-    found = left_out_clips.motion(trained, clip)
+    found = left_out_clips.predicted_motion(trained, clip)
     alone = predicted(trained, everyone[everyone != clip], clip)
     assert np.abs(found - alone).max() < ROUNDING
     # Negative control: with the clip itself the prediction is another.
@@ -46,23 +48,29 @@ def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
 
 
 def test_its_distance_from_the_capture_is_what_training_measured(trained, clip):
-    gap = trained.tensor.values[:, :, clip] - left_out_clips.motion(trained, clip)
+    gap = trained.tensor.values[:, :, clip] - left_out_clips.predicted_motion(trained, clip)
     frames = gap.shape[1]
-    assert np.sum(gap**2) / (trained.tensor.weight * frames) == pytest.approx(trained.missed[clip])
+    assert np.sum(gap**2) / (trained.tensor.weight * frames) == pytest.approx(
+        trained.left_out_errors[clip]
+    )
 
 
 def test_the_body_drawn_as_captured_is_the_aligned_clip(trained, clip):
     offsets = np.stack([example.offsets for example in trained.examples])
-    expected = time_alignment.positions(trained.aligned, trained.skeleton.parents, offsets)[clip]
-    body = left_out_clips.body(trained, clip, trained.tensor.values[:, :, clip])
+    expected = time_alignment.joint_positions(trained.aligned, trained.skeleton.parents, offsets)[
+        clip
+    ]
+    body = left_out_clips.body_motion(trained, clip, trained.tensor.values[:, :, clip])
     assert np.abs(body.joints - expected).max() < ROUNDING
-    guess = left_out_clips.body(trained, clip, left_out_clips.motion(trained, clip))
+    guess = left_out_clips.body_motion(
+        trained, clip, left_out_clips.predicted_motion(trained, clip)
+    )
     assert np.abs(guess.joints - expected).max() > SEEN
 
 
 def test_end_sites_keep_their_distance_from_their_joints(trained, clip):
     own = trained.examples[clip].clip.skeleton
-    body = left_out_clips.body(trained, clip, left_out_clips.motion(trained, clip))
+    body = left_out_clips.body_motion(trained, clip, left_out_clips.predicted_motion(trained, clip))
     bones = np.linalg.norm(body.tips - body.joints[:, list(own.tip_joints)], axis=-1)
     assert np.abs(bones - np.linalg.norm(own.tip_offsets, axis=-1)).max() < ROUNDING
 
@@ -71,16 +79,16 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
     """Over the family, whose poses the metric is averaged over, within five per cent; a single clip
     may be a third off, for its joints hang otherwise than the family's do on average."""
     clips = range(len(trained.examples))
-    drawn = np.array([drawn_clips.compare(trained, clip).apart for clip in clips])
-    missed = np.sqrt(trained.missed)
+    drawn = np.array([drawn_clips.compare_clip(trained, clip).apart for clip in clips])
+    missed = np.sqrt(trained.left_out_errors)
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.sqrt(np.mean(missed**2)), rel=0.05)
     assert np.abs(drawn / missed - 1.0).max() < 1.0 / 3.0
     assert np.abs(drawn[::-1] / missed - 1.0).max() > 1.0
 
 
 def test_the_nearest_clip_is_the_nearest(trained, clip):
-    pair = drawn_clips.compare(trained, clip)
-    points = trained.laid.half_ranges
+    pair = drawn_clips.compare_clip(trained, clip)
+    points = trained.samples.half_ranges
     distances = np.linalg.norm(points - points[clip], axis=1)
     distances[clip] = np.inf
     assert pair.nearest.distance == distances.min()

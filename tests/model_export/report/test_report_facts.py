@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefield.motion.measures import Measure
-from posefield_train.align.warp import DENSE
+from posefield_train.align.warp import FIT_TIMES
 from posefield_train.kriging import variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.report import (
@@ -22,7 +22,7 @@ from posefield_train.report import (
 from posefield_train.report.calibration import Calibration
 from posefield_train.report.drawing import left_out_clips, significant_digits
 from posefield_train.report.reliability import Reliability
-from posefield_train.report.warps import Warps
+from posefield_train.report.warps import TimeWarps
 
 # JSON holds six digits.
 DIGITS = 1e-5
@@ -60,30 +60,32 @@ def test_times_are_not_in_the_model(exported):
 
 def test_every_clip_is_there_the_worst_first(facts, trained):
     found = [clip["missed_m"] for clip in facts["clips"]["clips"]]
-    assert found == pytest.approx(sorted(np.sqrt(trained.missed), reverse=True), rel=DIGITS)
-    worst = trained.examples[int(np.argmax(trained.missed))]
-    assert facts["clips"]["clips"][0]["clip"] == left_out_clips.label(worst)
+    assert found == pytest.approx(
+        sorted(np.sqrt(trained.left_out_errors), reverse=True), rel=DIGITS
+    )
+    worst = trained.examples[int(np.argmax(trained.left_out_errors))]
+    assert facts["clips"]["clips"][0]["clip"] == left_out_clips.clip_label(worst)
     assert facts["clips"]["clips"][0]["performer"] == worst.row.performer
-    assert facts["figures"]["worst"][0]["clip"] == left_out_clips.label(worst)
+    assert facts["figures"]["worst"][0]["clip"] == left_out_clips.clip_label(worst)
 
 
 def test_performers_add_up_to_all_clips(trained, controls):
-    found = clip_errors.of(trained, controls)
+    found = clip_errors.collect_clip_errors(trained, controls)
     counts, means = np.array(list(found.by_performer.values())).T
-    assert counts.sum() == len(trained.missed) and np.all(np.diff(means) <= 0.0)
-    assert counts @ means**2 == pytest.approx(trained.missed.sum())
-    assert counts @ means**2 != pytest.approx(len(counts) * trained.missed.mean())
+    assert counts.sum() == len(trained.left_out_errors) and np.all(np.diff(means) <= 0.0)
+    assert counts @ means**2 == pytest.approx(trained.left_out_errors.sum())
+    assert counts @ means**2 != pytest.approx(len(counts) * trained.left_out_errors.mean())
 
 
 def test_spectra_add_up_to_the_tensor(trained):
     total = trained.tensor.rms(np.sum(np.square(trained.tensor.values))) ** 2
-    for carried in spectra.of(trained).carried:
+    for carried in spectra.measure_spectra(trained).carried:
         assert np.sum(np.square(carried)) == pytest.approx(total)
         assert np.sum(np.square(carried[1:])) != pytest.approx(total)
 
 
 def test_the_error_of_the_chosen_size_is_that_of_the_model(trained):
-    found = truncation.of(trained)
+    found = truncation.measure_truncation(trained)
     gap = trained.tensor.values - trained.model.decoder.reduced.restored()
     first, *others = found.chosen
     error = found.error(found.chosen)
@@ -93,14 +95,14 @@ def test_the_error_of_the_chosen_size_is_that_of_the_model(trained):
 
 def test_no_smaller_size_has_as_little_error_as_the_chosen_one(trained):
     """It is chosen by true distances, and so not quite at the budget in the tensor's metric."""
-    found = truncation.of(trained)
+    found = truncation.measure_truncation(trained)
     error = found.error(found.chosen)
     assert found.smallest(error) == found.chosen
     assert found.smallest(1.1 * error) != found.chosen
 
 
 def test_nothing_lies_below_the_front(trained, rng):
-    found = truncation.of(trained)
+    found = truncation.measure_truncation(trained)
     errors, marks = found.front()
     assert np.all(np.diff(errors) <= 0.0) and np.all(np.diff(marks) > 0.0)
     for flat in rng.integers(found.errors.size, size=200):
@@ -113,21 +115,21 @@ def test_nothing_lies_below_the_front(trained, rng):
 
 
 def test_the_isotropic_variogram_is_that_of_the_first_guess(trained, controls):
-    found = variograms.of(trained, controls).directions[-1]
-    hyper, points = trained.pose.hyper, trained.laid.half_ranges
+    found = variograms.measure_variograms(trained, controls).directions[-1]
+    hyper, points = trained.pose.hyper, trained.samples.half_ranges
     left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
-    expected = variogram.experimental(points * hyper.scales, left)
+    expected = variogram.experimental_variogram(points * hyper.scales, left)
     shared = trained.tensor.weight * trained.tensor.values.shape[1]
     assert found.mean.distances == pytest.approx(expected.distances)
     assert found.mean.values == pytest.approx(expected.values / shared)
     assert len(found.distances) == len(points) * (len(points) - 1) // 2
-    other = variogram.experimental(points, left)
+    other = variogram.experimental_variogram(points, left)
     assert other.distances != pytest.approx(expected.distances)
 
 
 def test_along_a_control_stand_pairs_that_go_along_it(trained, controls):
-    found = variograms.of(trained, controls).directions
-    points = trained.laid.half_ranges
+    found = variograms.measure_variograms(trained, controls).directions
+    points = trained.samples.half_ranges
     for axis, direction in enumerate(found[:-1]):
         counted = 0
         for i in range(len(points)):
@@ -139,7 +141,7 @@ def test_along_a_control_stand_pairs_that_go_along_it(trained, controls):
 
 
 def test_a_control_of_three_values_has_too_few_lags_for_a_curve(trained, controls):
-    found = {d.name: d for d in variograms.of(trained, controls).directions}
+    found = {d.name: d for d in variograms.measure_variograms(trained, controls).directions}
     assert found["stature"].fit is None
     assert found["turn"].fit is not None and found["all controls"].fit is not None
 
@@ -150,7 +152,7 @@ def test_no_pairs_at_all_make_no_lags():
 
 
 def test_a_control_that_tells_performers_apart_is_said_so(trained, controls):
-    found = coverage.of(trained, controls)
+    found = coverage.measure_coverage(trained, controls)
     assert found.labels() == ("stature",)
     # Negative control: one value changed, and it is a measurement like any other.
     values = found.values.copy()
@@ -190,25 +192,27 @@ def test_coverage_says_where_nothing_is(facts, trained):
 
 def test_the_largest_stretch_is_that_of_the_slope_or_its_inverse():
     knees = np.array([0.0, 0.5, 1.0])
-    maps = np.stack([np.interp(DENSE, knees, [0.0, middle, 1.0]) for middle in (0.5, 0.25, 0.9)])
-    found = Warps(maps, ("even", "slow first", "fast first"), np.ones(3), np.zeros(3))
+    maps = np.stack(
+        [np.interp(FIT_TIMES, knees, [0.0, middle, 1.0]) for middle in (0.5, 0.25, 0.9)]
+    )
+    found = TimeWarps(maps, ("even", "slow first", "fast first"), np.ones(3), np.zeros(3))
     assert found.stretches == pytest.approx([1.0, 2.0, 5.0])
-    assert found.places[1] == 0.0 and found.places[2] == pytest.approx(0.5)
-    assert found.bound.tolist() == [False, False, False]
-    steep = np.interp(DENSE, knees, [0.0, 0.95, 1.0])[None]
-    assert Warps(steep, ("steep",), np.ones(1), np.zeros(1)).bound.tolist() == [True]
+    assert found.change_times[1] == 0.0 and found.change_times[2] == pytest.approx(0.5)
+    assert found.at_limit.tolist() == [False, False, False]
+    steep = np.interp(FIT_TIMES, knees, [0.0, 0.95, 1.0])[None]
+    assert TimeWarps(steep, ("steep",), np.ones(1), np.zeros(1)).at_limit.tolist() == [True]
     named = [clip["clip"] for clip in found.facts()["clips"]]
     assert named == ["fast first", "slow first", "even"]
 
 
 def test_warps_lead_from_start_to_end(trained):
-    found = warps.of(trained)
+    found = warps.collect_warps(trained)
     assert np.abs(found.maps[:, [0, -1]] - [0.0, 1.0]).max() < 1e-12
     assert np.all(found.stretches >= 1.0)
 
 
 def test_sigma_is_right_on_average_by_construction(trained):
-    found = calibration.of(trained)
+    found = calibration.measure_calibration(trained)
     assert found.measures["mean_squared_ratio"] == pytest.approx(1.0)
     half = replace(found, predicted=0.5 * found.predicted)
     assert half.measures["mean_squared_ratio"] == pytest.approx(4.0)
@@ -218,7 +222,7 @@ def test_sigma_of_a_captured_point_is_the_graphs(trained):
     """Where the clip itself is known, and so less than where it is left out."""
     bank = trained.model.bank
     sigma = bank.sigma(bank.numpy(bank.pose.samples)[VARIANCE])
-    assert np.all(sigma < calibration.of(trained).predicted)
+    assert np.all(sigma < calibration.measure_calibration(trained).predicted)
 
 
 def test_calibration_measures(rng):
@@ -233,9 +237,13 @@ def test_calibration_measures(rng):
 
 
 def test_clips_of_equal_distance_keep_their_order(trained, controls):
-    even = replace(trained, missed=np.ones_like(trained.missed))
-    assert clip_errors.of(even, controls).indices == tuple(range(len(trained.missed)))
+    even = replace(trained, left_out_errors=np.ones_like(trained.left_out_errors))
+    assert clip_errors.collect_clip_errors(even, controls).indices == tuple(
+        range(len(trained.left_out_errors))
+    )
 
 
 def test_numbers_are_rounded_to_six_digits():
-    assert significant_digits.numbers(np.array([[1 / 3, 1e-9 / 3]])) == [[0.333333, 3.33333e-10]]
+    assert significant_digits.round_numbers(np.array([[1 / 3, 1e-9 / 3]])) == [
+        [0.333333, 3.33333e-10]
+    ]

@@ -14,14 +14,16 @@ def caption(chapter):
 
 def test_an_outlier_is_listed_with_the_evidence(trained, exported):
     against = tuple(Outlier(3, "far", said) for said in SAID)
-    odd = clip_errors.of(replace(trained, outliers=against), exported.card.controls)
+    odd = clip_errors.collect_clip_errors(
+        replace(trained, outliers=against), exported.card.controls
+    )
     assert caption(odd) == "Possible outliers"
     assert "Outlined" in odd.section().charts[0].caption
     ((file, said),) = odd.section().tables[0].rows
     assert said == "lies far away; leaps"
     assert file == odd.files[odd.indices.index(3)]
     assert [clip["against"] for clip in odd.facts()["clips"] if clip["against"]] == [said]
-    clean = clip_errors.of(trained, exported.card.controls)
+    clean = clip_errors.collect_clip_errors(trained, exported.card.controls)
     assert caption(clean) == "Clips with the largest error"
     assert "Outlined" not in clean.section().charts[0].caption
     assert not any(clip["against"] for clip in clean.facts()["clips"])
@@ -30,7 +32,9 @@ def test_an_outlier_is_listed_with_the_evidence(trained, exported):
 def test_shifts_of_cycles_are_told(trained):
     first, *others = trained.examples
     shifted = replace(trained, examples=(replace(first, shift=-0.125), *others))
-    told = warps.of(shifted)
+    told = warps.collect_warps(shifted)
     assert f"{told.labels[0]} by -12.5 %" in told.section().paragraphs[-1]
     assert {clip["shift"] for clip in told.facts()["clips"]} == {0.0, -0.125}
-    assert len(warps.of(trained).section().paragraphs) == len(told.section().paragraphs) - 1
+    assert (
+        len(warps.collect_warps(trained).section().paragraphs) == len(told.section().paragraphs) - 1
+    )

@@ -16,7 +16,7 @@ import pytest
 from posefield_train.report import clip_errors, coverage, training_report
 from posefield_train.report.drawing import left_out_clips, svg_chart
 from posefield_train.report.drawing.html_page import Page, Section, Table
-from posefield_train.report.provenance import Step
+from posefield_train.report.provenance import TrainingStep
 
 LOADING = {"src", "href", "xlink:href", "srcset", "action", "data", "poster", "background"}
 ACTIVE = {"script", "link", "iframe", "object", "embed", "base"}
@@ -128,7 +128,7 @@ def hostile(trained, exported):
     first = exported.card.controls[0]
     controls = (replace(first, description=MARKUP, unit=MARKUP), *exported.card.controls[1:])
     card = replace(exported.card, name=MARKUP, description=MARKUP, controls=controls)
-    worst = int(np.argmax(trained.missed))
+    worst = int(np.argmax(trained.left_out_errors))
     examples = list(trained.examples)
     row = replace(examples[worst].row, place=Path(f"{MARKUP}.bvh"), performer=MARKUP)
     examples[worst] = replace(examples[worst], row=row)
@@ -142,8 +142,9 @@ def test_user_given_text_is_shown_and_not_interpreted(hostile, levels, steps, pa
     assert found.loads == []
     # Title, heading and lead; unit and description of the control; performer; and the clip.
     assert found.texts.count(MARKUP) >= 6
-    assert f"{MARKUP} (line {trained.examples[int(np.argmax(trained.missed))].row.line})" in (
-        found.texts
+    assert (
+        f"{MARKUP} (line {trained.examples[int(np.argmax(trained.left_out_errors))].row.line})"
+        in (found.texts)
     )
     for svg in found.charts:
         assert b"<script>" not in svg
@@ -155,7 +156,10 @@ def test_user_given_text_is_shown_and_not_interpreted(hostile, levels, steps, pa
 def test_names_of_controls_are_shown_and_not_interpreted(trained, exported):
     first, *others = exported.card.controls
     controls = (replace(first, name=MARKUP), *others)
-    chapters = coverage.of(trained, controls), clip_errors.of(trained, controls)
+    chapters = (
+        coverage.measure_coverage(trained, controls),
+        clip_errors.collect_clip_errors(trained, controls),
+    )
     page = Page("", "", "", (), [chapter.section() for chapter in chapters])
     found = Parsed(page.html())
     assert found.tags["script"] == 0 and found.tags["img"] == 2
@@ -167,12 +171,14 @@ def test_a_long_name_leaves_space_for_the_charts(trained, exported):
     """matplotlib warns, which is an error here, where a label leaves no space."""
     long = "a" * 200
     first, *others = exported.card.controls
-    chapter = coverage.of(trained, (replace(first, name=long), *others)).section()
+    chapter = coverage.measure_coverage(trained, (replace(first, name=long), *others)).section()
     (svg,) = (drawn.svg.decode() for drawn in chapter.charts)
     assert f"{'a' * (svg_chart.LABEL - 1)}… (m)" in svg and long not in svg
     assert long in chapter.tables[0].rows[0]
     examples = [replace(e, row=replace(e.row, performer=long)) for e in trained.examples]
-    bars = clip_errors.of(replace(trained, examples=tuple(examples)), exported.card.controls)
+    bars = clip_errors.collect_clip_errors(
+        replace(trained, examples=tuple(examples)), exported.card.controls
+    )
     assert "a…" in bars.section().charts[0].svg.decode()
 
 
@@ -197,7 +203,7 @@ def test_charts_do_not_depend_on_the_users_matplotlib_settings():
 def test_two_reports_of_a_model_differ_only_in_the_times(
     trained, exported, levels, steps, rendered
 ):
-    late = [*steps[:1], Step(steps[1].name, 9.75)]
+    late = [*steps[:1], TrainingStep(steps[1].name, 9.75)]
     slower = training_report.render(trained, exported, levels, late)
     assert slower.html != rendered.html and slower.json != rendered.json
     # The step's own time, and its sums at the top and below the steps.
@@ -215,8 +221,10 @@ def test_no_date_and_no_path_is_in_the_report(rendered, page, trained):
 
 
 def test_the_clip_with_the_largest_error_is_named_first(rendered, trained):
-    order = np.argsort(-trained.missed)
-    worst, best = (left_out_clips.label(trained.examples[order[i]]) for i in (0, -1))
+    order = np.argsort(-trained.left_out_errors)
+    worst, best = (left_out_clips.clip_label(trained.examples[order[i]]) for i in (0, -1))
     found = re.search(r"largest error is ([0-9.]+) cm, of (.*?)\.<", rendered.html.decode())
     assert found.group(2) == worst != best
-    assert float(found.group(1)) == pytest.approx(100 * np.sqrt(trained.missed.max()), abs=0.005)
+    assert float(found.group(1)) == pytest.approx(
+        100 * np.sqrt(trained.left_out_errors.max()), abs=0.005
+    )

@@ -32,7 +32,7 @@ def samples():
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     output = tmp_path_factory.mktemp("sample") / "new" / "reaching"
-    assert sample_files.family(output) == output / "recipe.toml"
+    assert sample_files.write_family(output) == output / "recipe.toml"
     return output
 
 
@@ -92,7 +92,9 @@ def played(head, values):
 
 def meant(clip):
     """The same positions from the clip."""
-    places, turns = skeleton.forward(clip.skeleton.parents, clip.rotations, clip.translations)
+    places, turns = skeleton.forward_kinematics(
+        clip.skeleton.parents, clip.rotations, clip.translations
+    )
     holders = list(clip.skeleton.tip_joints)
     tips = places[:, holders] + quat.rotate(turns[:, holders], clip.skeleton.tip_offsets)
     return np.concatenate([places, tips], axis=1)
@@ -162,13 +164,15 @@ def test_table_holds_the_controls_of_the_samples(rows, samples):
         assert row["performer"] == sample.performer
         for name in sample_controls.RANGES:
             assert float(row[name]) == getattr(sample.controls, name)
-        assert sample_controls.parse({name: float(row[name]) for name in sample_controls.RANGES})
+        assert sample_controls.parse_controls(
+            {name: float(row[name]) for name in sample_controls.RANGES}
+        )
 
 
 def test_three_performers_sit_and_stand(rows):
     groups = {}
     for row in rows:
-        upright = sample_controls.parse(
+        upright = sample_controls.parse_controls(
             [float(row[name]) for name in sample_controls.RANGES]
         ).uprightness
         assert upright < 0.1 or upright > 0.9
@@ -191,7 +195,7 @@ def test_trials_scatter_about_the_truth(samples):
     for sample in samples:
         where = [getattr(sample.controls, name) for name in sample_controls.RANGES]
         lates.append(np.log(sample.clip.duration / noise_free.duration(where)))
-        hand = sample_arms.palm(sample.clip.positions())[-1]
+        hand = sample_arms.palm_position(sample.clip.positions())[-1]
         misses.append(np.linalg.norm(hand - noise_free.target(where)))
     assert 0.03 < np.std(lates) < 0.05
     assert 0.005 < np.median(misses) < 0.03
@@ -222,7 +226,7 @@ def test_recipe_names_columns_that_exist(folder, rows):
 
 def test_a_folder_that_holds_the_family_is_left_as_it_is(folder):
     before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
-    assert sample_files.family(folder) == folder / "recipe.toml"
+    assert sample_files.write_family(folder) == folder / "recipe.toml"
     assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
 
 
@@ -230,7 +234,7 @@ def test_a_folder_that_holds_the_family_is_left_as_it_is(folder):
 def small(tmp_path, samples):
     """A family of one clip in a folder that was empty."""
     (tmp_path / "small").mkdir()
-    return sample_files.family(tmp_path / "small", samples[:1]).parent
+    return sample_files.write_family(tmp_path / "small", samples[:1]).parent
 
 
 def test_an_empty_folder_is_filled_and_nothing_else_is_left(small):
@@ -250,9 +254,9 @@ def test_an_empty_folder_is_filled_and_nothing_else_is_left(small):
 def test_a_folder_with_anything_else_is_refused(small, samples, spoil, message):
     spoil(small)
     with pytest.raises(FileError, match=message):
-        sample_files.family(small, samples[:1])
+        sample_files.write_family(small, samples[:1])
 
 
 def test_a_file_in_the_way_is_refused(small, samples):
     with pytest.raises(FileError, match="found a file"):
-        sample_files.family(small / "recipe.toml", samples[:1])
+        sample_files.write_family(small / "recipe.toml", samples[:1])

@@ -10,7 +10,7 @@ from posefield.common.errors import InvalidField
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import assemble
 from posefield_train.sample import noise_free, sample_arms, sample_body, sample_controls
-from posefield_train.sample.reach_timing import Warp, minimum_jerk
+from posefield_train.sample.reach_timing import TimingWarp, minimum_jerk
 
 PHASES = np.linspace(0.0, 1.0, 201)
 SITTING = {"stature": 1.70, "hip_height": 0.50, "turn": 40.0, "target_height": 1.2}
@@ -35,7 +35,7 @@ def positions(point, phases=PHASES):
     rotations, root_path, offsets = noise_free.poses(point, phases)
     translations = np.repeat(offsets[None], len(phases), axis=0)
     translations[:, 0] = root_path
-    return skeleton.forward(sample_body.PARENTS, rotations, translations)
+    return skeleton.forward_kinematics(sample_body.PARENTS, rotations, translations)
 
 
 def joint(array, name):
@@ -43,7 +43,7 @@ def joint(array, name):
 
 
 def miss(point, phase):
-    found = sample_arms.palm(positions(point, np.array([phase]))[0])[0]
+    found = sample_arms.palm_position(positions(point, np.array([phase]))[0])[0]
     return np.linalg.norm(found - noise_free.target(point))
 
 
@@ -168,7 +168,7 @@ def test_gaze_ends_on_the_target():
 
 
 def test_clip_has_the_duration_and_timing_of_the_truth():
-    clip = noise_free.clip(STANDING, 240.0)
+    clip = noise_free.truth_clip(STANDING, 240.0)
     assert clip.duration == pytest.approx(noise_free.duration(STANDING), abs=0.5 / 240.0)
     phases = noise_free.phases(STANDING, np.linspace(0.0, 1.0, len(clip)))
     rotations, root_path, offsets = noise_free.poses(STANDING, phases)
@@ -187,7 +187,7 @@ def test_durations_and_timings_are_plausible():
 
 def test_a_warp_that_runs_backwards_is_refused():
     with pytest.raises(ValueError, match="monotone"):
-        Warp(0.8, 0.7)
+        TimingWarp(0.8, 0.7)
 
 
 def test_minimum_jerk_stays_at_its_ends():
@@ -200,7 +200,7 @@ def test_minimum_jerk_stays_at_its_ends():
 def test_rest_pose_stands_on_the_floor_and_is_as_tall_as_its_stature(stature):
     figure = sample_body.skeleton(stature)
     still = np.tile(quat.IDENTITY, (len(figure), 1))
-    places, _ = skeleton.forward(figure.parents, still, figure.offsets)
+    places, _ = skeleton.forward_kinematics(figure.parents, still, figure.offsets)
     tips = places[list(figure.tip_joints)] + figure.tip_offsets
     assert tips[:, 1].min() == pytest.approx(0.0, abs=1e-12)
     assert tips[:, 1].max() == pytest.approx(stature, abs=1e-12)
@@ -227,7 +227,7 @@ def test_performers_differ_in_more_than_size():
 )
 def test_what_the_body_cannot_do_is_refused_by_name(name, value):
     with pytest.raises(InvalidField, match=r"cannot be reached, expected .* to ") as error:
-        noise_free.clip({**SITTING, name: value}, 120.0)
+        noise_free.truth_clip({**SITTING, name: value}, 120.0)
     assert error.value.field == name
 
 

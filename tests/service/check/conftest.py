@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import clip, quat
 from posefield.motion.skeleton import Skeleton
 from posefield.question.results import ClipAnswer, Trust
@@ -30,7 +30,7 @@ def answer():
 @pytest.fixture(params=["usda", "usdc", "usdz"])
 def good(request, answer, tmp_path):
     path = tmp_path / f"good.{request.param}"
-    path.write_bytes(ENCODERS[request.param].encode(answer))
+    path.write_bytes(CLIP_ENCODERS[request.param].encode(answer))
     return path
 
 
@@ -38,5 +38,5 @@ def good(request, answer, tmp_path):
 def layer(answer, tmp_path):
     """Layer of a good file, in which a test breaks something and saves it."""
     path = tmp_path / "damaged.usda"
-    path.write_bytes(ENCODERS["usda"].encode(answer))
+    path.write_bytes(CLIP_ENCODERS["usda"].encode(answer))
     return Sdf.Layer.FindOrOpen(str(path))

@@ -6,7 +6,7 @@ from pxr import Gf, Sdf, Vt
 
 from posefield.check import Finding, check
 from posefield.common.errors import UsdError
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion.clip import Clip
 from posefield.question.results import ClipAnswer
 
@@ -19,7 +19,7 @@ def test_a_pose_has_no_finding(answer, tmp_path):
     clip = answer.clip
     pose = Clip(clip.skeleton, clip.rotations[:1], clip.translations[:1], clip.rate)
     path = tmp_path / "pose.usdc"
-    path.write_bytes(ENCODERS["usdc"].encode(ClipAnswer(pose, answer.trust)))
+    path.write_bytes(CLIP_ENCODERS["usdc"].encode(ClipAnswer(pose, answer.trust)))
     assert check(path) == []
 
 

@@ -1,10 +1,10 @@
 """Tests of progress without a terminal: plain lines on standard error only."""
 
-from posefield.console.progress import Bar
+from posefield.console.progress import ProgressBar
 
 
 def test_a_line_says_how_much_is_finished(capsys):
-    with Bar("clips", 1000, 250, interval=0.0) as bar:
+    with ProgressBar("clips", 1000, 250, interval=0.0) as bar:
         bar.update(260)
         bar.advance(5)
     out, err = capsys.readouterr()
@@ -16,7 +16,7 @@ def test_a_line_says_how_much_is_finished(capsys):
 
 
 def test_the_total_may_be_known_late(capsys):
-    with Bar("truth", interval=0.0) as bar:
+    with ProgressBar("truth", interval=0.0) as bar:
         bar.update(1, 4)
         bar.update(4, 4)
     assert capsys.readouterr().err.splitlines()[0] == "truth: 1 of 4"
@@ -24,7 +24,7 @@ def test_the_total_may_be_known_late(capsys):
 
 def test_lines_are_some_seconds_apart(capsys):
     """Negative control of `interval`: a thousand updates at once write nothing."""
-    with Bar("clips", 1000) as bar:
+    with ProgressBar("clips", 1000) as bar:
         for _ in range(1000):
             bar.advance(1)
     assert capsys.readouterr().err == ""
@@ -32,7 +32,7 @@ def test_lines_are_some_seconds_apart(capsys):
 
 def test_no_control_sequences_are_written_for_colours(capsys, monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")
-    with Bar("clips", 10, interval=0.0) as bar:
+    with ProgressBar("clips", 10, interval=0.0) as bar:
         bar.print("[a] note at 7 of 10")
         bar.update(5)
     assert capsys.readouterr().err.splitlines() == ["[a] note at 7 of 10", "clips: 5 of 10"]

@@ -60,6 +60,6 @@ def crowd(person, made, motion, size=3):
 def positions(clip, made):
     """Joint positions (N, F, J, 3) in the world, m, by our own forward kinematics in float64."""
     moves = skeleton.translations(made.bone_offsets, made.root_position)
-    own, _ = skeleton.forward(clip.skeleton.parents, made.rotations.astype(float), moves)
+    own, _ = skeleton.forward_kinematics(clip.skeleton.parents, made.rotations.astype(float), moves)
     turns = clip.placement.turns[:, None, None]
     return quat.rotate(turns, own[clip.motion]) + clip.placement.positions[:, None, None]

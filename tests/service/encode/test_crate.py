@@ -10,9 +10,9 @@ from pxr import Sdf, Vt
 
 from posefield.encode.usd import crate_template, custom_data, layer_metadata, prim_specs
 from posefield.encode.usd import layer_content as contents
-from posefield.encode.usd.layer_content import Content
-from posefield.encode.usd.prim_specs import Type
-from posefield.encode.usd.template_cache import Press
+from posefield.encode.usd.layer_content import LayerContent
+from posefield.encode.usd.prim_specs import ValueTypes
+from posefield.encode.usd.template_cache import TemplateCache
 
 RATE, UNIT = 29.97, 0.01
 MIX = 1.0 / 3.0
@@ -27,7 +27,7 @@ class Plain:
 
     def head(self, content):
         made = Sdf.Layer.CreateAnonymous("moves.usda")
-        layer_metadata.say(made, custom_data.dictionary(content.facts.whole()))
+        layer_metadata.set_custom_data(made, custom_data.usd_dictionary(content.facts.join()))
         made.timeCodesPerSecond = RATE
         made.pseudoRoot.SetInfo("metersPerUnit", UNIT)
         return made
@@ -35,11 +35,11 @@ class Plain:
     def layer(self, content):
         made = self.head(content)
         prim = prim_specs.prim(made, "Anim", "SkelAnimation")
-        prim_specs.attribute(prim, "translations", Type.Float3Array)
-        prim_specs.attribute(prim, "rotations", Type.QuatfArray)
+        prim_specs.varying_attribute(prim, "translations", ValueTypes.Float3Array)
+        prim_specs.varying_attribute(prim, "rotations", ValueTypes.QuatfArray)
         extent = Vt.Vec3fArray.FromNumpy(content.values["extent"])
-        prim_specs.attribute(prim, "extent", Type.Float3Array, extent)
-        prim_specs.samples(prim, content.samples)
+        prim_specs.varying_attribute(prim, "extent", ValueTypes.Float3Array, extent)
+        prim_specs.set_time_samples(prim, content.samples)
         return made
 
     def __hash__(self):
@@ -52,7 +52,7 @@ def content(seed=0, frames=7, joints=5, **said):
     samples = {name: rng.standard_normal(size, np.float32) for name, size in sizes.items()}
     told = {"model": f"m@{seed}", "sigma": 0.5 * seed, "mix": MIX + seed, "warnings": ["a", "b"]}
     extent = rng.standard_normal((2, 3), np.float32)
-    return Content(samples, {"extent": extent}, custom_data.parted(told | said))
+    return LayerContent(samples, {"extent": extent}, custom_data.split_facts(told | said))
 
 
 def changed(made, **samples):
@@ -206,7 +206,9 @@ class Negated(Plain):
 class Derived(Plain):
     def layer(self, content):
         made = super().layer(content)
-        spec = prim_specs.attribute(made.GetPrimAtPath("/Anim"), "highest", Type.Double)
+        spec = prim_specs.varying_attribute(
+            made.GetPrimAtPath("/Anim"), "highest", ValueTypes.Double
+        )
         spec.default = float(content.samples["translations"].max()) / 3
         return made
 
@@ -221,21 +223,23 @@ class Optional(Plain):
     def layer(self, content):
         made = super().layer(content)
         if content.values["extent"][0, 0] > 0.5:
-            prim_specs.attribute(made.GetPrimAtPath("/Anim"), "more", Type.Double, 1.0)
+            prim_specs.varying_attribute(
+                made.GetPrimAtPath("/Anim"), "more", ValueTypes.Double, 1.0
+            )
         return made
 
 
 @pytest.mark.parametrize("author", [Negated(), Derived(), Sorted(), Optional()])
 def test_what_cannot_be_trusted_is_written_the_ordinary_way(author):
     assert template(author, content(1)) is None
-    press = Press(crate_template, limit=10**6)
+    press = TemplateCache(crate_template, limit=10**6)
     for seed in range(4):
         assert press.write(author, content(seed)) == crate_template.ordinary(author, content(seed))
 
 
 def test_a_template_is_made_for_the_second_of_a_pattern():
     form = Counted()
-    press = Press(form, limit=10**6)
+    press = TemplateCache(form, limit=10**6)
     press.write(Plain(), content(1))
     assert form.calls == {"ordinary": 1}
     for _ in range(6):
@@ -247,16 +251,16 @@ def test_a_template_is_made_for_the_second_of_a_pattern():
 
 def test_templates_are_kept_within_a_limit():
     size = len(template(Plain(), content(1)))
-    press = Press(crate_template, limit=3 * size)
+    press = TemplateCache(crate_template, limit=3 * size)
     for frames in (7, 8, 9, 10, 7):
         for seed in range(3):
             other = content(seed, frames)
             assert press.write(Plain(), other) == crate_template.ordinary(Plain(), other)
-        assert press.taken <= press.limit
-    assert press.taken > size
-    nothing = Press(crate_template, limit=0)
+        assert press.used_bytes <= press.limit
+    assert press.used_bytes > size
+    nothing = TemplateCache(crate_template, limit=0)
     assert nothing.write(Plain(), content(1)) == crate_template.ordinary(Plain(), content(1))
-    assert nothing.taken == 0
+    assert nothing.used_bytes == 0
 
 
 def test_patterns_are_kept_within_the_limit_too():
@@ -264,12 +268,12 @@ def test_patterns_are_kept_within_the_limit_too():
     made = [looped(content(1, frames)) for frames in range(1000, 1006)]
     tracemalloc.start()
     first = pattern(made[0])
-    taken, size = tracemalloc.get_traced_memory()[0], contents.size(first)
+    taken, size = tracemalloc.get_traced_memory()[0], contents.pattern_size(first)
     tracemalloc.stop()
     assert taken / 1.5 < size < 1.5 * taken
-    assert contents.size(pattern(content(1, 1000))) < size / 10
-    press = Press(crate_template, limit=int(3.5 * size))
+    assert contents.pattern_size(pattern(content(1, 1000))) < size / 10
+    press = TemplateCache(crate_template, limit=int(3.5 * size))
     for each in made:
         press.write(Plain(), each)
     # Three, as a fourth has no room.
-    assert 2.5 * size < press.taken <= 3.5 * size
+    assert 2.5 * size < press.used_bytes <= 3.5 * size

@@ -213,7 +213,9 @@ def test_levels_have_a_sample_where_they_change(stage, made):
 
 
 def test_animations_are_baked_named_and_of_one_sign(stage, clip, made):
-    paths = joint_names.paths(joint_names.legal(clip.skeleton.names), clip.skeleton.parents)
+    paths = joint_names.joint_paths(
+        joint_names.legal_names(clip.skeleton.names), clip.skeleton.parents
+    )
     for prim in characters(stage):
         played = stage.GetPrimAtPath(animation(prim))
         assert tuple(played.GetAttribute("joints").Get()) == paths

@@ -23,7 +23,7 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.encode import usd_crowd
 from posefield.encode.character import character
 from posefield.encode.usd import character_prims, layer_metadata
-from posefield.encode.usd.template_cache import Press
+from posefield.encode.usd.template_cache import TemplateCache
 from posefield.encode.usd_crowd import crowd_motions, crowd_package, crowd_writer
 from posefield.motion.skeleton import Skeleton
 
@@ -235,15 +235,15 @@ def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, tempor
 
 def written_layers(clip, press):
     rig = character.rig(clip.skeleton)
-    each = crowd_motions.each(clip, rig)
-    return [crowd_motions.layer(rig, clip.rate, motion.samples, press) for motion in each]
+    each = crowd_motions.all_motions(clip, rig)
+    return [crowd_motions.motion_layer(rig, clip.rate, motion.samples, press) for motion in each]
 
 
 def test_motions_are_written_by_template_and_without_one_the_same(clip, made):
     form = Counted()
-    written = written_layers(clip, Press(form, limit=10**6))
+    written = written_layers(clip, TemplateCache(form, limit=10**6))
     assert form.calls == {"ordinary": 1, "template": 1}
-    none = Press(form, limit=0)
+    none = TemplateCache(form, limit=0)
     assert written_layers(replace(clip, batches=crowds.cut(made, 3)), none) == written
     assert form.calls == {"ordinary": 1 + len(written), "template": 1}
 
@@ -280,7 +280,7 @@ def print_digests():
     layer, copy = Sdf.Layer.CreateAnonymous("x.usdc"), Sdf.Layer.CreateAnonymous("x.usdc")
     prim = character_prims.root(layer, "Character", character.rig(person))
     Sdf.CopySpec(layer, prim.path, copy, prim.path)
-    print("CopySpec", hashlib.sha256(layer_metadata.crate(copy)).hexdigest())  # noqa: T201
+    print("CopySpec", hashlib.sha256(layer_metadata.crate_bytes(copy)).hexdigest())  # noqa: T201
 
 
 @pytest.mark.system
@@ -342,7 +342,7 @@ def test_the_size_of_an_archive_is_not_guessed_too_small():
     for frames, spare in ((1, 10), (500, 1.2)):
         given = crowds.crowd(person, crowds.motions(person, 5, frames), MOTION)
         size = sum(map(len, crowd_writer.stream(given, "usdz")))
-        assert size < crowd_package.size(given) < spare * size
+        assert size < crowd_package.size_bound(given) < spare * size
 
 
 def test_a_place_that_cannot_be_taken_is_named(clip, tmp_path):

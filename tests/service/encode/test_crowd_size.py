@@ -5,7 +5,7 @@ import crowds
 import pytest
 
 from posefield.encode.usd_crowd import INSTANCING, STREAMS, crowd_size, crowd_writer
-from posefield.encode.usd_crowd.crowd_size import Counts
+from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 
 # Characters, motions, frames.
 SHAPES = [(1, 1, 2), (1, 1, 200), (40, 2, 2), (12, 12, 30)]
@@ -20,16 +20,20 @@ def test_a_file_is_no_larger_than_said(ending, instancing, shape):
     made = crowds.motions(person, motions, frames)
     crowd = crowds.crowd(person, made, [index % motions for index in range(characters)])
     size = sum(map(len, crowd_writer.stream(crowd, ending, instancing)))
-    said = crowd_size.file(
-        Counts(len(person), characters, motions, frames), ending, instancing == "flatten"
+    said = crowd_size.file_size_bound(
+        CrowdCounts(len(person), characters, motions, frames), ending, instancing == "flatten"
     )
     # Of what each file begins with nothing is said.
     assert size - 40_000 < said
 
 
 def test_a_package_is_as_large_as_its_largest_layer():
-    long, many = Counts(31, 1, 1, 36_000), Counts(31, 100_000, 1, 2)
-    assert crowd_size.layer(long, "usdz", False) == pytest.approx(36_000 * 31 * 28, rel=0.1)
-    assert crowd_size.layer(many, "usdz", False) == 100_000 * crowd_size.CHARACTER
-    ten = Counts(31, 10, 10, 3_600)
-    assert crowd_size.layer(ten, "usdc", False) > 9 * crowd_size.layer(ten, "usdz", False)
+    long, many = CrowdCounts(31, 1, 1, 36_000), CrowdCounts(31, 100_000, 1, 2)
+    assert crowd_size.layer_size_bound(long, "usdz", False) == pytest.approx(
+        36_000 * 31 * 28, rel=0.1
+    )
+    assert crowd_size.layer_size_bound(many, "usdz", False) == 100_000 * crowd_size.CHARACTER
+    ten = CrowdCounts(31, 10, 10, 3_600)
+    assert crowd_size.layer_size_bound(ten, "usdc", False) > 9 * crowd_size.layer_size_bound(
+        ten, "usdz", False
+    )

@@ -8,13 +8,13 @@ import pytest
 
 from posefield.encode.files import axis_conversion, file_convention
 from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import skeleton
 from posefield_train.source import bvh
 
 
 def test_the_table_names_each_format_once():
-    assert {key: found.media_type for key, found in ENCODERS.items()} == {
+    assert {key: found.media_type for key, found in CLIP_ENCODERS.items()} == {
         "usda": "model/vnd.usda",
         "usdc": "model/vnd.usdc",
         "usdz": "model/vnd.usdz+zip",
@@ -25,12 +25,12 @@ def test_the_table_names_each_format_once():
         "arrow": "application/vnd.apache.arrow.stream",
         "msgpack": "application/vnd.msgpack",
     }
-    assert all(found.extension == key for key, found in ENCODERS.items())
+    assert all(found.extension == key for key, found in CLIP_ENCODERS.items())
 
 
 @pytest.fixture(scope="module")
 def keyframes(walk):
-    return orjson.loads(ENCODERS["json"].encode(walk))
+    return orjson.loads(CLIP_ENCODERS["json"].encode(walk))
 
 
 def test_json_holds_the_clip(keyframes, walk):
@@ -49,7 +49,7 @@ def test_json_is_enough_to_place_the_joints(keyframes, walk):
     offsets = np.tile(keyframes["bone_offsets"], (45, 1, 1))
     offsets[:, 0] = keyframes["root_position"]
     rotations = np.array(keyframes["rotations"])
-    positions, _ = skeleton.forward(tuple(keyframes["parents"]), rotations, offsets)
+    positions, _ = skeleton.forward_kinematics(tuple(keyframes["parents"]), rotations, offsets)
     np.testing.assert_allclose(positions, walk.clip.positions(), atol=1e-5)
 
 
@@ -60,12 +60,12 @@ def test_json_states_its_units_and_trust(keyframes, walk):
 
 def test_json_never_holds_nan(walk):
     unknown = dataclasses.replace(walk.trust, sigma=float("nan"))
-    data = ENCODERS["json"].encode(dataclasses.replace(walk, trust=unknown))
+    data = CLIP_ENCODERS["json"].encode(dataclasses.replace(walk, trust=unknown))
     assert orjson.loads(data)["trust"]["sigma"] is None
 
 
 def test_bvh_is_in_centimetres(walk):
-    file = bvh.loads(ENCODERS["bvh"].encode(walk), "clip.bvh")
+    file = bvh.loads(CLIP_ENCODERS["bvh"].encode(walk), "clip.bvh")
     clip = bvh.to_clip(file, metres_per_unit=0.01, up="y", root_offset="replace")
     # A BVH file lists joints depth first.
     order = [walk.clip.skeleton.names.index(name) for name in clip.skeleton.names]
@@ -74,7 +74,7 @@ def test_bvh_is_in_centimetres(walk):
 
 @pytest.fixture(scope="module")
 def arrays(walk):
-    with np.load(io.BytesIO(ENCODERS["npz"].encode(walk)), allow_pickle=False) as found:
+    with np.load(io.BytesIO(CLIP_ENCODERS["npz"].encode(walk)), allow_pickle=False) as found:
         return dict(found)
 
 
@@ -100,7 +100,7 @@ def positions(found):
     rotations = np.array(found["rotations"], float)
     offsets = np.tile(np.array(found["bone_offsets"], float), (len(rotations), 1, 1))
     offsets[:, 0] = found["root_position"]
-    return skeleton.forward(tuple(found["parents"]), rotations, offsets)[0]
+    return skeleton.forward_kinematics(tuple(found["parents"]), rotations, offsets)[0]
 
 
 STAGE = Convention(0.01, "z")
@@ -112,8 +112,8 @@ def on_stage(points):
 
 
 def test_json_and_npz_heed_the_convention_and_say_it(walk):
-    text = orjson.loads(ENCODERS["json"].encode(walk, STAGE))
-    with np.load(io.BytesIO(ENCODERS["npz"].encode(walk, STAGE))) as found:
+    text = orjson.loads(CLIP_ENCODERS["json"].encode(walk, STAGE))
+    with np.load(io.BytesIO(CLIP_ENCODERS["npz"].encode(walk, STAGE))) as found:
         binary = dict(found)
     meant = on_stage(walk.clip.positions())
     for read in (text, binary):
@@ -121,13 +121,13 @@ def test_json_and_npz_heed_the_convention_and_say_it(walk):
     for units in (text["units"], orjson.loads(str(binary["units"]))):
         assert (units["length"], units["up"]) == ("centimetre", "Z")
     # Negative control: as usual it is elsewhere.
-    usual = positions(orjson.loads(ENCODERS["json"].encode(walk)))
+    usual = positions(orjson.loads(CLIP_ENCODERS["json"].encode(walk)))
     assert np.abs(usual - meant).max() > 10.0
 
 
 @pytest.mark.parametrize("unit", [1.0, 0.01])
 def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
-    data = ENCODERS["bvh"].encode(walk, Convention(unit, "z"))
+    data = CLIP_ENCODERS["bvh"].encode(walk, Convention(unit, "z"))
     file = bvh.loads(data, "clip.bvh")
     clip = bvh.to_clip(file, metres_per_unit=unit, up="z", root_offset="replace")
     order = [walk.clip.skeleton.names.index(name) for name in clip.skeleton.names]
@@ -144,7 +144,7 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
 
 def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
     """Its front is -Y where Z is up."""
-    found = axis_conversion.moved(STAGE, walk.clip).skeleton
+    found = axis_conversion.convert_clip(STAGE, walk.clip).skeleton
     meant = on_stage(walk.clip.skeleton.offsets)
     np.testing.assert_allclose(found.offsets, meant, atol=1e-12)
     np.testing.assert_allclose(
@@ -163,12 +163,12 @@ def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
     ],
 )
 def test_what_is_not_asked_for_is_as_usual(unit, up, usual, meant):
-    assert file_convention.of(unit, up, usual) == meant
+    assert file_convention.requested_convention(unit, up, usual) == meant
 
 
-@pytest.mark.parametrize("extension", ENCODERS)
+@pytest.mark.parametrize("extension", CLIP_ENCODERS)
 def test_threads_write_the_same_bytes(extension, walk, pose):
-    encode = ENCODERS[extension].encode
+    encode = CLIP_ENCODERS[extension].encode
     expected = [encode(walk), encode(pose)] * 8
     with ThreadPoolExecutor(max_workers=4) as pool:
         assert list(pool.map(encode, [walk, pose] * 8)) == expected

@@ -38,7 +38,7 @@ READ = {
 @pytest.mark.parametrize("ending", ["usda", "usdc"])
 def test_facts_are_read_back(ending, tmp_path):
     made = Sdf.Layer.CreateNew(str(tmp_path / f"facts.{ending}"))
-    made.customLayerData = {"posefield": custom_data.dictionary(GIVEN)}
+    made.customLayerData = {"posefield": custom_data.usd_dictionary(GIVEN)}
     made.Save()
     copy = tmp_path / f"copy.{ending}"
     copy.write_bytes((tmp_path / f"facts.{ending}").read_bytes())
@@ -53,21 +53,21 @@ def plain(value):
 
 def test_what_is_no_plain_fact_is_an_error():
     with pytest.raises(TypeError, match="a fact of type object, expected text, a number or"):
-        custom_data.dictionary({"what": object()})
+        custom_data.usd_dictionary({"what": object()})
 
 
 def test_facts_in_parts_are_whole_again():
     plain = {"a": 1.5, "name": "a", "who": None, "also": ["x", "y", "x"], "of": [{"what": "x"}] * 2}
-    found = custom_data.parted(plain)
-    assert found.whole() == plain
+    found = custom_data.split_facts(plain)
+    assert found.join() == plain
     assert (found.numbers, found.texts) == ((1.5,), ("x", "y"))
 
 
 def test_facts_that_differ_in_numbers_and_texts_alone_have_one_shape():
     one, other = ({"of": [{"what": what, "miss": miss}]} for what, miss in (("u", 0.1), ("v", 0.2)))
-    assert custom_data.parted(one).shape == custom_data.parted(other).shape
+    assert custom_data.split_facts(one).shape == custom_data.split_facts(other).shape
     twice = {"of": 2 * one["of"]}
     assert (
-        custom_data.parted(twice).shape
-        != custom_data.parted({"of": [*one["of"], *other["of"]]}).shape
+        custom_data.split_facts(twice).shape
+        != custom_data.split_facts({"of": [*one["of"], *other["of"]]}).shape
     )

@@ -10,7 +10,7 @@ from pygltflib import GLTF2
 
 from posefield.common.errors import InvalidField
 from posefield.encode.files.file_convention import CENTIMETRES, Convention
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.question.results import ClipAnswer
@@ -72,7 +72,7 @@ def matrices(file, **kwargs):
 
 @pytest.fixture(scope="module")
 def file(walk):
-    return read(ENCODERS["glb"].encode(walk))
+    return read(CLIP_ENCODERS["glb"].encode(walk))
 
 
 def test_joints_are_where_the_clip_has_them(file, walk):
@@ -95,7 +95,9 @@ def test_the_body_moves_with_its_joints(file, walk):
     ends = np.concatenate([points, np.ones((len(points), 1))], axis=1)
     found = np.einsum("fpij,pj->fpi", moved[:, owners], ends)[..., :3]
     clip = walk.clip
-    places, turns = skeleton.forward(clip.skeleton.parents, clip.rotations, clip.translations)
+    places, turns = skeleton.forward_kinematics(
+        clip.skeleton.parents, clip.rotations, clip.translations
+    )
     offsets = clip.translations[0].copy()
     offsets[0] = clip.skeleton.offsets[0]
     arms = points - clip.skeleton.at_rest(offsets)[owners]
@@ -133,7 +135,7 @@ def test_a_joint_that_slides_has_translations_too(walk):
     moves = clip.translations.copy()
     moves[:, 7, 1] += 0.1 * np.sin(np.arange(len(clip)))
     sliding = Clip(clip.skeleton, clip.rotations, moves, clip.rate)
-    file = read(ENCODERS["glb"].encode(ClipAnswer(sliding, walk.trust)))
+    file = read(CLIP_ENCODERS["glb"].encode(ClipAnswer(sliding, walk.trust)))
     assert np.abs(matrices(file)[..., :3, 3] - sliding.positions()).max() < NEAR
     paths = [(c.target.node, c.target.path) for c in file.animations[0].channels]
     assert paths[-2:] == [(0, "translation"), (7, "translation")]
@@ -165,7 +167,7 @@ def test_bounds_are_those_of_the_numbers(file):
 
 
 def test_the_container_holds_a_text_and_a_buffer_and_nothing_else(walk):
-    data = ENCODERS["glb"].encode(walk)
+    data = CLIP_ENCODERS["glb"].encode(walk)
     magic, version, length, text, kind = struct.unpack_from("<4s2L L4s", data)
     assert (magic, version, length, kind) == (b"glTF", 2, len(data), b"JSON")
     size, kind = struct.unpack_from("<L4s", data, 20 + text)
@@ -174,14 +176,14 @@ def test_the_container_holds_a_text_and_a_buffer_and_nothing_else(walk):
 
 
 def test_a_pose_is_a_clip_of_one_frame(pose):
-    file = read(ENCODERS["glb"].encode(pose))
+    file = read(CLIP_ENCODERS["glb"].encode(pose))
     assert locals_of(file)[0].tolist() == [0.0]
     assert np.abs(matrices(file)[..., :3, 3] - pose.clip.positions()).max() < NEAR
 
 
 def test_numbers_that_json_has_not_are_null(walk):
     unknown = dataclasses.replace(walk.trust, sigma=float("nan"))
-    file = read(ENCODERS["glb"].encode(dataclasses.replace(walk, trust=unknown)))
+    file = read(CLIP_ENCODERS["glb"].encode(dataclasses.replace(walk, trust=unknown)))
     assert file.asset.extras["posefield"]["sigma"] is None
 
 
@@ -194,7 +196,7 @@ def test_numbers_that_json_has_not_are_null(walk):
 )
 def test_another_convention_is_refused(walk, convention, said):
     with pytest.raises(InvalidField) as caught:
-        ENCODERS["glb"].encode(walk, convention)
+        CLIP_ENCODERS["glb"].encode(walk, convention)
     assert str(caught.value) == said
 
 
@@ -204,6 +206,6 @@ def test_a_loop_in_place_ends_in_the_bytes_it_begins_with():
     turns, path = made.rotations.copy(), made.translations.copy()
     turns[-1], path[-1] = turns[0], path[0]
     closed = Clip(person(), turns, path, 30.0)
-    _, found, moves = locals_of(read(ENCODERS["glb"].encode(ClipAnswer(closed, TRUST))))
+    _, found, moves = locals_of(read(CLIP_ENCODERS["glb"].encode(ClipAnswer(closed, TRUST))))
     assert np.array_equal(moves[0], moves[-1])
     assert np.array_equal(found[0], found[-1])

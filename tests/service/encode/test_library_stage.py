@@ -35,9 +35,9 @@ def build(folder, answers, convention=METRES, rate=30.0):
         file = f"clips/00@/{name}.usdc"
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         (folder / file).write_bytes(layer)
-        entries.append(usd_library.entry(name, file, answer))
+        entries.append(usd_library.library_entry(name, file, answer))
     path = folder / "character.usd"
-    path.write_bytes(usd_library.stage(conftest.person(), convention, rate, entries))
+    path.write_bytes(usd_library.library_stage(conftest.person(), convention, rate, entries))
     return path
 
 
@@ -131,7 +131,7 @@ def test_the_text_is_what_usd_writes_of_it(answers, tmp_path):
 
 def test_a_library_of_no_clips_is_a_character_at_rest(tmp_path):
     path = tmp_path / "character.usd"
-    path.write_bytes(usd_library.stage(conftest.person(), METRES, 30.0, []))
+    path.write_bytes(usd_library.library_stage(conftest.person(), METRES, 30.0, []))
     stage = Usd.Stage.Open(str(path))
     assert stage.GetEndTimeCode() == 0
     assert not stage.GetPrimAtPath("/Character/Clips").GetAllChildren()
@@ -151,9 +151,9 @@ def test_layers_are_as_usd_writes_them(answers, convention):
     many = [answers[index] for index in (0, 1, 0, 2, 1)]
     expected = [
         crate_template.ordinary(
-            usd_animation.Animations(take.rate, convention, take.rig.paths), take.content
+            usd_animation.AnimationLayerBuilder(take.rate, convention, take.rig.paths), take.content
         )
-        for take in clip_arrays.bare(many, convention)
+        for take in clip_arrays.arrays_without_character(many, convention)
     ]
     assert usd_animation.usdc(many, convention) == expected
     assert usd_animation.usdc(many[1:2], convention) == expected[1:2]

@@ -4,26 +4,36 @@ from posefield.encode.character import joint_names
 
 
 def test_a_legal_name_stays_as_it_is():
-    assert joint_names.legal(["Hips", "_x", "A1"]) == ("Hips", "_x", "A1")
+    assert joint_names.legal_names(["Hips", "_x", "A1"]) == ("Hips", "_x", "A1")
 
 
 def test_illegal_characters_become_underscores():
     given = ["mixamorig:Hips", "Bip001-Pelvis", "Left Leg", "1Head", "", "左"]
     expected = ("mixamorig_Hips", "Bip001_Pelvis", "Left_Leg", "_1Head", "_", "__2")
-    assert joint_names.legal(given) == expected
+    assert joint_names.legal_names(given) == expected
 
 
 def test_names_that_meet_are_numbered_and_the_legal_one_keeps_its_own():
-    assert joint_names.legal(["a b", "a-b", "a_b", "a_b_2"]) == ("a_b_3", "a_b_4", "a_b", "a_b_2")
+    assert joint_names.legal_names(["a b", "a-b", "a_b", "a_b_2"]) == (
+        "a_b_3",
+        "a_b_4",
+        "a_b",
+        "a_b_2",
+    )
 
 
 def test_any_names_become_legal_and_unique():
     given = ["".join(letters) for letters in product("a_1 :é", repeat=3)] + [""]
-    found = joint_names.legal(given)
+    found = joint_names.legal_names(given)
     assert len(set(found)) == len(given)
-    assert all(joint_names.LEGAL.fullmatch(name) for name in found)
-    assert joint_names.legal(given) == found
+    assert all(joint_names.LEGAL_NAME.fullmatch(name) for name in found)
+    assert joint_names.legal_names(given) == found
 
 
 def test_a_path_holds_every_ancestor():
-    assert joint_names.paths(["a", "b", "c", "d"], [-1, 0, 1, 0]) == ("a", "a/b", "a/b/c", "a/d")
+    assert joint_names.joint_paths(["a", "b", "c", "d"], [-1, 0, 1, 0]) == (
+        "a",
+        "a/b",
+        "a/b/c",
+        "a/d",
+    )

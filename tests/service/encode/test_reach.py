@@ -38,8 +38,8 @@ def case(seed):
 def reached(person, rig, made):
     """Lowest and highest corner (M, 2, 3) of joints and ends of boxes, without their thickness."""
     local = skeleton.translations(made.bone_offsets, made.root_position)
-    places, turns = skeleton.forward(person.parents, made.rotations.astype(float), local)
-    boxes, joints = body_mesh.boxes(person, rig.bones, person.offsets), rig.bones.joints
+    places, turns = skeleton.forward_kinematics(person.parents, made.rotations.astype(float), local)
+    boxes, joints = body_mesh.bone_boxes(person, rig.bones, person.offsets), rig.bones.joints
     starts = boxes.starts - person.at_rest(person.offsets)[joints]
     ends = np.stack([starts, starts + boxes.arms])[:, None, None]
     drawn = places[:, :, joints] + quat.rotate(turns[:, :, joints], ends)
@@ -50,7 +50,7 @@ def reached(person, rig, made):
 def holds(hull, seed):
     person, rig, made = case(seed)
     found, least = (
-        crowd_extent.boxes(hull(rig), animation_samples.of_motions(made)),
+        crowd_extent.boxes(hull(rig), animation_samples.from_motions(made)),
         reached(person, rig, made),
     )
     return np.all(found[:, 0] <= least[:, 0]) and np.all(found[:, 1] >= least[:, 1])
@@ -78,7 +78,7 @@ def test_placed_boxes_hold_their_corners_wherever_they_stand():
     rng = np.random.default_rng(4)
     own = np.sort(rng.uniform(-1, 1, (6, 2, 3)), axis=1)
     placement = Placement(rng.uniform(-9, 9, (6, 3)), rng.uniform(-9, 9, 6))
-    low, high = crowd_extent.placed(placement, own)
+    low, high = crowd_extent.placed_box(placement, own)
     for box, turn, at in zip(own, placement.turns, placement.positions, strict=True):
         inside = rng.uniform(box[0], box[1], (200, 3))
         moved = quat.rotate(turn, inside) + at
@@ -100,7 +100,7 @@ def ragged(seed):
 
 def places(person, clip):
     """Joints and tips (F, P, 3), in float64."""
-    found, turns = skeleton.forward(person.parents, clip.rotations, clip.translations)
+    found, turns = skeleton.forward_kinematics(person.parents, clip.rotations, clip.translations)
     holders = list(person.tip_joints)
     return np.concatenate(
         [found, found[:, holders] + quat.rotate(turns[:, holders], person.tip_offsets)], 1
@@ -112,7 +112,7 @@ def test_boxes_of_clips_are_exact(seed):
     person, made = ragged(seed)
     rig = character.rig(person)
     none = np.zeros((len(made), len(person) + len(person.tip_joints)))
-    found = exact.boxes(rig.tree, animation_samples.of_clips(made), none)
+    found = exact.bounding_boxes(rig.tree, animation_samples.from_clips(made), none)
     for clip, (low, high) in zip(made, found, strict=True):
         every = places(person, clip).reshape(-1, 3)
         for ours, theirs in ((low, every.min(axis=0)), (-high, -every.max(axis=0))):
@@ -122,11 +122,11 @@ def test_boxes_of_clips_are_exact(seed):
 def test_motions_too_many_to_be_placed_at_once_have_the_boxes_that_each_has_alone():
     person, made = ragged(3)
     rig = character.rig(person)
-    many = animation_samples.of_clips(made * (2 * exact.FRAMES // sum(map(len, made))))
-    assert len(list(many.parts(exact.FRAMES))) > 1
+    many = animation_samples.from_clips(made * (2 * exact.FRAMES_AT_ONCE // sum(map(len, made))))
+    assert len(list(many.parts(exact.FRAMES_AT_ONCE))) > 1
     balls = np.zeros((len(many), len(person) + len(person.tip_joints)))
-    found = exact.boxes(rig.tree, many, balls)
-    alone = [exact.boxes(rig.tree, one, balls[:1])[0] for one in many.parts(1)]
+    found = exact.bounding_boxes(rig.tree, many, balls)
+    alone = [exact.bounding_boxes(rig.tree, one, balls[:1])[0] for one in many.parts(1)]
     assert np.array_equal(found, alone)
 
 
@@ -135,9 +135,12 @@ def test_a_turn_in_the_wrong_order_would_be_seen():
     rig = character.rig(person)
     none = np.zeros((len(made), len(person) + len(person.tip_joints)))
     swapped = [replace(clip, rotations=np.roll(clip.rotations, 1, axis=-1)) for clip in made]
-    found = exact.boxes(rig.tree, animation_samples.of_clips(swapped), none)
+    found = exact.bounding_boxes(rig.tree, animation_samples.from_clips(swapped), none)
     assert (
-        np.abs(found - exact.boxes(rig.tree, animation_samples.of_clips(made), none)).max() > 0.05
+        np.abs(
+            found - exact.bounding_boxes(rig.tree, animation_samples.from_clips(made), none)
+        ).max()
+        > 0.05
     )
 
 
@@ -145,10 +148,12 @@ def test_a_turn_in_the_wrong_order_would_be_seen():
 def test_a_body_in_any_pose_stays_in_the_box_of_anywhere(seed):
     person, made = ragged(seed)
     rig = character.rig(person)
-    whole = animation_samples.of_clips(made)
-    own = exact.boxes(rig.tree, whole, character.balls(character.resting(rig, whole.offsets)))
+    whole = animation_samples.from_clips(made)
+    own = exact.bounding_boxes(
+        rig.tree, whole, character.bounding_radii(character.rest_pose(rig, whole.offsets))
+    )
     for clip, (low, high) in zip(made, own, strict=True):
-        lowest, highest = exact.anywhere(person, clip.translations[0], clip.root_path)
+        lowest, highest = exact.pose_independent_box(person, clip.translations[0], clip.root_path)
         # A stub's ball holds its corners with some room.
         assert np.all(lowest <= low + 0.02) and np.all(highest >= high - 0.02)
         assert np.all(highest - lowest < 20)

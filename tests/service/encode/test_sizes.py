@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posefield.encode.formats import CROWD_ENCODERS, ENCODERS, poses_within
+from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS, max_poses
 from posefield.inference import session
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import ClipQuestion
@@ -26,27 +26,29 @@ def controls(model, share):
     }
 
 
-@pytest.mark.parametrize("name", ENCODERS)
+@pytest.mark.parametrize("name", CLIP_ENCODERS)
 def test_no_clip_takes_more_than_was_reckoned(name, model):
-    joints, encoder = len(model.session.card.skeleton) + 1, ENCODERS[name]
+    joints, encoder = len(model.session.card.skeleton) + 1, CLIP_ENCODERS[name]
     for share in SHARES:
         question = controls(model, share)
         long, short = (
-            clips.clip(model, ClipQuestion(controls=question, fps=f)) for f in (400.0, 200.0)
+            clips.synthesize_clip(model, ClipQuestion(controls=question, fps=f))
+            for f in (400.0, 200.0)
         )
         more = len(encoder.encode(long)) - len(encoder.encode(short))
         per_joint = more / (len(long.clip) - len(short.clip)) / joints
-        assert encoder.per_joint / 3 < per_joint < encoder.per_joint
+        assert encoder.bytes_per_joint / 3 < per_joint < encoder.bytes_per_joint
 
 
 @pytest.mark.parametrize("name", CROWD_ENCODERS)
 def test_no_crowd_takes_more_than_was_reckoned(name, model):
     joints, encoder = len(model.session.card.skeleton) + 1, CROWD_ENCODERS[name]
     sizes = [
-        len(encoder.encode(crowd_synthesis.poses(model, company(model, n)))) for n in (100, 400)
+        len(encoder.encode(crowd_synthesis.synthesize_crowd(model, company(model, n))))
+        for n in (100, 400)
     ]
     per_joint = (sizes[1] - sizes[0]) / 300 / joints
-    assert encoder.per_joint / 3 < per_joint < encoder.per_joint
+    assert encoder.bytes_per_joint / 3 < per_joint < encoder.bytes_per_joint
 
 
 def company(model, count):
@@ -67,5 +69,5 @@ def company(model, count):
 
 
 def test_as_many_poses_are_allowed_as_surely_fit():
-    assert poses_within(4800, 9, 48) == 10
-    assert poses_within(4799, 9, 48) == 9
+    assert max_poses(4800, 9, 48) == 10
+    assert max_poses(4799, 9, 48) == 9

@@ -13,9 +13,9 @@ import pytest
 
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
-from posefield.encode.formats import ENCODERS, POSE_ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.encode.tables import table as tables
-from posefield.encode.tables.arrow import arrow
+from posefield.encode.tables.arrow import arrow_stream
 from posefield.encode.tables.table import Table
 from posefield.question.results import PoseAnswer
 
@@ -85,8 +85,8 @@ def test_every_format_of_poses_has_a_reader_here():
 
 @pytest.mark.parametrize("extension", ["msgpack", "arrow", "npz"])
 def test_a_clip_holds_what_its_json_does(extension, walk):
-    plain = by_json(ENCODERS["json"].encode(walk))
-    found = READERS[extension](ENCODERS[extension].encode(walk))
+    plain = by_json(CLIP_ENCODERS["json"].encode(walk))
+    found = READERS[extension](CLIP_ENCODERS[extension].encode(walk))
     assert found.keys() == plain.keys() - {"frames"}
     for name in (*ROWS, "bone_offsets"):
         np.testing.assert_allclose(np.array(found[name], float), plain[name], atol=2e-6)
@@ -103,12 +103,17 @@ def test_a_clip_holds_what_its_json_does(extension, walk):
 
 def test_msgpack_is_little_endian_whatever_the_array(walk):
     column = np.arange(3, dtype=">f4")
-    found = msgpack.unpackb(tables.msgpack(Table({"a": column}, {})))["a"]
+    found = msgpack.unpackb(tables.msgpack_table(Table({"a": column}, {})))["a"]
     assert (found["dtype"], found["shape"]) == ("<f4", [3])
     assert np.frombuffer(found["data"], "<f4").tolist() == [0.0, 1.0, 2.0]
 
 
-FORMS = {"json": tables.json, "msgpack": tables.msgpack, "npz": tables.npz, "arrow": arrow}
+FORMS = {
+    "json": tables.json_table,
+    "msgpack": tables.msgpack_table,
+    "npz": tables.npz_table,
+    "arrow": arrow_stream,
+}
 
 
 @pytest.mark.parametrize("extension", FORMS)
@@ -126,26 +131,26 @@ def test_binary_is_smaller_than_json(posed):
 def test_large_arrays_are_written_in_pieces_that_do_not_show():
     rng = np.random.default_rng(4)
     content = {
-        "long": rng.standard_normal(3 * tables.BLOCK + 1).astype(np.float32),
-        "deep": rng.standard_normal((tables.BLOCK // 8, 5, 4)),
-        "wide": rng.standard_normal((3, tables.BLOCK)),
-        "whole": rng.integers(0, 9, tables.BLOCK + 7, dtype=np.int8),
-        "true": rng.random(tables.BLOCK + 1) < 0.5,
+        "long": rng.standard_normal(3 * tables.JSON_BLOCK + 1).astype(np.float32),
+        "deep": rng.standard_normal((tables.JSON_BLOCK // 8, 5, 4)),
+        "wide": rng.standard_normal((3, tables.JSON_BLOCK)),
+        "whole": rng.integers(0, 9, tables.JSON_BLOCK + 7, dtype=np.int8),
+        "true": rng.random(tables.JSON_BLOCK + 1) < 0.5,
         "empty": np.zeros((0, 4)),
         "name": '"quoted"',
     }
     expected = orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
-    assert tables.document(content) == expected
-    assert tables.document({}) == b"{}"
+    assert tables.json_object(content) == expected
+    assert tables.json_object({}) == b"{}"
 
 
 def test_writing_large_arrays_stops_when_it_is_cancelled():
     own = Cancellation()
     context = copy_context()
     context.run(cancellation.current.set, own)
-    small, large = {"a": np.zeros(4)}, {"a": np.zeros(tables.BLOCK + 1)}
-    assert context.run(tables.document, large)
+    small, large = {"a": np.zeros(4)}, {"a": np.zeros(tables.JSON_BLOCK + 1)}
+    assert context.run(tables.json_object, large)
     own.cancel()
-    assert context.run(tables.document, small)
+    assert context.run(tables.json_object, small)
     with pytest.raises(Cancelled):
-        context.run(tables.document, large)
+        context.run(tables.json_object, large)

@@ -7,23 +7,23 @@ import pytest
 from pxr import Sdf, Vt
 
 from posefield.encode.usd import text_template
-from posefield.encode.usd.prim_specs import Type, attribute, prim
+from posefield.encode.usd.prim_specs import ValueTypes, prim, varying_attribute
 
 
 def usd(values):
     """Each number as usd-core spells it."""
     kind, array = (
-        (Type.FloatArray, Vt.FloatArray)
+        (ValueTypes.FloatArray, Vt.FloatArray)
         if values.dtype == np.float32
-        else (Type.DoubleArray, Vt.DoubleArray)
+        else (ValueTypes.DoubleArray, Vt.DoubleArray)
     )
     layer = Sdf.Layer.CreateAnonymous("numbers.usda")
-    attribute(prim(layer, "Numbers", "Scope"), "all", kind, array.FromNumpy(values))
+    varying_attribute(prim(layer, "Numbers", "Scope"), "all", kind, array.FromNumpy(values))
     return re.search(r"= \[(.*)\]", layer.ExportToString()).group(1).split(", ")
 
 
 def ours(values):
-    (row,) = text_template.vectors(values.reshape(1, -1, 1))
+    (row,) = text_template.row_texts(values.reshape(1, -1, 1))
     return row.decode().split("), (")
 
 
@@ -47,7 +47,7 @@ def numbers(kind, count=100_000):
     ]
     every = np.concatenate([bits, powers, 1.5 * powers, -9.99 * powers / 10, odd, range(2000)])
     every = every[np.isfinite(every)].astype(kind)
-    return np.array([number for number in every if text_template.plain(number)], kind)
+    return np.array([number for number in every if text_template.all_plain(number)], kind)
 
 
 @pytest.mark.parametrize("kind", ["f4", "f8"])
@@ -64,16 +64,16 @@ def test_plain_numbers_are_spelt_as_usd_does(kind):
 )
 def test_other_numbers_would_be_spelt_in_another_way(value, kind):
     values = np.array([value, 1.5], kind)
-    assert not text_template.plain(values)
+    assert not text_template.all_plain(values)
     assert value in (2e13,) * (kind == "f8") or ours(values) != usd(values)
 
 
 def test_rows_of_vectors_are_told_apart():
     rows = np.arange(12, dtype="f4").reshape(2, 2, 3)
-    assert text_template.vectors(rows) == [b"0, 1, 2), (3, 4, 5", b"6, 7, 8), (9, 10, 11"]
-    assert text_template.moves(rows) == text_template.vectors(rows)
+    assert text_template.row_texts(rows) == [b"0, 1, 2), (3, 4, 5", b"6, 7, 8), (9, 10, 11"]
+    assert text_template.vector_texts(rows) == text_template.row_texts(rows)
     rows[1, 1] = rows[0, 1]
-    assert text_template.moves(rows) == text_template.vectors(rows)
-    assert text_template.moves(rows[:, :1]) == text_template.vectors(rows[:, :1])
-    (quaternion,) = text_template.quaternions(np.array([[[1, 2, 3, 4]]], "f4"))
+    assert text_template.vector_texts(rows) == text_template.row_texts(rows)
+    assert text_template.vector_texts(rows[:, :1]) == text_template.row_texts(rows[:, :1])
+    (quaternion,) = text_template.quaternion_texts(np.array([[[1, 2, 3, 4]]], "f4"))
     assert quaternion == b"4, 1, 2, 3"

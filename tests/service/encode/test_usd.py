@@ -7,7 +7,7 @@ import pytest
 from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from posefield.encode.character import joint_names
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd import layer_metadata
 from posefield.motion.clip import Clip
 from posefield.question.results import ClipAnswer
@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parent
 
 @pytest.fixture(params=["usda", "usdc"])
 def stage(request, walk, tmp_path):
-    return opened(ENCODERS[request.param].encode(walk), tmp_path / f"clip.{request.param}")
+    return opened(CLIP_ENCODERS[request.param].encode(walk), tmp_path / f"clip.{request.param}")
 
 
 def opened(data, path):
@@ -60,7 +60,7 @@ def test_usd_poses_the_joints_as_we_do(stage, walk):
 def test_quaternions_in_the_wrong_order_would_be_seen(walk, tmp_path):
     swapped = np.roll(walk.clip.rotations, 1, axis=-1)
     wrong = Clip(walk.clip.skeleton, swapped, walk.clip.translations, walk.clip.rate)
-    data = ENCODERS["usdc"].encode(ClipAnswer(wrong, walk.trust))
+    data = CLIP_ENCODERS["usdc"].encode(ClipAnswer(wrong, walk.trust))
     assert error(opened(data, tmp_path / "wrong.usdc"), walk.clip) > 0.1
 
 
@@ -113,7 +113,7 @@ def test_prims_are_bound_to_each_other(stage):
 def test_joints_have_legal_unique_leaf_names_and_keep_their_own(stage, walk):
     joints = value(stage, "/Skel.joints")
     leaves = [joint.rpartition("/")[2] for joint in joints]
-    assert tuple(leaves) == joint_names.legal(walk.clip.skeleton.names)
+    assert tuple(leaves) == joint_names.legal_names(walk.clip.skeleton.names)
     assert tuple(value(stage, "/Skel.jointNames")) == walk.clip.skeleton.names
     assert list(value(stage, "/Anim.joints")) == list(joints)
 
@@ -172,7 +172,7 @@ def skinned(stage, frames=(0, 20, 44)):
 
 
 def test_a_pose_is_one_time_sample(pose, tmp_path):
-    stage = opened(ENCODERS["usda"].encode(pose), tmp_path / "pose.usda")
+    stage = opened(CLIP_ENCODERS["usda"].encode(pose), tmp_path / "pose.usda")
     for name in ("translations", "rotations"):
         attribute = stage.GetAttributeAtPath(f"/Character/Anim.{name}")
         assert attribute.GetTimeSamples() == [0]
@@ -187,7 +187,9 @@ def test_the_layer_says_what_the_answer_is_worth(stage, walk):
 
 def test_an_answer_without_warnings_can_be_written(walk, tmp_path):
     bare = type(walk.trust)("m@1", {}, 1.0, 0.0, ())
-    stage = opened(ENCODERS["usda"].encode(ClipAnswer(walk.clip, bare)), tmp_path / "bare.usda")
+    stage = opened(
+        CLIP_ENCODERS["usda"].encode(ClipAnswer(walk.clip, bare)), tmp_path / "bare.usda"
+    )
     facts = stage.GetRootLayer().customLayerData["posefield"]
     assert (facts["controls"], list(facts["warnings"])) == ({}, [])
     # USD has no null: who was not asked for is not mentioned.
@@ -198,9 +200,9 @@ PRINT_DIGESTS = """
 import hashlib, sys
 sys.path.insert(0, sys.argv[1])
 import conftest
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 walk = conftest.answer(frames=45, rate=29.97)
-for encoder in ENCODERS.values():
+for encoder in CLIP_ENCODERS.values():
     print(encoder.extension, hashlib.sha256(encoder.encode(walk)).hexdigest())
 """
 
@@ -212,21 +214,21 @@ def test_other_processes_write_the_same_bytes():
         subprocess.run(command, capture_output=True, text=True, check=True).stdout for _ in range(2)
     }
     assert len(runs) == 1
-    assert len(runs.pop().splitlines()) == len(ENCODERS)
+    assert len(runs.pop().splitlines()) == len(CLIP_ENCODERS)
 
 
 @pytest.fixture
 def layer(walk):
     made = Sdf.Layer.CreateAnonymous("walk.usda")
-    made.ImportFromString(ENCODERS["usda"].encode(walk).decode())
+    made.ImportFromString(CLIP_ENCODERS["usda"].encode(walk).decode())
     return made
 
 
 def test_no_temporary_file_is_left(layer, tmp_path):
-    assert layer_metadata.crate(layer, tmp_path).startswith(b"PXR-USDC")
+    assert layer_metadata.crate_bytes(layer, tmp_path).startswith(b"PXR-USDC")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("place", ["none", "/proc"])
 def test_a_machine_without_a_folder_in_memory_will_do(layer, place, tmp_path):
-    assert layer_metadata.crate(layer, tmp_path / place) == layer_metadata.crate(layer)
+    assert layer_metadata.crate_bytes(layer, tmp_path / place) == layer_metadata.crate_bytes(layer)

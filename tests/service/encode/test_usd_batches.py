@@ -9,7 +9,7 @@ import pytest
 from counted import Counted
 
 from posefield.encode.files.file_convention import CENTIMETRES, Convention
-from posefield.encode.formats import ENCODERS, METRES
+from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.encode.usd import (
     clip_arrays,
     crate_template,
@@ -20,7 +20,7 @@ from posefield.encode.usd import (
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
-from posefield.question.results import ClipAnswer, Met, Trust
+from posefield.question.results import ClipAnswer, ConstraintResult, Trust
 
 INCHES = Convention(0.0254, "z")
 CONVENTIONS = [METRES, CENTIMETRES, Convention(1.0, "z"), INCHES]
@@ -45,7 +45,11 @@ def _answer(rng, frames, person, said):
 
 
 def ordinary(given, convention=METRES, form=crate_template):
-    return [form.ordinary(*each) for one in given for each in usd_clip.authored([one], convention)]
+    return [
+        form.ordinary(*each)
+        for one in given
+        for each in usd_clip.builders_and_contents([one], convention)
+    ]
 
 
 def written(given, convention=METRES, write=usd_clip.usdc):
@@ -85,7 +89,7 @@ def test_other_clips_have_other_bytes():
 @pytest.mark.parametrize("extension", ["usda", "usdc", "usdz"])
 def test_a_clip_is_the_same_alone_and_among_others(extension):
     given = [*answers(3, 20), *answers(2, 31, seed=1), *answers(1, 1, seed=2), *answers(2, 20)]
-    write = ENCODERS[extension].write
+    write = CLIP_ENCODERS[extension].write
     alone = [write([one], METRES)[0] for one in given]
     assert write(given, METRES) == alone
     assert write(given[::-1], METRES) == alone[::-1]
@@ -105,7 +109,7 @@ def test_clips_too_long_to_be_made_together_are_written():
     """Two that are too long together, and one that is too long by itself."""
     given = [*answers(2, 1700), *answers(1, 3300, seed=1)]
     lengths = [len(answer.clip) for answer in given]
-    assert max(lengths[:2]) < clip_arrays.TOGETHER < min(sum(lengths[:2]), lengths[2])
+    assert max(lengths[:2]) < clip_arrays.FRAMES_AT_ONCE < min(sum(lengths[:2]), lengths[2])
     assert written(given) == ordinary(given)
 
 
@@ -158,8 +162,18 @@ FACTS = [
     {"controls": {"a": 0.1, "b": 0.1, "c": 0.0254, "d": 0.3, "e": 0.3}},
     {"controls": {"a": 1, "b": True, "c": 0.5}},
     {"inferred": ("speed", "turn rate"), "measured": {"speed": 1.25, "turn rate": 0.1}},
-    {"targets": (Met("speed", 0.0, "m/s", True), Met("speed", 0.25, "m/s", False))},
-    {"targets": (Met("LeftHand at end", 1e-9, "m", True), Met("Body at 0.5 s", 0.3, "m", True))},
+    {
+        "targets": (
+            ConstraintResult("speed", 0.0, "m/s", True),
+            ConstraintResult("speed", 0.25, "m/s", False),
+        )
+    },
+    {
+        "targets": (
+            ConstraintResult("LeftHand at end", 1e-9, "m", True),
+            ConstraintResult("Body at 0.5 s", 0.3, "m", True),
+        )
+    },
 ]
 
 
@@ -177,7 +191,9 @@ def held(count, frames, reached=True):
         misses = rng.uniform(0, 1e-5, 3)
         places = [f"LeftHand at {index / 10:g} s", f"Hips at 1.{index} s"]
         names = zip(["speed", *places], misses, ("m/s", "m", "m"), strict=True)
-        met = tuple(Met(name, float(miss), unit, reached) for name, miss, unit in names)
+        met = tuple(
+            ConstraintResult(name, float(miss), unit, reached) for name, miss, unit in names
+        )
         measured = {"speed": float(rng.uniform(0, 2)), "turn rate": 0.25}
         trust = replace(one.trust, targets=met, measured=measured, inferred=("turn rate",))
         yield replace(one, trust=trust)
@@ -192,8 +208,8 @@ def test_what_clips_were_held_to_is_written_as_usd_does(reached):
 def pressed(form, given):
     """How clips are written by a new press: by usd-core, and templates that are made."""
     counted = Counted(form)
-    own = template_cache.Press(counted, 64_000_000)
-    for author, content in usd_clip.authored(given, METRES):
+    own = template_cache.TemplateCache(counted, 64_000_000)
+    for author, content in usd_clip.builders_and_contents(given, METRES):
         own.write(author, content)
     return counted.calls
 
@@ -252,4 +268,4 @@ def test_templates_are_used(form):
     given = answers(3, 37)
     assert pressed(form, given) == {"ordinary": 1, "template": 1}
     assert pressed(form, [*given, *answers(1, 38)]) == {"ordinary": 2, "template": 1}
-    assert template_cache.TEXTS.taken <= template_cache.TEXTS.limit
+    assert template_cache.TEXTS.used_bytes <= template_cache.TEXTS.limit

@@ -6,7 +6,7 @@ from pxr import Usd, UsdGeom, UsdSkel
 
 from posefield.check import check
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.formats import CENTIMETRES, ENCODERS, METRES
+from posefield.encode.formats import CENTIMETRES, CLIP_ENCODERS, METRES
 
 CONVENTIONS = [METRES, CENTIMETRES, Convention(1.0, "z"), Convention(0.0254, "z")]
 FRAMES = (0, 20, 44)
@@ -27,7 +27,7 @@ def path(convention, walk, tmp_path):
 
 def written(convention, walk, folder):
     path = folder / "clip.usdc"
-    path.write_bytes(ENCODERS["usdc"].encode(walk, convention))
+    path.write_bytes(CLIP_ENCODERS["usdc"].encode(walk, convention))
     return path
 
 

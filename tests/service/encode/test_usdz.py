@@ -6,12 +6,12 @@ import pytest
 from pxr import Usd, UsdSkel
 
 from posefield.encode.files import zip_archive
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 
 
 @pytest.fixture(scope="module")
 def archive(walk):
-    return ENCODERS["usdz"].encode(walk)
+    return CLIP_ENCODERS["usdz"].encode(walk)
 
 
 def test_the_archive_holds_the_binary_layer_alone(archive, walk):
@@ -20,16 +20,16 @@ def test_the_archive_holds_the_binary_layer_alone(archive, walk):
         (entry,) = found.infolist()
         assert (entry.filename, entry.compress_type) == ("clip.usdc", zipfile.ZIP_STORED)
         assert entry.date_time == (1980, 1, 1, 0, 0, 0)
-        assert found.read(entry) == ENCODERS["usdc"].encode(walk)
+        assert found.read(entry) == CLIP_ENCODERS["usdc"].encode(walk)
 
 
 def test_the_data_are_aligned(archive, walk):
-    assert archive.index(ENCODERS["usdc"].encode(walk)) % 64 == 0
+    assert archive.index(CLIP_ENCODERS["usdc"].encode(walk)) % 64 == 0
 
 
 @pytest.mark.parametrize("length", range(1, 65))
 def test_data_are_aligned_after_a_name_of_any_length(length):
-    data = b"".join(zip_archive.archive([zip_archive.whole("n" * length, b"data")]))
+    data = b"".join(zip_archive.zip_chunks([zip_archive.whole("n" * length, b"data")]))
     start = data.index(b"data")
     # A local header has 30 bytes, then come the name and the padding, an extra field.
     padding = data[30 + length : start]
@@ -50,7 +50,9 @@ def test_an_archive_of_many_members_is_aligned_and_whole(tmp_path):
     lying = tmp_path / "lying"
     lying.write_bytes(b"on disk" * 300_000)
     members = [zip_archive.whole(name, data) for name, data in contents.items()]
-    data = b"".join(zip_archive.archive([*members, zip_archive.lying("last.usdc", lying)]))
+    data = b"".join(
+        zip_archive.zip_chunks([*members, zip_archive.member_of_file("last.usdc", lying)])
+    )
     with zipfile.ZipFile(io.BytesIO(data)) as found:
         assert found.testzip() is None
         assert found.namelist() == [*contents, "last.usdc"]

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import orjson
 
-from posefield.batch.job import Job, Work
-from posefield.batch.rows.row_query import KEPT, Fault, Query, Survey
+from posefield.batch.job import ExportJob, WorkerInput
+from posefield.batch.rows.row_query import MAX_KEPT_FAULTS, ClipQuery, RowFault, RowSurvey
 from posefield.question.motion_question import ClipQuestion
 
 CONTROLS = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
@@ -20,8 +20,8 @@ class Listed:
         self.digest = hashlib.sha256(repr(self.listed).encode()).hexdigest()
 
     def survey(self):
-        faults = tuple(row for row in self.listed if isinstance(row, Fault))
-        return Survey(len(self.listed), len(faults), faults[:KEPT])
+        faults = tuple(row for row in self.listed if isinstance(row, RowFault))
+        return RowSurvey(len(self.listed), len(faults), faults[:MAX_KEPT_FAULTS])
 
     def rows(self):
         return iter(self.listed)
@@ -54,7 +54,7 @@ def question(**more):
 def queries(count, form="json", fps=30.0):
     """Source of so many clips, each turned a little further than the last."""
     return Listed(
-        Query(
+        ClipQuery(
             f"clip-{n:04d}",
             form,
             ClipQuestion(controls={**CONTROLS, "turn": 30.0 * n / count}, fps=fps),
@@ -68,8 +68,8 @@ def work(model, source, target, chunk=8, layout="folder", **more):
     """Work of a small job."""
     content = model.read_bytes()
     digest = hashlib.sha256(content).hexdigest()
-    job = Job(f"{model.stem}@{digest[:16]}", digest, source.digest, layout, chunk)
-    return replace(Work(job, content, str(target)), **more)
+    job = ExportJob(f"{model.stem}@{digest[:16]}", digest, source.digest, layout, chunk)
+    return replace(WorkerInput(job, content, str(target)), **more)
 
 
 def content(folder):

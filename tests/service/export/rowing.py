@@ -8,9 +8,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from posefield.batch.rows import row_sources
-from posefield.batch.rows.columns import OPTIONS
-from posefield.batch.rows.row_query import Fault, Query
-from posefield.batch.rows.row_sources import Asked, Defaults
+from posefield.batch.rows.columns import OPTION_KINDS
+from posefield.batch.rows.row_query import ClipQuery, RowFault
+from posefield.batch.rows.row_sources import Defaults, SourceOptions
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}
@@ -22,7 +22,10 @@ TYPES |= {"exact": pa.string(), "targets": pa.string(), "pin_feet": pa.bool_()}
 def columns(rows):
     """Controls first, then whatever any row says, in the order of messages in JSON Lines."""
     said = dict.fromkeys(key for row in rows for key in row)
-    return [*(key for key in said if key not in OPTIONS), *(key for key in OPTIONS if key in said)]
+    return [
+        *(key for key in said if key not in OPTION_KINDS),
+        *(key for key in OPTION_KINDS if key in said),
+    ]
 
 
 def write_csv(path: Path, rows):
@@ -54,7 +57,7 @@ def text(path: Path, *lines, end="\n"):
 
 
 def source(model, path=None, usual=None, **asked):
-    return row_sources.source(Asked(path, **asked), usual or Defaults("usdc"), model)
+    return row_sources.open_source(SourceOptions(path, **asked), usual or Defaults("usdc"), model)
 
 
 def rows(model, path=None, usual=None, **asked):
@@ -64,7 +67,7 @@ def rows(model, path=None, usual=None, **asked):
 def faults(model, path, usual=None):
     """Places, without the folder, and messages of the faults; the survey's must be the same."""
     opened = source(model, path, usual)
-    found = [row for row in opened.rows() if isinstance(row, Fault)]
+    found = [row for row in opened.rows() if isinstance(row, RowFault)]
     survey = opened.survey()
     assert (survey.faulty, survey.faults) == (len(found), tuple(found[:20]))
     return [(fault.place.removeprefix(f"{path.parent}/"), fault.message) for fault in found]
@@ -73,5 +76,5 @@ def faults(model, path, usual=None):
 def asked(found):
     """Names, formats and questions of rows that are all queries."""
     found = list(found)
-    assert all(isinstance(row, Query) for row in found), found
+    assert all(isinstance(row, ClipQuery) for row in found), found
     return [(row.name, row.format, row.question) for row in found]

@@ -195,13 +195,13 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import exporting
 from posefield.batch import dask_export as cluster
-from posefield.batch.chunks import Task
+from posefield.batch.chunks import ChunkTask
 from posefield.common.errors import FileError
 source = exporting.queries(4)
 work = exporting.work(Path(sys.argv[2]), source, sys.argv[3])
 with cluster.runner(sys.argv[4]) as run:
     try:
-        list(run(work, iter([Task(0, 0, tuple(source.rows()))]), lambda: False))
+        list(run(work, iter([ChunkTask(0, 0, tuple(source.rows()))]), lambda: False))
     except FileError as fault:
         print(fault)
 """

@@ -7,19 +7,19 @@ import sys
 
 import pytest
 
-from posefield.batch.folder_target import Folder
+from posefield.batch.folder_target import FolderTarget
 from posefield.common.errors import FileError
 
 # Dies with half a file written; what is written reaches the disk before.
 DIES = """
 import os, signal, sys
-from posefield.batch.folder_target import Folder
+from posefield.batch.folder_target import FolderTarget
 
 def pieces():
     yield bytes(1 << 20)
     os.kill(os.getpid(), signal.SIGKILL)
 
-folder = Folder(sys.argv[1], ".state/writing")
+folder = FolderTarget(sys.argv[1], ".state/writing")
 folder.prepare()
 folder.stream("clips/000/a.usdc", pieces())
 """
@@ -28,7 +28,7 @@ folder.stream("clips/000/a.usdc", pieces())
 @pytest.fixture
 def folder(tmp_path):
     """A folder that is ready to be written to."""
-    made = Folder(str(tmp_path), ".state/writing")
+    made = FolderTarget(str(tmp_path), ".state/writing")
     made.prepare()
     return made
 
@@ -62,7 +62,7 @@ def test_pieces_that_break_off_leave_nothing(folder, tmp_path):
 
 
 def test_two_writers_of_one_file_do_each_other_no_harm(folder, tmp_path):
-    other = Folder(str(tmp_path), ".state/writing")
+    other = FolderTarget(str(tmp_path), ".state/writing")
 
     def pieces():
         yield b"sa"

@@ -129,7 +129,7 @@ def test_a_library_is_one_character_that_can_play_every_clip(made, source, model
     skeleton = UsdSkel.Skeleton(stage.GetPrimAtPath("/Character/Skel"))
     source_of = UsdSkel.BindingAPI(skeleton).GetAnimationSourceRel()
     for row, query in enumerate(source.rows()):
-        clip = clips.clip(synthesizer, query.question).clip
+        clip = clips.synthesize_clip(synthesizer, query.question).clip
         source_of.SetTargets([f"/Character/Clips/{query.name.replace('-', '_')}"])
         cache, root = UsdSkel.Cache(), UsdSkel.Root(stage.GetPrimAtPath("/Character"))
         cache.Populate(root, Usd.PrimDefaultPredicate)
@@ -138,7 +138,7 @@ def test_a_library_is_one_character_that_can_play_every_clip(made, source, model
         # float32 keeps 1e-7 of a coordinate, and errors add up along the chain of joints.
         assert found == pytest.approx(clip.positions()[-1], abs=1e-5)
         # Negative control: its neighbour ends elsewhere.
-        other = clips.clip(synthesizer, list(source.rows())[row - 1].question).clip
+        other = clips.synthesize_clip(synthesizer, list(source.rows())[row - 1].question).clip
         assert np.abs(found - other.positions()[-1]).max() > 1e-4
 
 

@@ -9,10 +9,10 @@ import pytest
 
 from posefield.batch import process_pool, run
 from posefield.batch.layouts import path
-from posefield.batch.rows.row_query import Fault, Query
+from posefield.batch.rows.row_query import ClipQuery, RowFault
 from posefield.batch.run import Shard
 from posefield.common.errors import FileError, InvalidField
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.registry import model_registry
 from posefield.synthesis import clips
 
@@ -30,7 +30,7 @@ def undisturbed(source, model_path, tmp_path_factory):
     target = tmp_path_factory.mktemp("undisturbed") / "made" / "here"
     watch = exporting.Recorder()
     outcome = run.run(exporting.work(model_path, source, target), source, watch)
-    assert (outcome.rows, outcome.done, outcome.before) == (ROWS, ROWS, False)
+    assert (outcome.rows, outcome.done, outcome.already_complete) == (ROWS, ROWS, False)
     assert watch.begun == (ROWS, 0)
     assert [part.clips for part in watch.parts] == [8, 8, 8, 6]
     return target
@@ -39,7 +39,7 @@ def undisturbed(source, model_path, tmp_path_factory):
 def test_every_query_has_a_file_that_the_encoder_would_make(undisturbed, source, model_path):
     synthesizer = model_registry.load([model_path]).models["reaching"]
     for query in source.rows():
-        expected = ENCODERS["json"].encode(clips.clip(synthesizer, query.question))
+        expected = CLIP_ENCODERS["json"].encode(clips.synthesize_clip(synthesizer, query.question))
         assert (undisturbed / f"clips/000/{query.name}.json").read_bytes() == expected
     assert len(list((undisturbed / "clips/000").iterdir())) == ROWS
 
@@ -101,7 +101,7 @@ def test_what_is_complete_is_left_as_it_is(undisturbed, source, model_path):
     before = {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")}
     watch = exporting.Recorder()
     outcome = run.run(exporting.work(model_path, source, undisturbed), source, watch)
-    assert (outcome.before, outcome.done, watch.begun) == (True, ROWS, None)
+    assert (outcome.already_complete, outcome.done, watch.begun) == (True, ROWS, None)
     assert {path: path.stat().st_mtime_ns for path in undisturbed.rglob("*")} == before
 
 
@@ -117,7 +117,7 @@ def test_what_was_complete_and_lost_a_file_is_made_again(
         (clip if lost == "a clip" else target / lost).unlink()
     work = exporting.work(model_path, source, target)
     outcome = run.run(work, source, exporting.Recorder())
-    assert (outcome.before, outcome.done) == (False, ROWS)
+    assert (outcome.already_complete, outcome.done) == (False, ROWS)
     assert exporting.content(target) == exporting.content(undisturbed)
 
 
@@ -126,7 +126,7 @@ def test_what_was_killed_as_it_ended_is_tidied(undisturbed, source, model_path, 
     (tmp_path / ".posefield/parts").mkdir(parents=True)
     (tmp_path / ".posefield/parts/000001.jsonl").write_bytes(b"{}")
     work = exporting.work(model_path, source, tmp_path)
-    assert run.run(work, source, exporting.Recorder()).before
+    assert run.run(work, source, exporting.Recorder()).already_complete
     assert exporting.content(tmp_path) == exporting.content(undisturbed)
 
 
@@ -200,8 +200,8 @@ def test_a_file_is_no_target(source, model_path, tmp_path):
 def spoilt(source):
     """The same rows, of which one is no query and another makes no sense only when asked."""
     rows = list(source.rows())
-    rows[4] = Fault("line 6", "fps: 'often', expected a number")
-    late = Query("late", "json", exporting.question(end=50.0), "line 13")
+    rows[4] = RowFault("line 6", "fps: 'often', expected a number")
+    late = ClipQuery("late", "json", exporting.question(end=50.0), "line 13")
     rows[11] = late
     return exporting.Listed(rows)
 
@@ -228,7 +228,7 @@ def test_rows_at_fault_are_skipped_and_listed(source, model_path, tmp_path):
 
 
 def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp_path):
-    rows = [row for row in spoilt(source).rows() if not isinstance(row, Fault)]
+    rows = [row for row in spoilt(source).rows() if not isinstance(row, RowFault)]
     bad = exporting.Listed(rows)
     work = exporting.work(model_path, bad, tmp_path)
     for by in (process_pool.run_here, process_pool.runner(2)):
@@ -244,7 +244,7 @@ def test_a_fault_found_late_ends_it_and_skipping_goes_on(source, model_path, tmp
 
 
 def test_queries_of_which_none_can_be_answered_are_refused(model_path, tmp_path):
-    bad = exporting.Listed([Fault("line 2", "no")])
+    bad = exporting.Listed([RowFault("line 2", "no")])
     with pytest.raises(InvalidField, match="no row that can be answered"):
         run.run(exporting.work(model_path, bad, tmp_path, skip=True), bad, exporting.Recorder())
 

@@ -8,7 +8,7 @@ import stores
 
 from posefield.batch import process_pool, run
 from posefield.batch.run import Shard
-from posefield.batch.store_target import Store
+from posefield.batch.store_target import StoreTarget
 from posefield.batch.target import open_target
 from posefield.common.errors import FileError
 from posefield.registry import object_store
@@ -46,7 +46,7 @@ def local(source, model_path, tmp_path_factory):
 
 def content(url):
     """Bytes of every object under a URL, by path."""
-    store = Store(url)
+    store = StoreTarget(url)
     return {path: store.read(path) for path in paths(url)}
 
 
@@ -73,7 +73,7 @@ def test_what_was_stopped_goes_on_in_a_store(source, model_path, bucket, local):
     run.run(work, source, watch)
     assert watch.begun == (ROWS, 16)
     assert content(bucket) == local["folder"]
-    assert run.run(work, source, watch).before
+    assert run.run(work, source, watch).already_complete
 
 
 def test_shards_meet_in_a_store(source, model_path, bucket, local):
@@ -84,7 +84,7 @@ def test_shards_meet_in_a_store(source, model_path, bucket, local):
 
 
 def test_a_store_of_something_else_is_refused_and_left(source, model_path, bucket):
-    Store(bucket).write([("mine.txt", b"mine")])
+    StoreTarget(bucket).write([("mine.txt", b"mine")])
     with pytest.raises(FileError, match="has no manifest of an export"):
         run.run(exporting.work(model_path, source, bucket), source, exporting.Recorder())
     assert content(bucket) == {"mine.txt": b"mine"}
@@ -106,32 +106,32 @@ def test_what_was_complete_and_lost_its_manifest_is_made_again_in_a_store(
     target.drop("manifest.jsonl")
     target.drop("manifest.jsonl")
     assert content(bucket) != whole
-    assert not run.run(work, source, exporting.Recorder()).before
+    assert not run.run(work, source, exporting.Recorder()).already_complete
     assert content(bucket) == whole
 
 
 def test_an_object_with_a_flipped_bit_is_found_to_verify(source, model_path, bucket, local):
     work = exporting.work(model_path, source, bucket)
     run.run(work, source, exporting.Recorder())
-    assert run.run(work, source, exporting.Recorder(), verify=True).before
-    store, path = Store(bucket), "clips/000/clip-0003.json"
+    assert run.run(work, source, exporting.Recorder(), verify=True).already_complete
+    store, path = StoreTarget(bucket), "clips/000/clip-0003.json"
     store.write([(path, store.read(path).replace(b"0", b"1", 1))])
-    assert run.run(work, source, exporting.Recorder()).before
+    assert run.run(work, source, exporting.Recorder()).already_complete
     recorder = exporting.Recorder()
-    assert not run.run(work, source, recorder, verify=True).before
+    assert not run.run(work, source, recorder, verify=True).already_complete
     assert recorder.notes == [f"{bucket}/{path}: missing or damaged; the export is made again"]
     assert content(bucket) == local["folder"]
 
 
 def test_a_file_is_created_once(bucket):
-    store = Store(bucket)
+    store = StoreTarget(bucket)
     assert store.create("a", b"1")
     assert not store.create("a", b"2")
     assert store.read("a") == b"1"
 
 
 def test_a_large_file_goes_in_pieces_and_what_breaks_off_is_not_there(bucket):
-    store = Store(bucket)
+    store = StoreTarget(bucket)
     store.stream("large", (bytes([n]) * 1_000_000 for n in range(20)))
     assert store.read("large")[::1_000_000] == bytes(range(20))
 
@@ -160,4 +160,4 @@ def test_credentials_come_from_the_environment(bucket, monkeypatch):
     monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
     monkeypatch.setitem(os.environ, "AWS_MAX_RETRIES", "0")
     with pytest.raises(FileError, match="cannot be written or read"):
-        Store(bucket).read("a")
+        StoreTarget(bucket).read("a")

@@ -52,10 +52,10 @@ def test_a_flipped_bit_is_found_to_verify_and_the_file_made_again(
 ):
     target = shutil.copytree(complete[layout], tmp_path / "target")
     work = exporting.work(model_path, source, target, 4, layout)
-    assert run.run(work, source, exporting.Recorder(), verify=True).before
+    assert run.run(work, source, exporting.Recorder(), verify=True).already_complete
     flip(target / name)
     recorder = exporting.Recorder()
-    assert not run.run(work, source, recorder, verify=True).before
+    assert not run.run(work, source, recorder, verify=True).already_complete
     assert recorder.notes == [f"{target}/{name}: missing or damaged; the export is made again"]
     assert exporting.content(target) == exporting.content(complete[layout])
 
@@ -67,7 +67,7 @@ def test_a_file_of_another_size_is_found_without_verifying(
     target = shutil.copytree(complete[layout], tmp_path / "target")
     work = exporting.work(model_path, source, target, 4, layout)
     (target / name).write_bytes((target / name).read_bytes()[:-1])
-    assert not run.run(work, source, exporting.Recorder()).before
+    assert not run.run(work, source, exporting.Recorder()).already_complete
     assert exporting.content(target) == exporting.content(complete[layout])
 
 
@@ -79,7 +79,7 @@ def test_a_flipped_bit_is_not_looked_for_without_verifying(
     target = shutil.copytree(complete[layout], tmp_path / "target")
     flip(target / name)
     work = exporting.work(model_path, source, target, 4, layout)
-    assert run.run(work, source, exporting.Recorder()).before
+    assert run.run(work, source, exporting.Recorder()).already_complete
 
 
 def test_a_manifest_that_is_no_json_is_found_without_verifying(
@@ -89,7 +89,7 @@ def test_a_manifest_that_is_no_json_is_found_without_verifying(
     manifest = target / "manifest.jsonl"
     manifest.write_bytes(b"?" * manifest.stat().st_size)
     work = exporting.work(model_path, source, target, 4)
-    assert not run.run(work, source, exporting.Recorder()).before
+    assert not run.run(work, source, exporting.Recorder()).already_complete
     assert exporting.content(target) == exporting.content(complete["folder"])
 
 

@@ -7,14 +7,14 @@ import orjson
 import pytest
 
 from posefield.batch import clip_archive
-from posefield.batch.clip_archive import CLIPS, POSES, Order
-from posefield.batch.rows.row_query import Query
+from posefield.batch.clip_archive import CLIPS, POSES, ArchiveOrder
+from posefield.batch.rows.row_query import ClipQuery
 from posefield.encode.files.file_convention import METRES
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
-from posefield.synthesis.clips import Prospect
+from posefield.synthesis.clips import ClipPreview
 from posefield.synthesis.synthesizer import Synthesizer
 
 
@@ -35,10 +35,10 @@ def order(model):
     def ordered(rates):
         middle = {control.name: control.default for control in model.session.card.controls}
         questions = [ClipQuestion(controls=middle, fps=rate) for rate in rates]
-        queries = [Query(f"c{i}", "json", q, f"/clips/{i}") for i, q in enumerate(questions)]
-        encoder = dataclasses.replace(ENCODERS["json"], write=write)
-        prospects = [clips.prospect(model, question) for question in questions]
-        return Order(model, encoder, METRES, queries, prospects)
+        queries = [ClipQuery(f"c{i}", "json", q, f"/clips/{i}") for i, q in enumerate(questions)]
+        encoder = dataclasses.replace(CLIP_ENCODERS["json"], write=write)
+        prospects = [clips.preview_clip(model, question) for question in questions]
+        return ArchiveOrder(model, encoder, METRES, queries, prospects)
 
     return ordered, made
 
@@ -47,7 +47,7 @@ def test_batches_are_bounded_in_clips_and_in_poses(order):
     ordered, made = order
     rates = [10] * 40 + [1000] * 5 + [10] * 3
     asked = ordered(rates)
-    assert len(list(clip_archive.members(asked))) == len(rates) + 1
+    assert len(list(clip_archive.archive_members(asked))) == len(rates) + 1
     assert [frames for batch in made for frames in batch] == [p.frames for p in asked.prospects]
     assert all(len(batch) <= CLIPS for batch in made)
     assert all(sum(batch) <= POSES for batch in made)
@@ -58,14 +58,14 @@ def test_batches_are_bounded_in_clips_and_in_poses(order):
 def test_a_clip_that_alone_is_more_than_a_batch_is_one(order):
     ordered, made = order
     asked = ordered([10] * 4)
-    prospects = [Prospect(frames, ()) for frames in (1, POSES + 1, 1, 1)]
-    list(clip_archive.members(dataclasses.replace(asked, prospects=prospects)))
+    prospects = [ClipPreview(frames, ()) for frames in (1, POSES + 1, 1, 1)]
+    list(clip_archive.archive_members(dataclasses.replace(asked, prospects=prospects)))
     assert [len(batch) for batch in made] == [1, 1, 2]
 
 
 def test_a_batch_is_made_when_its_first_file_is_taken(order):
     ordered, made = order
-    members = clip_archive.members(ordered([10] * 2 * CLIPS))
+    members = clip_archive.archive_members(ordered([10] * 2 * CLIPS))
     for _ in range(CLIPS):
         next(members)
     assert len(made) == 1
@@ -75,7 +75,7 @@ def test_a_batch_is_made_when_its_first_file_is_taken(order):
 
 def test_the_manifest_lists_the_files_in_order(order):
     ordered, _ = order
-    *files, (name, content) = clip_archive.members(ordered([10, 20]))
+    *files, (name, content) = clip_archive.archive_members(ordered([10, 20]))
     assert name == clip_archive.MANIFEST
     lines = [orjson.loads(line) for line in content.splitlines()]
     assert [(line["name"], line["file"]) for line in lines] == [

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from msgspec import structs
 from rowing import POINT, faults, rows, source, write_csv, write_jsonl, write_parquet
 
-from posefield.batch.rows.row_query import Fault
+from posefield.batch.rows.row_query import RowFault
 from posefield.batch.rows.row_sources import Defaults
 from posefield.common.errors import QueryError
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.motion_question import ClipQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import clips
@@ -81,7 +81,7 @@ def plainly(model, table, usual=USUAL):
         name, form = said.pop("name", f"clip-{index:06d}"), said.pop("format", usual.format)
         controls = {c.name: said.pop(c.name) for c in model.session.card.controls}
         found.append(None)
-        if form not in ENCODERS or name in (".x", "a b") or said.get("extrapolate") == "no":
+        if form not in CLIP_ENCODERS or name in (".x", "a b") or said.get("extrapolate") == "no":
             continue
         question = structs.replace(usual.question, controls=controls, **said)
         try:
@@ -95,7 +95,7 @@ def plainly(model, table, usual=USUAL):
 
 
 def plain(row):
-    return None if isinstance(row, Fault) else (row.name, row.format, row.question)
+    return None if isinstance(row, RowFault) else (row.name, row.format, row.question)
 
 
 @given(table=st.lists(ROWS, min_size=1, max_size=12))
@@ -149,14 +149,14 @@ def test_blocks_leave_no_seam(model, tmp_path, ending):
     for i in (0, 4095, 4096, 5000, 9999):
         table[i]["fps"] = 0.5
     found = rows(model, WRITERS[ending](tmp_path / f"q.{ending}", table))
-    assert [i for i, row in enumerate(found) if isinstance(row, Fault)] == [
+    assert [i for i, row in enumerate(found) if isinstance(row, RowFault)] == [
         0,
         4095,
         4096,
         5000,
         9999,
     ]
-    kept = [(i, row) for i, row in enumerate(found) if not isinstance(row, Fault)]
+    kept = [(i, row) for i, row in enumerate(found) if not isinstance(row, RowFault)]
     assert all(row.question.controls["turn"] == i / 1000 for i, row in kept)
     assert all(row.name == f"clip-{i:06d}" for i, row in kept)
 
@@ -181,7 +181,7 @@ def test_what_is_read_together_ends_where_the_door_does(model, tmp_path, policy,
             let_in.append(False)
         else:
             let_in.append(True)
-    assert [not isinstance(row, Fault) for row in found] == let_in
+    assert [not isinstance(row, RowFault) for row in found] == let_in
     assert 0 < sum(let_in) < len(let_in)
 
 

@@ -3,7 +3,7 @@
 import pytest
 from rowing import POINT, rows, source, write_csv
 
-from posefield.batch.rows.columns import OPTIONS
+from posefield.batch.rows.columns import OPTION_KINDS
 from posefield.batch.rows.row_sources import Defaults
 from posefield.common.errors import FileError, InvalidField, OutsideSamples, UnknownFormat
 from posefield.question.motion_question import ClipQuestion, NamedClipQuestion
@@ -92,8 +92,8 @@ def test_a_file_that_cannot_be_read_is_refused(model, tmp_path, name, said):
 
 def test_every_option_but_name_and_format_is_a_field_of_a_question():
     fields = {*NamedClipQuestion.__struct_fields__, "format"}
-    assert fields - set(OPTIONS) == {"controls", "joint_sigma"}
-    assert set(OPTIONS) <= fields
+    assert fields - set(OPTION_KINDS) == {"controls", "joint_sigma"}
+    assert set(OPTION_KINDS) <= fields
 
 
 def test_a_refusal_before_a_row_is_the_same_as_in_one(model, table):

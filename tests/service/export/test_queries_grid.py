@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rowing import asked, rows, source
 
-from posefield.batch.rows.row_query import Fault
+from posefield.batch.rows.row_query import RowFault
 from posefield.batch.rows.row_sources import Defaults
 from posefield.common.errors import InvalidField
 from posefield.question.motion_question import ClipQuestion
@@ -57,7 +57,7 @@ def test_blocks_of_a_grid_leave_no_seam(model):
 def test_a_point_that_cannot_be_asked_for_is_a_fault(model):
     usual = Defaults("usdc", ClipQuestion(controls={}, extrapolate="refuse"))
     found = rows(model, usual=usual, grid=("turn=80:90:3",))
-    assert [isinstance(row, Fault) for row in found] == [False, False, True]
+    assert [isinstance(row, RowFault) for row in found] == [False, False, True]
     assert found[2].place == "grid point 3"
     assert found[2].message.startswith("controls: turn = 90 deg lies outside what was sampled")
 

@@ -21,7 +21,7 @@ from posefield.common.errors import FileError
 from posefield.registry import model_registry as library
 model = library.load([Path(sys.argv[1])]).models["labelled"]
 try:
-    queries.source(queries.Asked(Path(sys.argv[2])), queries.Defaults("usdc"), model)
+    queries.open_source(queries.SourceOptions(Path(sys.argv[2])), queries.Defaults("usdc"), model)
 except FileError as fault:
     print(fault)
 """

@@ -16,7 +16,7 @@ from scipy.optimize import linprog
 from scipy.stats import chisquare, qmc
 
 from posefield.batch.rows import sampled_rows
-from posefield.batch.rows.row_blocks import SIZE
+from posefield.batch.rows.row_blocks import BLOCK_SIZE
 from posefield.registry import model_registry
 
 # Chance gives less once in a million times.
@@ -31,8 +31,8 @@ from posefield.batch.rows import row_sources as queries
 from posefield.registry import model_registry as library
 model = library.load([Path(sys.argv[1])]).models["labelled"]
 for method in ("latin", "hull"):
-    asked = queries.Asked(sample=5000, method=method, seed=3)
-    source = queries.source(asked, queries.Defaults("usdc"), model)
+    asked = queries.SourceOptions(sample=5000, method=method, seed=3)
+    source = queries.open_source(asked, queries.Defaults("usdc"), model)
     found = hashlib.sha256()
     for row in source.rows():
         found.update(repr(row).encode())
@@ -76,20 +76,20 @@ def strata_hit_once(points):
 @given(count=st.integers(1, 3000), seed=st.integers(0, 2**63))
 @settings(max_examples=60, deadline=None)
 def test_a_permutation_sends_every_place_to_another(count, seed):
-    sent = sampled_rows.permuted(np.arange(count, dtype=np.uint64), count, (seed,))
+    sent = sampled_rows.permute(np.arange(count, dtype=np.uint64), count, (seed,))
     assert sorted(sent.tolist()) == list(range(count))
 
 
 def test_a_permutation_is_the_same_whatever_is_asked_together():
     places = np.arange(1000, dtype=np.uint64)
-    whole = sampled_rows.permuted(places, 1000, (5,))
-    parts = [sampled_rows.permuted(part, 1000, (5,)) for part in np.array_split(places, 7)]
+    whole = sampled_rows.permute(places, 1000, (5,))
+    parts = [sampled_rows.permute(part, 1000, (5,)) for part in np.array_split(places, 7)]
     assert np.concatenate(parts).tolist() == whole.tolist()
 
 
 def test_permutations_of_four_are_all_equally_likely():
     places = np.arange(4, dtype=np.uint64)
-    found = Counter(tuple(sampled_rows.permuted(places, 4, (s,)).tolist()) for s in range(4800))
+    found = Counter(tuple(sampled_rows.permute(places, 4, (s,)).tolist()) for s in range(4800))
     assert chisquare([found[order] for order in permutations(range(4))]).pvalue > UNLIKELY
 
 
@@ -99,7 +99,7 @@ def test_permutations_that_only_turn_would_be_noticed():
     assert chisquare([found[order] for order in permutations(range(4))]).pvalue < UNLIKELY
 
 
-@pytest.mark.parametrize("count", [1, 2, 7, 1000, 2 * SIZE + 77])
+@pytest.mark.parametrize("count", [1, 2, 7, 1000, 2 * BLOCK_SIZE + 77])
 def test_a_latin_hypercube_hits_every_stratum_once(card, count):
     found = unit(card, drawn(continua(card), "latin", count))
     assert found.shape == (count, 4)
@@ -206,7 +206,7 @@ def test_numbers_of_a_seed_are_those_of_ever(card):
     plain = [replace(c, minimum=0.0, maximum=1.0, values=()) for c in card.controls[:2]]
     square = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
     plain_card = replace(card, controls=tuple(plain), examples=square)
-    sent = sampled_rows.permuted(np.arange(10, dtype=np.uint64), 10, (0,))
+    sent = sampled_rows.permute(np.arange(10, dtype=np.uint64), 10, (0,))
     assert sent.tolist() == [4, 6, 8, 9, 0, 2, 5, 7, 3, 1]
     assert drawn(plain_card, "latin", 2, 7).tolist() == LATIN
     assert drawn(plain_card, "hull", 2, 7).tolist() == HULL

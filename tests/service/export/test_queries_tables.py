@@ -6,7 +6,7 @@ import contextlib
 import pytest
 from rowing import POINT, asked, faults, rows, source, text, write_csv
 
-from posefield.batch.rows.row_blocks import SIZE
+from posefield.batch.rows.row_blocks import BLOCK_SIZE
 from posefield.batch.rows.row_sources import Defaults
 from posefield.common.errors import FileError
 from posefield.question.motion_question import ClipQuestion
@@ -329,7 +329,7 @@ def test_a_file_that_changes_while_it_is_read_is_refused(model, tmp_path):
 @pytest.mark.parametrize("grown", [0, 1])
 def test_no_row_is_given_of_a_file_that_has_changed(grown, model, tmp_path):
     """Of a block that was read before; whoever exports the next would keep its clips."""
-    path = write_csv(tmp_path / "q.csv", [POINT] * 3 * SIZE)
+    path = write_csv(tmp_path / "q.csv", [POINT] * 3 * BLOCK_SIZE)
     under_way = source(model, path).rows()
     next(under_way)
     with path.open("ab") as file:
@@ -337,7 +337,7 @@ def test_no_row_is_given_of_a_file_that_has_changed(grown, model, tmp_path):
     given = [None]
     with contextlib.suppress(FileError):
         given.extend(under_way)
-    assert len(given) == (SIZE if grown else 3 * SIZE)
+    assert len(given) == (BLOCK_SIZE if grown else 3 * BLOCK_SIZE)
 
 
 def test_a_file_that_does_not_change_may_be_read_again(model, tmp_path):

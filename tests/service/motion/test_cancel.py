@@ -64,8 +64,8 @@ def test_threads_of_anyio_see_the_cancellation_of_the_task():
 
 def test_threads_of_a_pool_see_it_where_it_is_carried(cancellation):
     with ThreadPoolExecutor(2) as pool:
-        assert list(pool.map(cancel.carried(abs), [-1, 2, -3])) == [1, 2, 3]
-        carried = cancel.carried(cancel.check)
+        assert list(pool.map(cancel.bind_context(abs), [-1, 2, -3])) == [1, 2, 3]
+        carried = cancel.bind_context(cancel.check)
         cancellation.cancel()
         with pytest.raises(Cancelled):
             pool.submit(carried).result()
@@ -84,7 +84,7 @@ def test_a_running_loop_in_a_thread_stops(cancellation):
             except Cancelled:
                 stopped.append(True)
 
-    thread = threading.Thread(target=cancel.carried(loop))
+    thread = threading.Thread(target=cancel.bind_context(loop))
     thread.start()
     assert began.wait(60)
     assert not stopped
@@ -109,7 +109,7 @@ def test_other_threads_run_beside_a_loop_that_checks(cancellation, turns, check)
             found += 1
         looks.append(found)
 
-    thread = threading.Thread(target=cancel.carried(loop))
+    thread = threading.Thread(target=cancel.bind_context(loop))
     usual = sys.getswitchinterval()
     sys.setswitchinterval(1000.0)
     try:

@@ -7,7 +7,7 @@ import numpy as np
 from model_cards import CARD
 
 from posefield.model_file import model_card
-from posefield.model_file.model_card import Making
+from posefield.model_file.model_card import TrainingParameters
 
 
 def test_making_is_in_the_file_and_not_sent_to_clients():
@@ -22,9 +22,9 @@ def test_making_is_in_the_file_and_not_sent_to_clients():
 
 
 def test_parameters_at_their_default_take_no_bytes():
-    few = model_card.dump(replace(CARD, making=Making({"warp": (0.25, 1)})))
+    few = model_card.dump(replace(CARD, making=TrainingParameters({"warp": (0.25, 1)})))
     assert few["posefield.making"] == '{"fields": {"warp": [0.25, 1]}}'
-    assert model_card.dump(replace(CARD, making=Making()))["posefield.making"] == "{}"
+    assert model_card.dump(replace(CARD, making=TrainingParameters()))["posefield.making"] == "{}"
     controls = json.loads(few["posefield.controls"])
     assert controls[0]["measure"] == {"quantity": "stature"}
     assert "measure" not in controls[1]

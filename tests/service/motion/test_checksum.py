@@ -11,31 +11,31 @@ CONTENT = bytes(range(256)) * 4
 
 
 def test_a_sealed_file_holds_and_begins_as_before():
-    whole = checksum.sealed(CONTENT)
-    assert checksum.holds(whole)
+    whole = checksum.append_checksum(CONTENT)
+    assert checksum.is_valid(whole)
     assert whole[: -checksum.SIZE] == CONTENT
     assert whole.endswith(hashlib.sha256(CONTENT).hexdigest().encode())
-    assert checksum.holds(checksum.sealed(b""))
+    assert checksum.is_valid(checksum.append_checksum(b""))
 
 
 def test_every_bit_counts():
-    whole = checksum.sealed(CONTENT)
+    whole = checksum.append_checksum(CONTENT)
     for place in range(8 * len(whole)):
         damaged = bytearray(whole)
         damaged[place // 8] ^= 1 << place % 8
-        assert not checksum.holds(bytes(damaged))
+        assert not checksum.is_valid(bytes(damaged))
 
 
 @pytest.mark.parametrize("cut", [1, 10, checksum.SIZE - 1, checksum.SIZE, checksum.SIZE + 1, 1000])
 def test_a_file_that_is_cut_does_not_hold(cut):
-    whole = checksum.sealed(CONTENT)
-    assert not checksum.holds(whole[:-cut])
-    assert not checksum.holds(whole[cut:])
+    whole = checksum.append_checksum(CONTENT)
+    assert not checksum.is_valid(whole[:-cut])
+    assert not checksum.is_valid(whole[cut:])
 
 
-@pytest.mark.parametrize("content", [b"", b"x", CONTENT, checksum.sealed(CONTENT) + b"\n"])
+@pytest.mark.parametrize("content", [b"", b"x", CONTENT, checksum.append_checksum(CONTENT) + b"\n"])
 def test_a_file_without_a_checksum_does_not_hold(content):
-    assert not checksum.holds(content)
+    assert not checksum.is_valid(content)
 
 
 def test_the_checksum_is_metadata_of_an_onnx_file(model_path):

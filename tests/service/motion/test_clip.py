@@ -32,7 +32,7 @@ def test_duration_runs_from_the_first_frame_to_the_last():
 
 def test_positions_follow_the_root_and_its_turn():
     rotations = np.tile(quat.IDENTITY, (3, 2, 1))
-    rotations[1:, 0] = quat.about(np.array([0.0, 0.0, 1.0]), np.array(np.pi / 2))
+    rotations[1:, 0] = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(np.pi / 2))
     path = np.array([[0.0, 0.9, 0.0], [1.0, 0.9, 0.0], [2.0, 0.9, 5.0]])
     moving = clip.assemble(CHAIN, rotations, path, CHAIN.offsets, 30.0)
     expected = np.array([[0.0, 1.2, 0.0], [0.7, 0.9, 0.0], [1.7, 0.9, 5.0]])

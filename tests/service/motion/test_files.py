@@ -112,7 +112,7 @@ def test_pieces_that_break_off_leave_the_old_file(tmp_path):
         raise RuntimeError("no more")
 
     with pytest.raises(RuntimeError, match="no more"):
-        atomic_files.stream(pieces(), target)
+        atomic_files.write_chunks(pieces(), target)
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]
 

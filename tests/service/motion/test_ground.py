@@ -15,21 +15,21 @@ def foot(height, along):
 
 
 def test_a_foot_that_slides_does_so_at_its_speed():
-    assert foot_skate.skate(foot(0.1, 0.4 * SECONDS), RATE) == pytest.approx(0.4)
-    assert foot_skate.skate(foot(0.1, 0.4 * SECONDS), 2 * RATE) == pytest.approx(0.8)
+    assert foot_skate.mean_skate_speed(foot(0.1, 0.4 * SECONDS), RATE) == pytest.approx(0.4)
+    assert foot_skate.mean_skate_speed(foot(0.1, 0.4 * SECONDS), 2 * RATE) == pytest.approx(0.8)
 
 
 def test_only_the_ground_counts():
     lifted = np.where(SECONDS > 0.5, 0.3, 0.0)
-    assert foot_skate.skate(foot(lifted, np.where(SECONDS > 0.5, 9.0, 0.0)), RATE) == 0.0
+    assert foot_skate.mean_skate_speed(foot(lifted, np.where(SECONDS > 0.5, 9.0, 0.0)), RATE) == 0.0
     # Negative control: the same leap on the ground is seen.
-    assert foot_skate.skate(foot(0.0, np.where(SECONDS > 0.5, 9.0, 0.0)), RATE) > 5.0
+    assert foot_skate.mean_skate_speed(foot(0.0, np.where(SECONDS > 0.5, 9.0, 0.0)), RATE) > 5.0
 
 
 def test_every_motion_of_a_crowd_has_its_own_floor():
     low, high = foot(0.0, 0.1 * SECONDS), foot(7.0, 0.2 * SECONDS)
-    assert foot_skate.skate(np.stack([low, high]), RATE) == pytest.approx([0.1, 0.2])
+    assert foot_skate.mean_skate_speed(np.stack([low, high]), RATE) == pytest.approx([0.1, 0.2])
 
 
 def test_without_feet_nothing_slides():
-    assert foot_skate.skate(np.zeros((2, 31, 0, 3)), RATE).tolist() == [0.0, 0.0]
+    assert foot_skate.mean_skate_speed(np.zeros((2, 31, 0, 3)), RATE).tolist() == [0.0, 0.0]

@@ -7,7 +7,7 @@ import pytest
 
 from posefield.common.units import UP
 from posefield.motion import measures, quat
-from posefield.motion.measures import Measure, Seen
+from posefield.motion.measures import Measure, MeasuredMotion
 from posefield_train.sample import sample_walk
 from posefield_train.source.measured_controls import travel
 
@@ -27,11 +27,11 @@ def thrown():
     ball = np.stack([0 * t, 2.0 - 4.0 * (t - TOP) ** 2, 3.0 * t], axis=1)
     foot = np.stack([0 * t, 0 * t, np.sin(2 * np.pi * t)], axis=1)
     positions = np.stack([root, ball, foot], axis=1)
-    return Seen(positions, 2.0, np.array([0.5, 0.0, np.pi / 6]), PARENTS, OFFSETS, 25.5)
+    return MeasuredMotion(positions, 2.0, np.array([0.5, 0.0, np.pi / 6]), PARENTS, OFFSETS, 25.5)
 
 
 def of(quantity, *joints, at=None, seen=None):
-    return measures.value(Measure(quantity, joints, at), thrown() if seen is None else seen)
+    return measures.evaluate(Measure(quantity, joints, at), thrown() if seen is None else seen)
 
 
 def test_the_highest_moment_is_the_top_of_the_parabola():
@@ -95,54 +95,58 @@ INSENSITIVE = [
 def test_what_is_no_place_does_not_hang_on_where_it_happens(asked):
     seen = thrown()
     elsewhere = replace(seen, positions=seen.positions + np.array([3.0, 1.0, -7.0]))
-    assert measures.value(asked, elsewhere) == pytest.approx(measures.value(asked, seen), rel=1e-9)
+    assert measures.evaluate(asked, elsewhere) == pytest.approx(
+        measures.evaluate(asked, seen), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("at", [m for m in measures.MOMENTS if m != "landmark"])
-@pytest.mark.parametrize("quantity", measures.AXES)
+@pytest.mark.parametrize("quantity", measures.POSITION_AXES)
 def test_a_place_moves_with_the_motion_and_its_moment_does_not(quantity, at):
     seen, way = thrown(), np.array([3.0, 1.0, -7.0])
     elsewhere = replace(seen, positions=seen.positions + way)
     gone = of(quantity, 1, at=at, seen=elsewhere) - of(quantity, 1, at=at)
-    assert gone == pytest.approx(way[measures.AXES[quantity]], abs=1e-9)
+    assert gone == pytest.approx(way[measures.POSITION_AXES[quantity]], abs=1e-9)
 
 
 def strolled(speed, turn):
-    clip = sample_walk.stride(speed, turn, 0.02)
+    clip = sample_walk.walk_stride(speed, turn, 0.02)
     gone = travel(clip.rotations[:, 0], clip.root_path)
     offsets = sample_walk.SKELETON.offsets
-    return Seen(clip.positions(), clip.duration, gone, sample_walk.SKELETON.parents, offsets), clip
+    return MeasuredMotion(
+        clip.positions(), clip.duration, gone, sample_walk.SKELETON.parents, offsets
+    ), clip
 
 
 def test_a_stroll_is_as_fast_and_turns_as_much_as_it_was_made_to():
     for speed, turn in ((0.7, -0.5), (1.5, 0.0), (1.1, 0.2)):
         seen, _ = strolled(speed, turn)
-        assert measures.value(Measure("turn"), seen) == pytest.approx(np.degrees(turn), abs=1e-9)
+        assert measures.evaluate(Measure("turn"), seen) == pytest.approx(np.degrees(turn), abs=1e-9)
         # Its way is the chord of an arc as long as its speed says.
         arc = speed * seen.duration
         chord = arc * np.sinc(turn / (2 * np.pi))
-        assert measures.value(Measure("stride_length"), seen) == pytest.approx(chord, abs=1e-9)
-        assert measures.value(Measure("speed"), seen) == pytest.approx(chord / seen.duration)
+        assert measures.evaluate(Measure("stride_length"), seen) == pytest.approx(chord, abs=1e-9)
+        assert measures.evaluate(Measure("speed"), seen) == pytest.approx(chord / seen.duration)
     assert arc - chord > 1e-3, "negative control: an arc is longer than its chord"
 
 
 def test_a_step_of_the_stroll_is_half_its_stride():
     seen, clip = strolled(1.1, 0.0)
     feet = Measure("step_length", (3, 6))
-    length = measures.value(Measure("stride_length"), seen)
+    length = measures.evaluate(Measure("stride_length"), seen)
     # Walking straight, a foot that came down half a stride after the other is that far ahead, when
     # it has stopped; the frames of 1/60 s see that within what the foot moves in one.
-    assert measures.value(feet, seen) == pytest.approx(0.5 * length, rel=0.02)
+    assert measures.evaluate(feet, seen) == pytest.approx(0.5 * length, rel=0.02)
     ahead = clip.positions()[:, 3, 2] - clip.positions()[:, 6, 2]
     assert abs(ahead.mean()) < 0.1 * length < np.abs(ahead).max(), "negative control"
     swapped = Measure("step_length", (6, 3))
-    assert measures.value(swapped, seen) == measures.value(feet, seen)
+    assert measures.evaluate(swapped, seen) == measures.evaluate(feet, seen)
 
 
 def test_heading_is_the_roots_own_and_not_its_sway():
     t = np.linspace(0.0, 1.0, 11)
-    rolled = quat.about(np.array([0.0, 0.0, 1.0]), 0.2 * np.sin(2 * np.pi * t))
-    roots = quat.mul(quat.about(UP, 0.7 * t), rolled)
+    rolled = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), 0.2 * np.sin(2 * np.pi * t))
+    roots = quat.mul(quat.from_axis_angle(UP, 0.7 * t), rolled)
     assert travel(roots, np.zeros((11, 3)))[2] == pytest.approx(0.7)
 
 
@@ -163,13 +167,15 @@ def test_units_are_those_of_the_values(quantity, unit):
     ],
 )
 def test_a_measure_read_is_the_measure_written(asked):
-    assert measures.parse(measures.plain(asked)) == asked
-    assert all(value not in (None, []) for value in measures.plain(asked).values())
+    assert measures.from_dict(measures.to_dict(asked)) == asked
+    assert all(value not in (None, []) for value in measures.to_dict(asked).values())
 
 
 def test_a_measure_can_be_said():
     names = ("hips", "hand", "foot")
-    assert measures.words(Measure("turn"), names) == "turn"
-    assert measures.words(Measure("step_length", (1, 2)), names) == "step length of hand and foot"
+    assert measures.describe(Measure("turn"), names) == "turn"
+    assert (
+        measures.describe(Measure("step_length", (1, 2)), names) == "step length of hand and foot"
+    )
     at_end = Measure("height", (1,), "landmark", 0.254)
-    assert measures.words(at_end, names) == "height of hand at landmark (25%)"
+    assert measures.describe(at_end, names) == "height of hand at landmark (25%)"

@@ -90,7 +90,9 @@ def test_slerp_goes_the_shorter_way(turns):
 
 
 def test_unrolled_rotations_are_the_same_and_lie_close(rng):
-    path = np.stack([quat.about(np.eye(3)[i % 3], np.linspace(0, 7, 60)) for i in range(4)], axis=1)
+    path = np.stack(
+        [quat.from_axis_angle(np.eye(3)[i % 3], np.linspace(0, 7, 60)) for i in range(4)], axis=1
+    )
     signs = rng.choice([-1.0, 1.0], size=(60, 4, 1))
     unrolled = quat.unroll(path * signs)
     assert np.min(np.sum(unrolled[1:] * unrolled[:-1], axis=-1)) > 0.9
@@ -126,15 +128,15 @@ def test_mean_of_opposite_deviations_is_the_middle(rng, turns):
 def test_twist_is_the_angle_about_the_axis_within_half_a_turn(axis):
     angles = np.linspace(-9.0, 9.0, 37)
     wrapped = np.arctan2(np.sin(angles), np.cos(angles))
-    assert near(quat.twist(quat.about(axis, angles), axis), wrapped)
-    assert near(quat.twist(-quat.about(axis, angles), axis), wrapped)
-    assert not near(quat.twist(quat.about(axis, angles), axis), angles)
+    assert near(quat.twist(quat.from_axis_angle(axis, angles), axis), wrapped)
+    assert near(quat.twist(-quat.from_axis_angle(axis, angles), axis), wrapped)
+    assert not near(quat.twist(quat.from_axis_angle(axis, angles), axis), angles)
 
 
 def test_twist_leaves_out_a_swing(rng):
     swing = quat.exp(np.stack([rng.normal(size=20), np.zeros(20), rng.normal(size=20)], axis=-1))
     up, angles = np.array([0.0, 1.0, 0.0]), np.linspace(-3.0, 3.0, 20)
-    assert near(quat.twist(quat.mul(swing, quat.about(up, angles)), up), angles)
+    assert near(quat.twist(quat.mul(swing, quat.from_axis_angle(up, angles)), up), angles)
 
 
 def test_matrices_are_rotations(turns, vectors):
@@ -180,4 +182,4 @@ def test_locked_euler_angles_mean_the_same_rotation_and_end_in_zero(order, middl
 
 def test_euler_angles_of_one_axis_are_a_turn_about_it():
     turn = quat.from_euler(np.array([[0.7]]), "Y")
-    assert near(turn, quat.about(np.array([0.0, 1.0, 0.0]), np.array([0.7])))
+    assert near(turn, quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array([0.7])))

@@ -7,10 +7,10 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.motion import joint_roles
-from posefield.motion.joint_roles import Names
+from posefield.motion.joint_roles import NamingConvention
 from posefield.motion.skeleton import Skeleton
 
-CONVENTIONS = [names for names in get_args(Names) if names != "own"]
+CONVENTIONS = [names for names in get_args(NamingConvention) if names != "own"]
 
 
 def chain(*names):
@@ -19,8 +19,8 @@ def chain(*names):
 
 
 def test_every_convention_has_a_name_of_its_own_for_every_role():
-    assert set(joint_roles.TABLES) == set(CONVENTIONS)
-    for table in joint_roles.TABLES.values():
+    assert set(joint_roles.NAMES_BY_CONVENTION) == set(CONVENTIONS)
+    for table in joint_roles.NAMES_BY_CONVENTION.values():
         assert tuple(table) == joint_roles.ROLES
         assert len(set(table.values())) == len(joint_roles.ROLES) == 22
 
@@ -36,27 +36,28 @@ def test_every_convention_has_a_name_of_its_own_for_every_role():
 )
 def test_conventions_name_joints_as_their_users_do(names, hips, upper_chest, left_arm, right_toes):
     found = [
-        joint_roles.TABLES[names][r] for r in ("hips", "upperChest", "leftUpperArm", "rightToes")
+        joint_roles.NAMES_BY_CONVENTION[names][r]
+        for r in ("hips", "upperChest", "leftUpperArm", "rightToes")
     ]
     assert found == [hips, upper_chest, left_arm, right_toes]
 
 
 @pytest.mark.parametrize("names", CONVENTIONS)
 def test_joints_without_a_role_keep_their_names(names):
-    found = joint_roles.renamed(chain("root", "thorax", "thumb"), {"hips": "root"}, names)
-    assert found.names == (joint_roles.TABLES[names]["hips"], "thorax", "thumb")
+    found = joint_roles.rename_joints(chain("root", "thorax", "thumb"), {"hips": "root"}, names)
+    assert found.names == (joint_roles.NAMES_BY_CONVENTION[names]["hips"], "thorax", "thumb")
 
 
 def test_own_names_need_no_roles():
     own = chain("root", "thorax")
-    assert joint_roles.renamed(own, {}, "own") is own
+    assert joint_roles.rename_joints(own, {}, "own") is own
 
 
 def test_names_that_a_convention_takes_are_left_to_it():
     """CMU's spine is shifted by one: LowerBack, Spine, Spine1 become Spine, Spine1, Spine2."""
     given = chain("Hips", "LowerBack", "Spine", "Spine1", "Neck")
     cast = {"spine": "LowerBack", "chest": "Spine", "upperChest": "Spine1"}
-    assert joint_roles.renamed(given, cast, "humanik").names == (
+    assert joint_roles.rename_joints(given, cast, "humanik").names == (
         "Hips",
         "Spine",
         "Spine1",
@@ -67,7 +68,7 @@ def test_names_that_a_convention_takes_are_left_to_it():
 
 def test_a_joint_whose_name_was_taken_gets_an_ending_that_nobody_has():
     given = chain("hips", "Spine", "Spine_2", "low")
-    assert joint_roles.renamed(given, {"spine": "low"}, "humanik").names == (
+    assert joint_roles.rename_joints(given, {"spine": "low"}, "humanik").names == (
         "hips",
         "Spine_3",
         "Spine_2",
@@ -77,13 +78,13 @@ def test_a_joint_whose_name_was_taken_gets_an_ending_that_nobody_has():
 
 def test_nothing_but_names_changes():
     given = chain("a", "b", "c")
-    found = joint_roles.renamed(given, {"hips": "a", "spine": "b"}, "vrm")
+    found = joint_roles.rename_joints(given, {"hips": "a", "spine": "b"}, "vrm")
     assert found.parents == given.parents
     assert found.offsets is given.offsets and found.tip_joints is given.tip_joints
 
 
 def test_without_roles_a_convention_is_refused():
     with pytest.raises(InvalidField) as caught:
-        joint_roles.renamed(chain("a"), {}, "mixamo")
+        joint_roles.rename_joints(chain("a"), {}, "mixamo")
     assert caught.value.field == "names"
     assert "expected 'own': this model's recipe gives its joints no [roles]" in str(caught.value)

@@ -40,15 +40,15 @@ def by_matrices(rotations, translations):
 
 
 def test_forward_is_the_product_of_matrices_down_the_tree(pose):
-    positions, _ = skeleton.forward(PARENTS, *pose)
+    positions, _ = skeleton.forward_kinematics(PARENTS, *pose)
     assert np.max(np.abs(positions - by_matrices(*pose))) < TOLERANCE
-    chain = skeleton.forward((-1, 0, 1, 2, 3, 4), *pose)[0]
+    chain = skeleton.forward_kinematics((-1, 0, 1, 2, 3, 4), *pose)[0]
     assert np.max(np.abs(chain - by_matrices(*pose))) > 0.1
 
 
 def test_orientations_are_those_that_carry_the_children(pose):
     rotations, translations = pose
-    positions, orientations = skeleton.forward(PARENTS, rotations, translations)
+    positions, orientations = skeleton.forward_kinematics(PARENTS, rotations, translations)
     for joint, parent in enumerate(PARENTS[1:], start=1):
         arm = quat.rotate(orientations[:, parent], translations[:, joint])
         assert np.max(np.abs(positions[:, parent] + arm - positions[:, joint])) < TOLERANCE
@@ -59,40 +59,40 @@ def test_orientations_are_those_that_carry_the_children(pose):
 def test_rotations_broadcast_against_bone_offsets(pose):
     rotations, translations = pose
     still = np.broadcast_to(translations[:1], translations.shape)
-    broadcast = skeleton.forward(PARENTS, rotations, translations[0])
-    assert np.array_equal(broadcast[0], skeleton.forward(PARENTS, rotations, still)[0])
+    broadcast = skeleton.forward_kinematics(PARENTS, rotations, translations[0])
+    assert np.array_equal(broadcast[0], skeleton.forward_kinematics(PARENTS, rotations, still)[0])
     assert broadcast[1].shape == (7, 6, 4)
 
 
 def test_positions_are_those_of_forward(pose):
     positions = skeleton.positions(PARENTS, *pose)
-    assert np.array_equal(positions, skeleton.forward(PARENTS, *pose)[0])
+    assert np.array_equal(positions, skeleton.forward_kinematics(PARENTS, *pose)[0])
     assert not np.array_equal(positions, skeleton.positions((-1, 0, 1, 2, 3, 4), *pose))
 
 
 def test_poses_in_several_blocks_are_those_one_by_one(rng):
-    count = 2 * skeleton.BLOCK + 1
+    count = 2 * skeleton.POSES_PER_BLOCK + 1
     rotations = quat.normalize(rng.normal(size=(count, 1, 6, 4)))
     translations = rng.normal(size=(count, 1, 6, 3))
-    positions, orientations = skeleton.forward(PARENTS, rotations, translations)
+    positions, orientations = skeleton.forward_kinematics(PARENTS, rotations, translations)
     assert positions.shape == (count, 1, 6, 3)
-    for pose in (0, skeleton.BLOCK - 1, skeleton.BLOCK, count - 1):
-        alone = skeleton.forward(PARENTS, rotations[pose], translations[pose])
+    for pose in (0, skeleton.POSES_PER_BLOCK - 1, skeleton.POSES_PER_BLOCK, count - 1):
+        alone = skeleton.forward_kinematics(PARENTS, rotations[pose], translations[pose])
         assert np.array_equal(positions[pose], alone[0])
         assert np.array_equal(orientations[pose], alone[1])
-    assert not np.array_equal(positions[0], positions[skeleton.BLOCK])
+    assert not np.array_equal(positions[0], positions[skeleton.POSES_PER_BLOCK])
 
 
 def test_bones_keep_their_lengths(pose):
     rotations, translations = pose
-    positions, _ = skeleton.forward(PARENTS, rotations, translations)
+    positions, _ = skeleton.forward_kinematics(PARENTS, rotations, translations)
     bones = positions[:, 1:] - positions[:, list(PARENTS[1:])]
     lengths = np.linalg.norm(translations[:, 1:], axis=-1)
     assert np.max(np.abs(np.linalg.norm(bones, axis=-1) - lengths)) < TOLERANCE
 
 
 def test_a_chain_leads_from_the_root_to_its_joint():
-    assert [skeleton.chain(PARENTS, joint) for joint in (0, 2, 4)] == [
+    assert [skeleton.joint_chain(PARENTS, joint) for joint in (0, 2, 4)] == [
         (0,),
         (0, 1, 2),
         (0, 1, 3, 4),
@@ -106,7 +106,7 @@ def test_descendants_are_the_joints_whose_way_up_passes_by():
         while above >= 0:
             expected[above, joint] = 1.0
             above = PARENTS[above]
-    assert np.array_equal(skeleton.descendants(PARENTS), expected)
+    assert np.array_equal(skeleton.descendant_matrix(PARENTS), expected)
 
 
 def test_trees_of_different_size_are_the_same_tree():

@@ -19,7 +19,7 @@ def controls(rng):
 
 @pytest.fixture
 def own(controls):
-    return support.of(controls)
+    return support.fit_support(controls)
 
 
 def test_the_variance_is_that_of_a_gaussian_process(own, controls, rng):
@@ -47,26 +47,28 @@ def test_left_out_each_sample_is_as_the_others_support_it(own, controls):
 
 
 def test_much_that_is_near_leaves_no_variance_and_nothing_leaves_all(controls):
-    crowded = support.of(np.vstack([controls, np.tile(controls[:1], (400, 1))]))
+    crowded = support.fit_support(np.vstack([controls, np.tile(controls[:1], (400, 1))]))
     assert crowded.variance(controls[:1])[0] < 2e-4
     # Negative control: once captured, it leaves more.
-    assert support.of(controls).variance(controls[:1])[0] > 2e-3
-    assert support.of(controls).variance(controls[:1] + 100.0 * WIDE)[0] == pytest.approx(1.0)
+    assert support.fit_support(controls).variance(controls[:1])[0] > 2e-3
+    assert support.fit_support(controls).variance(controls[:1] + 100.0 * WIDE)[0] == pytest.approx(
+        1.0
+    )
 
 
 def test_units_do_not_matter(own, controls, rng):
     points = np.array([1.0, -5.0, 0.0]) + WIDE * rng.uniform(-0.3, 1.3, (50, 3))
     scale, shift = np.array([100.0, -0.01, 3.0]), np.array([7.0, 1.0, 0.0])
-    moved = support.of(controls * scale + shift)
+    moved = support.fit_support(controls * scale + shift)
     assert np.allclose(moved.variance(points * scale + shift), own.variance(points), atol=CLOSE)
-    assert np.array_equal(moved.holds(points * scale + shift), own.holds(points))
+    assert np.array_equal(moved.supported(points * scale + shift), own.supported(points))
 
 
 def test_one_is_told_as_many_are(own, rng):
     points = np.array([1.0, -5.0, 0.0]) + WIDE * rng.uniform(-0.3, 1.3, (5_000, 3))
-    many = own.holds(points)
-    assert many.tolist() == [own.held(point) for point in points.tolist()]
-    plainly = (own.beyond(points) <= support.BEYOND).all(axis=1)
+    many = own.supported(points)
+    assert many.tolist() == [own.is_supported(point) for point in points.tolist()]
+    plainly = (own.beyond(points) <= support.RANGE_MARGIN).all(axis=1)
     assert np.array_equal(many, plainly & (own.variance(points) <= own.limit))
     assert set(many) == {True, False}
 
@@ -79,10 +81,10 @@ def test_on_the_edge_of_what_is_held_one_is_told_as_many_are(own, controls):
     for control in range(3):
         points[control, :, control] = even[:, control]
     points = points.reshape(-1, 3)
-    many = own.holds(points)
-    assert many.tolist() == [own.held(point) for point in points.tolist()]
+    many = own.supported(points)
+    assert many.tolist() == [own.is_supported(point) for point in points.tolist()]
     # Negative control: told by shares, which are rounded otherwise, they would not be.
-    assert (many & (own.beyond(points) > support.BEYOND).any(axis=1)).any()
+    assert (many & (own.beyond(points) > support.RANGE_MARGIN).any(axis=1)).any()
 
 
 def test_what_lies_farther_beyond_a_control_than_a_tenth_of_its_range_is_not_held(own, controls):
@@ -91,27 +93,27 @@ def test_what_lies_farther_beyond_a_control_than_a_tenth_of_its_range_is_not_hel
             # A sample that is the outermost already.
             sample = controls[np.argmin(np.abs(controls[:, control] - end[control]))].copy()
             sample[control] = end[control] + outward * 0.1001 * width
-            assert not own.held(sample.tolist())
+            assert not own.is_supported(sample.tolist())
             assert own.beyond(sample[None])[0, control] == pytest.approx(0.1001)
             sample[control] = end[control] + outward * 0.0999 * width
-            assert (own.beyond(sample[None])[0] <= support.BEYOND).all()
+            assert (own.beyond(sample[None])[0] <= support.RANGE_MARGIN).all()
 
 
 def test_far_away_is_no_overflow(own, controls):
     far = controls[:2] + 1e6 * WIDE
-    assert own.holds(far).tolist() == [False, False]
-    assert not own.held(far[0].tolist())
+    assert own.supported(far).tolist() == [False, False]
+    assert not own.is_supported(far[0].tolist())
 
 
 def test_a_gap_between_two_clusters_is_seen(rng):
     clusters = np.vstack([rng.random((30, 2)) * [0.2, 1.0], rng.random((30, 2)) * [0.2, 1.0]])
     clusters[30:, 0] += 0.8
-    own = support.of(clusters)
+    own = support.fit_support(clusters)
     across = np.stack([np.linspace(0.35, 0.65, 30), rng.random(30)], axis=1)
-    assert not own.holds(across).any()
+    assert not own.supported(across).any()
     # Negative control: where all of it was captured, the same points are held.
-    whole = support.of(rng.random((60, 2)))
-    assert whole.holds(np.clip(across, 0.1, 0.9)).mean() > 0.8
+    whole = support.fit_support(rng.random((60, 2)))
+    assert whole.supported(np.clip(across, 0.1, 0.9)).mean() > 0.8
 
 
 def test_of_the_captured_clips_a_twentieth_is_beyond_the_limit(own, controls):

@@ -28,7 +28,7 @@ def variances(candidates, samples):
 
 def test_each_is_worth_what_the_variance_falls_by_with_those_before_it(samples, candidates):
     known = samples
-    for at, found in acquisition.rank(candidates, samples, 8):
+    for at, found in acquisition.rank_candidates(candidates, samples, 8):
         before = variances(candidates, known)
         known = np.vstack([known, candidates[at]])
         after = variances(candidates, known)
@@ -42,7 +42,7 @@ def test_each_is_worth_what_the_variance_falls_by_with_those_before_it(samples, 
 
 
 def test_none_is_ranked_twice_and_all_there_are_at_most(samples, candidates):
-    found = acquisition.rank(candidates[:5], samples, 10)
+    found = acquisition.rank_candidates(candidates[:5], samples, 10)
     assert sorted(at for at, _ in found) == [0, 1, 2, 3, 4]
 
 
@@ -50,13 +50,13 @@ def test_what_is_far_from_all_that_was_captured_comes_first(samples):
     gap = np.array([[0.9, 0.9, 0.9]])
     known = samples[np.max(samples, axis=1) < 0.3]
     beside = known + 0.01
-    (at, found), *_ = acquisition.rank(np.vstack([beside, gap]), known, 1)
+    (at, found), *_ = acquisition.rank_candidates(np.vstack([beside, gap]), known, 1)
     assert at == len(beside)
     assert found.variance > 3.0 * variances(beside, known).max()
 
 
 def test_suggested_points_lower_the_variance_more_than_random_ones(rng, samples, candidates):
-    chosen = [at for at, _ in acquisition.rank(candidates, samples, 10)]
+    chosen = [at for at, _ in acquisition.rank_candidates(candidates, samples, 10)]
     suggested = variances(candidates, np.vstack([samples, candidates[chosen]])).mean()
     for _ in range(20):
         some = candidates[rng.choice(len(candidates), 10, replace=False)]

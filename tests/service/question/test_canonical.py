@@ -22,9 +22,12 @@ CASES = {
 @pytest.mark.parametrize("form", CASES)
 def test_every_way_to_ask_is_one_question(form):
     pairs, rest = [*PAIRS, *CASES[form][0]], {**BODY, **CASES[form][1]}
-    first = text_decoding.question(form, pairs)
-    assert text_decoding.question(form, pairs[::-1]) == first
-    assert json_decoding.question(form, json.dumps(rest).encode()) == first
-    assert json_decoding.question(form, json.dumps(dict(reversed(rest.items()))).encode()) == first
+    first = text_decoding.decode_question(form, pairs)
+    assert text_decoding.decode_question(form, pairs[::-1]) == first
+    assert json_decoding.decode_question(form, json.dumps(rest).encode()) == first
+    assert (
+        json_decoding.decode_question(form, json.dumps(dict(reversed(rest.items()))).encode())
+        == first
+    )
     other = [(key, "1.8" if key == "stature" else text) for key, text in pairs]
-    assert text_decoding.question(form, other) != first
+    assert text_decoding.decode_question(form, other) != first

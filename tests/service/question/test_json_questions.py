@@ -27,7 +27,7 @@ class Outer(msgspec.Struct, forbid_unknown_fields=True):
 
 def pointer(content):
     with pytest.raises(FormError) as caught:
-        bodies.question(Outer, json.dumps(content).encode())
+        bodies.decode_question(Outer, json.dumps(content).encode())
     return f"/{caught.value.field}" if caught.value.field else ""
 
 
@@ -99,7 +99,7 @@ def test_a_long_key_takes_no_time_that_grows_with_its_square():
 )
 def test_a_body_that_is_no_question_is_named(form, content, path, said):
     with pytest.raises(FormError) as caught:
-        bodies.question(form, content.encode())
+        bodies.decode_question(form, content.encode())
     assert caught.value.field == path and caught.value.message == said
     assert str(caught.value) == (f"{path}: {said}" if path else said)
 
@@ -107,5 +107,5 @@ def test_a_body_that_is_no_question_is_named(form, content, path, said):
 def test_whole_numbers_may_be_written_as_json_writes_them():
     for level in ("1", "1.0", "10e-1"):
         body = f'{{"controls":{{"a":1.0}},"level":{level}}}'.encode()
-        found = bodies.question(FileQuestion, body)
+        found = bodies.decode_question(FileQuestion, body)
         assert found == FileQuestion(controls={"a": 1.0}, level=1) and type(found.level) is int

@@ -24,52 +24,54 @@ def test_a_query_and_a_body_are_one_pose_question():
     pairs = [("turn", "20"), ("time", "0"), ("stature", "1.7"), ("time", "0.5")]
     # A name may look like a number.
     rest = [("extrapolate", "refuse"), ("performer", "12")]
-    assert text_decoding.question(PoseQuestion, [*pairs, *rest]) == expected
+    assert text_decoding.decode_question(PoseQuestion, [*pairs, *rest]) == expected
     content = (
         b'{"controls": {"turn": 20, "stature": 1.7}, "times": [0, 5e-1], '
         b'"extrapolate": "refuse", "performer": "12"}'
     )
-    assert json_decoding.question(PoseQuestion, content) == expected
+    assert json_decoding.decode_question(PoseQuestion, content) == expected
 
 
 def test_a_query_and_a_body_are_one_clip_question():
     expected = FileQuestion(controls={"turn": -2.0}, fps=60.0, start=0.1, end=0.9, performer="ada")
     pairs = [("turn", "-2"), ("fps", "60"), ("start", "0.1"), ("end", "0.9"), ("performer", "ada")]
-    assert text_decoding.question(FileQuestion, pairs) == expected
+    assert text_decoding.decode_question(FileQuestion, pairs) == expected
     content = b'{"controls": {"turn": -2}, "fps": 60, "start": 0.1, "end": 0.9, "performer": "ada"}'
-    assert json_decoding.question(FileQuestion, content) == expected
+    assert json_decoding.decode_question(FileQuestion, content) == expected
 
 
 def test_a_query_and_a_body_say_alike_how_a_file_is_made():
     said = {"names": "ue5", "root": "in_place", "unit": "cm", "up": "z"}
     expected = FileQuestion(controls={"turn": -2.0}, loop=True, **said)
     assert (
-        text_decoding.question(FileQuestion, [("turn", "-2"), ("loop", "true"), *said.items()])
+        text_decoding.decode_question(
+            FileQuestion, [("turn", "-2"), ("loop", "true"), *said.items()]
+        )
         == expected
     )
     content = {"controls": {"turn": -2}, "loop": True, **said}
-    assert json_decoding.question(FileQuestion, json.dumps(content).encode()) == expected
+    assert json_decoding.decode_question(FileQuestion, json.dumps(content).encode()) == expected
 
 
 def test_what_is_left_out_has_one_default():
     expected = FileQuestion(controls={})
-    assert text_decoding.question(FileQuestion, []) == expected
-    assert text_decoding.question(FileQuestion, [("loop", "false")]) == expected
-    assert json_decoding.question(FileQuestion, b'{"controls": {}}') == expected
+    assert text_decoding.decode_question(FileQuestion, []) == expected
+    assert text_decoding.decode_question(FileQuestion, [("loop", "false")]) == expected
+    assert json_decoding.decode_question(FileQuestion, b'{"controls": {}}') == expected
     nothing = b'{"controls": {}, "end": null, "unit": null, "up": null, "loop": false}'
-    assert json_decoding.question(FileQuestion, nothing) == expected
+    assert json_decoding.decode_question(FileQuestion, nothing) == expected
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_a_number_survives_the_query(number):
-    asked = text_decoding.question(FileQuestion, [("turn", repr(number))])
+    asked = text_decoding.decode_question(FileQuestion, [("turn", repr(number))])
     assert asked.controls == {"turn": number}
 
 
 @given(st.text())
 def test_any_text_is_a_finite_number_or_refused(text):
     try:
-        value = text_decoding.question(FileQuestion, [("turn", text)]).controls["turn"]
+        value = text_decoding.decode_question(FileQuestion, [("turn", text)]).controls["turn"]
     except FormError:
         pass
     else:
@@ -79,10 +81,10 @@ def test_any_text_is_a_finite_number_or_refused(text):
 @given(st.binary())
 def test_bytes_that_are_no_question_are_refused(content):
     with pytest.raises(FormError):
-        json_decoding.question(PoseQuestion, content)
+        json_decoding.decode_question(PoseQuestion, content)
 
 
 @given(st.text(alphabet="ab&=;%+2f é", max_size=24))
 def test_a_query_is_read_as_the_standard_library_reads_it(text):
     raw = text.encode()
-    assert steps.pairs(raw) == parse_qsl(raw.decode("latin-1"), keep_blank_values=True)
+    assert steps.query_pairs(raw) == parse_qsl(raw.decode("latin-1"), keep_blank_values=True)

@@ -24,8 +24,8 @@ from posefield.question.walk_question import WalkQuestion
     ],
 )
 def test_words_are_targets(text, expected):
-    assert text_decoding.target(text) == expected
-    assert text_decoding.target("=".join(text.rsplit(":", 1))) == expected
+    assert text_decoding.parse_target(text) == expected
+    assert text_decoding.parse_target("=".join(text.rsplit(":", 1))) == expected
 
 
 @pytest.mark.parametrize(
@@ -48,7 +48,7 @@ def test_words_are_targets(text, expected):
 )
 def test_other_words_are_none(text):
     with pytest.raises(ValueError, match="expected JOINT@MOMENT:X,Y,Z, m; a moment is seconds or"):
-        text_decoding.target(text)
+        text_decoding.parse_target(text)
 
 
 HAND = {"joint": "hand", "position": [0, 1.5, 2], "time": 1}
@@ -86,30 +86,33 @@ def test_other_values_are_none(found):
 
 
 def test_exact_controls_in_words():
-    assert text_decoding.exact("auto") == "auto"
-    assert text_decoding.exact("none") == "none"
-    assert text_decoding.exact("speed") == ("speed",)
-    assert text_decoding.exact("speed,turn") == ("speed", "turn")
+    assert text_decoding.parse_exact("auto") == "auto"
+    assert text_decoding.parse_exact("none") == "none"
+    assert text_decoding.parse_exact("speed") == ("speed",)
+    assert text_decoding.parse_exact("speed,turn") == ("speed", "turn")
     for text in ("", ",", "speed,"):
         with pytest.raises(ValueError, match="expected auto, none or names"):
-            text_decoding.exact(text)
+            text_decoding.parse_exact(text)
 
 
 def test_a_name_that_is_no_parameter_is_a_control():
     pairs = [("turn", "3"), ("fps", "24"), ("loop", "true"), ("unit", "cm")]
     pairs += [("target", "a@end:1,2,3"), ("target", "b@0.5:1,2,3")]
-    found = text_decoding.question(FileQuestion, pairs)
+    found = text_decoding.decode_question(FileQuestion, pairs)
     targets = (Target("a", (1, 2, 3), at="end"), Target("b", (1, 2, 3), time=0.5))
     assert found == FileQuestion(
         controls={"turn": 3}, fps=24, loop=True, unit="cm", targets=targets
     )
-    assert found.corrects and not text_decoding.question(FileQuestion, [("turn", "3")]).corrects
+    assert (
+        found.has_constraints
+        and not text_decoding.decode_question(FileQuestion, [("turn", "3")]).has_constraints
+    )
 
 
 @pytest.mark.parametrize(
     ("form", "pairs", "said"),
     [
-        (PoseQuestion, [], "time: missing, expected seconds from the start"),
+        (PoseQuestion, [], "time: missing, expected time from the start"),
         (PoseQuestion, [("time", "0"), ("turn", "1"), ("turn", "2")], "turn: given twice"),
         (PoseQuestion, [("time", "0"), ("level", "1"), ("level", "1")], "level: given twice"),
         (PoseQuestion, [("time", "nan")], "time: 'nan', expected a finite number"),
@@ -125,7 +128,7 @@ def test_a_name_that_is_no_parameter_is_a_control():
 )
 def test_words_that_are_no_question_are_named(form, pairs, said):
     with pytest.raises(FormError, match=said):
-        text_decoding.question(form, pairs)
+        text_decoding.decode_question(form, pairs)
 
 
 @pytest.mark.parametrize(
@@ -139,5 +142,5 @@ def test_words_that_are_no_question_are_named(form, pairs, said):
 )
 def test_a_question_checks_itself(form, pairs, field):
     with pytest.raises(InvalidField) as fault:
-        text_decoding.question(form, pairs)
+        text_decoding.decode_question(form, pairs)
     assert fault.value.field == field

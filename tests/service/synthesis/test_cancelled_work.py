@@ -8,12 +8,12 @@ import pytest
 from posefield.batch import clip_archive
 from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.http.api.settings import Settings
 from posefield.http.decoding import clips_query, crowd_query
 from posefield.locomotion import crowd_order, gait
-from posefield.locomotion.crowd_order import Order
+from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.question import json_decoding as bodies
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion
 from posefield.question.motion_question import ClipQuestion, FileQuestion
@@ -61,13 +61,13 @@ def contradictory(count):
 def solved(model, walk):
     """A clip with targets that contradict each other."""
     body = json.dumps({"controls": controls(model), "targets": contradictory(8)}).encode()
-    return clips.clip(model, bodies.question(FileQuestion, body))
+    return clips.synthesize_clip(model, bodies.decode_question(FileQuestion, body))
 
 
 def solved_open(model, walk):
     """The same where the controls are left open."""
     body = json.dumps({"controls": {}, "targets": contradictory(8)}).encode()
-    return clips.clip(model, bodies.question(FileQuestion, body))
+    return clips.synthesize_clip(model, bodies.decode_question(FileQuestion, body))
 
 
 def mapped(model, walk):
@@ -83,31 +83,37 @@ def suggested(model, walk):
 def archived(model, walk):
     """An archive of clips."""
     asked = {"format": "usdc", "clips": [{"controls": controls(model)}] * 20}
-    found = clips_query.order(model, ENCODERS, json.dumps(asked).encode(), Settings())
-    return list(clip_archive.members(found))
+    found = clips_query.decode_order(model, CLIP_ENCODERS, json.dumps(asked).encode(), Settings())
+    return list(clip_archive.archive_members(found))
 
 
 def crowded(model, walk):
     """Poses of a crowd."""
     asked = {"controls": controls(model), "time": [0.1] * 20_000}
-    return crowd_synthesis.poses(model, crowd_query.of_body(json.dumps(asked).encode(), 1e6))
+    return crowd_synthesis.synthesize_crowd(
+        model, crowd_query.of_body(json.dumps(asked).encode(), 1e6)
+    )
 
 
 def planned(model, walk):
     """The plan of a crowd that walks."""
-    return crowd_order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=10.0))
+    return crowd_order.build_crowd(
+        walk, gait.fit_gait(walk.session), CrowdOrder(count=300, seconds=10.0)
+    )
 
 
 def walked(model, walk):
     """A crowd that walks, as USD."""
-    made = crowd_order.crowd(walk, gait.of(walk.session), Order(count=300, seconds=1.0))
+    made = crowd_order.build_crowd(
+        walk, gait.fit_gait(walk.session), CrowdOrder(count=300, seconds=1.0)
+    )
     return list(crowd_writer.stream(made, "usdc"))
 
 
 def several(model, walk):
     """Several clips, written together."""
-    answers = [clips.clip(model, ClipQuestion(controls=controls(model)))] * 8
-    return ENCODERS["usda"].write(answers, ENCODERS["usda"].usual)
+    answers = [clips.synthesize_clip(model, ClipQuestion(controls=controls(model)))] * 8
+    return CLIP_ENCODERS["usda"].write(answers, CLIP_ENCODERS["usda"].usual)
 
 
 WORK = [solved, solved_open, mapped, suggested, archived, crowded, planned, walked, several]

@@ -129,5 +129,5 @@ def test_numbers_that_no_float_holds_are_refused(number):
 
 
 def test_a_card_of_too_many_bytes_is_refused():
-    text = json.dumps("x" * card_reader.MOST_BYTES).encode()
+    text = json.dumps("x" * card_reader.MAX_BYTES).encode()
     assert "bytes, expected at most" in refusal(WRITTEN | {"posefield.description": text})

@@ -31,13 +31,17 @@ def reacher(model_path):
 
 
 def clip(model, controls, **asked):
-    return clips.clip(model, ClipQuestion(controls=controls, **asked)).clip
+    return clips.synthesize_clip(model, ClipQuestion(controls=controls, **asked)).clip
 
 
 def end_of(model, controls):
     """The pose at the end of the clip, s, and when that is."""
-    duration = poses.pose(model, PoseQuestion(controls=controls, times=[0.0])).trust.duration
-    return poses.pose(model, PoseQuestion(controls=controls, times=[duration])), duration
+    duration = poses.synthesize_poses(
+        model, PoseQuestion(controls=controls, times=[0.0])
+    ).trust.duration
+    return poses.synthesize_poses(
+        model, PoseQuestion(controls=controls, times=[duration])
+    ), duration
 
 
 def apart(a, b):
@@ -47,14 +51,16 @@ def apart(a, b):
 
 @pytest.mark.parametrize("fps", [1.0, 24.0, 29.97, 120.0])
 def test_a_loop_is_the_whole_cycle_in_even_steps(walker, fps):
-    found = clips.clip(walker, ClipQuestion(controls=STROLL, fps=fps, loop=True))
+    found = clips.synthesize_clip(walker, ClipQuestion(controls=STROLL, fps=fps, loop=True))
     _, duration = end_of(walker, STROLL)
     steps = max(1, round(duration * fps))
     assert len(found.clip) == steps + 1
     assert (found.clip.rate, found.clip.duration) == (fps, steps / fps)
     assert found.trust.duration == duration
     middle = steps // 2
-    there = poses.pose(walker, PoseQuestion(controls=STROLL, times=[middle * duration / steps]))
+    there = poses.synthesize_poses(
+        walker, PoseQuestion(controls=STROLL, times=[middle * duration / steps])
+    )
     assert np.abs(found.clip.rotations[middle] - there.rotations[0]).max() < FLOAT32
     assert np.abs(found.clip.root_path[middle] - there.root_position[0]).max() < FLOAT32
 
@@ -62,7 +68,9 @@ def test_a_loop_is_the_whole_cycle_in_even_steps(walker, fps):
 @pytest.mark.parametrize("fps", [7.0, 30.0, 1.0])
 def test_the_frames_of_a_loop_are_known_before_it_is_made(walker, fps):
     asked = ClipQuestion(controls=STROLL, fps=fps, loop=True)
-    assert clips.prospect(walker, asked).frames == len(clips.clip(walker, asked).clip)
+    assert clips.preview_clip(walker, asked).frames == len(
+        clips.synthesize_clip(walker, asked).clip
+    )
 
 
 def test_a_loop_in_place_ends_in_every_number_as_it_begins(walker):
@@ -102,10 +110,10 @@ def test_a_cycle_in_place_is_posed_as_in_crowds(walker):
     _, duration = end_of(walker, STROLL)
     phases = np.arange(count) / 30.0 / duration
     labels = stride.labels(walker.session, np.full(count, -1))
-    crowd = stride.poses(walker.session, np.tile(point, (count, 1)), labels, phases)
+    crowd = stride.synthesize_poses(walker.session, np.tile(point, (count, 1)), labels, phases)
     own = stride.strides(walker.session, point, labels[:1])
     assert np.abs(found.rotations - crowd.rotations).max() < FLOAT32
-    assert np.abs(floor_plane.of(found.root_path) - own.starts - crowd.places).max() < FLOAT32
+    assert np.abs(floor_plane.project(found.root_path) - own.starts - crowd.places).max() < FLOAT32
     assert np.abs(found.root_path[:, 1] - crowd.heights).max() < FLOAT32
 
 
@@ -155,7 +163,7 @@ def test_every_level_of_detail_closes(walker, level):
 
 
 def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
-    for ask in (clips.clip, clips.check):
+    for ask in (clips.synthesize_clip, clips.check):
         with pytest.raises(InvalidField, match=r"^loop: true, expected false: this model's last"):
             ask(reacher, ClipQuestion(controls=POINT, loop=True))
 
@@ -168,7 +176,7 @@ def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
     ],
 )
 def test_a_part_of_a_loop_is_refused(walker, span, said):
-    for ask in (clips.clip, clips.check):
+    for ask in (clips.synthesize_clip, clips.check):
         with pytest.raises(InvalidField) as caught:
             ask(walker, ClipQuestion(controls=STROLL, loop=True, **span))
         assert str(caught.value) == said
@@ -189,6 +197,6 @@ def test_joints_are_called_as_asked_for_and_stay_where_they_are(reacher):
 
 
 def test_names_of_a_convention_need_roles(walker):
-    for ask in (clips.clip, clips.check):
+    for ask in (clips.synthesize_clip, clips.check):
         with pytest.raises(InvalidField, match=r"^names: 'ue5', expected 'own'"):
             ask(walker, ClipQuestion(controls=STROLL, names="ue5"))

@@ -8,7 +8,7 @@ import pytest
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import UP
-from posefield.inference.level_selection import Camera, View
+from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.motion import quat, skeleton
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import PoseQuestion
@@ -54,7 +54,7 @@ def asked(model, count=COUNT, **given):
 
 def joints(rotations, root, offsets, parents):
     local = skeleton.translations(offsets.astype(float), root[:, None].astype(float))
-    return skeleton.forward(parents, rotations[:, None].astype(float), local)[0][:, 0]
+    return skeleton.forward_kinematics(parents, rotations[:, None].astype(float), local)[0][:, 0]
 
 
 def of(model, found):
@@ -67,18 +67,18 @@ def alone(model, question, row):
     controls = {name: float(values[row]) for name, values in question.controls.items()}
     time, level = float(question.times[row]), int(question.detail[row])
     who = question.performers[question.performer[row]]
-    answer = poses.pose(
+    answer = poses.synthesize_poses(
         model, PoseQuestion(controls=controls, times=[time], performer=who, level=level)
     )
     parents = model.session.card.skeleton.parents
     found = joints(answer.rotations, answer.root_position, answer.bone_offsets[None], parents)
-    turn = quat.about(UP, question.placement.headings[row])
+    turn = quat.from_axis_angle(UP, question.placement.headings[row])
     return quat.rotate(turn, found[0]) + question.placement.positions[row], answer.trust
 
 
 def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
     question = asked(model)
-    found = crowd_synthesis.poses(model, question)
+    found = crowd_synthesis.synthesize_crowd(model, question)
     places = of(model, found)
     for row in range(COUNT):
         expected, trust = alone(model, question, row)
@@ -91,18 +91,20 @@ def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
     assert found.error_px is None and found.warnings == ()
     # Negative controls: another heading, and another level.
     turned = replace(question.placement, headings=question.placement.headings + 0.01)
-    others = crowd_synthesis.poses(model, replace(question, placement=turned))
+    others = crowd_synthesis.synthesize_crowd(model, replace(question, placement=turned))
     assert np.abs(of(model, others) - places).max(axis=(1, 2)).min() > 10 * FLOAT32
-    finest = crowd_synthesis.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
+    finest = crowd_synthesis.synthesize_crowd(
+        model, replace(question, detail=np.zeros(COUNT, dtype=int))
+    )
     changed = np.abs(of(model, finest) - places).max(axis=(1, 2)) > 10 * FLOAT32
     assert np.array_equal(changed, question.detail > 0)
 
 
 def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
     question = asked(model, 3 * crowd_synthesis.BATCH + 7)
-    whole = crowd_synthesis.poses(model, question)
+    whole = crowd_synthesis.synthesize_crowd(model, question)
     rows = np.array([0, 1, crowd_synthesis.BATCH, 2 * crowd_synthesis.BATCH + 5, len(question) - 1])
-    part = crowd_synthesis.poses(
+    part = crowd_synthesis.synthesize_crowd(
         model,
         replace(
             question,
@@ -122,7 +124,10 @@ def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
 
 def test_the_same_crowd_is_the_same_bytes(model):
     question = asked(model, 2_000)
-    once, again = crowd_synthesis.poses(model, question), crowd_synthesis.poses(model, question)
+    once, again = (
+        crowd_synthesis.synthesize_crowd(model, question),
+        crowd_synthesis.synthesize_crowd(model, question),
+    )
     for name in ("rotations", "root_position", "bone_offsets", "sigma"):
         assert getattr(once, name).tobytes() == getattr(again, name).tobytes()
 
@@ -134,11 +139,11 @@ def test_in_place_a_cycle_goes_nowhere(walk):
     still = replace(
         question, times=np.zeros(count), placement=Placement(np.zeros((count, 3)), np.zeros(count))
     )
-    begin = crowd_synthesis.poses(walk, still)
+    begin = crowd_synthesis.synthesize_crowd(walk, still)
     late = replace(still, times=begin.duration.astype(float))
-    end = crowd_synthesis.poses(walk, late)
+    end = crowd_synthesis.synthesize_crowd(walk, late)
     assert np.abs(of(walk, end) - of(walk, begin)).max() < 1e-4
-    gone = crowd_synthesis.poses(walk, replace(late, root="travelling"))
+    gone = crowd_synthesis.synthesize_crowd(walk, replace(late, root="travelling"))
     assert card.cyclic and np.abs(gone.root_position - end.root_position).max(axis=1).min() > 0.3
 
 
@@ -149,13 +154,15 @@ def test_levels_are_those_that_the_camera_asks_for(model):
     question = asked(
         model,
         placement=Placement(positions, np.zeros(COUNT)),
-        detail=View(camera, 1.0, None, None),
+        detail=LevelCriteria(camera, 1.0, None, None),
     )
-    found = crowd_synthesis.poses(model, question)
+    found = crowd_synthesis.synthesize_crowd(model, question)
     assert found.levels.tolist() == sorted(found.levels.tolist())
     assert {0, 3} < set(found.levels)
     errors = np.array([level.pose for level in model.session.card.levels])
-    nearest = np.linalg.norm(positions + model.middle - camera.position, axis=1) - model.radius
+    nearest = (
+        np.linalg.norm(positions + model.rest_position - camera.position, axis=1) - model.radius
+    )
     shown = errors[found.levels] * camera.pixels / nearest
     assert found.error_px == pytest.approx(shown, rel=1e-5)
     assert np.all((shown <= 1.0) | (found.levels == 0))
@@ -174,43 +181,51 @@ def test_what_the_viewer_sees_of_a_level_is_less_than_the_limit(model):
         [rng.uniform(5.0, 150.0, count), np.zeros(count), rng.uniform(-20.0, 20.0, count)]
     )
     placed = Placement(positions, np.zeros(count))
-    question = asked(model, count, placement=placed, detail=View(camera, 1.0, None, None))
-    seen = crowd_synthesis.poses(model, question)
-    finest = crowd_synthesis.poses(model, replace(question, detail=np.zeros(count, dtype=int)))
+    question = asked(model, count, placement=placed, detail=LevelCriteria(camera, 1.0, None, None))
+    seen = crowd_synthesis.synthesize_crowd(model, question)
+    finest = crowd_synthesis.synthesize_crowd(
+        model, replace(question, detail=np.zeros(count, dtype=int))
+    )
     gaps = np.linalg.norm(of(model, seen) - of(model, finest), axis=-1)
     distances = np.linalg.norm(of(model, finest) - camera.position, axis=-1)
     pixels = gaps / distances * camera.pixels
     assert np.sqrt(np.mean(np.square(pixels), axis=1)).max() < 1.0
     assert np.mean(pixels > 1.0) < 0.02
-    coarsest = crowd_synthesis.poses(model, replace(question, detail=np.full(count, 3)))
+    coarsest = crowd_synthesis.synthesize_crowd(model, replace(question, detail=np.full(count, 3)))
     gaps = np.linalg.norm(of(model, coarsest) - of(model, finest), axis=-1)
     assert np.mean(gaps / distances * camera.pixels > 1.0) > 0.04
 
 
 def test_a_budget_is_kept_and_said(model):
     camera = Camera(np.array([0.0, 1.7, -20.0]), math.radians(60.0), 1080.0)
-    view = View(camera, 0.01, None, None)
+    view = LevelCriteria(camera, 0.01, None, None)
     question = asked(model, placement=Placement(np.zeros((COUNT, 3)), np.zeros(COUNT)), detail=view)
-    free = crowd_synthesis.poses(model, question)
+    free = crowd_synthesis.synthesize_crowd(model, question)
     assert set(free.levels) == {0}
-    costs = model.ladder.costs
+    costs = model.level_table.costs
     if costs[-1] == costs[0]:
         pytest.skip("this machine takes as long for every level")
     tight = COUNT * float(costs[-1]) * 1.001
-    bound = crowd_synthesis.poses(model, replace(question, detail=replace(view, budget=tight)))
+    bound = crowd_synthesis.synthesize_crowd(
+        model, replace(question, detail=replace(view, budget=tight))
+    )
     assert float(np.sum(costs[bound.levels])) <= tight
     assert len(bound.warnings) == 1 and "budget" in bound.warnings[0]
 
 
 def test_who_is_between_two_levels_is_between_their_poses(model):
     question = asked(model, detail=np.full(COUNT, 3))
-    before = crowd_synthesis.poses(model, replace(question, detail=np.zeros(COUNT, dtype=int)))
-    after = crowd_synthesis.poses(model, question)
+    before = crowd_synthesis.synthesize_crowd(
+        model, replace(question, detail=np.zeros(COUNT, dtype=int))
+    )
+    after = crowd_synthesis.synthesize_crowd(model, question)
 
     def mixed(share):
         shares = np.full(COUNT, share)
         blending = Blending(np.zeros(COUNT, dtype=int), shares)
-        return of(model, crowd_synthesis.poses(model, replace(question, blending=blending)))
+        return of(
+            model, crowd_synthesis.synthesize_crowd(model, replace(question, blending=blending))
+        )
 
     assert np.abs(mixed(1.0) - of(model, after)).max() < FLOAT32
     assert np.abs(mixed(0.0) - of(model, before)).max() < FLOAT32
@@ -222,7 +237,7 @@ def test_who_is_between_two_levels_is_between_their_poses(model):
         assert np.median(way[moved] / whole[moved]) == pytest.approx(0.5, abs=0.02)
         assert np.all(way[moved] < 0.75 * whole[moved])
     assert np.linalg.norm(
-        crowd_synthesis.poses(
+        crowd_synthesis.synthesize_crowd(
             model,
             replace(question, blending=Blending(np.zeros(COUNT, dtype=int), np.full(COUNT, 0.3))),
         ).rotations,
@@ -233,7 +248,7 @@ def test_who_is_between_two_levels_is_between_their_poses(model):
 def test_who_is_on_the_way_goes_to_no_third_level(model):
     camera = Camera(np.array([0.0, 1.7, -3.0]), math.radians(60.0), 1080.0)
     held = np.full(COUNT, 2)
-    view = View(camera, 1.0, None, held)
+    view = LevelCriteria(camera, 1.0, None, held)
     placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
     shares = np.where(np.arange(COUNT) % 2, 1.0, 0.4)
     question = asked(
@@ -242,7 +257,7 @@ def test_who_is_on_the_way_goes_to_no_third_level(model):
         detail=view,
         blending=Blending(np.full(COUNT, 3), shares),
     )
-    found = crowd_synthesis.poses(model, question)
+    found = crowd_synthesis.synthesize_crowd(model, question)
     assert set(found.levels[shares < 1.0]) == {2}
     assert set(found.levels[shares == 1.0]) == {0}
 
@@ -275,7 +290,7 @@ def broken(model, field, row, value):
 )
 def test_what_is_wrong_with_one_character_names_it(model, field, value, said):
     with pytest.raises(InvalidField, match=said) as caught:
-        crowd_synthesis.poses(model, broken(model, field, 17, value))
+        crowd_synthesis.synthesize_crowd(model, broken(model, field, 17, value))
     assert (caught.value.field, caught.value.index) == (field, 17)
 
 
@@ -285,7 +300,7 @@ def test_controls_that_make_no_sense_name_the_first_character(model):
     far = turn.maximum + 99.0 * (turn.maximum - turn.minimum)
     question = broken(model, "controls/turn", 5, far)
     try:
-        crowd_synthesis.poses(model, question)
+        crowd_synthesis.synthesize_crowd(model, question)
     except OutsideSamples as refusal:
         assert refusal.index == 5
 
@@ -294,17 +309,17 @@ def test_missing_and_unknown_controls_are_named(model):
     question = asked(model)
     fewer = {name: values for name, values in question.controls.items() if name != "turn"}
     with pytest.raises(InvalidField, match="controls/turn: missing"):
-        crowd_synthesis.poses(model, replace(question, controls=fewer))
+        crowd_synthesis.synthesize_crowd(model, replace(question, controls=fewer))
     more = {**question.controls, "mood": np.zeros(COUNT)}
     with pytest.raises(InvalidField, match="controls/mood: no such control"):
-        crowd_synthesis.poses(model, replace(question, controls=more))
+        crowd_synthesis.synthesize_crowd(model, replace(question, controls=more))
 
 
 def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     high = model.session.card.control("stature").maximum
     question = broken(model, "controls/stature", 9, high + 0.05)
-    assert crowd_synthesis.poses(model, question).warnings == ()
-    found = crowd_synthesis.poses(model, replace(question, extrapolate="warn"))
+    assert crowd_synthesis.synthesize_crowd(model, question).warnings == ()
+    found = crowd_synthesis.synthesize_crowd(model, replace(question, extrapolate="warn"))
     outside, gap = found.warnings
     assert "stature of 1 characters" in outside
     assert "the first is character 9" in outside
@@ -312,15 +327,15 @@ def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     assert f"{np.count_nonzero(beside)} characters; the first, " in gap
     assert f"character {int(np.argmax(beside))}, lies in a gap" in gap
     with pytest.raises(OutsideSamples, match="the first is character 9") as caught:
-        crowd_synthesis.poses(model, replace(question, extrapolate="refuse"))
+        crowd_synthesis.synthesize_crowd(model, replace(question, extrapolate="refuse"))
     assert (caught.value.field, caught.value.index) == ("controls/stature", 9)
 
 
 def test_gaps_alone_are_refused_too(model):
     question = replace(asked(model), extrapolate="refuse")
-    first = int(np.argmin(crowd_synthesis.poses(model, asked(model)).supported))
+    first = int(np.argmin(crowd_synthesis.synthesize_crowd(model, asked(model)).supported))
     with pytest.raises(OutsideSamples, match="in a gap") as caught:
-        crowd_synthesis.poses(model, question)
+        crowd_synthesis.synthesize_crowd(model, question)
     assert (caught.value.field, caught.value.index) == ("controls", first)
 
 
@@ -328,53 +343,57 @@ def test_a_heading_of_many_turns_is_the_one_within_a_turn(model):
     question = asked(model)
     turns = 2.0 * np.pi * np.arange(COUNT)
     wound = replace(question.placement, headings=question.placement.headings + 1e4 * turns)
-    found = crowd_synthesis.poses(model, replace(question, placement=wound))
+    found = crowd_synthesis.synthesize_crowd(model, replace(question, placement=wound))
     assert (
-        np.abs(of(model, found) - of(model, crowd_synthesis.poses(model, question))).max()
+        np.abs(
+            of(model, found) - of(model, crowd_synthesis.synthesize_crowd(model, question))
+        ).max()
         < 10 * FLOAT32
     )
     endless = replace(question.placement, headings=np.full(COUNT, 1e300))
-    far = crowd_synthesis.poses(model, replace(question, placement=endless))
+    far = crowd_synthesis.synthesize_crowd(model, replace(question, placement=endless))
     assert np.isfinite(far.rotations).all()
 
 
 def test_who_lets_the_camera_choose_need_not_know_the_levels_end(model):
     camera = Camera(np.array([0.0, 1.7, -4.0]), math.radians(60.0), 1080.0)
     placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
-    seen = asked(model, placement=placed, detail=View(camera, 1.0, None, None))
-    late = 1.05 * crowd_synthesis.poses(model, seen).duration.astype(float)
-    assert set(crowd_synthesis.poses(model, replace(seen, times=late)).levels) == {0}
+    seen = asked(model, placement=placed, detail=LevelCriteria(camera, 1.0, None, None))
+    late = 1.05 * crowd_synthesis.synthesize_crowd(model, seen).duration.astype(float)
+    assert set(crowd_synthesis.synthesize_crowd(model, replace(seen, times=late)).levels) == {0}
     numbered = replace(seen, times=late, detail=np.zeros(COUNT, dtype=int))
     with pytest.raises(InvalidField, match="s, expected 0 to"):
-        crowd_synthesis.poses(model, numbered)
+        crowd_synthesis.synthesize_crowd(model, numbered)
     with pytest.raises(InvalidField, match="s, expected 0 to"):
-        crowd_synthesis.poses(model, replace(seen, times=1.2 * late))
+        crowd_synthesis.synthesize_crowd(model, replace(seen, times=1.2 * late))
 
 
 def test_a_budget_counts_who_is_on_the_way(model):
     camera = Camera(np.array([0.0, 1.7, -20.0]), math.radians(60.0), 1080.0)
     held = np.zeros(COUNT, dtype=int)
-    view = View(camera, 1.0, 1e-9, held)
+    view = LevelCriteria(camera, 1.0, 1e-9, held)
     blending = Blending(np.ones(COUNT, dtype=int), np.full(COUNT, 0.5))
     placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
-    found = crowd_synthesis.poses(
+    found = crowd_synthesis.synthesize_crowd(
         model, asked(model, placement=placed, detail=view, blending=blending)
     )
     assert set(found.levels) == {0} and found.warnings == ()
     shares = np.where(np.arange(COUNT) % 2, 1.0, 0.5)
     some = replace(blending, shares=shares)
-    found = crowd_synthesis.poses(model, asked(model, placement=placed, detail=view, blending=some))
+    found = crowd_synthesis.synthesize_crowd(
+        model, asked(model, placement=placed, detail=view, blending=some)
+    )
     assert set(found.levels[shares == 1.0]) == {3} and "budget" in found.warnings[0]
 
 
 def test_a_camera_in_a_character_names_it(model):
-    inside = Camera(model.middle + np.array([0.0, 0.0, 0.2]), 1.0, 1080.0)
+    inside = Camera(model.rest_position + np.array([0.0, 0.0, 0.2]), 1.0, 1080.0)
     positions = np.full((COUNT, 3), 40.0)
     positions[23] = 0.0
     question = asked(
         model,
         placement=Placement(positions, np.zeros(COUNT)),
-        detail=View(inside, 1.0, None, None),
+        detail=LevelCriteria(inside, 1.0, None, None),
     )
     with pytest.raises(InvalidField, match="inside character 23"):
-        crowd_synthesis.poses(model, question)
+        crowd_synthesis.synthesize_crowd(model, question)

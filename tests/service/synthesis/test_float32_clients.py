@@ -27,7 +27,9 @@ def sampled(model, rng):
 
 
 def pose(model, controls, *times, **more):
-    return poses.pose(model, PoseQuestion(controls=controls, times=times, extrapolate="ok", **more))
+    return poses.synthesize_poses(
+        model, PoseQuestion(controls=controls, times=times, extrapolate="ok", **more)
+    )
 
 
 def as_float32(number):
@@ -51,9 +53,9 @@ def test_a_duration_as_float32_is_the_duration(model, rng):
         assert end.times.tolist() == [min(written, duration)]
         if written > duration:
             assert_same_poses(end, pose(model, controls, duration))
-        whole = clips.clip(model, ClipQuestion(controls=controls, end=written)).clip
-        assert len(whole) == len(clips.clip(model, ClipQuestion(controls=controls)).clip)
-        last = clips.clip(model, ClipQuestion(controls=controls, start=written)).clip
+        whole = clips.synthesize_clip(model, ClipQuestion(controls=controls, end=written)).clip
+        assert len(whole) == len(clips.synthesize_clip(model, ClipQuestion(controls=controls)).clip)
+        last = clips.synthesize_clip(model, ClipQuestion(controls=controls, start=written)).clip
         assert len(last) == 1
     # Negative control: without slack these would have been refused.
     assert above > POINTS / 10
@@ -82,7 +84,7 @@ def test_what_is_later_is_refused_in_digits_that_differ(model, rng, field):
         if field == "times/1":
             pose(model, controls, 0.0, float(late))
         else:
-            clips.clip(model, ClipQuestion(controls=controls, **{field: float(late)}))
+            clips.synthesize_clip(model, ClipQuestion(controls=controls, **{field: float(late)}))
     assert caught.value.field == field
     found, _, bound = caught.value.message.partition(" s, expected 0 to ")
     assert float(found) > float(bound.removesuffix(" s"))

@@ -33,7 +33,7 @@ def test_each_point_is_the_sigma_of_an_answer(model):
     for row, along in enumerate(found.along.values):
         for column, across in enumerate(found.across.values):
             controls = {**fixed, "turn": across, "target_height": along}
-            trust = poses.pose(
+            trust = poses.synthesize_poses(
                 model, PoseQuestion(controls=controls, times=[0.0], performer="tall")
             ).trust
             # One row of a product is summed in another order than many.
@@ -64,7 +64,7 @@ def test_support_is_what_an_answer_says_of_itself(model, stature):
 
 def supported(model, found, across, along):
     controls = {**found.controls, "turn": across, "target_height": along}
-    return poses.pose(
+    return poses.synthesize_poses(
         model, PoseQuestion(controls=controls, times=[0.0], extrapolate="ok")
     ).trust.supported
 

@@ -3,24 +3,26 @@
 import pytest
 
 from posefield.common.errors import OutOfReach
-from posefield.constraints.targets import Goal, Goals
+from posefield.constraints.targets import ConstraintSet, JointTarget
 from posefield.motion.measures import Measure
-from posefield.question.results import Met
+from posefield.question.results import ConstraintResult
 from posefield.synthesis import synthesizer
 
 HIGH = Measure("height", (3,), "highest")
-GOALS = Goals((("speed", Measure("speed"), 2.0),), (Goal("hand at 1 s", HIGH, (0, 0, 0), 1.0),))
-SLOW = Met("speed", 0.1234, "m/s", False)
-SHORT = Met("hand at 1 s", 0.1234, "m", False)
-FINE = Met("hand at 1 s", 1e-6, "m", True)
+GOALS = ConstraintSet(
+    (("speed", Measure("speed"), 2.0),), (JointTarget("hand at 1 s", HIGH, (0, 0, 0), 1.0),)
+)
+SLOW = ConstraintResult("speed", 0.1234, "m/s", False)
+SHORT = ConstraintResult("hand at 1 s", 0.1234, "m", False)
+FINE = ConstraintResult("hand at 1 s", 1e-6, "m", True)
 
 
 def test_each_miss_is_a_sentence():
-    assert synthesizer.sentences([SLOW, SHORT]) == (
+    assert synthesizer.miss_warnings([SLOW, SHORT]) == (
         "speed stays 0.123 m/s from its target: out of reach",
         "hand at 1 s stays 12.3 cm from its target: out of reach",
     )
-    assert synthesizer.sentences([FINE]) == ()
+    assert synthesizer.miss_warnings([FINE]) == ()
 
 
 @pytest.mark.parametrize(
@@ -28,15 +30,18 @@ def test_each_miss_is_a_sentence():
     [
         ([SLOW, SHORT], "controls/speed"),
         ([SLOW, FINE], "controls/speed"),
-        ([Met("speed", 0.0, "m/s", True), SHORT], "targets/0"),
+        ([ConstraintResult("speed", 0.0, "m/s", True), SHORT], "targets/0"),
     ],
 )
 def test_the_first_miss_is_named(met, field):
     with pytest.raises(OutOfReach) as caught:
-        synthesizer.refuse(GOALS, met)
+        synthesizer.check_targets(GOALS, met)
     assert caught.value.field == field
-    assert caught.value.message == "; ".join(synthesizer.sentences(met))
+    assert caught.value.message == "; ".join(synthesizer.miss_warnings(met))
 
 
 def test_what_is_met_is_not_refused():
-    assert synthesizer.refuse(GOALS, [Met("speed", 0.0, "m/s", True), FINE]) is None
+    assert (
+        synthesizer.check_targets(GOALS, [ConstraintResult("speed", 0.0, "m/s", True), FINE])
+        is None
+    )

@@ -20,15 +20,15 @@ def content(labelled_path):
 
 def refusal(content):
     with pytest.raises(ModelError) as caught:
-        checked_file.checked(content, "some.onnx")
+        checked_file.load_card(content, "some.onnx")
     assert caught.value.path == "some.onnx"
     assert "\n" not in caught.value.message
     return caught.value.message
 
 
 def test_a_good_file_passes(content):
-    card = checked_file.checked(content, "some.onnx")
-    assert checked_file.checked(numbered(content, 7), "other").name == card.name
+    card = checked_file.load_card(content, "some.onnx")
+    assert checked_file.load_card(numbered(content, 7), "other").name == card.name
 
 
 def flipped(content, rng):
@@ -59,32 +59,32 @@ def test_every_damaged_file_is_refused(content, rng, damage):
         damaged = damage(content, rng)
         if damaged != content:
             tried += 1
-            assert refusal(damaged) == checked_file.UNSEALED
+            assert refusal(damaged) == checked_file.NO_CHECKSUM
 
 
 def test_a_file_that_another_program_has_changed_is_refused(content):
     """As optimizers do it: the same answers, another graph."""
     model = onnx.load_from_string(content)
     model.graph.name = "optimized"
-    assert refusal(model.SerializeToString()) == checked_file.UNSEALED
+    assert refusal(model.SerializeToString()) == checked_file.NO_CHECKSUM
     model.metadata_props.add(key="optimizer", value="1.0")
-    assert refusal(model.SerializeToString()) == checked_file.UNSEALED
+    assert refusal(model.SerializeToString()) == checked_file.NO_CHECKSUM
 
 
 @pytest.mark.parametrize("after", [b"\n", onnx.ModelProto(producer_name="x").SerializeToString()])
 def test_bytes_after_the_checksum_are_refused(content, after):
-    assert refusal(content + after) == checked_file.UNSEALED
+    assert refusal(content + after) == checked_file.NO_CHECKSUM
 
 
 def test_a_file_from_before_checksums_is_refused(content):
-    assert refusal(content[: -checksum.SIZE]) == checked_file.UNSEALED
+    assert refusal(content[: -checksum.SIZE]) == checked_file.NO_CHECKSUM
 
 
 def test_a_foreign_model_is_refused():
     foreign = onnx.ModelProto(producer_name="other", ir_version=8).SerializeToString()
-    assert refusal(foreign) == checked_file.UNSEALED
+    assert refusal(foreign) == checked_file.NO_CHECKSUM
     said = "no posefield metadata: it was not written by posefield"
-    assert refusal(checksum.sealed(foreign + graph_of_nothing())) == said
+    assert refusal(checksum.append_checksum(foreign + graph_of_nothing())) == said
 
 
 def graph_of_nothing():
@@ -95,8 +95,8 @@ def graph_of_nothing():
 
 @pytest.mark.parametrize("found", [b"", b"no model", bytes(range(256)) * 8, b"\0" * 4096])
 def test_something_else_is_refused(found):
-    assert refusal(found) == checked_file.UNSEALED
-    assert refusal(checksum.sealed(found)) != checked_file.UNSEALED
+    assert refusal(found) == checked_file.NO_CHECKSUM
+    assert refusal(checksum.append_checksum(found)) != checked_file.NO_CHECKSUM
 
 
 @pytest.mark.parametrize(
@@ -175,4 +175,4 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path):
         file.truncate(100 << 30)
     said = "cannot be read: 107374182400 bytes, expected at most 67108864"
     assert unreadable(path) == said
-    assert "expected at most 67108864" in refusal(bytes(checked_file.MOST_BYTES + 1))
+    assert "expected at most 67108864" in refusal(bytes(checked_file.MAX_BYTES + 1))

@@ -7,8 +7,8 @@ from model_files import numbered
 from posefield.common.errors import ModelError
 from posefield.model_file import checked_file
 from posefield.registry import model_registry
-from posefield.registry.model_registry import Bounds
-from posefield.registry.model_reload import Shelf
+from posefield.registry.model_registry import VersionLimits
+from posefield.registry.model_reload import ReloadingRegistry
 from posefield.registry.object_store import connect
 
 pytestmark = pytest.mark.usefixtures("store_environment")
@@ -38,9 +38,9 @@ def test_models_are_named_as_in_a_folder(put, url):
     old, new = put("reach/9.onnx", 2), put("reach/10.onnx", 3)
     put(".hidden.onnx", 4)
     put("notes.txt", 5)
-    shelf = Shelf([url], Bounds())
-    assert sorted(shelf.library.models) == ["reach", "walk"]
-    assert [m.session.digest for m in shelf.library.versions("reach")] == [new, old]
+    shelf = ReloadingRegistry([url], VersionLimits())
+    assert sorted(shelf.registry.models) == ["reach", "walk"]
+    assert [m.session.digest for m in shelf.registry.versions("reach")] == [new, old]
     assert sorted(model_registry.load([f"{url}/"]).models) == ["reach", "walk"]
 
 
@@ -54,21 +54,21 @@ def test_one_object_is_a_model(put, url):
 @pytest.mark.parametrize("ending", ["", "/walk.onnx"])
 def test_what_is_put_there_is_followed(ending, put, url):
     old = put("walk.onnx", 1)
-    shelf = Shelf([url + ending], Bounds())
-    assert shelf.look() and shelf.reloads.opened == 1
+    shelf = ReloadingRegistry([url + ending], VersionLimits())
+    assert shelf.scan() and shelf.reloads.opened == 1
     new = put("walk.onnx", 2)
-    assert not shelf.look()
-    assert shelf.look()
-    assert [m.session.digest for m in shelf.library.versions("walk")] == [new, old]
+    assert not shelf.scan()
+    assert shelf.scan()
+    assert [m.session.digest for m in shelf.registry.versions("walk")] == [new, old]
 
 
 def test_a_broken_object_leaves_the_old_one(put, url):
     old = put("walk.onnx", 1)
-    shelf = Shelf([url], Bounds())
+    shelf = ReloadingRegistry([url], VersionLimits())
     connect(url).put("walk.onnx", b"broken")
-    shelf.look()
-    shelf.look()
-    assert shelf.library.find("walk").session.digest == old
+    shelf.scan()
+    shelf.scan()
+    assert shelf.registry.find("walk").session.digest == old
     (fault,) = shelf.reloads.faults
     assert fault.error.path == f"{url}/walk.onnx"
 
@@ -82,11 +82,11 @@ def test_a_bucket_that_is_not_there_is_refused(url):
 
 def test_a_store_that_has_become_empty_leaves_what_there_was(put, url):
     old = put("walk.onnx", 1)
-    shelf = Shelf([url], Bounds())
+    shelf = ReloadingRegistry([url], VersionLimits())
     connect(url).delete("walk.onnx")
-    shelf.look()
-    shelf.look()
-    assert shelf.library.find("walk").session.digest == old
+    shelf.scan()
+    shelf.scan()
+    assert shelf.registry.find("walk").session.digest == old
     (fault,) = shelf.reloads.faults
     assert fault.name == "" and fault.error.path == url
 
@@ -97,9 +97,9 @@ def test_a_store_that_cannot_be_reached_leaves_what_there_was(model_path, tmp_pa
             monkeypatch.setenv(name, value)
         url = f"s3://{stores.bucket(address, 'models')}"
         connect(url).put("walk.onnx", model_path.read_bytes())
-        shelf = Shelf([url], Bounds())
-    shelf.look()
-    assert list(shelf.library.models) == ["walk"]
+        shelf = ReloadingRegistry([url], VersionLimits())
+    shelf.scan()
+    assert list(shelf.registry.models) == ["walk"]
     (fault,) = shelf.reloads.faults
     assert fault.error.message.startswith("cannot be read: ")
 

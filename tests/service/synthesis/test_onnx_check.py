@@ -10,7 +10,7 @@ from onnx import TensorProto
 from posefield.common.errors import ModelError
 from posefield.model_file import checked_file, checksum, onnx_check
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.onnx_graph.graph_builder import Net
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 MODELS = ("model_path", "labelled_path", "walk_path", "measured_walk_path")
 
@@ -34,8 +34,8 @@ def weight(model, name):
 
 def covariance(formula):
     """A graph of one covariance, as the exporter writes it."""
-    net = Net()
-    net.named("near", formula.onnx(net, "squared"))
+    net = GraphBuilder()
+    net.add_output("near", formula.onnx(net, "squared"))
     content = net.model({"squared": ["n"]}, {"near": ["n"]}, {}, {"producer_name": "posefield"})
     return onnx.load_from_string(content)
 
@@ -131,7 +131,7 @@ def test_a_constant_of_another_shape_than_its_bytes_is_refused(model_path, shape
     model = onnx.load(model_path)
     weight(model, "core").dims[:] = shape
     with pytest.raises(ModelError):
-        checked_file.checked(model_files.written(model), "some.onnx")
+        checked_file.load_card(model_files.written(model), "some.onnx")
 
 
 @pytest.mark.parametrize("change", [{"data_type": TensorProto.STRING}, {"name": None}])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from posefield.inference import cost_model, session
-from posefield.inference.level_selection import Camera, Ladder, View, see
+from posefield.inference.level_selection import Camera, LevelCriteria, LevelTable, select_levels
 
 
 @pytest.fixture(scope="module")
@@ -79,13 +79,13 @@ def test_a_round_that_something_else_slowed_down_does_not_count(paced):
 
 def test_levels_of_several_files_are_told_as_they_are_found(paced):
     one, other = paced(512, 600), paced(64)
-    found = cost_model.in_turn([(one, 1), (other, 0), (one, 0)], 3)
+    found = cost_model.benchmark_levels([(one, 1), (other, 0), (one, 0)], 3)
     assert found == pytest.approx([600 / 512e3, 64 / 512e3, 1e-3])
 
 
 def test_costs_never_grow(rng):
     costs = rng.uniform(1.0, 2.0, 20)
-    found = np.array(cost_model.falling(costs))
+    found = np.array(cost_model.monotone_costs(costs))
     assert np.all(np.diff(found) <= 0.0) and np.all(found <= costs)
     assert np.any(np.diff(costs) > 0.0)
 
@@ -97,7 +97,9 @@ def test_a_view_takes_them_as_they_are(opened):
     camera = Camera(np.zeros(3), 1.0, 1080.0)
 
     def chosen(budget):
-        return see(Ladder(errors, costs), np.full(10, 1e3), View(camera, 1e-3, budget, None))
+        return select_levels(
+            LevelTable(errors, costs), np.full(10, 1e3), LevelCriteria(camera, 1e-3, budget, None)
+        )
 
     assert chosen(11 * costs[0]).levels.tolist() == [0] * 10
     assert chosen(9 * costs[-1]).limit is None

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.encode.formats import ENCODERS, POSE_ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import clips, poses
@@ -33,7 +33,7 @@ def differ(a, b):
 
 def test_performers_move_each_in_their_own_way(model):
     asked = (PoseQuestion(controls=POINT, times=[0.5], performer=name) for name in (*NAMES, None))
-    found = [poses.pose(model, each) for each in asked]
+    found = [poses.synthesize_poses(model, each) for each in asked]
     for i, one in enumerate(found):
         for other in found[:i]:
             assert differ(one, other) > 10 * FLOAT32
@@ -47,7 +47,9 @@ TWICE = np.array([[0.5], [0.5]])
 def test_the_answer_for_a_name_is_that_of_its_label(model):
     point = np.array([[POINT[c.name] for c in model.session.card.controls]])
     for name, label in zip(NAMES, np.eye(3), strict=True):
-        answer = poses.pose(model, PoseQuestion(controls=POINT, times=[0.5], performer=name))
+        answer = poses.synthesize_poses(
+            model, PoseQuestion(controls=POINT, times=[0.5], performer=name)
+        )
         rotations = [
             model.session.run(point.repeat(2, 0), TWICE, "rotations", labels=labels)[0][0, 0]
             for labels in (np.tile(label, (2, 1)), np.tile(np.roll(label, 1), (2, 1)))
@@ -58,31 +60,35 @@ def test_the_answer_for_a_name_is_that_of_its_label(model):
 
 def test_whether_a_performer_was_seen_is_said_where_any_are_told_apart(model, plain):
     asked = (PoseQuestion(controls=POINT, times=[0.5], performer=who) for who in ("tall", None))
-    seen = [poses.pose(model, each).trust.facts() for each in asked]
+    seen = [poses.synthesize_poses(model, each).trust.facts() for each in asked]
     assert [facts["performer_seen"] for facts in seen] == [True, False]
     assert seen[0]["warnings"] == seen[1]["warnings"]
     assert (
         "performer_seen"
-        not in poses.pose(plain, PoseQuestion(controls=POINT, times=[0.5])).trust.facts()
+        not in poses.synthesize_poses(
+            plain, PoseQuestion(controls=POINT, times=[0.5])
+        ).trust.facts()
     )
 
 
 def test_nobody_is_asked_for_unless_somebody_is(model):
-    silent = poses.pose(model, PoseQuestion(controls=POINT, times=[0.5]))
-    nobody = poses.pose(model, PoseQuestion(controls=POINT, times=[0.5], performer=None))
+    silent = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.5]))
+    nobody = poses.synthesize_poses(
+        model, PoseQuestion(controls=POINT, times=[0.5], performer=None)
+    )
     assert differ(silent, nobody) == 0.0
     assert silent.trust == nobody.trust
     assert silent.trust.performer is None
 
 
 def test_a_clip_is_the_poses_of_its_performer(model):
-    clip = clips.clip(
+    clip = clips.synthesize_clip(
         model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn", performer="tall")
     )
     asked = (
         PoseQuestion(controls=POINT, times=[0.5], performer=name) for name in ("tall", "short")
     )
-    pose, other = (poses.pose(model, each) for each in asked)
+    pose, other = (poses.synthesize_poses(model, each) for each in asked)
     assert clip.trust == pose.trust
     assert clip.trust.duration != other.trust.duration
     assert np.abs(clip.clip.rotations[15] - pose.rotations[0]).max() < FLOAT32
@@ -92,8 +98,10 @@ def test_a_clip_is_the_poses_of_its_performer(model):
 @pytest.mark.parametrize("name", ["Tall", "", " tall", "nobody", "tall, short"])
 def test_an_unknown_performer_is_refused_with_those_there_are(model, name):
     for ask in (
-        lambda: poses.pose(model, PoseQuestion(controls=POINT, times=[0.0], performer=name)),
-        lambda: clips.clip(
+        lambda: poses.synthesize_poses(
+            model, PoseQuestion(controls=POINT, times=[0.0], performer=name)
+        ),
+        lambda: clips.synthesize_clip(
             model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn", performer=name)
         ),
     ):
@@ -105,18 +113,23 @@ def test_an_unknown_performer_is_refused_with_those_there_are(model, name):
 
 def test_a_model_that_knows_nobody_refuses_every_name(plain):
     with pytest.raises(InvalidField) as caught:
-        poses.pose(plain, PoseQuestion(controls=POINT, times=[0.0], performer="tall"))
+        poses.synthesize_poses(plain, PoseQuestion(controls=POINT, times=[0.0], performer="tall"))
     assert caught.value.field == "performer"
     assert caught.value.message == "'tall', expected none: this model knows none"
-    assert poses.pose(plain, PoseQuestion(controls=POINT, times=[0.0])).trust.performer is None
+    assert (
+        poses.synthesize_poses(plain, PoseQuestion(controls=POINT, times=[0.0])).trust.performer
+        is None
+    )
 
 
 def test_json_says_who_was_asked_for_and_usd_where_it_was_somebody(model):
     for name, said in (("tall", b'"performer":"tall"'), (None, b'"performer":null')):
-        pose = poses.pose(model, PoseQuestion(controls=POINT, times=[0.0], performer=name))
+        pose = poses.synthesize_poses(
+            model, PoseQuestion(controls=POINT, times=[0.0], performer=name)
+        )
         assert said in POSE_ENCODERS["json"].encode(pose)
-        clip = clips.clip(
+        clip = clips.synthesize_clip(
             model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn", performer=name)
         )
-        assert said in ENCODERS["json"].encode(clip)
-        assert (b'string performer = "tall"' in ENCODERS["usda"].encode(clip)) == bool(name)
+        assert said in CLIP_ENCODERS["json"].encode(clip)
+        assert (b'string performer = "tall"' in CLIP_ENCODERS["usda"].encode(clip)) == bool(name)

@@ -16,15 +16,15 @@ def test_what_google_writes_is_read(axes, name, kind):
     assert [field.value for field in found if field.number == 1] == axes
     assert [field.value for field in found if field.number == 2] == [kind]
     assert [field.content.decode() for field in found if field.number == 8] == [name]
-    assert b"".join(field.whole for field in found) == tensor.SerializeToString()
+    assert b"".join(field.encoded for field in found) == tensor.SerializeToString()
 
 
 @given(st.integers(0, 2**31 - 1), st.binary(max_size=300), st.text())
 def test_google_reads_what_is_written(kind, numbers, name):
     content = (
-        protobuf_wire.varint(2, kind)
-        + protobuf_wire.nested(9, numbers)
-        + protobuf_wire.nested(8, name.encode())
+        protobuf_wire.encode_varint(2, kind)
+        + protobuf_wire.encode_bytes(9, numbers)
+        + protobuf_wire.encode_bytes(8, name.encode())
     )
     tensor = onnx.TensorProto.FromString(content)
     assert (tensor.data_type, tensor.raw_data, tensor.name) == (kind, numbers, name)
@@ -42,7 +42,7 @@ def test_any_bytes_are_fields_or_refused(content):
         found = list(protobuf_wire.fields(content))
     except ValueError:
         return
-    assert b"".join(field.whole for field in found) == content
+    assert b"".join(field.encoded for field in found) == content
 
 
 @pytest.mark.parametrize(

@@ -87,7 +87,7 @@ def test_durations_alone_are_those_of_the_whole_graph(labelled_path, rng):
 
 
 def test_durations_alone_are_a_part_of_the_graph(model_path):
-    clock = session.load(model_path).clocks[0]
+    clock = session.load(model_path).duration_sessions[0]
     assert [port.name for port in clock.get_inputs()] == ["controls"]
     assert [port.name for port in clock.get_outputs()] == ["duration"]
 

@@ -15,13 +15,13 @@ import pytest
 from model_files import numbered
 
 from posefield.common.errors import ModelError, UnknownModel
-from posefield.inference.trial_process import Limits
+from posefield.inference.trial_process import TrialLimits
 from posefield.model_file import checked_file
-from posefield.registry.model_loading import Intake
-from posefield.registry.model_registry import Bounds
-from posefield.registry.model_reload import SETTLING, Fixed, Shelf
+from posefield.registry.model_loading import ModelLoader
+from posefield.registry.model_registry import VersionLimits
+from posefield.registry.model_reload import SETTLE_SECONDS, FixedRegistry, ReloadingRegistry
 
-ROOM = Bounds()
+ROOM = VersionLimits()
 
 
 @pytest.fixture(scope="module")
@@ -47,19 +47,19 @@ def put(content, tmp_path):
 
 def followed(shelf):
     """The library once a change is settled."""
-    assert not shelf.look()
-    assert shelf.look()
-    return shelf.library
+    assert not shelf.scan()
+    assert shelf.scan()
+    return shelf.registry
 
 
 def identities(shelf):
-    return [model.identity for model in shelf.library.models.values()]
+    return [model.identity for model in shelf.registry.models.values()]
 
 
 def test_a_file_that_was_replaced_is_newest_and_the_old_answers_under_its_hash(put, tmp_path):
     old = put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
-    before = shelf.library
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    before = shelf.registry
     new = put("walk.onnx", 2)
     after = followed(shelf)
     assert after.find("walk").identity == f"walk@{new}" != f"walk@{old}"
@@ -69,8 +69,8 @@ def test_a_file_that_was_replaced_is_newest_and_the_old_answers_under_its_hash(p
 
 def test_a_library_that_was_taken_stays_what_it_was(put, tmp_path):
     old = put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
-    taken = shelf.library
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    taken = shelf.registry
     put("walk.onnx", 2)
     assert followed(shelf) is not taken
     assert taken.find("walk").identity == f"walk@{old}"
@@ -78,24 +78,24 @@ def test_a_library_that_was_taken_stays_what_it_was(put, tmp_path):
 
 def test_nothing_new_leaves_the_very_same_library(put, tmp_path):
     put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
-    taken = shelf.library
-    assert shelf.look()
-    assert shelf.library is taken
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    taken = shelf.registry
+    assert shelf.scan()
+    assert shelf.registry is taken
     assert (shelf.reloads.looks, shelf.reloads.opened) == (2, 1)
 
 
 def test_a_file_is_read_only_when_two_looks_find_it_the_same(put, content, tmp_path):
     put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     whole = content(2)
     # A copy in progress, longer at every look.
     for share in (0.3, 0.6, 1.0):
         (tmp_path / "walk.onnx").write_bytes(whole[: int(share * len(whole))])
-        assert not shelf.look()
+        assert not shelf.scan()
         assert not shelf.reloads.faults
-    assert shelf.look()
-    assert shelf.library.find("walk").session.digest == checked_file.digest(whole)
+    assert shelf.scan()
+    assert shelf.registry.find("walk").session.digest == checked_file.digest(whole)
     assert shelf.reloads.failed == 0
 
 
@@ -104,11 +104,11 @@ def test_a_broken_file_leaves_the_old_one_and_is_told_until_it_changes(
     broken, put, content, tmp_path, caplog
 ):
     old = put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     path = tmp_path / "walk.onnx"
     path.write_bytes(content(2)[:-9000] if broken is None else broken)
     for _ in range(4):
-        shelf.look()
+        shelf.scan()
     assert identities(shelf) == [f"walk@{old}"]
     (fault,) = shelf.reloads.faults
     assert (fault.name, fault.version, fault.error.path) == ("walk", "", str(path))
@@ -123,8 +123,8 @@ def test_a_broken_file_leaves_the_old_one_and_is_told_until_it_changes(
 
 def test_what_was_put_back_is_newest_again_and_not_opened_twice(put, tmp_path):
     first = put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
-    model = shelf.library.find("walk")
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    model = shelf.registry.find("walk")
     put("walk.onnx", 2)
     followed(shelf)
     put("walk.onnx", 1)
@@ -135,14 +135,14 @@ def test_what_was_put_back_is_newest_again_and_not_opened_twice(put, tmp_path):
 
 def test_older_versions_are_bounded_and_the_oldest_goes(put, tmp_path):
     digests = [put("walk.onnx", 0)]
-    shelf = Shelf([tmp_path], Bounds(older=2))
+    shelf = ReloadingRegistry([tmp_path], VersionLimits(older=2))
     for number in (1, 2, 3):
         digests.append(put("walk.onnx", number))
         followed(shelf)
-    held = [m.session.digest for m in shelf.library.versions("walk")]
+    held = [m.session.digest for m in shelf.registry.versions("walk")]
     assert held == digests[:0:-1]
     with pytest.raises(UnknownModel) as caught:
-        shelf.library.find(f"walk@{digests[0]}")
+        shelf.registry.find(f"walk@{digests[0]}")
     said = ", ".join(f"walk@{digest}" for digest in held)
     assert caught.value.message == f"no model 'walk@{digests[0]}'; there are {said}"
 
@@ -150,37 +150,37 @@ def test_older_versions_are_bounded_and_the_oldest_goes(put, tmp_path):
 def test_older_versions_are_bounded_by_memory_the_furthest_from_newest_first(put, tmp_path):
     for name in ("run.onnx", "walk.onnx"):
         put(name, 0)
-    one = Shelf([tmp_path], ROOM).library.find("walk").session.memory
-    shelf = Shelf([tmp_path], Bounds(older=5, memory=3 * one))
+    one = ReloadingRegistry([tmp_path], ROOM).registry.find("walk").session.memory
+    shelf = ReloadingRegistry([tmp_path], VersionLimits(older=5, memory=3 * one))
     for number in (1, 2):
         runs, walks = put("run.onnx", number), put("walk.onnx", number)
         followed(shelf)
-    assert len(shelf.library.older) == 3
-    assert [len(shelf.library.versions(name)) for name in ("run", "walk")] == [3, 2]
+    assert len(shelf.registry.older) == 3
+    assert [len(shelf.registry.versions(name)) for name in ("run", "walk")] == [3, 2]
     assert identities(shelf) == [f"run@{runs}", f"walk@{walks}"]
-    without = Shelf([tmp_path], Bounds(memory=0))
+    without = ReloadingRegistry([tmp_path], VersionLimits(memory=0))
     put("run.onnx", 3)
     assert followed(without).older == ()
 
 
 def test_what_is_held_no_longer_is_freed(put, tmp_path):
     put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], Bounds(older=0))
-    models = [weakref.ref(shelf.library.find("walk"))]
+    shelf = ReloadingRegistry([tmp_path], VersionLimits(older=0))
+    models = [weakref.ref(shelf.registry.find("walk"))]
     for number in (2, 3, 4):
         put("walk.onnx", number)
         followed(shelf)
-        models.append(weakref.ref(shelf.library.find("walk")))
+        models.append(weakref.ref(shelf.registry.find("walk")))
     gc.collect()
     assert [model() is None for model in models] == [True, True, True, False]
 
 
 def test_a_version_that_had_no_room_is_opened_when_it_is_the_newest(put, tmp_path):
     old, new = put("walk/1.onnx", 1), put("walk/2.onnx", 2)
-    shelf = Shelf([tmp_path], Bounds(older=2, memory=0))
-    assert identities(shelf) == [f"walk@{new}"] and not shelf.library.older
+    shelf = ReloadingRegistry([tmp_path], VersionLimits(older=2, memory=0))
+    assert identities(shelf) == [f"walk@{new}"] and not shelf.registry.older
     for _ in range(3):
-        shelf.look()
+        shelf.scan()
     assert shelf.reloads.opened == 2
     (tmp_path / "walk/2.onnx").unlink()
     followed(shelf)
@@ -189,8 +189,8 @@ def test_a_version_that_had_no_room_is_opened_when_it_is_the_newest(put, tmp_pat
 
 def test_a_folder_of_versions_answers_with_the_highest_and_holds_the_next(put, tmp_path):
     digests = {n: put(f"walk/{n}.onnx", n) for n in (2, 10, 9, 1)}
-    shelf = Shelf([tmp_path], ROOM)
-    assert [m.session.digest for m in shelf.library.versions("walk")] == [
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    assert [m.session.digest for m in shelf.registry.versions("walk")] == [
         digests[n] for n in (10, 9, 2)
     ]
     digests[11] = put("walk/11.onnx", 11)
@@ -205,13 +205,13 @@ def test_a_folder_of_versions_answers_with_the_highest_and_holds_the_next(put, t
 def test_versions_as_model_servers_lay_them_out(put, tmp_path):
     old, new = put("walk/2/model.onnx", 2), put("walk/10/model.onnx", 10)
     (tmp_path / "walk/config.pbtxt").write_text('name: "walk"')
-    shelf = Shelf([tmp_path], ROOM)
-    assert [m.session.digest for m in shelf.library.versions("walk")] == [new, old]
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    assert [m.session.digest for m in shelf.registry.versions("walk")] == [new, old]
 
 
 def test_a_broken_newest_version_leaves_the_one_before(put, tmp_path):
     good = put("walk/1.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     (tmp_path / "walk/2.onnx").write_bytes(b"broken")
     followed(shelf)
     assert identities(shelf) == [f"walk@{good}"]
@@ -221,7 +221,7 @@ def test_a_broken_newest_version_leaves_the_one_before(put, tmp_path):
 
 def test_a_new_file_is_a_new_model(put, tmp_path):
     walk = put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     run = put("run.onnx", 2)
     followed(shelf)
     assert sorted(identities(shelf)) == [f"run@{run}", f"walk@{walk}"]
@@ -229,26 +229,26 @@ def test_a_new_file_is_a_new_model(put, tmp_path):
 
 def test_a_deleted_name_goes_with_all_its_versions(put, tmp_path):
     walk, _, run = put("walk.onnx", 1), put("run.onnx", 1), put("run.onnx", 2)
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     put("run.onnx", 3)
     followed(shelf)
     (tmp_path / "run.onnx").unlink()
-    assert not shelf.look()
-    assert shelf.library.find("run"), "it may be about to be put back"
-    shelf.look()
+    assert not shelf.scan()
+    assert shelf.registry.find("run"), "it may be about to be put back"
+    shelf.scan()
     assert identities(shelf) == [f"walk@{walk}"]
     for key in ("run", f"run@{run}"):
         with pytest.raises(UnknownModel):
-            shelf.library.find(key)
+            shelf.registry.find(key)
 
 
 def test_a_source_without_any_model_left_keeps_what_it_had(put, tmp_path):
     """A folder that is suddenly empty is a disk that was not mounted."""
     walk = put("models/walk.onnx", 1)
-    shelf = Shelf([tmp_path / "models"], ROOM)
+    shelf = ReloadingRegistry([tmp_path / "models"], ROOM)
     shutil.rmtree(tmp_path / "models")
     for _ in range(3):
-        shelf.look()
+        shelf.scan()
     assert identities(shelf) == [f"walk@{walk}"]
     (fault,) = shelf.reloads.faults
     assert fault.name == "" and "no .onnx file" in fault.error.message
@@ -257,7 +257,7 @@ def test_a_source_without_any_model_left_keeps_what_it_had(put, tmp_path):
 
 def test_a_file_given_by_itself_is_followed_too(put, tmp_path):
     put("walk.onnx", 1)
-    shelf = Shelf([tmp_path / "walk.onnx"], ROOM)
+    shelf = ReloadingRegistry([tmp_path / "walk.onnx"], ROOM)
     new = put("walk.onnx", 2)
     followed(shelf)
     assert identities(shelf) == [f"walk@{new}"]
@@ -271,7 +271,7 @@ def test_a_link_that_is_turned_is_a_change(put, tmp_path):
         os.utime(tmp_path / f"..{number}/walk.onnx", (0, 0))
     (tmp_path / "..data").symlink_to("..1")
     (tmp_path / "walk.onnx").symlink_to("..data/walk.onnx")
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     (tmp_path / "..turned").symlink_to("..2")
     (tmp_path / "..turned").rename(tmp_path / "..data")
     followed(shelf)
@@ -282,32 +282,32 @@ def test_two_places_of_one_name_are_refused_at_the_start(put, tmp_path):
     put("walk.onnx", 1)
     put("walk/1.onnx", 2)
     with pytest.raises(ModelError, match="a second model named 'walk'"):
-        Shelf([tmp_path], ROOM).check()
+        ReloadingRegistry([tmp_path], ROOM).check()
 
 
 def test_a_second_place_of_a_name_leaves_the_first(put, tmp_path):
     walk = put("walk/1.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     put("other/walk.onnx", 2)
     put("walk/2.onnx", 3)
     put("walk.onnx", 4)
     followed(shelf)
     assert {f.error.message for f in shelf.reloads.faults} == {"a second model named 'walk'"}
-    assert f"walk@{walk}" in {m.identity for m in shelf.library.versions("walk")}
+    assert f"walk@{walk}" in {m.identity for m in shelf.registry.versions("walk")}
 
 
 def test_a_broken_file_stops_the_start(put, tmp_path):
     put("a.onnx", 1)
     (tmp_path / "b.onnx").write_bytes(b"broken")
     with pytest.raises(ModelError) as caught:
-        Shelf([tmp_path], ROOM).check()
+        ReloadingRegistry([tmp_path], ROOM).check()
     assert caught.value.path == str(tmp_path / "b.onnx")
 
 
 def test_it_follows_by_itself_while_watched(put, tmp_path):
     put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
-    with shelf.watched(0.05):
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    with shelf.watch(0.05):
         new = put("walk.onnx", 2)
         until = time.monotonic() + 20
         while identities(shelf) != [f"walk@{new}"] and time.monotonic() < until:
@@ -317,18 +317,18 @@ def test_it_follows_by_itself_while_watched(put, tmp_path):
 
 def test_it_does_not_follow_when_told_never_to(put, tmp_path):
     put("walk.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM)
-    with shelf.watched(0):
+    shelf = ReloadingRegistry([tmp_path], ROOM)
+    with shelf.watch(0):
         put("walk.onnx", 2)
-        time.sleep(2 * SETTLING)
+        time.sleep(2 * SETTLE_SECONDS)
         assert shelf.reloads.looks == 1
 
 
 def test_fixed_models_are_a_library_that_stays(put, tmp_path):
     put("walk.onnx", 1)
-    library = Shelf([tmp_path], ROOM).library
-    assert Fixed(library).library is library
-    assert Fixed(library).reloads.looks == 0
+    library = ReloadingRegistry([tmp_path], ROOM).registry
+    assert FixedRegistry(library).registry is library
+    assert FixedRegistry(library).reloads.looks == 0
 
 
 # --- files that are meant to do harm --------------------------------------------------------------
@@ -352,7 +352,7 @@ def test_files_that_cannot_be_served_do_not_keep_others_from_being_taken(
     put, hostile, tmp_path, caplog
 ):
     put("a.onnx", 1)
-    shelf = Shelf([tmp_path], ROOM, Limits(cpu=1))
+    shelf = ReloadingRegistry([tmp_path], ROOM, TrialLimits(cpu=1))
     for name, (own, _) in hostile.items():
         (tmp_path / f"b_{name}.onnx").write_bytes(own)
     # In the order of their names it is the last.
@@ -378,7 +378,7 @@ def test_files_that_cannot_be_served_do_not_keep_others_from_being_taken(
 def test_a_file_that_was_refused_is_tried_again_when_it_changes(put, hostile, tmp_path):
     put("a.onnx", 1)
     (tmp_path / "b.onnx").write_bytes(hostile["large"][0])
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     assert [fault.name for fault in shelf.reloads.faults] == ["b"]
     new = put("b.onnx", 2)
     assert followed(shelf).find("b").identity == f"b@{new}"
@@ -389,10 +389,10 @@ def test_a_fault_of_the_start_is_logged_at_the_next_look_and_then_no_more(put, t
     """A process that takes the place of another one starts with the models that are left."""
     put("a.onnx", 1)
     (tmp_path / "b.onnx").write_bytes(b"broken")
-    shelf = Shelf([tmp_path], ROOM)
+    shelf = ReloadingRegistry([tmp_path], ROOM)
     assert not caplog.records
-    shelf.look()
-    shelf.look()
+    shelf.scan()
+    shelf.scan()
     (record,) = caplog.records
     assert "b.onnx: does not end with its checksum" in record.getMessage()
 
@@ -411,19 +411,19 @@ def address_space_but(room):
 
 def test_an_error_that_no_check_foresees_is_a_fault_too(put, tmp_path, caplog):
     with (tmp_path / "a.onnx").open("wb") as file:
-        file.truncate(checked_file.MOST_BYTES)
+        file.truncate(checked_file.MAX_BYTES)
     good = put("b.onnx", 1)
-    intake = Intake([tmp_path], most=1)
+    intake = ModelLoader([tmp_path], most=1)
     before = resource.getrlimit(resource.RLIMIT_AS)
     gc.collect()
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     # There is room for one file, and not for the other.
-    room = checked_file.MOST_BYTES // 2
+    room = checked_file.MAX_BYTES // 2
     resource.setrlimit(resource.RLIMIT_AS, (used + room, before[1]))
     try:
         ballast = address_space_but(room)
         for _ in range(3):
-            intake.look()
+            intake.scan()
         del ballast
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
@@ -438,16 +438,16 @@ def test_an_error_that_no_check_foresees_is_a_fault_too(put, tmp_path, caplog):
 def test_a_machine_without_a_process_to_spare_tries_again(put, tmp_path):
     put("a.onnx", 1)
     before = resource.getrlimit(resource.RLIMIT_NOFILE)
-    intake = Intake([tmp_path], most=1)
+    intake = ModelLoader([tmp_path], most=1)
     with Path(os.devnull).open(), Path(os.devnull).open() as second:
         limit = second.fileno()
     # One descriptor is left to list and read files by, and not two for a pair of sockets.
     resource.setrlimit(resource.RLIMIT_NOFILE, (limit, before[1]))
     try:
-        intake.look()
+        intake.scan()
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, before)
     (fault,) = intake.faults.values()
     assert fault.error.message == "no process to try it in: Too many open files"
-    intake.look()
+    intake.scan()
     assert not intake.faults and intake.opened == 1

@@ -7,7 +7,7 @@ from posefield.common.errors import InvalidField
 from posefield.encode.tables import model_tables
 from posefield.question.model_question import SuggestQuestion
 from posefield.registry import model_registry
-from posefield.synthesis.capture_suggestions import DRAWN, suggest
+from posefield.synthesis.capture_suggestions import DRAWN_CANDIDATES, suggest
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +17,11 @@ def model(labelled_path):
 
 def test_points_lie_in_the_box_and_the_first_is_worth_most(model):
     found = suggest(model, SuggestQuestion(count=20))
-    assert (found.model, found.candidates, len(found.suggestions)) == (model.identity, DRAWN, 20)
+    assert (found.model, found.candidates, len(found.suggestions)) == (
+        model.identity,
+        DRAWN_CANDIDATES,
+        20,
+    )
     for control in model.session.card.controls:
         values = [each.controls[control.name] for each in found.suggestions]
         assert control.minimum <= min(values) < max(values) <= control.maximum

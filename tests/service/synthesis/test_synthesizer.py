@@ -24,7 +24,7 @@ def model(model_path):
 
 @pytest.fixture(scope="module")
 def duration(model):
-    return poses.pose(model, PoseQuestion(controls=POINT, times=[0.0])).trust.duration
+    return poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.0])).trust.duration
 
 
 @pytest.fixture
@@ -33,7 +33,9 @@ def refused(model):
 
     def of(controls=POINT, rate=30.0, **span):
         with pytest.raises(InvalidField) as caught:
-            clips.clip(model, ClipQuestion(controls=controls, fps=rate, extrapolate="warn", **span))
+            clips.synthesize_clip(
+                model, ClipQuestion(controls=controls, fps=rate, extrapolate="warn", **span)
+            )
         return caught.value.field, caught.value.message
 
     return of
@@ -71,8 +73,13 @@ def test_a_control_that_is_no_finite_number_is_refused(refused, name, value, sai
 
 
 def test_a_whole_number_is_a_number(model):
-    whole = poses.pose(model, PoseQuestion(controls={**POINT, "turn": 10}, times=[0.0]))
-    assert poses_differ(whole, poses.pose(model, PoseQuestion(controls=POINT, times=[0.0]))) == 0.0
+    whole = poses.synthesize_poses(model, PoseQuestion(controls={**POINT, "turn": 10}, times=[0.0]))
+    assert (
+        poses_differ(
+            whole, poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.0]))
+        )
+        == 0.0
+    )
     assert whole.trust.controls == POINT
 
 
@@ -87,38 +94,45 @@ def test_a_control_out_of_all_reason_is_refused_with_the_range(refused, value):
 @pytest.mark.parametrize(("time", "inside"), [(-0.01, False), (0.0, True), (9.0, False)])
 def test_a_time_outside_the_clip_is_refused(model, duration, time, inside):
     if inside:
-        assert poses.pose(model, PoseQuestion(controls=POINT, times=[time])).times.tolist() == [
-            time
-        ]
+        assert poses.synthesize_poses(
+            model, PoseQuestion(controls=POINT, times=[time])
+        ).times.tolist() == [time]
         return
     with pytest.raises(InvalidField) as caught:
-        poses.pose(model, PoseQuestion(controls=POINT, times=[0.1, time]))
+        poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.1, time]))
     assert caught.value.field == "times/1"
     assert caught.value.message == f"{time:g} s, expected 0 to {duration:.9g} s"
 
 
 def test_the_last_moment_of_a_clip_is_inside(model, duration):
     assert (
-        len(poses.pose(model, PoseQuestion(controls=POINT, times=[0.0, duration])).rotations) == 2
+        len(
+            poses.synthesize_poses(
+                model, PoseQuestion(controls=POINT, times=[0.0, duration])
+            ).rotations
+        )
+        == 2
     )
     with pytest.raises(InvalidField, match="times/0"):
-        poses.pose(model, PoseQuestion(controls=POINT, times=[duration * (1.0 + 2.0**-22)]))
+        poses.synthesize_poses(
+            model, PoseQuestion(controls=POINT, times=[duration * (1.0 + 2.0**-22)])
+        )
 
 
 @pytest.mark.parametrize("time", [math.nan, math.inf, "0", True, None])
 def test_a_time_that_is_no_finite_number_is_refused(model, time):
     with pytest.raises(InvalidField, match=r"times/2: .*expected a (finite )?number"):
-        poses.pose(model, PoseQuestion(controls=POINT, times=[0.0, 0.0, time]))
+        poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.0, 0.0, time]))
 
 
 @pytest.mark.parametrize("count", [0, 10_001])
 def test_so_many_times_are_refused(model, count):
     with pytest.raises(InvalidField, match=f"times: {count} times, expected 1 to 10000"):
-        poses.pose(model, PoseQuestion(controls=POINT, times=[0.0] * count))
+        poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.0] * count))
 
 
 def test_ten_thousand_poses_are_answered(model):
-    answer = poses.pose(model, PoseQuestion(controls=POINT, times=[0.5] * 10_000))
+    answer = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.5] * 10_000))
     assert answer.rotations.shape == (10_000, 33, 4)
 
 
@@ -143,7 +157,9 @@ def lasting(model, reach):
         try:
             yield (
                 corner,
-                poses.pose(model, PoseQuestion(controls=corner, times=[0.0])).trust.duration,
+                poses.synthesize_poses(
+                    model, PoseQuestion(controls=corner, times=[0.0])
+                ).trust.duration,
             )
         except OutsideSamples:
             yield corner, None
@@ -163,7 +179,7 @@ def test_an_absurd_duration_is_blamed_on_the_controls(model):
     lost = [corner for corner, seconds in lasting(model, 90.0) if seconds is None]
     assert lost
     with pytest.raises(OutsideSamples, match=r"clip would last \S+ s; captured clips last"):
-        clips.clip(model, ClipQuestion(controls=lost[0], fps=30.0, extrapolate="warn"))
+        clips.synthesize_clip(model, ClipQuestion(controls=lost[0], fps=30.0, extrapolate="warn"))
 
 
 @pytest.mark.parametrize(
@@ -188,7 +204,7 @@ def test_a_span_outside_the_clip_is_refused(refused, span, field, said):
 def test_a_span_of_one_moment_is_one_frame(model):
     assert (
         len(
-            clips.clip(
+            clips.synthesize_clip(
                 model,
                 ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn", start=0.5, end=0.5),
             ).clip
@@ -203,7 +219,7 @@ OUTSIDE = {**POINT, "turn": 120.0, "target_height": 0.1}
 def test_inside_the_samples_nothing_is_warned_of(model):
     for policy in ("warn", "refuse"):
         assert (
-            clips.clip(
+            clips.synthesize_clip(
                 model, ClipQuestion(controls=POINT, fps=30.0, extrapolate=policy)
             ).trust.warnings
             == ()
@@ -211,7 +227,7 @@ def test_inside_the_samples_nothing_is_warned_of(model):
 
 
 def test_outside_the_samples_each_control_has_its_sentence(model):
-    warnings = poses.pose(
+    warnings = poses.synthesize_poses(
         model, PoseQuestion(controls=OUTSIDE, times=[0.0], extrapolate="warn")
     ).trust.warnings
     assert len(warnings) == 2
@@ -224,12 +240,14 @@ def test_outside_the_samples_each_control_has_its_sentence(model):
 
 
 def test_outside_the_samples_a_client_may_ask_for_a_refusal(model):
-    warnings = clips.clip(
+    warnings = clips.synthesize_clip(
         model, ClipQuestion(controls=OUTSIDE, fps=30.0, extrapolate="warn")
     ).trust.warnings
     for ask in (
-        lambda: clips.clip(model, ClipQuestion(controls=OUTSIDE, fps=30.0, extrapolate="refuse")),
-        lambda: poses.pose(
+        lambda: clips.synthesize_clip(
+            model, ClipQuestion(controls=OUTSIDE, fps=30.0, extrapolate="refuse")
+        ),
+        lambda: poses.synthesize_poses(
             model, PoseQuestion(controls=OUTSIDE, times=[0.0], extrapolate="refuse")
         ),
     ):
@@ -243,14 +261,14 @@ def test_the_bounds_of_the_card_are_inside(model):
     for end in ("minimum", "maximum"):
         corner = {c.name: getattr(c, end) for c in model.session.card.controls}
         # Nobody is smallest, sitting and reaching lowest at once: a corner may be a gap.
-        warnings = poses.pose(
+        warnings = poses.synthesize_poses(
             model, PoseQuestion(controls=corner, times=[0.0], extrapolate="warn")
         ).trust.warnings
         assert not any("outside" in warning for warning in warnings)
         beyond = {**corner, "turn": 1.01 * corner["turn"]}
         assert (
             "outside"
-            in poses.pose(
+            in poses.synthesize_poses(
                 model, PoseQuestion(controls=beyond, times=[0.0], extrapolate="warn")
             ).trust.warnings[0]
         )
@@ -262,30 +280,34 @@ def between(model):
     rng = np.random.Generator(np.random.PCG64(4))
     low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
     drawn = rng.uniform(low, high, (200, len(low)))
-    point = drawn[np.argmin(model.door.support.holds(drawn))]
+    point = drawn[np.argmin(model.validator.support.supported(drawn))]
     return {c.name: float(v) for c, v in zip(card.controls, point, strict=True)}
 
 
 def test_a_gap_of_what_was_sampled_is_told_by_a_flag_and_as_it_was_asked_to(model):
     gap = between(model)
     ok, warned = (
-        poses.pose(model, PoseQuestion(controls=gap, times=[0.0], extrapolate=policy)).trust
+        poses.synthesize_poses(
+            model, PoseQuestion(controls=gap, times=[0.0], extrapolate=policy)
+        ).trust
         for policy in ("ok", "warn")
     )
     assert not ok.supported and not warned.supported
     assert ok.warnings == ()
     assert len(warned.warnings) == 1 and "in a gap" in warned.warnings[0]
     with pytest.raises(OutsideSamples, match="in a gap") as caught:
-        poses.pose(model, PoseQuestion(controls=gap, times=[0.0], extrapolate="refuse"))
+        poses.synthesize_poses(model, PoseQuestion(controls=gap, times=[0.0], extrapolate="refuse"))
     assert caught.value.field == "controls"
     # Negative control: what was captured is answered whatever is asked.
-    assert poses.pose(
+    assert poses.synthesize_poses(
         model, PoseQuestion(controls=POINT, times=[0.0], extrapolate="refuse")
     ).trust.supported
 
 
 def test_outside_the_samples_a_client_may_ask_for_the_flag_alone(model):
-    trust = poses.pose(model, PoseQuestion(controls=OUTSIDE, times=[0.0], extrapolate="ok")).trust
+    trust = poses.synthesize_poses(
+        model, PoseQuestion(controls=OUTSIDE, times=[0.0], extrapolate="ok")
+    ).trust
     assert trust.warnings == () and not trust.supported
     assert trust.facts()["supported"] is False
 
@@ -295,28 +317,30 @@ def test_a_little_beyond_a_control_is_said_and_supported(model):
     example = dict(zip((c.name for c in card.controls), card.examples[20], strict=True))
     turn = card.control("turn")
     beyond = {**example, "turn": turn.maximum + 0.02 * (turn.maximum - turn.minimum)}
-    trust = poses.pose(model, PoseQuestion(controls=beyond, times=[0.0])).trust
+    trust = poses.synthesize_poses(model, PoseQuestion(controls=beyond, times=[0.0])).trust
     assert "outside" in trust.warnings[0]
-    assert trust.supported == model.door.support.held(list(trust.controls.values()))
+    assert trust.supported == model.validator.support.is_supported(list(trust.controls.values()))
 
 
 def test_sigma_of_each_joint_is_its_share_of_sigma(model):
-    trust = poses.pose(model, PoseQuestion(controls=POINT, times=[0.0])).trust
+    trust = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.0])).trust
     assert trust.joint_sigma == () and "joint_sigma" not in trust.facts()
-    found = clips.clip(model, ClipQuestion(controls=POINT, joint_sigma=True)).trust
+    found = clips.synthesize_clip(model, ClipQuestion(controls=POINT, joint_sigma=True)).trust
     card = model.session.card
     assert len(found.joint_sigma) == len(card.skeleton) == len(card.joint_sigma)
     shares = np.array(found.joint_sigma) / trust.sigma
     assert shares == pytest.approx(card.joint_sigma, abs=1e-4)
     assert np.sqrt(np.mean(np.square(shares))) == pytest.approx(1.0, abs=0.01)
     assert found.facts()["joint_sigma"] == list(found.joint_sigma)
-    pose = poses.pose(model, PoseQuestion(controls=POINT, times=[0.0], joint_sigma=True))
+    pose = poses.synthesize_poses(
+        model, PoseQuestion(controls=POINT, times=[0.0], joint_sigma=True)
+    )
     assert pose.trust == found
 
 
 def test_farther_outside_there_is_less_trust(model):
     inside, outside = (
-        poses.pose(model, PoseQuestion(controls=p, times=[0.0])).trust.sigma
+        poses.synthesize_poses(model, PoseQuestion(controls=p, times=[0.0])).trust.sigma
         for p in (POINT, OUTSIDE)
     )
     assert 0.0 < inside < outside
@@ -324,12 +348,14 @@ def test_farther_outside_there_is_less_trust(model):
 
 @pytest.mark.parametrize("rate", [24.0, 30.0, 29.97, 120.0, 1.0])
 def test_frame_i_is_the_pose_at_i_over_the_rate(model, duration, rate):
-    answer = clips.clip(model, ClipQuestion(controls=POINT, fps=rate, extrapolate="warn"))
+    answer = clips.synthesize_clip(
+        model, ClipQuestion(controls=POINT, fps=rate, extrapolate="warn")
+    )
     frames = len(answer.clip)
     assert answer.clip.rate == rate
     assert (frames - 1) / rate <= duration + 1e-6 < frames / rate + 2e-6
     for frame in {0, frames // 2, frames - 1}:
-        pose = poses.pose(model, PoseQuestion(controls=POINT, times=[frame / rate]))
+        pose = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[frame / rate]))
         assert np.abs(answer.clip.rotations[frame] - pose.rotations[0]).max() < FLOAT32
         assert np.abs(answer.clip.root_path[frame] - pose.root_position[0]).max() < FLOAT32
         assert np.abs(answer.clip.translations[frame, 1:] - pose.bone_offsets[1:]).max() < FLOAT32
@@ -337,15 +363,19 @@ def test_frame_i_is_the_pose_at_i_over_the_rate(model, duration, rate):
 
 def test_one_frame_on_the_pose_is_another(model):
     """Negative control of the frames' times: an error of one frame would be seen."""
-    clip = clips.clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")).clip
+    clip = clips.synthesize_clip(
+        model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")
+    ).clip
     middle = len(clip) // 2
-    pose = poses.pose(model, PoseQuestion(controls=POINT, times=[(middle + 1) / 30.0]))
+    pose = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[(middle + 1) / 30.0]))
     assert np.abs(clip.rotations[middle] - pose.rotations[0]).max() > 100 * FLOAT32
 
 
 def test_a_span_is_a_slice_of_the_whole(model):
-    whole = clips.clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")).clip
-    part = clips.clip(
+    whole = clips.synthesize_clip(
+        model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")
+    ).clip
+    part = clips.synthesize_clip(
         model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn", start=0.2, end=0.7)
     ).clip
     assert len(part) == 16
@@ -355,8 +385,10 @@ def test_a_span_is_a_slice_of_the_whole(model):
 
 
 def test_a_clip_that_starts_late_goes_on_to_the_end(model):
-    whole = clips.clip(model, ClipQuestion(controls=POINT, fps=50.0, extrapolate="warn")).clip
-    rest = clips.clip(
+    whole = clips.synthesize_clip(
+        model, ClipQuestion(controls=POINT, fps=50.0, extrapolate="warn")
+    ).clip
+    rest = clips.synthesize_clip(
         model, ClipQuestion(controls=POINT, fps=50.0, extrapolate="warn", start=0.5)
     ).clip
     assert len(rest) == len(whole) - 25
@@ -364,18 +396,20 @@ def test_a_clip_that_starts_late_goes_on_to_the_end(model):
 
 
 def test_an_answer_says_where_it_comes_from(model):
-    trust = clips.clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")).trust
+    trust = clips.synthesize_clip(
+        model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn")
+    ).trust
     assert trust.model == model.identity == f"reaching@{model.session.digest}"
     assert trust.controls == POINT
     assert (
         trust.duration
-        == poses.pose(model, PoseQuestion(controls=POINT, times=[0.0])).trust.duration
+        == poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.0])).trust.duration
     )
 
 
 def test_the_same_question_has_the_same_answer(model):
     first, second = (
-        clips.clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn"))
+        clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=30.0, extrapolate="warn"))
         for _ in range(2)
     )
     assert np.array_equal(first.clip.rotations, second.clip.rotations)
@@ -386,7 +420,8 @@ def test_the_same_question_has_the_same_answer(model):
 def test_controls_may_come_in_any_order(model):
     backwards = dict(reversed(POINT.items()))
     found, other = (
-        poses.pose(model, PoseQuestion(controls=each, times=[0.5])) for each in (backwards, POINT)
+        poses.synthesize_poses(model, PoseQuestion(controls=each, times=[0.5]))
+        for each in (backwards, POINT)
     )
     assert poses_differ(found, other) == 0.0
     assert [*found.trust.controls.items()] == [*other.trust.controls.items()] == [*POINT.items()]
@@ -394,13 +429,13 @@ def test_controls_may_come_in_any_order(model):
 
 def test_a_whole_rate_is_a_number_like_any_other(model):
     """Else text formats would write 30 or 30.0 of the same question."""
-    rate = clips.clip(model, ClipQuestion(controls=POINT, fps=30, end=0.0)).clip.rate
+    rate = clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=30, end=0.0)).clip.rate
     assert repr(rate) == repr(30.0) != repr(30)
 
 
 def test_clips_are_float64_and_poses_what_the_graph_speaks(model):
-    pose = poses.pose(model, PoseQuestion(controls=POINT, times=[0.5]))
-    clip = clips.clip(model, ClipQuestion(controls=POINT)).clip
+    pose = poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.5]))
+    clip = clips.synthesize_clip(model, ClipQuestion(controls=POINT)).clip
     arrays = (pose.rotations, pose.root_position, pose.bone_offsets)
     assert {array.dtype for array in arrays} == {np.dtype(np.float32)}
     assert {array.dtype for array in (clip.rotations, clip.translations)} == {np.dtype(np.float64)}
@@ -422,7 +457,7 @@ def test_what_a_clip_would_be_refused_for_is_said_before_it_is_made(model, asked
     with pytest.raises(InvalidField) as before:
         clips.check(model, asked)
     with pytest.raises(InvalidField) as after:
-        clips.clip(model, asked)
+        clips.synthesize_clip(model, asked)
     assert before.value.field == after.value.field == field
 
 
@@ -430,7 +465,7 @@ def test_a_question_with_an_answer_passes(model):
     """Negative control of the test above."""
     asked = ClipQuestion(controls=POINT, start=0.1, end=0.4)
     clips.check(model, asked)
-    assert len(clips.clip(model, asked).clip) == 10
+    assert len(clips.synthesize_clip(model, asked).clip) == 10
 
 
 @pytest.mark.parametrize(
@@ -442,7 +477,7 @@ def test_a_question_with_an_answer_passes(model):
     ],
 )
 def test_what_is_known_of_a_clip_before_it_is_made_is_true(model, asked):
-    prospect, answer = clips.prospect(model, asked), clips.clip(model, asked)
+    prospect, answer = clips.preview_clip(model, asked), clips.synthesize_clip(model, asked)
     assert prospect.frames == len(answer.clip)
     assert prospect.warnings == answer.trust.warnings
 
@@ -451,11 +486,11 @@ def test_what_is_known_of_a_clip_before_it_is_made_is_true(model, asked):
 def test_an_end_that_is_the_clips_own_is_known_to_be_one(model, rng, level):
     for _ in range(50):
         moved = {name: value * rng.uniform(0.9, 1.1) for name, value in POINT.items()}
-        own = poses.pose(
+        own = poses.synthesize_poses(
             model, PoseQuestion(controls=moved, times=[0.0], level=level)
         ).trust.duration
-        clips.prospect(model, ClipQuestion(controls=moved, end=own, level=level))
+        clips.preview_clip(model, ClipQuestion(controls=moved, end=own, level=level))
         with pytest.raises(InvalidField, match="end: "):
-            clips.prospect(
+            clips.preview_clip(
                 model, ClipQuestion(controls=moved, end=own * (1.0 + 2.0**-22), level=level)
             )

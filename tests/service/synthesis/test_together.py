@@ -28,7 +28,7 @@ def question(model, place, level):
     controls = {c.name: low + s * span for (c, low, span), s in zip(ranges, shares, strict=False)}
     names = (None, *card.performers)
     time *= card.durations[0]
-    return poses.moments(
+    return poses.prepare(
         model,
         PoseQuestion(
             controls=controls, times=[time], performer=names[who % len(names)], level=level
@@ -46,13 +46,15 @@ PLACE = st.tuples(st.tuples(*[SHARE] * 4), st.floats(0.0, 0.5), st.integers(0, 9
 def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places, data):
     level = data.draw(st.integers(0, len(model.session.card.levels) - 1))
     asked = [question(model, place, level) for place in places]
-    for each, row in zip(asked, poses.rows(model, asked), strict=True):
-        (own,) = poses.rows(model, [each])
+    for each, row in zip(asked, poses.run_batch(model, asked), strict=True):
+        (own,) = poses.run_batch(model, [each])
         assert [a.tobytes() for a in row] == [a.tobytes() for a in own]
 
 
 def test_every_level_is_known_to_be_exact(model):
-    assert all(poses.exact(model, level) for level in range(len(model.session.card.levels)))
+    assert all(
+        poses.is_batch_exact(model, level) for level in range(len(model.session.card.levels))
+    )
 
 
 def test_a_graph_that_sums_by_place_is_found_out(model_path, tmp_path):
@@ -68,4 +70,4 @@ def test_a_graph_that_sums_by_place_is_found_out(model_path, tmp_path):
     path.write_bytes(written(graph))
     model = Synthesizer("reaching", session.load(path))
     assert len(columns) == 1
-    assert not poses.exact(model, 0)
+    assert not poses.is_batch_exact(model, 0)

@@ -13,10 +13,10 @@ import pytest
 
 from posefield.common.errors import ModelError
 from posefield.inference import session
-from posefield.inference.trial_process import LIMITS, Limits
+from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.model_file import checked_file
 
-LONG = Limits(cpu=600, wall=600.0)
+LONG = TrialLimits(cpu=600, wall=600.0)
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def way(request):
     other.join()
 
 
-def refusal(content, limits=LIMITS):
+def refusal(content, limits=DEFAULT_LIMITS):
     with pytest.raises(ModelError) as caught:
         limits.check(content, "bad.onnx")
     assert caught.value.path == "bad.onnx" and "\n" not in caught.value.message
@@ -67,7 +67,7 @@ def nothing_is_left():
 
 @pytest.mark.usefixtures("way")
 def test_a_good_file_passes(content):
-    assert LIMITS.check(content, "good.onnx") is None
+    assert DEFAULT_LIMITS.check(content, "good.onnx") is None
 
 
 @pytest.mark.usefixtures("way")
@@ -80,27 +80,27 @@ def test_a_good_file_passes(content):
     ],
 )
 def test_a_hostile_file_is_refused(content, hostile, said):
-    assert refusal(hostile(content), Limits(cpu=1)) == said
+    assert refusal(hostile(content), TrialLimits(cpu=1)) == said
 
 
 def test_a_file_that_takes_too_long_by_the_clock_is_refused(content):
     """Of a process that does not compute, CPU time says nothing."""
-    limits = Limits(cpu=600, wall=0.5)
+    limits = TrialLimits(cpu=600, wall=0.5)
     assert refusal(model_files.slow(content), limits) == "was not open after 0.5 s"
 
 
 def test_memory_is_counted_beyond_what_the_process_has(content):
     """Negative control: without the limit the file opens."""
     small = model_files.large(content, numbers=50_000_000)
-    refusal(small, Limits(memory=100 << 20))
-    assert Limits(memory=1 << 30).check(small, "good.onnx") is None
+    refusal(small, TrialLimits(memory=100 << 20))
+    assert TrialLimits(memory=1 << 30).check(small, "good.onnx") is None
 
 
 def test_a_file_that_was_tried_is_not_tried_again(content):
     small = model_files.large(content, numbers=50_000_000)
     tried = frozenset([checked_file.digest(small)])
-    assert Limits(memory=100 << 20, tried=tried).check(small, "good.onnx") is None
-    refusal(small, Limits(memory=100 << 20, tried=frozenset(["0" * 16])))
+    assert TrialLimits(memory=100 << 20, passed=tried).check(small, "good.onnx") is None
+    refusal(small, TrialLimits(memory=100 << 20, passed=frozenset(["0" * 16])))
 
 
 @pytest.mark.system
@@ -142,7 +142,7 @@ def test_the_limits_are_of_the_child_alone(content):
     import resource
 
     before = [resource.getrlimit(kind) for kind in (resource.RLIMIT_CPU, resource.RLIMIT_AS)]
-    LIMITS.check(content, "good.onnx")
+    DEFAULT_LIMITS.check(content, "good.onnx")
     after = [resource.getrlimit(kind) for kind in (resource.RLIMIT_CPU, resource.RLIMIT_AS)]
     assert before == after
 

@@ -11,10 +11,10 @@ from posefield.inference import session
 from posefield.question.model_question import WhyQuestion
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
-from posefield.synthesis.explanation import why
+from posefield.synthesis.explanation import explain_result
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import imputation
-from posefield.validation.imputation import Chooser, fit
+from posefield.validation.imputation import ControlImputer, fit_gaussian
 
 # A solve of numbers near one.
 ROUNDING = 1e-9
@@ -39,11 +39,11 @@ def card(model):
 
 
 def test_of_nothing_given_the_mean_is_typical(drawn):
-    assert np.abs(fit(drawn)({}) - drawn.mean(axis=0)).max() < ROUNDING
+    assert np.abs(fit_gaussian(drawn)({}) - drawn.mean(axis=0)).max() < ROUNDING
 
 
 def test_what_is_given_stays_as_it_is_and_the_mean_is_its_own_companion(drawn):
-    found = fit(drawn)
+    found = fit_gaussian(drawn)
     assert found({1: 0.1 + 0.2})[1] == 0.1 + 0.2
     mean = drawn.mean(axis=0)
     assert np.abs(found({0: mean[0], 2: mean[2]}) - mean).max() < ROUNDING
@@ -54,8 +54,8 @@ def test_what_is_given_stays_as_it_is_and_the_mean_is_its_own_companion(drawn):
 def test_of_one_given_all_others_follow_by_regression(drawn):
     given = drawn[:, 0].mean() + 1.5
     slope = np.cov(drawn.T, ddof=0)[:, 0] / drawn[:, 0].var()
-    expected = drawn.mean(axis=0) + (1.0 - imputation.SHRUNK) * slope * 1.5
-    assert np.abs(fit(drawn)({0: given}) - expected)[1:].max() < ROUNDING
+    expected = drawn.mean(axis=0) + (1.0 - imputation.SHRINKAGE) * slope * 1.5
+    assert np.abs(fit_gaussian(drawn)({0: given}) - expected)[1:].max() < ROUNDING
     assert np.abs(slope[1] * 1.5) > 0.1, "negative control: it does follow"
 
 
@@ -64,41 +64,41 @@ def test_of_several_given_the_others_are_the_conditional_mean(drawn):
     design = np.column_stack([np.ones(len(drawn)), drawn[:, [0, 2]]])
     by_least_squares = np.linalg.lstsq(design, drawn[:, [1, 3]], rcond=None)[0]
     asked = np.array([1.0, 3.0, 30.2])
-    found = fit(drawn, shrunk=0.0)({0: 3.0, 2: 30.2})
+    found = fit_gaussian(drawn, shrunk=0.0)({0: 3.0, 2: 30.2})
     assert np.abs(found[[1, 3]] - asked @ by_least_squares).max() < 1e-8
     assert found[0] == 3.0 and found[2] == 30.2
 
 
 def test_columns_that_say_the_same_are_no_trouble(drawn):
     twice = np.hstack([drawn, drawn[:, :1], np.full((len(drawn), 1), 7.0)])
-    found = fit(twice)({0: 3.0, 4: 3.0, 5: 7.0})
+    found = fit_gaussian(twice)({0: 3.0, 4: 3.0, 5: 7.0})
     assert np.isfinite(found).all()
-    assert found[1] == pytest.approx(fit(drawn)({0: 3.0})[1], abs=0.2)
+    assert found[1] == pytest.approx(fit_gaussian(drawn)({0: 3.0})[1], abs=0.2)
 
 
 def test_units_do_not_matter(drawn):
     scale = np.array([1.0, 100.0, 1e-3, 1.0])
-    found = fit(scale * drawn)({0: 3.0, 2: 30.1e-3})
-    assert np.abs(found / scale - fit(drawn)({0: 3.0, 2: 30.1})).max() < ROUNDING * 1e3
+    found = fit_gaussian(scale * drawn)({0: 3.0, 2: 30.1e-3})
+    assert np.abs(found / scale - fit_gaussian(drawn)({0: 3.0, 2: 30.1})).max() < ROUNDING * 1e3
 
 
 def test_a_control_of_few_values_takes_one_of_them_and_others_follow_it(card):
     few = [i for i, control in enumerate(card.controls) if control.values]
     assert few, "the family has statures"
-    found = Chooser(card).fill({}, NOBODY)
+    found = ControlImputer(card).impute({}, NOBODY)
     for i in few:
         control = card.controls[i]
         mean = np.mean([point[i] for point in card.examples])
         assert found[control.name] in control.values
         assert found[control.name] == min(control.values, key=lambda value: abs(value - mean))
     given = {card.controls[i].name: found[card.controls[i].name] for i in few}
-    assert Chooser(card).fill(given, NOBODY) == found
+    assert ControlImputer(card).impute(given, NOBODY) == found
 
 
 def test_what_is_chosen_is_short_and_within_what_was_sampled(card):
     rare = {"target_height": card.control("target_height").maximum * 50}
     for given in ({}, {"turn": 21.0}, rare):
-        found = Chooser(card).fill(given, NOBODY)
+        found = ControlImputer(card).impute(given, NOBODY)
         assert list(found) == [control.name for control in card.controls]
         for control in card.controls:
             if control.name in given:
@@ -111,10 +111,10 @@ def test_what_is_chosen_is_short_and_within_what_was_sampled(card):
 
 
 def test_a_performer_who_is_named_is_typical_of_himself(card):
-    chooser, who = Chooser(card), np.eye(len(card.performers))
+    chooser, who = ControlImputer(card), np.eye(len(card.performers))
     statures = {}
     for i, name in enumerate(card.performers):
-        statures[name] = chooser.fill({}, who[i : i + 1])["stature"]
+        statures[name] = chooser.impute({}, who[i : i + 1])["stature"]
         own = [p[0] for p, mover in zip(card.examples, card.moved_by, strict=True) if mover == i]
         assert abs(statures[name] - np.mean(own)) < 0.05
     assert statures["short"] < statures["middle"] < statures["tall"]
@@ -122,8 +122,8 @@ def test_a_performer_who_is_named_is_typical_of_himself(card):
 
 def left_out(model, asked):
     """A question's answer, and that of the whole question with what was chosen."""
-    part = clips.clip(model, asked)
-    whole = clips.clip(model, structs.replace(asked, controls=part.trust.controls))
+    part = clips.synthesize_clip(model, asked)
+    whole = clips.synthesize_clip(model, structs.replace(asked, controls=part.trust.controls))
     return part, whole
 
 
@@ -139,19 +139,19 @@ def test_the_answer_is_that_of_the_whole_question(model, given, performer):
     for field in ("rotations", "translations"):
         assert getattr(part.clip, field).tobytes() == getattr(whole.clip, field).tobytes()
     turned = structs.replace(asked, controls={**part.trust.controls, "turn": -20.0})
-    other = clips.clip(model, turned)
+    other = clips.synthesize_clip(model, turned)
     assert other.clip.rotations.tobytes() != whole.clip.rotations.tobytes(), "negative control"
 
 
 def test_poses_and_reasons_choose_alike(model):
     given = {"target_height": 1.2}
-    clip = clips.clip(model, ClipQuestion(controls=given)).trust
-    pose = poses.pose(model, PoseQuestion(controls=given, times=[0.1])).trust
-    reasons = why(model, WhyQuestion(controls=given, extrapolate="warn"))
+    clip = clips.synthesize_clip(model, ClipQuestion(controls=given)).trust
+    pose = poses.synthesize_poses(model, PoseQuestion(controls=given, times=[0.1])).trust
+    reasons = explain_result(model, WhyQuestion(controls=given, extrapolate="warn"))
     assert clip.controls == pose.controls == reasons.controls
     assert clip.inferred == pose.inferred == reasons.inferred
     assert clip.inferred == ("stature", "hip_height", "turn")
-    whole = why(model, WhyQuestion(controls=clip.controls, extrapolate="warn"))
+    whole = explain_result(model, WhyQuestion(controls=clip.controls, extrapolate="warn"))
     assert replace(reasons, inferred=()) == whole
 
 
@@ -159,17 +159,19 @@ def test_another_process_would_choose_the_same(model, labelled_path):
     again = Synthesizer("labelled", session.load(labelled_path))
     given = {"turn": -3.0}
     asked = PoseQuestion(controls=given, times=[0.0])
-    assert poses.pose(again, asked).trust == poses.pose(model, asked).trust
+    assert poses.synthesize_poses(again, asked).trust == poses.synthesize_poses(model, asked).trust
 
 
 def test_only_what_is_given_is_warned_of(model, card):
     high = card.control("target_height").maximum + 0.2
-    trust = poses.pose(model, PoseQuestion(controls={"target_height": high}, times=[0.0])).trust
+    trust = poses.synthesize_poses(
+        model, PoseQuestion(controls={"target_height": high}, times=[0.0])
+    ).trust
     assert len(trust.warnings) == 1 and trust.warnings[0].startswith("target_height")
     # All that was given is sampled: nothing that was chosen makes it refused.
     for turn in (card.control("turn").minimum, card.control("turn").maximum):
         assert (
-            poses.pose(
+            poses.synthesize_poses(
                 model, PoseQuestion(controls={"turn": turn}, times=[0.0], extrapolate="refuse")
             ).trust.warnings
             == ()
@@ -178,8 +180,8 @@ def test_only_what_is_given_is_warned_of(model, card):
 
 def test_what_is_unknown_or_no_number_is_refused_all_the_same(model):
     with pytest.raises(InvalidField, match="no such control; this model has stature"):
-        poses.pose(model, PoseQuestion(controls={"speed": 1.0}, times=[0.0]))
+        poses.synthesize_poses(model, PoseQuestion(controls={"speed": 1.0}, times=[0.0]))
     with pytest.raises(InvalidField, match="nan, expected a finite number"):
-        poses.pose(model, PoseQuestion(controls={"turn": float("nan")}, times=[0.0]))
+        poses.synthesize_poses(model, PoseQuestion(controls={"turn": float("nan")}, times=[0.0]))
     with pytest.raises(InvalidField, match="expected one of middle, short, tall"):
-        poses.pose(model, PoseQuestion(controls={}, times=[0.0], performer="eve"))
+        poses.synthesize_poses(model, PoseQuestion(controls={}, times=[0.0], performer="eve"))

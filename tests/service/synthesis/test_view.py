@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 
 from posefield.common.errors import InvalidField
 from posefield.inference import level_selection
-from posefield.inference.level_selection import HYSTERESIS, Camera, Ladder, View
+from posefield.inference.level_selection import HYSTERESIS, Camera, LevelCriteria, LevelTable
 
 ERRORS = np.array([0.0, 0.002, 0.01, 0.01, 0.05])
 COSTS = np.array([4.0, 3.0, 2.0, 1.0, 0.5]) * 1e-6
-LADDER = Ladder(ERRORS, COSTS)
-STEEP = Ladder(np.array([0, 2, 5, 10, 20, 50]) * 1e-3, np.array([4, 3, 2, 1.5, 1, 0.5]) * 1e-6)
+LADDER = LevelTable(ERRORS, COSTS)
+STEEP = LevelTable(np.array([0, 2, 5, 10, 20, 50]) * 1e-3, np.array([4, 3, 2, 1.5, 1, 0.5]) * 1e-6)
 # Halfway between sums of costs, so that no rounding decides.
 ROUNDING = 0.25e-6
 
@@ -32,7 +32,7 @@ def scenes(draw):
     errors = np.sort(numbers(levels)) / 8.0
     costs = np.sort(numbers(levels, 1))[::-1] / 8.0
     held = numbers(people) % levels if draw(st.booleans()) else None
-    return Ladder(errors, costs), numbers(people, 1).astype(float), held
+    return LevelTable(errors, costs), numbers(people, 1).astype(float), held
 
 
 def level_of(errors, scale, limit, held):
@@ -61,14 +61,14 @@ def best_limit(ladder, scale, budget, previous):
 @given(scenes(), st.integers(0, 80))
 def test_the_choice_is_that_of_a_loop_over_characters(scene, limit):
     ladder, scale, previous = scene
-    levels = level_selection.choose(ladder.errors, scale, limit / 8, previous)
+    levels = level_selection.select_by_error(ladder.errors, scale, limit / 8, previous)
     assert levels.tolist() == one_by_one(ladder.errors, scale, limit / 8, previous)
 
 
 @given(scenes(), st.integers(0, 60))
 def test_the_fit_is_the_smallest_limit_that_a_loop_finds(scene, budget):
     ladder, scale, previous = scene
-    found = level_selection.fit(ladder, scale, budget / 8, previous)
+    found = level_selection.select_by_budget(ladder, scale, budget / 8, previous)
     expected = best_limit(ladder, scale, budget / 8, previous)
     assert (found.limit is None) == (expected is None)
     if expected is None:
@@ -84,9 +84,9 @@ def test_the_fit_is_the_smallest_limit_that_a_loop_finds(scene, budget):
 def test_what_is_seen_keeps_the_budget_and_is_no_worse_than_need_be(scene, budget, limit):
     ladder, scale, previous = scene
     camera = Camera(np.zeros(3), 1.0, 1080.0)
-    asked = View(camera, limit / 8, budget / 8, previous)
-    found = level_selection.see(ladder, scale, asked)
-    free = level_selection.choose(ladder.errors, scale, limit / 8, previous)
+    asked = LevelCriteria(camera, limit / 8, budget / 8, previous)
+    found = level_selection.select_levels(ladder, scale, asked)
+    free = level_selection.select_by_error(ladder.errors, scale, limit / 8, previous)
     if ladder.costs[free].sum() <= budget / 8:
         assert found.limit == limit / 8
         assert np.array_equal(found.levels, free)
@@ -96,16 +96,16 @@ def test_what_is_seen_keeps_the_budget_and_is_no_worse_than_need_be(scene, budge
 
 
 def test_of_levels_that_are_equally_good_the_cheapest_is_taken():
-    assert level_selection.choose(ERRORS, np.array([100.0]), 1.0).tolist() == [3]
+    assert level_selection.select_by_error(ERRORS, np.array([100.0]), 1.0).tolist() == [3]
 
 
 def test_where_no_level_is_good_enough_the_finest_is_taken():
-    assert level_selection.choose(ERRORS[1:], np.array([1e6]), 1.0).tolist() == [0]
+    assert level_selection.select_by_error(ERRORS[1:], np.array([1e6]), 1.0).tolist() == [0]
 
 
 def test_a_level_counts_as_no_better_than_a_finer_one():
     bent = np.array([0.0, 0.05, 0.01])
-    assert level_selection.choose(bent, np.array([40.0]), 1.0).tolist() == [0]
+    assert level_selection.select_by_error(bent, np.array([40.0]), 1.0).tolist() == [0]
 
 
 def switches(levels):
@@ -117,7 +117,7 @@ def trembling(holds):
     found, level = [], np.array([2])
     for i in range(60):
         scale = np.array([100.0 * (1.0 + 0.1 * math.sin(2.1 * i))])
-        level = level_selection.choose(ERRORS, scale, 1.0, level if holds else None)
+        level = level_selection.select_by_error(ERRORS, scale, 1.0, level if holds else None)
         found.append(int(level[0]))
     return found
 
@@ -139,9 +139,9 @@ def budgeted(rng, holds):
     for i in range(40):
         place = np.array([0, 2, -5]) + 0.2 * np.sin(np.array([2.1, 1.3, 0.7]) * i)
         camera = Camera(place, 1.0, 1080.0)
-        asked = View(camera, 0.1, 1000 * 2.2e-6 + ROUNDING, before if holds else None)
+        asked = LevelCriteria(camera, 0.1, 1000 * 2.2e-6 + ROUNDING, before if holds else None)
         scale = level_selection.pixels_per_metre(camera, centres, 1.0)
-        found = level_selection.see(STEEP, scale, asked)
+        found = level_selection.select_levels(STEEP, scale, asked)
         assert STEEP.costs[found.levels].sum() <= asked.budget
         changes += 0 if before is None else np.count_nonzero(found.levels != before)
         before = found.levels
@@ -159,10 +159,10 @@ def test_without_the_levels_before_a_budget_does(rng):
 
 def test_hysteresis_never_holds_what_the_limit_forbids(rng):
     scale, held = rng.uniform(1, 1000, 500), rng.integers(0, len(ERRORS), 500)
-    levels = level_selection.choose(ERRORS, scale, 1.0, held)
+    levels = level_selection.select_by_error(ERRORS, scale, 1.0, held)
     assert (level_selection.error_pixels(ERRORS, scale, levels) <= 1.0).all()
     assert (level_selection.error_pixels(ERRORS, scale, held) > 1.0).any()
-    assert (levels <= level_selection.choose(ERRORS, scale, 1.0)).all()
+    assert (levels <= level_selection.select_by_error(ERRORS, scale, 1.0)).all()
 
 
 def test_an_error_covers_what_a_pinhole_camera_shows():
@@ -207,10 +207,10 @@ def test_a_camera_that_cannot_be_is_refused(position, fov, height, field):
 def test_a_hundred_thousand_characters_are_chosen_for(rng):
     """The sizes that a loop is too slow for, by the property that defines the answer."""
     scale = rng.uniform(1, 1000, 100_000)
-    found = level_selection.fit(LADDER, scale, 0.2 + ROUNDING)
+    found = level_selection.select_by_budget(LADDER, scale, 0.2 + ROUNDING)
     assert found.limit is not None
     assert COSTS[found.levels].sum() <= 0.2 + ROUNDING
-    below = level_selection.choose(ERRORS, scale, np.nextafter(found.limit, 0.0))
+    below = level_selection.select_by_error(ERRORS, scale, np.nextafter(found.limit, 0.0))
     assert COSTS[below].sum() > 0.2 + ROUNDING
 
 
@@ -227,6 +227,6 @@ def test_a_hundred_thousand_characters_are_chosen_for(rng):
     ],
 )
 def test_a_budget_that_decides_says_so(budget, sentences):
-    asked = View(Camera(np.zeros(3), 1.0, 1080.0), 0.5, budget, None)
-    found = level_selection.see(LADDER, np.full(100, 90.0), asked)
-    assert level_selection.warnings(found, LADDER, asked) == sentences
+    asked = LevelCriteria(Camera(np.zeros(3), 1.0, 1080.0), 0.5, budget, None)
+    found = level_selection.select_levels(LADDER, np.full(100, 90.0), asked)
+    assert level_selection.budget_warnings(found, LADDER, asked) == sentences

@@ -21,13 +21,15 @@ RATE = 30.0
 
 @pytest.fixture(scope="module")
 def own(walk_path):
-    return gait.of(session.load(walk_path))
+    return gait.fit_gait(session.load(walk_path))
 
 
 def made(own, count, seed=3, seconds=1.0):
     """A crowd that wanders, and its motions."""
-    plan = walking_crowd.wandering(own, count, seconds, RATE, seed)
-    crowd = walking_crowd.crowd(own.session, plan, level_transitions.constant(0, plan.phases.shape))
+    plan = walking_crowd.plan_random(own, count, seconds, RATE, seed)
+    crowd = walking_crowd.build_crowd(
+        own.session, plan, level_transitions.constant_schedule(0, plan.phases.shape)
+    )
     return crowd, list(crowd.batches)
 
 
@@ -56,14 +58,16 @@ def test_fewer_characters_are_the_first_of_more(own):
 
 
 def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
-    plan = walking_crowd.wandering(own, 4, 2.0, RATE, 0)
-    crowd = walking_crowd.crowd(own.session, plan, level_transitions.constant(0, plan.phases.shape))
+    plan = walking_crowd.plan_random(own, 4, 2.0, RATE, 0)
+    crowd = walking_crowd.build_crowd(
+        own.session, plan, level_transitions.constant_schedule(0, plan.phases.shape)
+    )
     motions = next(iter(crowd.batches))
     at_home = motions.root_position[:, 0] * [1.0, 0.0, 1.0]
     # A pelvis sways about the way, no farther.
     assert np.abs(at_home).max() < 0.1
     who, frames = np.repeat(np.arange(4), 61), np.tile(np.arange(61), 4)
-    posed = locomotion_plan.pose(own.session, plan, who, frames)
+    posed = locomotion_plan.synthesize_poses(own.session, plan, who, frames)
     turns = crowd.placement.turns[:, None]
     roots = quat.rotate(turns, motions.root_position) + crowd.placement.positions[:, None]
     expected = floor_plane.at_height(posed.places, posed.heights).reshape(4, 61, 3)
@@ -76,7 +80,7 @@ def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
 
 
 def test_motions_are_made_some_at_a_time(own):
-    together = walking_crowd.TOGETHER // 4
+    together = walking_crowd.POSES_PER_BATCH // 4
     crowd, motions = made(own, together + 3, seconds=0.1)
     assert [len(some) for some in motions] == [together, 3]
     assert not crowd.shared
@@ -87,11 +91,11 @@ def test_motions_are_made_some_at_a_time(own):
 
 
 def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
-    seconds = (walking_crowd.POSED + 500) / RATE
+    seconds = (walking_crowd.POSES_PER_CALL + 500) / RATE
     _, motions = made(own, 1, seed=0, seconds=seconds)
-    plan = walking_crowd.wandering(own, 1, seconds, RATE, 0)
-    frames = np.arange(walking_crowd.POSED - 2, walking_crowd.POSED + 3)
-    near = locomotion_plan.pose(own.session, plan, np.zeros_like(frames), frames)
+    plan = walking_crowd.plan_random(own, 1, seconds, RATE, 0)
+    frames = np.arange(walking_crowd.POSES_PER_CALL - 2, walking_crowd.POSES_PER_CALL + 3)
+    near = locomotion_plan.synthesize_poses(own.session, plan, np.zeros_like(frames), frames)
     assert len(motions) == 1
     found = motions[0].rotations[0, frames, 1:]
     assert np.abs(found - near.rotations[:, 1:]).max() < 1e-6
@@ -100,7 +104,7 @@ def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
 
 
 def test_phases_and_walkers_differ(own):
-    plan = walking_crowd.wandering(own, 100, 1.0, RATE, 0)
+    plan = walking_crowd.plan_random(own, 100, 1.0, RATE, 0)
     assert np.ptp(plan.phases[:, 0]) > 0.9
     assert sorted(set(plan.who)) == [0, 1]
     assert plan.roots.shape == (100, 31, 3)
@@ -120,4 +124,4 @@ def test_phases_and_walkers_differ(own):
 )
 def test_numbers_that_make_no_crowd_are_refused(own, asked, said):
     with pytest.raises(InvalidField, match=re.escape(said)):
-        walking_crowd.wandering(own, *asked)
+        walking_crowd.plan_random(own, *asked)

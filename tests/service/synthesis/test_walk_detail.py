@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from posefield.inference.level_selection import HYSTERESIS, Camera, Ladder
+from posefield.inference.level_selection import HYSTERESIS, Camera, LevelTable
 from posefield.locomotion import crowd_order, gait, level_transitions, walking_crowd
-from posefield.locomotion.crowd_order import Order
+from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion import skeleton
 from posefield.registry import model_registry
 
 RATE = 30.0
-LADDER = Ladder(np.array([0.01, 0.03, 0.08, 0.2]), np.array([4.0, 3.0, 2.0, 1.0]))
-SWITCH = round(level_transitions.SWITCH * RATE)
+LADDER = LevelTable(np.array([0.01, 0.03, 0.08, 0.2]), np.array([4.0, 3.0, 2.0, 1.0]))
+SWITCH = round(level_transitions.TRANSITION_SECONDS * RATE)
 
 
 def passing(count=40, frames=600):
@@ -26,14 +26,14 @@ def passing(count=40, frames=600):
 
 def shown_pixels(shown, scale):
     """Errors (N, F) of what is shown, the coarser level's while two are mixed."""
-    both = np.maximum(LADDER.errors[shown.levels], LADDER.errors[shown.before])
+    both = np.maximum(LADDER.errors[shown.levels], LADDER.errors[shown.previous])
     coarser = np.where(shown.shares < 1.0, both, LADDER.errors[shown.levels])
     return coarser * scale
 
 
 def test_nobody_is_shown_coarser_than_the_limit_even_while_switching():
     scale = passing()
-    shown = level_transitions.seen(LADDER, scale, 1.0, RATE)
+    shown = level_transitions.schedule_levels(LADDER, scale, 1.0, RATE)
     visible = shown_pixels(shown, scale) > 1.0
     unavoidable = LADDER.errors[0] * scale > 1.0
     # On its way to the finest level a character may still be at the next: never beyond its limit.
@@ -46,7 +46,7 @@ def test_nobody_is_shown_coarser_than_the_limit_even_while_switching():
 
 
 def test_a_switch_takes_its_time_and_ends_before_the_next():
-    shown = level_transitions.seen(LADDER, passing(), 1.0, RATE)
+    shown = level_transitions.schedule_levels(LADDER, passing(), 1.0, RATE)
     for levels, shares in zip(shown.levels, shown.shares, strict=True):
         switches = np.flatnonzero(np.diff(levels)) + 1
         assert np.all(np.diff(switches) >= SWITCH)
@@ -61,16 +61,21 @@ def test_who_trembles_about_a_threshold_does_not_flicker():
     frames = np.arange(600)
     # The limit of level 1, met and missed by a tenth every second.
     scale = (1.0 / LADDER.errors[1]) * (1.0 + 0.1 * np.sin(frames / 5.0))[None]
-    switches = np.count_nonzero(np.diff(level_transitions.seen(LADDER, scale, 1.0, RATE).levels))
+    switches = np.count_nonzero(
+        np.diff(level_transitions.schedule_levels(LADDER, scale, 1.0, RATE).levels)
+    )
     assert switches <= 1
     # Negative control: more than hysteresis allows for.
     wide = (1.0 / LADDER.errors[1]) * (1.0 + 0.5 * np.sin(frames / 20.0))[None]
     assert wide.min() < (1.0 - HYSTERESIS) / LADDER.errors[1]
-    assert np.count_nonzero(np.diff(level_transitions.seen(LADDER, wide, 1.0, RATE).levels)) > 4
+    assert (
+        np.count_nonzero(np.diff(level_transitions.schedule_levels(LADDER, wide, 1.0, RATE).levels))
+        > 4
+    )
 
 
 def test_one_level_for_all_is_never_mixed():
-    shown = level_transitions.constant(2, (3, 5))
+    shown = level_transitions.constant_schedule(2, (3, 5))
     assert np.all(shown.levels == 2) and np.all(shown.shares == 1.0)
 
 
@@ -84,31 +89,31 @@ def model(walk_path):
 
 @pytest.fixture(scope="module")
 def own(model):
-    return gait.of(model.session)
+    return gait.fit_gait(model.session)
 
 
 def joints(own, plan, shown):
     made = walking_crowd.motions(own.session, plan, np.arange(len(plan.who)), shown)
     local = skeleton.translations(made.bone_offsets.astype(float), made.root_position.astype(float))
     parents = own.session.card.skeleton.parents
-    return skeleton.forward(parents, made.rotations.astype(float), local)[0]
+    return skeleton.forward_kinematics(parents, made.rotations.astype(float), local)[0]
 
 
 def switching(plan, shares):
     """From the finest level to the coarsest in the middle, by the shares of the way."""
-    shown = level_transitions.constant(0, plan.phases.shape)
+    shown = level_transitions.constant_schedule(0, plan.phases.shape)
     middle = plan.phases.shape[1] // 2
     shown.levels[:, middle:] = 3
     before = np.zeros_like(shown.levels)
     own_shares = np.ones(plan.phases.shape)
     own_shares[:, middle : middle + len(shares)] = shares
-    return level_transitions.Detail(shown.levels, before, own_shares)
+    return level_transitions.LevelSchedule(shown.levels, before, own_shares)
 
 
 def test_a_switch_does_not_pop(own):
     """Mixed, a switch moves joints hardly more than the coarse level does by itself."""
-    plan = walking_crowd.wandering(own, 20, 2.0, RATE, 1)
-    finest = joints(own, plan, level_transitions.constant(0, plan.phases.shape))
+    plan = walking_crowd.plan_random(own, 20, 2.0, RATE, 1)
+    finest = joints(own, plan, level_transitions.constant_schedule(0, plan.phases.shape))
 
     middle = plan.phases.shape[1] // 2
 
@@ -118,18 +123,20 @@ def test_a_switch_does_not_pop(own):
         return np.sqrt(np.mean(np.square(steps), axis=(0, 2))).max()
 
     gentle = np.array(
-        [level_transitions.blend.eased(s) for s in np.linspace(0.0, 1.0, SWITCH + 2)[1:-1]]
+        [level_transitions.blend.smoothstep(s) for s in np.linspace(0.0, 1.0, SWITCH + 2)[1:-1]]
     )
     sudden, mixed = pop(switching(plan, np.zeros(0))), pop(switching(plan, gentle))
-    usual = pop(level_transitions.constant(3, plan.phases.shape))
+    usual = pop(level_transitions.constant_schedule(3, plan.phases.shape))
     assert mixed < 1.5 * usual
     assert sudden > 2.0 * mixed
 
 
 def test_a_camera_changes_levels_and_hardly_the_walk(model, own):
     camera = Camera(np.array([-40.0, 1.7, 0.0]), 1.0472, 1080.0)
-    far = crowd_order.crowd(model, own, Order(count=12, seconds=2.0, camera=camera, pixels=2.0))
-    near = crowd_order.crowd(model, own, Order(count=12, seconds=2.0))
+    far = crowd_order.build_crowd(
+        model, own, CrowdOrder(count=12, seconds=2.0, camera=camera, pixels=2.0)
+    )
+    near = crowd_order.build_crowd(model, own, CrowdOrder(count=12, seconds=2.0))
     assert far.facts["level_shares"][0] < 1.0 == near.facts["level_shares"][0]
     gaps = [
         np.abs(a.root_position - b.root_position).max()
@@ -139,7 +146,7 @@ def test_a_camera_changes_levels_and_hardly_the_walk(model, own):
 
 
 def test_characters_may_share_motions(model, own):
-    made = crowd_order.crowd(model, own, Order(count=25, motions=4, seconds=0.5))
+    made = crowd_order.build_crowd(model, own, CrowdOrder(count=25, motions=4, seconds=0.5))
     assert len(made.placement) == 25 and made.shared
     assert np.array_equal(made.motion, np.arange(25) % 4)
     assert sum(len(batch) for batch in made.batches) == 4

@@ -20,7 +20,7 @@ def opened(walk_path):
 
 @pytest.fixture(scope="module")
 def own(opened):
-    return gait.of(opened)
+    return gait.fit_gait(opened)
 
 
 def test_speeds_and_turning_are_those_of_the_clips(own, strides):
@@ -40,7 +40,7 @@ def test_the_model_does_what_was_wanted_whoever_walks(own, opened, rng):
     assert np.abs(done.speeds - speeds).max() < 2e-3
     assert np.abs(done.turning - turning).max() < 2e-3
     # Negative control: the regression alone is not that near.
-    usual = stride.strides(opened, own.typical(speeds, turning, who), labels)
+    usual = stride.strides(opened, own.mean_controls(speeds, turning, who), labels)
     assert np.abs(usual.turning - turning).max() > 0.01
 
 
@@ -55,18 +55,18 @@ def test_what_speed_and_turning_leave_open_is_typical(rng):
 
 
 def test_a_cycle_of_all_that_was_sampled_is_within_and_twice_that_is_not(own):
-    assert own.region.holds(*own.rates.T).all()
-    assert own.region.holds(np.array([0.71, 1.1, 1.49]), np.zeros(3)).all()
-    assert not own.region.holds(own.rates[:, 0], 2.0 * own.rates[:, 1])[[0, 3, 16, 19]].any()
+    assert own.region.contains(*own.rates.T).all()
+    assert own.region.contains(np.array([0.71, 1.1, 1.49]), np.zeros(3)).all()
+    assert not own.region.contains(own.rates[:, 0], 2.0 * own.rates[:, 1])[[0, 3, 16, 19]].any()
     low, high = own.region.turning(np.array([1.0, 1.4]))
-    assert own.region.holds(np.array([1.0, 1.4]), high).all()
-    assert not own.region.holds(np.array([1.0, 1.4]), low - 0.01).any()
+    assert own.region.contains(np.array([1.0, 1.4]), high).all()
+    assert not own.region.contains(np.array([1.0, 1.4]), low - 0.01).any()
 
 
 def test_the_hull_of_a_square_is_the_square(rng):
     corners = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
     inner = rng.uniform([1.0, -1.0], [2.0, 1.0], (50, 2))
-    found = gait_region.hull(np.vstack([inner, corners]))
+    found = gait_region.convex_hull(np.vstack([inner, corners]))
     assert len(found.limits) == 4
     assert found.speeds == (1.0, 2.0)
     low, high = found.turning(np.array([1.0, 1.3, 2.0]))
@@ -76,19 +76,19 @@ def test_the_hull_of_a_square_is_the_square(rng):
 
 def test_a_model_that_is_no_cycle_does_not_walk(model_path):
     with pytest.raises(InvalidField, match="model: reaching is no cycle"):
-        gait.of(session.load(model_path))
+        gait.fit_gait(session.load(model_path))
 
 
 def test_a_model_that_stays_in_place_does_not_walk(opened):
     still = replace(opened, card=replace(opened.card, root="in_place"))
     with pytest.raises(InvalidField, match="model: stroll stays in place"):
-        gait.of(still)
+        gait.fit_gait(still)
 
 
 def test_a_model_of_one_speed_does_not_walk(opened):
     once = replace(opened.card, examples=opened.card.examples[:2], moved_by=(0, 0))
     with pytest.raises(InvalidField, match=r"model: stroll goes 0\.\d+ to 0\.\d+ m/s, expected"):
-        gait.of(replace(opened, card=once))
+        gait.fit_gait(replace(opened, card=once))
 
 
 def test_nobody_in_particular_walks_too(opened):

@@ -28,20 +28,20 @@ ANN = np.zeros(1, dtype=np.int64)
 
 def finest(opened, plan):
     """Motions of all characters of a plan, at the finest level."""
-    shown = level_transitions.constant(0, plan.phases.shape)
+    shown = level_transitions.constant_schedule(0, plan.phases.shape)
     return walking_crowd.motions(opened, plan, np.arange(len(plan.who)), shown)
 
 
 @pytest.fixture(scope="module")
 def own(walk_path):
-    return gait.of(session.load(walk_path))
+    return gait.fit_gait(session.load(walk_path))
 
 
 def held(own, veer, frames, rate, phase=0.0):
     """Plan of Ann who walks at one speed and turns evenly, from the origin."""
     controls = np.tile([4.0, veer], (1, frames, 1))
     origin = np.zeros(1, dtype=np.complex128), np.zeros(1)
-    return locomotion_plan.roam(own, controls, ANN, np.array([phase]), origin, rate)
+    return locomotion_plan.plan_from_controls(own, controls, ANN, np.array([phase]), origin, rate)
 
 
 def joints(own, plan):
@@ -50,13 +50,13 @@ def joints(own, plan):
         own.session,
         plan,
         np.arange(len(plan.who)),
-        level_transitions.constant(0, plan.phases.shape),
+        level_transitions.constant_schedule(0, plan.phases.shape),
     )
     local = skeleton.translations(
         made.bone_offsets.astype(np.float64), made.root_position.astype(np.float64)
     )
     parents = own.session.card.skeleton.parents
-    return skeleton.forward(parents, made.rotations.astype(np.float64), local)[0]
+    return skeleton.forward_kinematics(parents, made.rotations.astype(np.float64), local)[0]
 
 
 def clip_joints(own, veer, phases):
@@ -69,7 +69,7 @@ def clip_joints(own, veer, phases):
     roots = roots[0] - roots[0, :1] * [1.0, 0.0, 1.0]
     local = skeleton.translations(bones[0].astype(float), roots[1:])
     parents = own.session.card.skeleton.parents
-    return skeleton.forward(parents, rotations[0, 1:].astype(float), local)[0]
+    return skeleton.forward_kinematics(parents, rotations[0, 1:].astype(float), local)[0]
 
 
 def rate_of(own, veer, frames):
@@ -88,9 +88,10 @@ def test_held_controls_are_the_models_own_clip_again_and_again(own, veer):
     # A cycle ends where the next begins, in the same pose.
     assert np.abs(made[40] - clip[40]).max() < SINGLE
     first = (
-        floor_plane.facing(plan.headings[0, 80]) * floor_plane.of(clip[:40]) + plan.places[0, 80]
+        floor_plane.unit_vectors(plan.headings[0, 80]) * floor_plane.project(clip[:40])
+        + plan.places[0, 80]
     )
-    assert np.abs(floor_plane.of(made[80:120]) - first).max() < SINGLE
+    assert np.abs(floor_plane.project(made[80:120]) - first).max() < SINGLE
     # Negative control: another phase is another clip.
     other = joints(own, held(own, veer, 41, rate, phase=0.3))[0]
     assert np.abs(other[:40] - clip[:40]).max() > 0.1
@@ -102,7 +103,7 @@ def test_an_even_turn_comes_back_to_where_it_began(own):
     cycles = 2.0 * np.pi / found.turns[0]
     frames = 600
     plan = held(own, 450.0, frames + 1, frames / (cycles * found.durations[0]))
-    radius = np.abs(found.ways[0]) / found.turns[0]
+    radius = np.abs(found.travels[0]) / found.turns[0]
     assert abs(plan.places[0, -1] - plan.places[0, 0]) < 1e-9
     across = np.abs(plan.places[0][: frames // 2] - plan.places[0][frames // 2 : -1])
     assert across == pytest.approx(2.0 * radius, rel=1e-9)
@@ -116,7 +117,7 @@ def swaying(own, frames):
     share = 0.5 - 0.5 * np.cos(np.linspace(0.0, 4 * np.pi, frames))
     controls = np.stack([3.0 + 2.0 * share, -400.0 + 800.0 * share], axis=-1)[None]
     origin = np.zeros(1, dtype=np.complex128), np.zeros(1)
-    return locomotion_plan.roam(own, controls, ANN, np.zeros(1), origin, RATE)
+    return locomotion_plan.plan_from_controls(own, controls, ANN, np.zeros(1), origin, RATE)
 
 
 def leap(own, plan):
@@ -126,7 +127,7 @@ def leap(own, plan):
 
 def test_nothing_leaps_while_controls_change(own):
     plan = swaying(own, 300)
-    fastest = locomotion_plan.roam(
+    fastest = locomotion_plan.plan_from_controls(
         own,
         np.tile([5.0, 400.0], (1, 300, 1)),
         ANN,
@@ -141,21 +142,25 @@ def test_nothing_leaps_while_controls_change(own):
 
 
 def wandering(own, count, seconds=6.0, seed=3):
-    return walking_crowd.wandering(own, count, seconds, RATE, seed)
+    return walking_crowd.plan_random(own, count, seconds, RATE, seed)
 
 
 def test_who_walks_keeps_to_the_way(own):
-    characters = random_paths.cast(own, 20, 3)
-    ways = random_paths.paths(own, characters, 6.0)
+    characters = random_paths.draw_characters(own, 20, 3)
+    ways = random_paths.draw_paths(own, characters, 6.0)
     frames = 181
-    plan = locomotion_plan.follow(own, ways, characters.who, characters.phases, frames, RATE)
+    plan = locomotion_plan.plan_along_paths(
+        own, ways, characters.who, characters.phases, frames, RATE
+    )
     starts = plan.places[:, 0], plan.headings[:, 0]
-    free = locomotion_plan.roam(own, plan.controls, plan.who, plan.phases[:, 0], starts, RATE)
+    free = locomotion_plan.plan_from_controls(
+        own, plan.controls, plan.who, plan.phases[:, 0], starts, RATE
+    )
     # Left to itself the model goes the same way: median 2 cm away after six seconds, 11 at most.
     assert np.median(np.abs(free.places - plan.places)[:, -1]) < 0.03
     assert np.abs(free.places - plan.places).max() < 0.15
     assert np.abs(free.headings - plan.headings).max() < 0.05
-    straight = plan.places[:, :1] + floor_plane.facing(plan.headings[:, :1]) * np.linspace(
+    straight = plan.places[:, :1] + floor_plane.unit_vectors(plan.headings[:, :1]) * np.linspace(
         0, 6, frames
     )
     assert np.abs(plan.places - straight).max() > 0.5
@@ -164,16 +169,16 @@ def test_who_walks_keeps_to_the_way(own):
 def test_feet_slide_no_more_than_in_the_models_own_strides(own):
     plan = wandering(own, 60)
     made = finest(own.session, plan)
-    found = walking_crowd.foot_skate_of(own.session.card, made, RATE).mean()
-    strides = walking_crowd.usual_skate(own, RATE)
-    each = walking_crowd.stride_skate(own, RATE)[:, 0]
+    found = walking_crowd.measure_foot_skate(own.session.card, made, RATE).mean()
+    strides = walking_crowd.mean_foot_skate(own, RATE)
+    each = walking_crowd.foot_skate_per_clip(own, RATE)[:, 0]
     who = np.array(own.session.card.moved_by)
     assert strides == pytest.approx(0.5 * (each[who == 0].mean() + each[who == 1].mean()))
     assert 0.0 < found < 1.2 * strides < 0.05
     # Negative control: a root that goes on a tenth too fast.
     fast = replace(plan, places=plan.places + 0.1 * (plan.places - plan.places[:, :1]))
     slid = finest(own.session, fast)
-    assert walking_crowd.foot_skate_of(own.session.card, slid, RATE).mean() > 2.0 * strides
+    assert walking_crowd.measure_foot_skate(own.session.card, slid, RATE).mean() > 2.0 * strides
 
 
 def test_the_measure_is_that_of_the_evaluation(own, strides):
@@ -181,17 +186,19 @@ def test_the_measure_is_that_of_the_evaluation(own, strides):
     made = finest(own.session, plan)
     feet = joints(own, plan)[0][:, list(own.session.card.feet)]
     length = round(float(np.mean(own.session.card.durations)) * RATE) + 1
-    assert walking_crowd.foot_skate_of(own.session.card, made, RATE)[0, 0] == pytest.approx(
-        float(foot_skate.skate(feet[:length], RATE))
+    assert walking_crowd.measure_foot_skate(own.session.card, made, RATE)[0, 0] == pytest.approx(
+        float(foot_skate.mean_skate_speed(feet[:length], RATE))
     )
-    clips = [foot_skate.skate(e.clip.positions()[:, [3, 6]], e.clip.rate) for e in strides]
+    clips = [
+        foot_skate.mean_skate_speed(e.clip.positions()[:, [3, 6]], e.clip.rate) for e in strides
+    ]
     assert np.max(clips) < 1e-5
 
 
 def test_a_straight_route_is_walked_at_its_speed(own):
     route = Route(np.array([[2.0, 1.0], [2.0, 9.0]]), 1.2)
-    ways = routes.through(own, [route])
-    plan = locomotion_plan.follow(own, ways, ANN, np.zeros(1), 121, RATE)
+    ways = routes.paths_through(own, [route])
+    plan = locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)
     gone = plan.places[0, -1] - plan.places[0, 0]
     assert gone.real == pytest.approx(1.2 * 4.0, rel=2e-3)
     assert abs(gone.imag) < 1e-9
@@ -199,6 +206,6 @@ def test_a_straight_route_is_walked_at_its_speed(own):
 
 
 def test_a_way_that_ends_too_soon_is_refused(own):
-    ways = routes.through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
+    ways = routes.paths_through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
     with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
-        locomotion_plan.follow(own, ways, ANN, np.zeros(1), 121, RATE)
+        locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)

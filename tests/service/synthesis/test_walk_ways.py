@@ -8,20 +8,20 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.locomotion import gait, random_paths, routes
-from posefield.locomotion.paths import STEP, Paths
+from posefield.locomotion.paths import POINT_SPACING, Paths
 from posefield.locomotion.routes import Route
 
 
 @pytest.fixture(scope="module")
 def own(walk_path):
-    return gait.of(session.load(walk_path))
+    return gait.fit_gait(session.load(walk_path))
 
 
 def circle(radius):
     """One way round a circle, to the left."""
-    headings = np.arange(200) * STEP / radius
+    headings = np.arange(200) * POINT_SPACING / radius
     starts = np.zeros(1, dtype=np.complex128)
-    return Paths(starts, headings[None], np.ones((1, 200)), np.array([199 * STEP]))
+    return Paths(starts, headings[None], np.ones((1, 200)), np.array([199 * POINT_SPACING]))
 
 
 def test_even_turns_are_a_circle_between_places_too():
@@ -30,12 +30,12 @@ def test_even_turns_are_a_circle_between_places_too():
     # Its middle lies to the left, which is imaginary.
     assert np.abs(np.abs(places - 2.0j) - 2.0).max() < 1e-12
     assert tangents[0, -1] == pytest.approx(7.5)
-    assert ways.bends == pytest.approx(0.5)
+    assert ways.curvatures == pytest.approx(0.5)
 
 
 def test_values_are_met_at_known_places_and_halved_between():
     values = np.arange(200.0)[None, :, None] * [1.0, -2.0]
-    found = circle(2.0).along(values, np.array([[0.0, 3.0, 3.05]]))
+    found = circle(2.0).interpolate(values, np.array([[0.0, 3.0, 3.05]]))
     assert found[0] == pytest.approx(np.array([[0.0, 0.0], [30.0, -60.0], [30.5, -61.0]]))
 
 
@@ -43,22 +43,22 @@ BEND = np.array([[1.0, -2.0], [1.0, 3.0], [2.0, 8.0], [5.0, 12.0], [9.0, 14.0]])
 
 
 def test_a_route_leads_through_its_waypoints_without_a_kink(own):
-    ways = routes.through(own, [Route(BEND, 0.9)])
+    ways = routes.paths_through(own, [Route(BEND, 0.9)])
     gone = np.linspace(0.0, ways.lengths[0], 100_000)[None]
     places, tangents = ways.at(gone)
     for left, ahead in BEND:
         assert np.abs(places - complex(ahead, left)).min() < 1e-3
     assert np.abs(np.diff(tangents)).max() < 1e-3
     # A bend changes by little from step to step: nothing snaps when it is walked.
-    assert np.abs(np.diff(ways.bends)).max() < 0.02
+    assert np.abs(np.diff(ways.curvatures)).max() < 0.02
     # Negative control: the straight lines between them are another way.
     assert np.abs(places - complex(5.5, 1.5)).min() > 0.05
 
 
 def test_routes_of_different_lengths_go_together(own):
     straight = Route(np.array([[0.0, 0.0], [0.0, 4.0]]), 1.1)
-    both = routes.through(own, [Route(BEND, 0.9), straight])
-    alone = routes.through(own, [straight])
+    both = routes.paths_through(own, [Route(BEND, 0.9), straight])
+    alone = routes.paths_through(own, [straight])
     assert both.lengths[1] == alone.lengths[0] == pytest.approx(4.0)
     assert np.array_equal(both.headings[1, :41], alone.headings[0, :41])
     assert both.speeds[:, 0].tolist() == [0.9, 1.1]
@@ -85,7 +85,7 @@ CORNER = [[0.0, 0.0], [0.0, 3.0], [3.0, 3.0]]
 def test_a_route_that_cannot_be_walked_is_refused_by_number_and_place(own, waypoints, speed, said):
     fine = Route(np.array([[0.0, 0.0], [0.0, 4.0]]), 1.1)
     with pytest.raises(InvalidField) as refusal:
-        routes.through(own, [fine, Route(np.array(waypoints, dtype=float), speed)])
+        routes.paths_through(own, [fine, Route(np.array(waypoints, dtype=float), speed)])
     assert re.match(said, str(refusal.value)), str(refusal.value)
 
 
@@ -101,19 +101,19 @@ def test_a_route_that_cannot_be_walked_is_refused_by_number_and_place(own, waypo
 )
 def test_what_is_no_route_is_refused(plain, field):
     with pytest.raises(InvalidField) as refusal:
-        routes.parse(plain)
+        routes.parse_routes(plain)
     assert refusal.value.field == field
 
 
 def test_routes_are_read_as_they_are_written():
-    (route,) = routes.parse([{"waypoints": [[0, 1], [2, 3]], "speed": 1}])
+    (route,) = routes.parse_routes([{"waypoints": [[0, 1], [2, 3]], "speed": 1}])
     assert (route.waypoints.tolist(), route.speed) == ([[0.0, 1.0], [2.0, 3.0]], 1.0)
 
 
 def test_characters_that_wander_stay_within_what_was_sampled(own):
-    ways = random_paths.paths(own, random_paths.cast(own, 200, 1), 10.0)
-    turning = ways.speeds * ways.bends
-    assert own.region.holds(ways.speeds, turning).all()
+    ways = random_paths.draw_paths(own, random_paths.draw_characters(own, 200, 1), 10.0)
+    turning = ways.speeds * ways.curvatures
+    assert own.region.contains(ways.speeds, turning).all()
     # They do turn, and change their speed.
     assert np.ptp(ways.headings, axis=1).min() > 0.1
     assert np.ptp(ways.speeds, axis=1).min() > 0.02
@@ -121,7 +121,7 @@ def test_characters_that_wander_stay_within_what_was_sampled(own):
 
 def test_nobody_begins_within_a_metre_of_another_however_many(own):
     for count in (2, 50, 701):
-        ways = random_paths.paths(own, random_paths.cast(own, count, 5), 1.0)
+        ways = random_paths.draw_paths(own, random_paths.draw_characters(own, count, 5), 1.0)
         apart = np.abs(ways.starts[:, None] - ways.starts) + 9.0 * np.eye(count)
         assert apart.min() >= 1.0
     side = np.ptp(ways.starts.real)
@@ -129,12 +129,14 @@ def test_nobody_begins_within_a_metre_of_another_however_many(own):
 
 
 def test_a_character_hangs_on_its_number_and_the_seed_alone(own):
-    few, many = (random_paths.cast(own, count, 7) for count in (5, 10))
+    few, many = (random_paths.draw_characters(own, count, 7) for count in (5, 10))
     assert np.array_equal(few.who, many.who[:5])
-    assert np.array_equal(few.drawn, many.drawn[:5])
-    assert set(random_paths.cast(own, 50, 7).who) == {0, 1}
-    short, long = random_paths.paths(own, few, 2.0), random_paths.paths(own, many, 4.0)
+    assert np.array_equal(few.random_numbers, many.random_numbers[:5])
+    assert set(random_paths.draw_characters(own, 50, 7).who) == {0, 1}
+    short, long = random_paths.draw_paths(own, few, 2.0), random_paths.draw_paths(own, many, 4.0)
     known = short.headings.shape[1]
     assert np.array_equal(short.starts, long.starts[:5])
     assert np.abs(short.headings - long.headings[:5, :known]).max() < 1e-12
-    assert not np.array_equal(random_paths.cast(own, 5, 8).drawn, few.drawn)
+    assert not np.array_equal(
+        random_paths.draw_characters(own, 5, 8).random_numbers, few.random_numbers
+    )

@@ -8,11 +8,11 @@ from msgspec import structs
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.inference import session
-from posefield.kriging.kriging_model import Weigher
+from posefield.kriging.kriging_model import KrigingWeights
 from posefield.question.model_question import WhyQuestion
-from posefield.question.results import Reasons
+from posefield.question.results import Explanation
 from posefield.registry import model_registry
-from posefield.synthesis.explanation import why
+from posefield.synthesis.explanation import explain_result
 
 EVERYTHING = 10_000
 
@@ -36,7 +36,7 @@ def asked(card, point, performer=None, nearest=EVERYTHING):
     return WhyQuestion(controls=controls, extrapolate="warn", performer=performer, nearest=nearest)
 
 
-def in_the_card_s_order(card, found: Reasons):
+def in_the_card_s_order(card, found: Explanation):
     """Weights (N,) of an answer that lists all clips."""
     at = {source: i for i, source in enumerate(card.sources)}
     assert len(at) == len(card.sources) == len(found.nearest)
@@ -47,9 +47,9 @@ def in_the_card_s_order(card, found: Reasons):
 
 def test_samples_and_weights_are_those_of_the_training(case, rng):
     made, model = case
-    weigher, pose = model.session.weigher, made.model.bank.pose
+    weigher, pose = model.session.kriging_weights, made.model.bank.pose
     assert np.array_equal(weigher.samples, pose.samples)
-    points = np.hstack([rng.uniform(-1, 1, (9, made.laid.controls)), pose.samples[:9, 4:]])
+    points = np.hstack([rng.uniform(-1, 1, (9, made.samples.controls)), pose.samples[:9, 4:]])
     np.testing.assert_allclose(weigher.weights(points), pose.weights(points), atol=1e-9)
 
 
@@ -57,11 +57,11 @@ def test_weights_add_up_to_one(case, rng):
     card, model = case[1].session.card, case[1]
     for performer in (None, *card.performers):
         for point in drawn(card, rng, 5):
-            listed = in_the_card_s_order(card, why(model, asked(card, point, performer)))
+            listed = in_the_card_s_order(card, explain_result(model, asked(card, point, performer)))
             assert abs(listed.sum() - 1.0) < 1e-9
             # Negative control: without one of the clips they do not.
             assert abs(np.delete(listed, np.argmax(np.abs(listed))).sum() - 1.0) > 1e-3
-            few = why(model, asked(card, point, performer, 3))
+            few = explain_result(model, asked(card, point, performer, 3))
             listed = sum(clip.weight for clip in few.nearest)
             assert abs(listed + few.others_weight - 1.0) < 1e-9
             assert len(few.nearest) + few.others == card.samples
@@ -77,19 +77,19 @@ def test_the_file_s_poses_are_the_weighted_sum_of_the_captured_clips(case, rng):
         fields = stages.bank.numpy(stages.bank.points(point[None], labels))
         time = np.array([[0.3, 0.7]])
         _, place = stages.timing.numpy(fields["duration"], fields["warp"], time)
-        weights = in_the_card_s_order(card, why(model, asked(card, point)))
+        weights = in_the_card_s_order(card, explain_result(model, asked(card, point)))
         turns = model.session.run(point[None], time, "rotations")[0]
         told, _ = stages.decoder.numpy((weights @ captured)[None], place)
         np.testing.assert_allclose(told, turns, atol=1e-4)
         # Negative control: the weights of another answer tell another pose.
-        other = in_the_card_s_order(card, why(model, asked(card, 0.98 * point)))
+        other = in_the_card_s_order(card, explain_result(model, asked(card, 0.98 * point)))
         wrong, _ = stages.decoder.numpy((other @ captured)[None], place)
         assert np.abs(wrong - turns).max() > 1e-3
 
 
 def test_without_a_nugget_a_clip_is_made_of_itself_alone(labelled_path):
-    weigher = session.load(labelled_path).weigher
-    exact = Weigher(replace(weigher.hyper, nugget=0.0), weigher.samples)
+    weigher = session.load(labelled_path).kriging_weights
+    exact = KrigingWeights(replace(weigher.hyper, nugget=0.0), weigher.samples)
     own = np.eye(len(weigher.samples))
     np.testing.assert_allclose(exact.weights(weigher.samples), own, atol=1e-6)
     assert np.abs(weigher.weights(weigher.samples) - own).max() > 1e-2
@@ -100,7 +100,7 @@ def test_the_nearest_come_first_and_a_clip_is_nearest_to_itself(case):
     card = model.session.card
     for index in (0, card.samples // 2, card.samples - 1):
         performer = card.performers[card.moved_by[index]] if card.performers else None
-        found = why(model, asked(card, card.examples[index], performer)).nearest
+        found = explain_result(model, asked(card, card.examples[index], performer)).nearest
         distances = [clip.distance for clip in found]
         assert distances == sorted(distances) and distances[0] < 1e-12 < distances[1]
         assert found[0].source == card.sources[index]
@@ -112,7 +112,7 @@ def test_distance_is_that_of_scales_and_performers(labelled_path):
     model = model_registry.load([labelled_path]).find("labelled")
     card = model.session.card
     hyper = card.kriging
-    found = why(model, asked(card, card.examples[0], "tall"))
+    found = explain_result(model, asked(card, card.examples[0], "tall"))
     low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
     for clip in found.nearest:
         gap = np.array([*clip.controls.values()]) - card.examples[0]
@@ -127,14 +127,14 @@ def test_what_cannot_be_answered_is_refused(case):
     card = model.session.card
     question = asked(card, card.examples[0])
     outside = {**question.controls, "turn": 1e3}
-    assert len(why(model, structs.replace(question, controls=outside)).warnings) == 1
+    assert len(explain_result(model, structs.replace(question, controls=outside)).warnings) == 1
     with pytest.raises(OutsideSamples, match="turn = 1000"):
-        why(model, structs.replace(question, controls=outside, extrapolate="refuse"))
+        explain_result(model, structs.replace(question, controls=outside, extrapolate="refuse"))
     for change, field in (
         ({"nearest": 0}, "nearest"),
         ({"performer": "nobody"}, "performer"),
         ({"controls": {**question.controls, "spin": 1.0}}, "controls/spin"),
     ):
         with pytest.raises(InvalidField) as caught:
-            why(model, structs.replace(question, **change))
+            explain_result(model, structs.replace(question, **change))
         assert caught.value.field == field

@@ -7,13 +7,13 @@ import pytest
 import recorded
 
 from posefield.common.errors import InvalidField
-from posefield.http.concurrency.pose_batching import MOST, Batcher
+from posefield.http.concurrency.pose_batching import MAX_BATCH, PoseBatcher
 from posefield.inference import session
 from posefield.question.motion_question import PoseQuestion
 from posefield.synthesis import poses
 from posefield.synthesis.synthesizer import Synthesizer
 
-HASTE = [3.0 + 0.125 * number for number in range(2 * MOST + 7)]
+HASTE = [3.0 + 0.125 * number for number in range(2 * MAX_BATCH + 7)]
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def counted(model, check=lambda feed: None):
     session, feeds = recorded.session(model.session, check)
     own = Synthesizer(model.name, session)
     for level in range(len(session.card.levels)):
-        assert poses.exact(own, level)
+        assert poses.is_batch_exact(own, level)
     feeds.clear()
     return own, feeds
 
@@ -40,14 +40,14 @@ def rows(feeds):
 
 def question(model, haste, time=0.1, level=0):
     controls = {c.name: c.default for c in model.session.card.controls} | {"haste": haste}
-    return poses.moments(model, PoseQuestion(controls=controls, times=[time], level=level))
+    return poses.prepare(model, PoseQuestion(controls=controls, times=[time], level=level))
 
 
 def together(model, asked, rounds=1):
     """Rows that a batcher gives to questions asked in one turn, after a turn that promises more."""
 
     async def ask():
-        batcher = Batcher()
+        batcher = PoseBatcher()
         await asyncio.gather(*(batcher.row(model, asked[0]) for _ in range(2)))
         for _ in range(rounds):
             await asyncio.sleep(0)
@@ -62,13 +62,13 @@ def test_one_call_answers_all_of_a_turn(model):
     asked = [question(own, haste) for haste in HASTE]
     feeds.clear()
     together(own, asked)
-    assert rows(feeds) == [2, 2, MOST, MOST, 7]
+    assert rows(feeds) == [2, 2, MAX_BATCH, MAX_BATCH, 7]
 
 
 def test_each_gets_the_bytes_that_it_gets_alone(model):
     asked = [question(model, haste) for haste in HASTE]
     for each, row in zip(asked, together(model, asked), strict=True):
-        (own,) = poses.rows(model, [each])
+        (own,) = poses.run_batch(model, [each])
         assert all(np.array_equal(a, b) for a, b in zip(row, own, strict=True))
 
 
@@ -83,7 +83,7 @@ def test_levels_are_not_mixed(model):
 
 def test_whoever_asks_alone_is_answered_at_once(model):
     async def alone():
-        batcher = Batcher()
+        batcher = PoseBatcher()
         for _ in range(3):
             asking = batcher.row(model, question(model, 4.0))
             with pytest.raises(StopIteration):
@@ -98,9 +98,9 @@ def test_one_that_has_no_answer_harms_no_other(model):
     asked = [question(model, 4.0, time) for time in (0.1, 99.0, 0.2)]
     first, wrong, last = together(model, asked)
     with pytest.raises(InvalidField, match="99 s, expected 0 to"):
-        poses.posed(model, asked[1], wrong)
+        poses.build_answer(model, asked[1], wrong)
     for each, row in ((asked[0], first), (asked[2], last)):
-        np.testing.assert_array_equal(poses.posed(model, each, row).rotations, row[0])
+        np.testing.assert_array_equal(poses.build_answer(model, each, row).rotations, row[0])
 
 
 def test_a_fault_of_the_graph_reaches_everybody(model):
@@ -115,7 +115,7 @@ def test_a_fault_of_the_graph_reaches_everybody(model):
 
 def test_a_client_that_went_away_is_passed_over(model):
     async def ask():
-        batcher = Batcher()
+        batcher = PoseBatcher()
         asked = question(model, 4.0)
         await asyncio.gather(*(batcher.row(model, asked) for _ in range(2)))
         await asyncio.sleep(0)

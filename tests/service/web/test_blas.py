@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from posefield.common.cpu_cores import ALONE
+from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.http import server
 
 
 @pytest.fixture(autouse=True)
 def two_threads(monkeypatch):
     """Two BLAS threads, of which the environment says nothing."""
-    for name in ALONE:
+    for name in SINGLE_THREAD_ENV:
         monkeypatch.delenv(name, raising=False)
     with threadpool_limits(2, user_api="blas"):
         assert threads() == {2}
@@ -29,7 +29,7 @@ def test_blas_keeps_to_one_thread():
     assert threads() == {1}
 
 
-@pytest.mark.parametrize("name", ALONE)
+@pytest.mark.parametrize("name", SINGLE_THREAD_ENV)
 def test_the_environment_counts_more(monkeypatch, name):
     monkeypatch.setenv(name, "2")
     server.limit_threads()

@@ -7,7 +7,7 @@ import pytest
 import uvloop
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
-from posefield.http.middleware.coalescing import MOST, CoalescingProtocol, CoalescingTransport
+from posefield.http.middleware.coalescing import MAX_BUFFER, CoalescingProtocol, CoalescingTransport
 
 
 class Recorder(asyncio.Transport):
@@ -57,12 +57,12 @@ def test_head_and_body_are_one_call_and_the_next_turn_another():
 def test_much_is_not_held_so_that_flow_control_sees_it():
     async def play(transport, recorder):
         transport.write(b"h")
-        transport.write(b"x" * MOST)
-        assert [len(call) for call in recorder.calls] == [MOST + 1]
+        transport.write(b"x" * MAX_BUFFER)
+        assert [len(call) for call in recorder.calls] == [MAX_BUFFER + 1]
         transport.write(b"rest")
         await asyncio.sleep(0)
 
-    assert [len(call) for call in scene(play)] == [MOST + 1, 4]
+    assert [len(call) for call in scene(play)] == [MAX_BUFFER + 1, 4]
 
 
 def test_what_is_held_goes_before_the_end():

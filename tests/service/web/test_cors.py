@@ -7,16 +7,16 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.http.middleware import cors
 
-ALLOWED = cors.read("https://a.example, http://localhost:5173", "ORIGINS")
+ALLOWED = cors.parse_origins("https://a.example, http://localhost:5173", "ORIGINS")
 
 
 def test_none_may_if_none_is_named():
-    assert cors.read("", "ORIGINS") == cors.read(" , ", "ORIGINS") == frozenset()
-    assert cors.headers(b"https://a.example", frozenset()) == []
+    assert cors.parse_origins("", "ORIGINS") == cors.parse_origins(" , ", "ORIGINS") == frozenset()
+    assert cors.cors_headers(b"https://a.example", frozenset()) == []
 
 
 def test_an_origin_is_allowed_by_its_very_name():
-    given = dict(cors.headers(b"https://a.example", ALLOWED))
+    given = dict(cors.cors_headers(b"https://a.example", ALLOWED))
     assert given[b"access-control-allow-origin"] == b"https://a.example"
     assert given[b"vary"] == b"Origin"
     shown = given[b"access-control-expose-headers"].split(b", ")
@@ -39,23 +39,26 @@ def test_an_origin_is_allowed_by_its_very_name():
     ],
 )
 def test_every_other_is_not_but_caches_are_told(origin):
-    assert cors.headers(origin, ALLOWED) == [(b"vary", b"Origin")]
+    assert cors.cors_headers(origin, ALLOWED) == [(b"vary", b"Origin")]
 
 
 def test_all_may_be_allowed_and_none_by_name():
-    given = dict(cors.headers(b"https://b.example", cors.read("*", "ORIGINS")))
+    given = dict(cors.cors_headers(b"https://b.example", cors.parse_origins("*", "ORIGINS")))
     assert given[b"access-control-allow-origin"] == b"*"
     assert b"vary" not in given
 
 
 def test_credentials_of_browsers_are_never_allowed():
-    for allowed in (ALLOWED, cors.EVERY):
-        for pair in (*cors.headers(b"https://a.example", allowed), *cors.preflight(b"GET")):
+    for allowed in (ALLOWED, cors.ANY_ORIGIN):
+        for pair in (
+            *cors.cors_headers(b"https://a.example", allowed),
+            *cors.preflight_headers(b"GET"),
+        ):
             assert b"credentials" not in pair[0]
 
 
 def test_a_preflight_names_methods_and_headers():
-    given = dict(cors.preflight(b"GET, HEAD, POST"))
+    given = dict(cors.preflight_headers(b"GET, HEAD, POST"))
     assert given[b"access-control-allow-methods"] == b"GET, HEAD, POST"
     assert {b"Authorization", b"Content-Type"} <= set(
         given[b"access-control-allow-headers"].split(b", ")
@@ -78,4 +81,4 @@ def test_a_preflight_names_methods_and_headers():
 )
 def test_what_is_no_origin_is_refused(text):
     with pytest.raises(InvalidField, match=re.escape("ORIGINS: ")):
-        cors.read(text, "ORIGINS")
+        cors.parse_origins(text, "ORIGINS")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.http.decoding import crowd_query
-from posefield.inference.level_selection import View
+from posefield.inference.level_selection import LevelCriteria
 from posefield.validation import crowd_question
 
 CAMERA = {"position": [0, 1.7, -5], "fov": 1.0, "height": 1080}
@@ -85,7 +85,7 @@ def test_auto_is_a_view():
     view = asked(
         **changed(level="auto", camera=CAMERA, budget_ms=5, previous_level=[0, 3], pixels=2)
     ).detail
-    assert isinstance(view, View)
+    assert isinstance(view, LevelCriteria)
     assert view.camera.position.tolist() == [0.0, 1.7, -5.0]
     assert (view.camera.fov, view.camera.height) == (1.0, 1080.0)
     assert (view.pixels, view.budget, view.previous.tolist()) == (2.0, 0.005, [0, 3])

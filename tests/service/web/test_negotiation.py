@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posefield.http.middleware.negotiation import preferred
+from posefield.http.middleware.negotiation import preferred_format
 
 CLIP = (
     ("usdc", "model/vnd.usdc"),
@@ -57,7 +57,7 @@ CLIP = (
     ],
 )
 def test_the_header_decides(accept, expected):
-    assert preferred(accept, CLIP) == expected
+    assert preferred_format(accept, CLIP) == expected
 
 
 TYPES = [media_type for _, media_type in CLIP]
@@ -83,13 +83,15 @@ def test_it_is_what_the_standard_says_word_by_word(ranges):
         return (ranges[closest] if close else 0.0, close)
 
     best = max(CLIP, key=worth)
-    assert preferred(accept, CLIP) == (best[0] if worth(best)[0] else None)
-    assert preferred(", ".join(reversed(accept.split(", "))), CLIP) == preferred(accept, CLIP)
+    assert preferred_format(accept, CLIP) == (best[0] if worth(best)[0] else None)
+    assert preferred_format(", ".join(reversed(accept.split(", "))), CLIP) == preferred_format(
+        accept, CLIP
+    )
 
 
 @given(st.text(max_size=200))
 def test_nothing_that_is_sent_is_a_failure(accept):
-    assert preferred(accept, CLIP) in {None, *(name for name, _ in CLIP)}
+    assert preferred_format(accept, CLIP) in {None, *(name for name, _ in CLIP)}
 
 
 @pytest.mark.parametrize(
@@ -97,4 +99,4 @@ def test_nothing_that_is_sent_is_a_failure(accept):
 )
 def test_a_long_header_takes_no_long_time(piece):
     # A search that goes back on itself would not come to an end.
-    assert preferred(piece * 20_000 + ",*/*", CLIP) in ("usdc", None)
+    assert preferred_format(piece * 20_000 + ",*/*", CLIP) in ("usdc", None)

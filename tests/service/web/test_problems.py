@@ -15,17 +15,19 @@ def descendants(error):
 
 def test_every_query_error_is_in_the_table():
     # A FormError is a bad parameter or a bad body.
-    assert {*problems.TABLE, FormError} == descendants(QueryError) - {QueryError}
+    assert {*problems.QUERY_ERROR_PROBLEMS, FormError} == descendants(QueryError) - {QueryError}
 
 
 def test_every_kind_is_a_client_error_but_one():
-    for kind in (*problems.OF_REQUEST, *problems.TABLE.values()):
+    for kind in (*problems.REQUEST_PROBLEMS, *problems.QUERY_ERROR_PROBLEMS.values()):
         assert 400 <= kind.status < 500
     assert problems.INTERNAL.status == 500
 
 
 def test_no_two_kinds_share_a_name():
-    names = [kind.name for kind in (*problems.OF_REQUEST, *problems.TABLE.values())]
+    names = [
+        kind.name for kind in (*problems.REQUEST_PROBLEMS, *problems.QUERY_ERROR_PROBLEMS.values())
+    ]
     assert len(names) == len(set(names))
 
 
@@ -34,7 +36,7 @@ def test_no_two_kinds_share_a_name():
     [((), ""), (("times", "0"), "/times/0"), (("controls", "a/b~c"), "/controls/a~1b~0c")],
 )
 def test_pointers_escape_what_rfc_6901_says(parts, expected):
-    assert problems.pointer(*parts) == expected
+    assert problems.json_pointer(*parts) == expected
 
 
 @pytest.mark.parametrize(
@@ -47,5 +49,5 @@ def test_pointers_escape_what_rfc_6901_says(parts, expected):
 )
 def test_one_of_many_is_pointed_at(error, where):
     request = Request({"type": "http", "method": "POST", "path": "/", "state": {"request_id": "x"}})
-    answer = problems.of_query_error(request, error)
+    answer = problems.query_error_response(request, error)
     assert json.loads(answer.body)["errors"][0]["pointer"] == where

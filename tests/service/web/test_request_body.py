@@ -5,11 +5,11 @@ import asyncio
 import pytest
 from starlette.requests import Request
 
-from posefield.http.api.problems import RequestFault
+from posefield.http.api.problems import RequestError
 from posefield.http.decoding import request_body
-from posefield.http.decoding.request_body import FREE, BodyMemory
+from posefield.http.decoding.request_body import FREE_BYTES, BodyMemory
 
-LIMIT = 4 * FREE
+LIMIT = 4 * FREE_BYTES
 
 
 def request(*chunks, **headers):
@@ -29,11 +29,11 @@ def request(*chunks, **headers):
 
 
 def read(asked, memory=None):
-    return asyncio.run(request_body.read(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
+    return asyncio.run(request_body.read_body(asked, LIMIT, memory or BodyMemory(10 * LIMIT)))
 
 
 def refused(asked, memory=None):
-    with pytest.raises(RequestFault) as caught:
+    with pytest.raises(RequestError) as caught:
         read(asked, memory)
     return caught.value
 
@@ -61,20 +61,20 @@ def test_another_media_type_is_refused():
 
 
 def test_large_bodies_share_a_memory_and_small_ones_do_not_count():
-    memory = BodyMemory(FREE)
-    first = request(b" " * FREE, b" " * FREE)
+    memory = BodyMemory(FREE_BYTES)
+    first = request(b" " * FREE_BYTES, b" " * FREE_BYTES)
     read(first, memory)
-    assert (memory.used, first.scope["body_memory"]) == (FREE, FREE)
-    fault = refused(request(b" " * FREE, b" "), memory)
+    assert (memory.used, first.scope["body_memory"]) == (FREE_BYTES, FREE_BYTES)
+    fault = refused(request(b" " * FREE_BYTES, b" "), memory)
     assert (fault.kind.name, fault.headers["Retry-After"]) == ("overloaded", "1")
-    assert len(read(request(b" " * FREE), memory)) == FREE
+    assert len(read(request(b" " * FREE_BYTES), memory)) == FREE_BYTES
     memory.release(first.scope["body_memory"])
-    assert len(read(request(b" " * FREE, b" "), memory)) == FREE + 1
+    assert len(read(request(b" " * FREE_BYTES, b" "), memory)) == FREE_BYTES + 1
 
 
 def test_what_a_refused_body_had_taken_can_be_released():
-    memory = BodyMemory(FREE)
-    second = request(b" " * FREE, b" " * 10, b" " * FREE)
+    memory = BodyMemory(FREE_BYTES)
+    second = request(b" " * FREE_BYTES, b" " * 10, b" " * FREE_BYTES)
     assert refused(second, memory).kind.name == "overloaded"
     assert memory.used == second.scope["body_memory"] == 10
 

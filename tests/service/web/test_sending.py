@@ -2,7 +2,7 @@
 
 import pytest
 
-from posefield.http.responses import ENOUGH, gathered
+from posefield.http.responses import MIN_CHUNK_SIZE, merged_chunks
 
 
 @pytest.mark.parametrize(
@@ -11,20 +11,20 @@ from posefield.http.responses import ENOUGH, gathered
         [],
         [b""],
         [b"a", b"", b"b"],
-        [b"", b"x" * ENOUGH, b"", b"y"],
+        [b"", b"x" * MIN_CHUNK_SIZE, b"", b"y"],
         [b"x" * 1000] * 1000,
-        [b"x" * ENOUGH] * 3,
+        [b"x" * MIN_CHUNK_SIZE] * 3,
     ],
 )
 def test_nothing_is_lost_and_all_but_the_last_are_long_enough(pieces):
-    found = list(gathered(pieces))
+    found = list(merged_chunks(pieces))
     assert b"".join(found) == b"".join(pieces)
     assert all(found)
-    assert all(ENOUGH <= len(piece) < 2 * ENOUGH for piece in found[:-1])
+    assert all(MIN_CHUNK_SIZE <= len(piece) < 2 * MIN_CHUNK_SIZE for piece in found[:-1])
 
 
 def test_no_more_is_taken_than_is_sent():
     taken = []
-    pieces = gathered(taken.append(n) or b"x" * (ENOUGH // 2) for n in range(10))
+    pieces = merged_chunks(taken.append(n) or b"x" * (MIN_CHUNK_SIZE // 2) for n in range(10))
     next(pieces)
     assert taken == [0, 1]

@@ -11,7 +11,7 @@ from posefield.http.api.settings import Settings
 
 
 def test_nothing_set_is_the_defaults():
-    assert settings.read(environ={"PATH": "/bin"}) == Settings()
+    assert settings.read_settings(environ={"PATH": "/bin"}) == Settings()
 
 
 def test_each_setting_has_a_variable():
@@ -41,7 +41,7 @@ def test_each_setting_has_a_variable():
     access = {"open": True, "keys_file": "keys", "jwt_leeway": 0}
     others = {**crowds, **clips, **ends, **follows, **access}
     expected = Settings("::1", 9000, body_limit=10, **others)
-    assert settings.read(environ=given) == expected
+    assert settings.read_settings(environ=given) == expected
 
 
 def test_the_readme_lists_every_setting_and_its_default():
@@ -77,10 +77,10 @@ def test_the_readme_lists_every_setting_and_its_default():
 )
 def test_a_variable_that_cannot_be_used_is_named(name, text):
     with pytest.raises(InvalidField, match=f"POSEFIELD_{name}: .*expected"):
-        settings.read(environ={f"POSEFIELD_{name}": text})
+        settings.read_settings(environ={f"POSEFIELD_{name}": text})
 
 
 def test_the_command_line_wins():
     given = {"POSEFIELD_HOST": "::1", "POSEFIELD_PORT": "9000"}
-    assert settings.read("0.0.0.0", 0, given) == Settings(host="0.0.0.0", port=0)
-    assert settings.read(None, None, given) == Settings(host="::1", port=9000)
+    assert settings.read_settings("0.0.0.0", 0, given) == Settings(host="0.0.0.0", port=0)
+    assert settings.read_settings(None, None, given) == Settings(host="::1", port=9000)

@@ -45,9 +45,9 @@ async def cancelled(task):
 
 def test_a_result_and_a_fault_come_back():
     async def both():
-        assert await worker_threads.run(lambda a, b: a + b, 1, 2) == 3
+        assert await worker_threads.run_in_thread(lambda a, b: a + b, 1, 2) == 3
         with pytest.raises(ZeroDivisionError):
-            await worker_threads.run(lambda: 1 / 0)
+            await worker_threads.run_in_thread(lambda: 1 / 0)
 
     asyncio.run(both())
 
@@ -55,7 +55,7 @@ def test_a_result_and_a_fault_come_back():
 def test_cancelled_work_is_asked_to_stop_and_has_ended_when_its_task_has():
     async def scene():
         work = Work()
-        task = asyncio.create_task(worker_threads.run(work))
+        task = asyncio.create_task(worker_threads.run_in_thread(work))
         await begun(work)
         task.cancel()
         await cancelled(task)
@@ -78,7 +78,7 @@ class Failing(Work):
 def test_cancelled_work_leaves_nothing_in_the_log_unless_it_fails(kind, lines, caplog):
     async def scene():
         work = kind()
-        task = asyncio.create_task(worker_threads.run(work))
+        task = asyncio.create_task(worker_threads.run_in_thread(work))
         await begun(work)
         task.cancel()
         await cancelled(task)
@@ -93,9 +93,9 @@ def test_cancelled_work_leaves_nothing_in_the_log_unless_it_fails(kind, lines, c
 def test_a_place_is_held_until_work_that_does_not_look_has_ended(times):
     async def scene():
         places, work, next_one = CapacityLimiter(1), Work(looks=False, seconds=0.3), Work()
-        task = asyncio.create_task(worker_threads.run(work, places=places))
+        task = asyncio.create_task(worker_threads.run_in_thread(work, places=places))
         await begun(work)
-        waiting = asyncio.create_task(worker_threads.run(next_one, places=places))
+        waiting = asyncio.create_task(worker_threads.run_in_thread(next_one, places=places))
         for _ in range(times):
             task.cancel()
             await asyncio.sleep(0.01)
@@ -112,9 +112,9 @@ def test_a_place_is_held_until_work_that_does_not_look_has_ended(times):
 def test_work_that_waits_for_a_place_never_begins_when_it_is_cancelled():
     async def scene():
         places, work, never = CapacityLimiter(1), Work(), Work()
-        first = asyncio.create_task(worker_threads.run(work, places=places))
+        first = asyncio.create_task(worker_threads.run_in_thread(work, places=places))
         await begun(work)
-        second = asyncio.create_task(worker_threads.run(never, places=places))
+        second = asyncio.create_task(worker_threads.run_in_thread(never, places=places))
         await asyncio.sleep(0.01)
         second.cancel()
         await cancelled(second)
@@ -129,7 +129,7 @@ def test_a_scope_of_anyio_that_is_cancelled_waits_for_the_end_without_spinning()
     async def scene():
         work = Work(looks=False, seconds=0.4)
         async with create_task_group() as group:
-            group.start_soon(worker_threads.run, work)
+            group.start_soon(worker_threads.run_in_thread, work)
             await begun(work)
             before = time.process_time()
             group.cancel_scope.cancel()
@@ -158,7 +158,7 @@ def test_the_fault_of_cancelled_work_is_no_complaint_of_the_loop():
     async def scene():
         asyncio.get_running_loop().set_exception_handler(lambda _, said: complaints.append(said))
         work = Work()
-        task = asyncio.create_task(worker_threads.run(work))
+        task = asyncio.create_task(worker_threads.run_in_thread(work))
         await begun(work)
         task.cancel()
         await cancelled(task)

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from posefield.encode.files.file_convention import CENTIMETRES, METRES
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.concurrency import clip_batching
-from posefield.http.concurrency.clip_batching import Desk
+from posefield.http.concurrency.clip_batching import ClipBatcher
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
-USDC = ENCODERS["usdc"]
+USDC = CLIP_ENCODERS["usdc"]
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def answers(walk_path):
     model = Synthesizer("walk", session.load(walk_path))
     controls = {c.name: c.default for c in model.session.card.controls}
     questions = (controls | {"haste": 3.0 + 0.1 * number} for number in range(40))
-    return [clips.clip(model, ClipQuestion(controls=question)) for question in questions]
+    return [clips.synthesize_clip(model, ClipQuestion(controls=question)) for question in questions]
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def calls():
 
 def written(encoder, wanted):
     async def ask():
-        desk = Desk()
+        desk = ClipBatcher()
         own = [(convention, replace(answer)) for convention, answer in wanted]
         held = [weakref.ref(answer) for _, answer in own]
         files = await asyncio.gather(*(desk.file(encoder, c, a) for c, a in own))
@@ -64,7 +64,7 @@ def written(encoder, wanted):
 def test_what_is_wanted_at_once_is_written_together(calls, answers):
     encoder, made = calls
     files = written(encoder, [(METRES, answer) for answer in answers])
-    assert made == [clip_batching.MOST, clip_batching.MOST, 8]
+    assert made == [clip_batching.MAX_BATCH, clip_batching.MAX_BATCH, 8]
     assert files == [USDC.encode(answer, METRES) for answer in answers]
 
 
@@ -78,7 +78,7 @@ def test_conventions_are_not_mixed(calls, answers):
 def test_a_long_clip_keeps_nobody_waiting(calls, answers):
     encoder, made = calls
     clip = answers[0].clip
-    times = -(-clip_batching.LONG // len(clip)) + 1
+    times = -(-clip_batching.MAX_BATCHED_FRAMES // len(clip)) + 1
     turns, moves = (np.tile(a, (times, 1, 1)) for a in (clip.rotations, clip.translations))
     long = replace(answers[0], clip=replace(clip, rotations=turns, translations=moves))
     written(encoder, [(METRES, long)] * 3)
@@ -90,7 +90,7 @@ def test_a_fault_reaches_everybody_and_the_next_is_written(answers):
         raise RuntimeError("broken")
 
     async def ask():
-        desk = Desk()
+        desk = ClipBatcher()
         wrong = replace(USDC, write=broken)
         asking = (desk.file(wrong, METRES, answer) for answer in answers[:3])
         faults = await asyncio.gather(*asking, return_exceptions=True)
@@ -105,7 +105,7 @@ def test_a_client_that_went_away_is_passed_over(calls, answers):
     encoder, made = calls
 
     async def ask():
-        desk = Desk()
+        desk = ClipBatcher()
         tasks = [asyncio.create_task(desk.file(encoder, METRES, a)) for a in answers[:3]]
         await asyncio.sleep(0)
         tasks[1].cancel()

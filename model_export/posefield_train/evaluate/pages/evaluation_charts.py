@@ -11,18 +11,18 @@ from matplotlib.figure import Figure
 
 from posefield.common.units import Floats
 from posefield_train.evaluate import evaluation_summary, event_bodies
-from posefield_train.evaluate.evaluation_summary import Summary
-from posefield_train.evaluate.event_bodies import CAPTURED, Still, Stills
+from posefield_train.evaluate.evaluation_summary import MethodSummary
+from posefield_train.evaluate.event_bodies import CAPTURED, EventBodies, EventBody
 from posefield_train.evaluate.learning_curves import Learning
 from posefield_train.evaluate.methods import EXACT, OURS
-from posefield_train.evaluate.new_performers import SHOWN
-from posefield_train.evaluate.protocol import Result
+from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS
+from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.report.drawing import stick_figures, svg_chart
 from posefield_train.report.drawing.svg_chart import Chart
 
-WORST = 8
+MAX_NAMED_CLIPS = 8
 """Clips named beside the scatter plot."""
-MANY = 512
+MAX_MARKERS = 512
 """More points than this are drawn as a bitmap."""
 MARGIN = 0.15
 """Space around a body, m."""
@@ -32,15 +32,15 @@ PANELS: dict[str, dict[str, str]] = {
         OURS: "no clip shown",
         **{
             name: f"{count} clip{'s' * (count > 1)} shown"
-            for name, count in SHOWN.items()
-            if count < max(SHOWN.values())
+            for name, count in ADAPTATION_COUNTS.items()
+            if count < max(ADAPTATION_COUNTS.values())
         },
     },
 }
 """Methods whose bodies are drawn, and the titles of their panels, by protocol."""
 
 
-def bars(found: Sequence[Summary]) -> Chart:
+def method_bars(found: Sequence[MethodSummary]) -> Chart:
     """Return the mean distances of all methods."""
     return svg_chart.draw(
         0.9 + 0.27 * len(found),
@@ -51,7 +51,7 @@ def bars(found: Sequence[Summary]) -> Chart:
     )
 
 
-def paint_bars(found: Sequence[Summary], figure: Figure) -> None:
+def paint_bars(found: Sequence[MethodSummary], figure: Figure) -> None:
     """Draw a panel for each kind of distance, with a bar for each method."""
     names = [one.name.replace("_", " ") for one in found]
     colours = [svg_chart.ORANGE if one.name.startswith(OURS) else svg_chart.BLUE for one in found]
@@ -70,7 +70,7 @@ def paint_bars(found: Sequence[Summary], figure: Figure) -> None:
     axes[0].invert_yaxis()
 
 
-def clips(result: Result, rival: str) -> Chart:
+def clips(result: EvaluationResult, rival: str) -> Chart:
     """Return the error of each clip against that of another method."""
     return svg_chart.draw(
         3.6,
@@ -82,16 +82,16 @@ def clips(result: Result, rival: str) -> Chart:
     )
 
 
-def _paint_clips(result: Result, rival: str, figure: Figure) -> None:
+def _paint_clips(result: EvaluationResult, rival: str, figure: Figure) -> None:
     left, right = figure.subplots(1, 2)
-    ours = 100 * evaluation_summary.relative(result.of(OURS, result.asked(OURS)))
-    theirs = 100 * evaluation_summary.relative(result.of(rival, result.asked(rival)))
-    left.plot(theirs, ours, ".", color=svg_chart.BLUE, rasterized=len(ours) > MANY)
+    ours = 100 * evaluation_summary.relative_distances(result.of(OURS, result.asked(OURS)))
+    theirs = 100 * evaluation_summary.relative_distances(result.of(rival, result.asked(rival)))
+    left.plot(theirs, ours, ".", color=svg_chart.BLUE, rasterized=len(ours) > MAX_MARKERS)
     far = 1.05 * max(ours.max(), theirs.max())
     left.plot([0, far], [0, far], color=svg_chart.GREY, linewidth=0.8)
     title = "root-relative error"
     left.set(xlabel=f"{rival} (cm)", ylabel="posefield (cm)", title=title, aspect="equal")
-    worst = np.argsort(-ours)[:WORST]
+    worst = np.argsort(-ours)[:MAX_NAMED_CLIPS]
     right.barh(
         [svg_chart.label(result.clips[i]) for i in worst], ours[worst], color=svg_chart.ORANGE
     )
@@ -100,7 +100,7 @@ def _paint_clips(result: Result, rival: str, figure: Figure) -> None:
     right.grid(visible=False, axis="y")
 
 
-def calibration(result: Result) -> Chart:
+def calibration(result: EvaluationResult) -> Chart:
     """Return the error of each motion against sigma."""
     return svg_chart.draw(
         3.2,
@@ -111,11 +111,13 @@ def calibration(result: Result) -> Chart:
     )
 
 
-def _paint_calibration(result: Result, figure: Figure) -> None:
+def _paint_calibration(result: EvaluationResult, figure: Figure) -> None:
     ax = figure.subplots()
-    actual = 100 * np.sqrt([error.squared for error in result.of(OURS, result.asked(OURS))])
+    actual = 100 * np.sqrt(
+        [error.mean_squared_error for error in result.of(OURS, result.asked(OURS))]
+    )
     sigma = 100 * result.sigma
-    ax.plot(sigma, actual, ".", color=svg_chart.BLUE, rasterized=len(actual) > MANY)
+    ax.plot(sigma, actual, ".", color=svg_chart.BLUE, rasterized=len(actual) > MAX_MARKERS)
     far = 1.1 * float(sigma.max())
     ax.plot([0, far], [0, far], color=svg_chart.GREY, linewidth=0.8)
     ax.set(xlabel="sigma (cm)", ylabel="error (cm)", title="error against sigma", xlim=(0, far))
@@ -138,20 +140,20 @@ def _paint_learning(curve: Learning, figure: Figure) -> None:
         for (way, own), colour in zip(
             curve.errors.items(), (svg_chart.ORANGE, svg_chart.BLUE), strict=True
         ):
-            off = 100 * curve.doubts[way][row]
+            off = 100 * curve.standard_errors[way][row]
             ax.errorbar(curve.sizes, 100 * own[row], off, fmt="o-", color=colour, label=way)
         ax.set(xlabel="samples", ylabel="error (cm)", title=f"{title} error", ylim=(0, None))
     axes[0].legend()
 
 
-def event(result: Result) -> list[Chart]:
+def event_charts(result: EvaluationResult) -> list[Chart]:
     """Return the clip of median error at its event, by several methods; empty without events."""
     titles = PANELS.get(result.protocol, {})
-    place = event_bodies.chosen(result.stills, tuple(titles)) if titles else None
+    place = event_bodies.median_clip(result.bodies, tuple(titles)) if titles else None
     if place is None:
         return []
     clip = result.clips[place]
-    scene = _scene(result.stills, titles, place, result.parents)
+    scene = _event_scene(result.bodies, titles, place, result.parents)
     drawn = svg_chart.draw(
         3.6,
         scene.paint,
@@ -164,20 +166,20 @@ def event(result: Result) -> list[Chart]:
 
 
 @dataclass(frozen=True)
-class _Scene:
+class _EventScene:
     """Bodies of one clip at its event.
 
     bodies: by panel title, the captured one first. parents: of the joints.
     """
 
-    bodies: dict[str, Still]
+    bodies: dict[str, EventBody]
     parents: tuple[int, ...]
 
     def paint(self, figure: Figure) -> None:
         """Draw a panel for each body, from the side that shows most of the effector's path."""
         captured = self.bodies[CAPTURED]
         away = captured.path - captured.path.mean(axis=0)
-        direction = stick_figures.across(away)
+        direction = stick_figures.widest_direction(away)
         panels = figure.subplots(1, len(self.bodies), sharex=True, sharey=True, squeeze=False)[0]
         for ax, (title, own) in zip(panels, self.bodies.items(), strict=True):
             if own is not captured:
@@ -192,7 +194,7 @@ class _Scene:
             ax.tick_params(length=0, labelbottom=False, labelleft=False)
             ax.spines[:].set_visible(False)
 
-    def _body(self, ax: Axes, own: Still, direction: Floats, colour: str) -> None:
+    def _body(self, ax: Axes, own: EventBody, direction: Floats, colour: str) -> None:
         joints = stick_figures.project(own.joints, direction)
         bones = [(joints[j], joints[p]) for j, p in enumerate(self.parents) if p >= 0]
         ax.add_collection(LineCollection(bones, colors=colour, linewidths=1.6))
@@ -203,9 +205,9 @@ class _Scene:
         ax.autoscale_view()
 
 
-def _scene(
-    found: Stills, titles: Mapping[str, str], place: int, parents: tuple[int, ...]
-) -> _Scene:
+def _event_scene(
+    found: EventBodies, titles: Mapping[str, str], place: int, parents: tuple[int, ...]
+) -> _EventScene:
     bodies = {CAPTURED: found[CAPTURED][place]}
     bodies |= {title: found[name][place] for name, title in titles.items()}
-    return _Scene({title: own for title, own in bodies.items() if own}, parents)
+    return _EventScene({title: own for title, own in bodies.items() if own}, parents)

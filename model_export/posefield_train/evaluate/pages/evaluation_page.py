@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 
 from posefield_train.evaluate import corrections, evaluation_summary
-from posefield_train.evaluate.evaluation_summary import Summary
+from posefield_train.evaluate.evaluation_summary import MethodSummary
 from posefield_train.evaluate.learning_curves import Learning
 from posefield_train.evaluate.methods import DEFINITIONS, OURS
 from posefield_train.evaluate.pages import evaluation_charts
-from posefield_train.evaluate.protocol import Result
+from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.report.drawing.html_page import Page, Section, Table
 
 TITLES = {
@@ -17,9 +17,11 @@ TITLES = {
 }
 
 
-def html(description: str, results: Sequence[Result], curve: Learning | None = None) -> bytes:
+def html(
+    description: str, results: Sequence[EvaluationResult], curve: Learning | None = None
+) -> bytes:
     """Return the page of a recipe's results and learning curve; equal results, equal bytes."""
-    first = evaluation_summary.of(results[0])[0]
+    first = evaluation_summary.summarize(results[0])[0]
     figures = [
         ("root-relative error", f"{100 * first.mean.relative.mean:.2f} cm"),
         ("global error", f"{100 * first.mean.absolute.mean:.2f} cm"),
@@ -32,25 +34,25 @@ def html(description: str, results: Sequence[Result], curve: Learning | None = N
     return Page("evaluation", results[0].family, description, figures, sections).html()
 
 
-def _section(result: Result) -> Section:
-    found = evaluation_summary.of(result)
+def _section(result: EvaluationResult) -> Section:
+    found = evaluation_summary.summarize(result)
     caption = "Mean error of each method (cm; columns are explained under Methods and columns)"
     head = tuple(title for title, _ in evaluation_summary.COLUMNS)
-    rival = min(_rivals(found), key=lambda one: one.worse).name
+    rival = min(_other_methods(found), key=lambda one: one.worse).name
     return Section(
         result.protocol,
         TITLES[result.protocol],
         (
             evaluation_summary.UNITS,
-            _verdict(found),
+            _comparison(found),
             *map(_sentence, evaluation_summary.trust_text(result)),
         ),
         (Table(caption, head, tuple(one.cells() for one in found)), *_corrections(result)),
         (
-            evaluation_charts.bars(found),
+            evaluation_charts.method_bars(found),
             evaluation_charts.clips(result, rival),
             evaluation_charts.calibration(result),
-            *evaluation_charts.event(result),
+            *evaluation_charts.event_charts(result),
         ),
     )
 
@@ -59,20 +61,20 @@ def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}."
 
 
-def _corrections(result: Result) -> list[Table]:
+def _corrections(result: EvaluationResult) -> list[Table]:
     rows = corrections.rows(result)
     caption = "Answers corrected to the captured position of the effector"
-    return [Table(caption, corrections.HEAD, rows)] if rows else []
+    return [Table(caption, corrections.TABLE_HEADER, rows)] if rows else []
 
 
-def _rivals(found: Sequence[Summary]) -> list[Summary]:
+def _other_methods(found: Sequence[MethodSummary]) -> list[MethodSummary]:
     """Return the methods other than the variants of posefield."""
     return [one for one in found if not one.name.startswith(OURS)]
 
 
-def _verdict(found: Sequence[Summary]) -> str:
+def _comparison(found: Sequence[MethodSummary]) -> str:
     """Return which methods are better than posefield, or tie with it."""
-    others = _rivals(found)
+    others = _other_methods(found)
     ahead = [one.name for one in others if one.worse < -one.worse_error]
     tied = [one.name for one in others if abs(one.worse) <= one.worse_error]
     if ahead:
@@ -85,12 +87,12 @@ def _verdict(found: Sequence[Summary]) -> str:
     return "Posefield is better than every other method by more than one standard error."
 
 
-def _distances(result: Result) -> Section:
+def _distances(result: EvaluationResult) -> Section:
     """Return the statistics of every distance of every method."""
     heading = ("method", "distance", "mean", "RMS", "p95", "p99", "largest")
     rows = [
         (one.name, title, *(f"{100 * value:.2f}" for value in vars(spread).values()))
-        for one in evaluation_summary.of(result)
+        for one in evaluation_summary.summarize(result)
         for name, title in evaluation_summary.DISTANCES.items()
         for spread in (getattr(one.mean, name),)
     ]
@@ -115,7 +117,7 @@ def _learning(curve: Learning) -> Section:
     return Section("learning", title, paragraphs, (), (evaluation_charts.learning(curve),))
 
 
-def _legend(results: Sequence[Result]) -> Section:
+def _legend(results: Sequence[EvaluationResult]) -> Section:
     names = dict.fromkeys(name for result in results for name in result.errors)
     methods = tuple((name, DEFINITIONS[name]) for name in names)
     paragraphs = (

@@ -40,7 +40,7 @@ class Section:
     charts: tuple[Chart, ...] = ()
 
 
-class Chapter(Protocol):
+class ReportChapter(Protocol):
     """Part of a report, as JSON values and as a section of the page."""
 
     def facts(self) -> dict[str, Any]:

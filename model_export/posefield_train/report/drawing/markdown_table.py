@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table with cells padded to the width of their column."""
     listed = [head, *rows]
     widths = [max(len(row[i]) for row in listed) for i in range(len(head))]

@@ -10,14 +10,14 @@ from matplotlib.lines import Line2D
 
 from posefield.common.units import UP, Floats
 from posefield_train.report.drawing import svg_chart
-from posefield_train.report.drawing.left_out_clips import Body
+from posefield_train.report.drawing.left_out_clips import BodyMotion
 
 FRAMES = 6
 MARGIN = 0.25
 """Gap between two figures, m."""
 
 
-def across(displacements: Floats) -> Floats:
+def widest_direction(displacements: Floats) -> Floats:
     """Return the horizontal direction (3,) along which displacements (..., 3) are largest."""
     ways = displacements.reshape(-1, 3) * (1.0 - UP)
     _, vectors = np.linalg.eigh(ways.T @ ways)
@@ -32,7 +32,7 @@ def project(points: Floats, direction: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class Strip:
+class PoseStrip:
     """Captured and predicted bodies at several times, side by side.
 
     captured, predicted: bones (F, B, 2, 2), m. times: shares of canonical time (F,). floor: height
@@ -73,7 +73,9 @@ class Strip:
         figure.legend(handles=handles[::-1], loc="outside upper left", ncols=2)
 
 
-def strip(captured: Body, predicted: Body, bones: tuple[tuple[int, int], ...]) -> Strip:
+def pose_strip(
+    captured: BodyMotion, predicted: BodyMotion, bones: tuple[tuple[int, int], ...]
+) -> PoseStrip:
     """Return both bodies at FRAMES times, drawn relative to the captured root.
 
     bones: indices of the points at both ends, the tips after the joints.
@@ -81,7 +83,7 @@ def strip(captured: Body, predicted: Body, bones: tuple[tuple[int, int], ...]) -
     count = len(captured.joints)
     frames = np.rint(np.linspace(0, count - 1, FRAMES)).astype(np.int64)
     moved = captured.joints - captured.joints.mean(axis=0)
-    direction = across(np.concatenate([moved, captured.joints - predicted.joints]))
+    direction = widest_direction(np.concatenate([moved, captured.joints - predicted.joints]))
     root = captured.joints[frames, :1] * (1.0 - UP)
     flat = [
         project(np.concatenate([body.joints, body.tips], axis=1)[frames] - root, direction)
@@ -95,4 +97,4 @@ def strip(captured: Body, predicted: Body, bones: tuple[tuple[int, int], ...]) -
     ends = np.array(bones)
     first, second = ((points + at)[:, ends] for points in flat)
     floor = min(0.0, float(first[..., 1].min()))
-    return Strip(first, second, frames / (count - 1), floor, step)
+    return PoseStrip(first, second, frames / (count - 1), floor, step)

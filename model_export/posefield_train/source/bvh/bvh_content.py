@@ -7,7 +7,7 @@ from posefield.common.units import Floats
 
 CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-LARGEST = 1e9
+MAX_NUMBER = 1e9
 """Largest magnitude of a number; larger ones would overflow in products."""
 
 Vector = tuple[float, float, float]
@@ -60,6 +60,6 @@ def decode(content: bytes) -> str:
     return content.decode("latin-1")
 
 
-def brief(text: str) -> str:
+def quote(text: str) -> str:
     """Quote text for a message, cut to 40 characters."""
     return repr(text if len(text) <= 40 else f"{text[:37]}...")

@@ -13,7 +13,7 @@ from posefield_train.source.bvh.bvh_content import BvhFile, BvhJoint
 Up = Literal["y", "z"]
 RootOffset = Literal["replace", "add"]
 
-TURNED = 50_000
+BLOCK_JOINTS = 50_000
 """Rotations per block."""
 
 
@@ -37,12 +37,12 @@ def to_clip(file: BvhFile, *, metres_per_unit: float, up: Up, root_offset: RootO
         root = file.joints[0]
         moved = [f"{axis}position" in root.channels for axis in "XYZ"]
         translations[:, 0] += np.where(moved, root.offset, 0.0)
-    rotations[..., 1:] = upright(rotations[..., 1:], up)
-    lengths = metres_per_unit * upright(translations, up)
+    rotations[..., 1:] = to_y_up(rotations[..., 1:], up)
+    lengths = metres_per_unit * to_y_up(translations, up)
     return Clip(skeleton(file, metres_per_unit, up), rotations, lengths, file.rate)
 
 
-def upright(vectors: Floats, up: Up) -> Floats:
+def to_y_up(vectors: Floats, up: Up) -> Floats:
     """Return vectors (..., 3) with Y up; the last three components of a quaternion turn alike."""
     return vectors if up == "y" else vectors[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
 
@@ -54,9 +54,9 @@ def skeleton(file: BvhFile, metres_per_unit: float, up: Up) -> Skeleton:
     return Skeleton(
         tuple(joint.name for joint in file.joints),
         tuple(joint.parent for joint in file.joints),
-        metres_per_unit * upright(offsets, up),
+        metres_per_unit * to_y_up(offsets, up),
         tuple(joint for joint, _ in file.tips),
-        metres_per_unit * upright(tips, up),
+        metres_per_unit * to_y_up(tips, up),
     )
 
 
@@ -74,7 +74,7 @@ def local_motion(file: BvhFile) -> tuple[Floats, Floats]:
         column = end
     for axes, alike in turning.items():
         # Convert joints with the same axis order together, in blocks of small arrays.
-        step = max(1, TURNED // frames)
+        step = max(1, BLOCK_JOINTS // frames)
         for start in range(0, len(alike), step):
             some = alike[start : start + step]
             angles = np.deg2rad(file.values[:, [turns for _, turns in some]])

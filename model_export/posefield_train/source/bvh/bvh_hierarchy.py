@@ -6,19 +6,19 @@ It does not recurse, so that deep nesting cannot overflow the stack.
 import re
 from dataclasses import dataclass, field
 
-from posefield_train.source.bvh.bvh_content import CHANNELS, BvhJoint, Vector, brief
-from posefield_train.source.bvh.bvh_tokens import Tokens
+from posefield_train.source.bvh.bvh_content import CHANNELS, BvhJoint, Vector, quote
+from posefield_train.source.bvh.bvh_tokens import TokenCursor
 
-MOST_JOINTS = 1000
-MOST_LEVELS = 256
+MAX_JOINTS = 1000
+MAX_DEPTH = 256
 """Limits of joints and levels, several times those of any character."""
 
-SPELLING = {name.lower(): name for name in CHANNELS}
+CHANNEL_NAMES = {name.lower(): name for name in CHANNELS}
 COUNT = re.compile(r"\d{1,3}", re.ASCII)
 
 
 @dataclass
-class Draft:
+class JointDraft:
     """A joint before its closing brace."""
 
     name: str
@@ -30,11 +30,11 @@ class Draft:
 
 
 @dataclass
-class Hierarchy:
+class HierarchyReader:
     """Joints and end sites read so far. open: indices of the joints around the cursor."""
 
-    tokens: Tokens
-    drafts: list[Draft] = field(default_factory=list)
+    tokens: TokenCursor
+    drafts: list[JointDraft] = field(default_factory=list)
     tips: list[tuple[int, Vector]] = field(default_factory=list)
     open: list[int] = field(default_factory=list)
     lines: dict[str, int] = field(default_factory=dict)
@@ -66,15 +66,17 @@ class Hierarchy:
                 raise self.tokens.unexpected(
                     word,
                     "OFFSET, CHANNELS, JOINT, End Site or '}' in joint "
-                    f"{brief(joint.name)} of line {joint.line}",
+                    f"{quote(joint.name)} of line {joint.line}",
                 )
 
     def begin_joint(self) -> None:
         """Read a joint's name and its opening brace."""
-        draft = Draft(self.tokens.take_name(), self.open[-1] if self.open else -1, self.tokens.line)
+        draft = JointDraft(
+            self.tokens.take_name(), self.open[-1] if self.open else -1, self.tokens.line
+        )
         if first := self.lines.get(draft.name):
             raise self.tokens.error(
-                f"joint name {brief(draft.name)} stands at line {first} and again at line "
+                f"joint name {quote(draft.name)} stands at line {first} and again at line "
                 f"{draft.line}, expected every joint to have its own name"
             )
         self.lines[draft.name] = draft.line
@@ -94,14 +96,12 @@ class Hierarchy:
 
     def refuse_excess(self) -> None:
         """Raise BvhError for too many joints or levels."""
-        if len(self.drafts) > MOST_JOINTS:
+        if len(self.drafts) > MAX_JOINTS:
             raise self.tokens.error(
-                f"found {len(self.drafts)} joints, expected at most {MOST_JOINTS}"
+                f"found {len(self.drafts)} joints, expected at most {MAX_JOINTS}"
             )
-        if len(self.open) > MOST_LEVELS:
-            raise self.tokens.error(
-                f"found {len(self.open)} levels, expected at most {MOST_LEVELS}"
-            )
+        if len(self.open) > MAX_DEPTH:
+            raise self.tokens.error(f"found {len(self.open)} levels, expected at most {MAX_DEPTH}")
 
     def offset(self) -> None:
         """Read the OFFSET of the innermost open joint."""
@@ -120,7 +120,7 @@ class Hierarchy:
 
         After a child, the order of the columns would be ambiguous.
         """
-        name = brief(self.drafts[self.open[-1]].name)
+        name = quote(self.drafts[self.open[-1]].name)
         if repeated:
             raise self.tokens.error(f"found a second {keyword} in joint {name}, expected one")
         if self.drafts[self.open[-1]].has_children:
@@ -134,8 +134,8 @@ class Hierarchy:
         if not COUNT.fullmatch(word):
             raise self.tokens.unexpected(word, "the number of CHANNELS")
         line, declared, names = self.tokens.line, int(word), list[str]()
-        while self.tokens.peek().lower() in SPELLING:
-            name = SPELLING[self.tokens.take().lower()]
+        while self.tokens.peek().lower() in CHANNEL_NAMES:
+            name = CHANNEL_NAMES[self.tokens.take().lower()]
             if name in names:
                 raise self.tokens.error(
                     f"found channel {name} a second time in one joint, expected once"
@@ -171,7 +171,7 @@ class Hierarchy:
         draft = self.drafts[self.open.pop()]
         if draft.offset is None:
             raise self.tokens.error(
-                f"found the end of joint {brief(draft.name)} of line {draft.line}, "
+                f"found the end of joint {quote(draft.name)} of line {draft.line}, "
                 "expected its OFFSET first"
             )
 

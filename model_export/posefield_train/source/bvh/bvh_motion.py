@@ -7,17 +7,17 @@ import numpy as np
 
 from posefield.common.errors import BvhError
 from posefield.common.units import Floats
-from posefield_train.source.bvh.bvh_content import LARGEST, NUMBER, brief, decode
-from posefield_train.source.bvh.bvh_rows import Held, Rows
-from posefield_train.source.bvh.bvh_text import Text
+from posefield_train.source.bvh.bvh_content import MAX_NUMBER, NUMBER, decode, quote
+from posefield_train.source.bvh.bvh_rows import NumberBuffer, RowCounter
+from posefield_train.source.bvh.bvh_text import TextCursor
 
 FRAMES = re.compile(r"\s*Frames\s*:\s*(\d{1,18})\s*", re.ASCII | re.IGNORECASE)
 FRAME_TIME = re.compile(rf"\s*Frame\s+Time\s*:\s*({NUMBER.pattern})\s*", re.ASCII | re.IGNORECASE)
-SHORTEST, LONGEST = 1e-6, 1e6
+MIN_FRAME_TIME, LONGEST = 1e-6, 1e6
 """Bounds of a frame time, s."""
 
 BROADCAST_RATES = tuple(1000.0 * base / 1001.0 for base in (24, 30, 60, 120))
-SNAP = 1e-4
+RATE_TOLERANCE = 1e-4
 """Relative error of a frame time cut to few digits, such as .008333 or 0.0333333."""
 
 NOT_IN_NUMBERS = bytes(set(range(256)) - set(b"0123456789+-.eE \t\n\r\v\f"))
@@ -27,15 +27,15 @@ def snapped_rate(frame_time: float) -> float:
     """Return frames per second: the nearest whole or broadcast rate within SNAP, or the inverse."""
     rate = 1.0 / frame_time
     nearest = min((max(1.0, float(round(rate))), *BROADCAST_RATES), key=lambda c: abs(c - rate))
-    return nearest if abs(nearest - rate) <= SNAP * nearest else rate
+    return nearest if abs(nearest - rate) <= RATE_TOLERANCE * nearest else rate
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionReader:
     """The text after the line MOTION. most: largest number of values kept in memory."""
 
-    text: Text
-    most: int
+    text: TextCursor
+    max_values: int
 
     def error(self, message: str, line: int) -> BvhError:
         """Return the error at a line of the file."""
@@ -44,14 +44,14 @@ class Motion:
     def read(self, channels: int) -> tuple[float, int, Floats]:
         """Return frame time, number of frames and values (frames, channels).
 
-        If the file both declares and contains more than `most` numbers, the values are empty.
+        If the file both declares and contains more than `max_values` numbers, the values are empty.
         """
         frames = int(self.header(FRAMES, "'Frames: N', N a whole number"))
         if frames < 1:
             raise self.error("found 0 frames, expected at least 1", self.text.line)
         seconds = self.header(FRAME_TIME, "'Frame Time: seconds'")
-        if not SHORTEST <= float(seconds) <= LONGEST:
-            expected = f"a positive number of seconds from {SHORTEST:g} to {LONGEST:g}"
+        if not MIN_FRAME_TIME <= float(seconds) <= LONGEST:
+            expected = f"a positive number of seconds from {MIN_FRAME_TIME:g} to {LONGEST:g}"
             raise self.error(f"found frame time {seconds}, expected {expected}", self.text.line)
         return float(seconds), frames, self.values(frames, channels)
 
@@ -60,7 +60,7 @@ class Motion:
         line = self.text.take_line()
         if match := pattern.fullmatch(line):
             return match.group(1)
-        found = brief(decode(line.strip().encode("latin-1"))) if line else "the end of the file"
+        found = quote(decode(line.strip().encode("latin-1"))) if line else "the end of the file"
         raise self.error(f"found {found}, expected {expected}", self.text.line)
 
     def values(self, frames: int, channels: int) -> Floats:
@@ -68,34 +68,38 @@ class Motion:
         # Skip the line feed after the frame time.
         self.text.fill(1)
         self.text.take(1)
-        rows, held = Rows(frames, channels, self.text.line), Held(min(frames * channels, self.most))
+        rows, held = (
+            RowCounter(frames, channels, self.text.line),
+            NumberBuffer(min(frames * channels, self.max_values)),
+        )
         for piece in self.text.blocks():
             if not piece.strip():
                 rows.pass_blank(piece.count("\n"))
                 continue
             held.add(self.numbers(piece, rows))
-            if rows.expected > self.most < rows.total:
+            if rows.expected > self.max_values < rows.total:
                 return np.empty(0)
-            if rows.total > rows.expected + self.most:
+            if rows.total > rows.expected + self.max_values:
                 raise self.far_too_many(rows)
         rows.finish()
         if fault := rows.fault:
             raise self.error(*fault)
         return held.numbers.reshape(frames, channels)
 
-    def numbers(self, piece: str, rows: Rows) -> Floats:
+    def numbers(self, piece: str, rows: RowCounter) -> Floats:
         """Return the numbers of a piece of the text and add them to the count of `rows`."""
         block = piece.encode("latin-1")
-        numbers = parse(block)
+        numbers = parse_numbers(block)
         if numbers is None:
             raise self.wrong_word(block, rows.total, rows.expected)
         rows.add(block)
         return numbers
 
-    def far_too_many(self, rows: Rows) -> BvhError:
+    def far_too_many(self, rows: RowCounter) -> BvhError:
         """Return the error for so many excess numbers that the rest is not counted."""
         message = (
-            f"found more than {rows.expected + self.most} numbers, expected {rows.frames} frames x "
+            f"found more than {rows.expected + self.max_values} numbers, expected "
+            f"{rows.frames} frames x "
             f"{rows.channels} channels = {rows.expected}"
         )
         return self.error(message, self.text.line)
@@ -105,21 +109,21 @@ class Motion:
         line = self.text.line
         for text in block.decode("latin-1").split("\n"):
             for word in text.encode("latin-1").split():
-                if not NUMBER.fullmatch(word.decode("latin-1")) or abs(float(word)) > LARGEST:
-                    return self.error(_wrong(decode(word), before >= expected), line)
+                if not NUMBER.fullmatch(word.decode("latin-1")) or abs(float(word)) > MAX_NUMBER:
+                    return self.error(_word_error(decode(word), before >= expected), line)
                 before += 1
             line += 1
         raise AssertionError("a block without a fault")
 
 
-def _wrong(word: str, after_the_last: bool) -> str:
+def _word_error(word: str, after_the_last: bool) -> str:
     if after_the_last:
-        return f"found {brief(word)} after the last frame, expected nothing"
-    wanted = f"at most {LARGEST:g}" if NUMBER.fullmatch(word) else "a number"
-    return f"found {brief(word)}, expected {wanted}"
+        return f"found {quote(word)} after the last frame, expected nothing"
+    wanted = f"at most {MAX_NUMBER:g}" if NUMBER.fullmatch(word) else "a number"
+    return f"found {quote(word)}, expected {wanted}"
 
 
-def parse(block: bytes) -> Floats | None:
+def parse_numbers(block: bytes) -> Floats | None:
     """Return the numbers of a block's words.
 
     None if a word is not a number, not finite, or above LARGEST.
@@ -131,4 +135,4 @@ def parse(block: bytes) -> Floats | None:
         numbers = np.array(block.split(), dtype=float)
     except ValueError:
         return None
-    return numbers if np.all(np.abs(numbers) <= LARGEST) else None
+    return numbers if np.all(np.abs(numbers) <= MAX_NUMBER) else None

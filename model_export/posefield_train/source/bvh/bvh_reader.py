@@ -7,18 +7,18 @@ from typing import IO, Literal, Protocol
 
 from posefield.common.errors import BvhError
 from posefield_train.source.bvh.bvh_content import BvhFile, BvhJoint, Vector, decode
-from posefield_train.source.bvh.bvh_hierarchy import Hierarchy
-from posefield_train.source.bvh.bvh_motion import Motion, snapped_rate
-from posefield_train.source.bvh.bvh_text import BLOCK, Text
-from posefield_train.source.bvh.bvh_tokens import Tokens
+from posefield_train.source.bvh.bvh_hierarchy import HierarchyReader
+from posefield_train.source.bvh.bvh_motion import MotionReader, snapped_rate
+from posefield_train.source.bvh.bvh_text import BLOCK, TextCursor
+from posefield_train.source.bvh.bvh_tokens import TokenCursor
 
 # A joint can be named MOTION_head, so the section begins at a line of the keyword alone.
 MOTION_LINE = re.compile(r"^[ \t]*MOTION[ \t]*$", re.MULTILINE | re.IGNORECASE)
 
-MOST_HEAD = 4_000_000
+MAX_HEADER = 4_000_000
 """Limit of characters before the line MOTION: several times the length of MOST_JOINTS joints."""
 
-MOST_POSES = 10_000_000
+MAX_POSES = 10_000_000
 """Limit of frames times joints: 45 minutes of 31 joints at 120 frames a second, 0.6 GB as a clip.
 
 Joints without channels add nothing to the MOTION section, so the file's size does not limit them.
@@ -52,25 +52,25 @@ def load(file: IO[bytes], source: str) -> BvhFile:
     At most the numbers of MOST_POSES and a few megabytes are kept in memory, whatever the file's
     size. Raises BvhError for a violation of the grammar or an inconsistency.
     """
-    text = Text(file, source)
+    text = TextCursor(file, source)
     # Read one more block, so that a line that begins before the limit is complete.
-    text.fill(MOST_HEAD + BLOCK)
+    text.fill(MAX_HEADER + BLOCK)
     found = MOTION_LINE.search(text.ahead)
     size = found.start() if found else len(text.ahead)
     end = "MOTION" if found else "the end of the file"
-    if size > MOST_HEAD:
-        size, end = MOST_HEAD, f"{MOST_HEAD // 1_000_000} MB without a line MOTION"
+    if size > MAX_HEADER:
+        size, end = MAX_HEADER, f"{MAX_HEADER // 1_000_000} MB without a line MOTION"
     joints, tips = _tree(text.take(size), source, end)
     channels = sum(len(joint.channels) for joint in joints)
     if not channels:
         message = f"found no channel in {len(joints)} joints, expected at least one"
         raise BvhError(source, message, text.line)
     text.take_line()
-    motion = Motion(text, most=MOST_POSES // len(joints) * channels)
+    motion = MotionReader(text, max_values=MAX_POSES // len(joints) * channels)
     frame_time, frames, values = motion.read(channels)
-    if frames * len(joints) > MOST_POSES:
+    if frames * len(joints) > MAX_POSES:
         message = f"found {frames} frames of {len(joints)} joints, expected at most"
-        raise BvhError(source, f"{message} {MOST_POSES} poses of a joint", text.line)
+        raise BvhError(source, f"{message} {MAX_POSES} poses of a joint", text.line)
     return BvhFile(source, joints, tips, values, frame_time, snapped_rate(frame_time))
 
 
@@ -80,14 +80,14 @@ _Tree = tuple[tuple[BvhJoint, ...], tuple[tuple[int, Vector], ...]]
 def _tree(head: str, source: str, end: str) -> _Tree:
     """Return the joints and end sites of the text before MOTION; `end` names the text after it."""
     try:
-        return _known_tree(head, end)
+        return _parse_tree(head, end)
     except BvhError as fault:
         raise BvhError(source, fault.message, fault.line) from None
 
 
 @lru_cache(maxsize=16)
-def _known_tree(head: str, end: str) -> _Tree:
+def _parse_tree(head: str, end: str) -> _Tree:
     # Cached, because all takes of one performer have the same hierarchy.
-    hierarchy = Hierarchy(Tokens(decode(head.encode("latin-1")), "", end))
+    hierarchy = HierarchyReader(TokenCursor(decode(head.encode("latin-1")), "", end))
     hierarchy.read()
     return hierarchy.joints(), tuple(hierarchy.tips)

@@ -11,7 +11,7 @@ BLANK = np.isin(np.arange(256), list(b" \t\n\r\v\f"))
 
 
 @dataclass
-class Rows:
+class RowCounter:
     """Counts of the numbers on each line, over consecutive blocks.
 
     A frame may extend over several lines. The total alone is not checked, because a line with too
@@ -29,9 +29,9 @@ class Rows:
     total: int = 0
     filled: int = 0
     begun: int = 0
-    odd: int | None = None
+    wrong_line: int | None = None
     last: int | None = None
-    torn: bool = False
+    ends_inside_line: bool = False
 
     @property
     def expected(self) -> int:
@@ -70,10 +70,12 @@ class Rows:
             return
         rows = self.filled + np.arange(len(ends))
         odd = np.flatnonzero((ends - starts != self.channels) | (rows == self.frames))
-        if self.odd is None and len(odd):
-            self.odd = int(lines[odd[0]])
+        if self.wrong_line is None and len(odd):
+            self.wrong_line = int(lines[odd[0]])
         inner = starts // self.channels + 1
-        self.torn |= bool(np.any((inner * self.channels < ends) & (inner <= self.frames)))
+        self.ends_inside_line |= bool(
+            np.any((inner * self.channels < ends) & (inner <= self.frames))
+        )
         self.filled += len(ends)
         self.begun, self.last = int(ends[-1]), int(lines[-1])
 
@@ -83,16 +85,18 @@ class Rows:
 
         The line is the first one of a wrong length, else the end of the numbers.
         """
-        if self.total == self.expected and not self.torn:
+        if self.total == self.expected and not self.ends_inside_line:
             return None
         message = (
             f"found {self.total} numbers in {self.filled} lines, expected {self.frames} frames x "
             f"{self.channels} channels = {self.expected}, each frame on lines of its own"
         )
-        return message, next(line for line in (self.odd, self.last, self.line) if line is not None)
+        return message, next(
+            line for line in (self.wrong_line, self.last, self.line) if line is not None
+        )
 
 
-class Held:
+class NumberBuffer:
     """Numbers of a MOTION section, up to `most`.
 
     Memory is allocated for numbers read, not for the count that the file declares.

@@ -10,11 +10,11 @@ from posefield.common.errors import BvhError
 BLOCK = 256_000
 """Bytes per read; parsing their numbers takes fifty times as much memory."""
 
-MOST_BYTES = 1_000_000_000
+MAX_BYTES = 1_000_000_000
 """Limit of the file's size: three times 45 minutes of 31 joints at 120 frames a second."""
 
 
-class Text:
+class TextCursor:
     """Cursor over the characters of a binary file, one per byte (Latin-1).
 
     Only line feeds end a line; carriage returns are translated. ahead: characters read and not yet
@@ -34,8 +34,8 @@ class Text:
         while len(self.ahead) < count and not self._ended:
             block = self._file.read(BLOCK)
             self._bytes += len(block)
-            if self._bytes > MOST_BYTES:
-                most = f"{MOST_BYTES // 1_000_000} MB"
+            if self._bytes > MAX_BYTES:
+                most = f"{MAX_BYTES // 1_000_000} MB"
                 raise BvhError(self.source, f"found more than {most}, expected at most {most}")
             self._ended = not block
             self.ahead += self._newlines.decode(block.decode("latin-1"), final=self._ended)

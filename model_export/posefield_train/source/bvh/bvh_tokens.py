@@ -4,13 +4,13 @@ import re
 
 from posefield.common.errors import BvhError
 from posefield.motion.bvh_writer import WORD
-from posefield_train.source.bvh.bvh_content import LARGEST, NUMBER, Vector, brief
+from posefield_train.source.bvh.bvh_content import MAX_NUMBER, NUMBER, Vector, quote
 
 # Consecutive blank lines are one token, because a file can have millions.
 TOKEN = re.compile(rf"\n\s*|[{{}}]|{WORD.pattern}", re.ASCII)
 
 
-class Tokens:
+class TokenCursor:
     """Cursor over the tokens of `text`; `end` names the text after the last one.
 
     line: line of the token last taken. Tokens are found one at a time, so that an invalid file is
@@ -67,13 +67,13 @@ class Tokens:
         word = self.take()
         if not NUMBER.fullmatch(word):
             raise self.unexpected(word, f"a number, the {axis} of an OFFSET of three")
-        if abs(value := float(word)) > LARGEST:
-            raise self.unexpected(word, f"an OFFSET of at most {LARGEST:g}")
+        if abs(value := float(word)) > MAX_NUMBER:
+            raise self.unexpected(word, f"an OFFSET of at most {MAX_NUMBER:g}")
         return value
 
     def unexpected(self, word: str, expected: str) -> BvhError:
         """Return an error about the token last taken."""
-        return self.error(f"found {brief(word) if word else self.end}, expected {expected}")
+        return self.error(f"found {quote(word) if word else self.end}, expected {expected}")
 
     def error(self, message: str) -> BvhError:
         """Return an error at the line of the token last taken."""

@@ -11,10 +11,10 @@ from typing import Any, Protocol
 import msgspec
 
 from posefield.question import text_decoding
-from posefield.question.motion_question import LEGAL_NAME, Exact, Target
+from posefield.question.motion_question import LEGAL_NAME, ExactControls, Target
 
 
-class Kind(Protocol):
+class CellKind(Protocol):
     """Parsers of a column's cells, for text and for values of JSON or Parquet."""
 
     @property
@@ -29,7 +29,7 @@ class Kind(Protocol):
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberCell:
     """Numbers, with an optional unit."""
 
     unit: str | None = None
@@ -56,23 +56,23 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Whole:
+class IntegerCell:
     """Whole numbers, also as floats such as 1.0, which columns with gaps are converted to."""
 
     expected: str = "a whole number"
 
     def text(self, cells: Sequence[str]) -> list[int | None]:
-        return self.values(Number().text(cells))
+        return self.values(NumberCell().text(cells))
 
     def values(self, cells: Sequence[Any]) -> list[int | None]:
-        numbers = Number().values(cells)
+        numbers = NumberCell().values(cells)
         if not all(number is None or number.is_integer() for number in numbers):
             raise ValueError
         return [None if number is None else int(number) for number in numbers]
 
 
 @dataclass(frozen=True)
-class Word:
+class ChoiceCell:
     """One of a list of words."""
 
     choices: tuple[str, ...]
@@ -92,7 +92,7 @@ class Word:
 
 
 @dataclass(frozen=True)
-class Flag:
+class BooleanCell:
     """True or false."""
 
     expected: str = "true or false"
@@ -119,23 +119,23 @@ class ExactCell:
 
     expected: str = "auto, none or names of controls, commas between"
 
-    def text(self, cells: Sequence[str]) -> list[Exact | None]:
-        return [text_decoding.exact(cell) if cell else None for cell in cells]
+    def text(self, cells: Sequence[str]) -> list[ExactControls | None]:
+        return [text_decoding.parse_exact(cell) if cell else None for cell in cells]
 
-    def values(self, cells: Sequence[Any]) -> list[Exact | None]:
-        return [_exact(cell) for cell in cells]
+    def values(self, cells: Sequence[Any]) -> list[ExactControls | None]:
+        return [_parse_exact(cell) for cell in cells]
 
 
-def _exact(cell: object) -> Exact | None:
+def _parse_exact(cell: object) -> ExactControls | None:
     if isinstance(cell, list) and cell and {*map(type, cell)} == {str}:
         return tuple(cell)
     if cell is None or isinstance(cell, str):
-        return text_decoding.exact(cell) if cell else None
+        return text_decoding.parse_exact(cell) if cell else None
     raise ValueError
 
 
 @dataclass(frozen=True)
-class Targets:
+class TargetsCell:
     """Targets of a clip: JOINT@MOMENT:X,Y,Z; ... in text, else a list of objects.
 
     The objects have the keys joint, position, and time or at.
@@ -144,17 +144,17 @@ class Targets:
     expected: str = "targets: JOINT@MOMENT:X,Y,Z; ... in text, else a list of objects"
 
     def text(self, cells: Sequence[str]) -> list[tuple[Target, ...] | None]:
-        return [_targets(cell) for cell in cells]
+        return [_parse_targets(cell) for cell in cells]
 
     def values(self, cells: Sequence[Any]) -> list[tuple[Target, ...] | None]:
-        return [_targets(cell) for cell in cells]
+        return [_parse_targets(cell) for cell in cells]
 
 
-def _targets(cell: object) -> tuple[Target, ...] | None:
+def _parse_targets(cell: object) -> tuple[Target, ...] | None:
     if cell is None or cell == "":
         return None
     if isinstance(cell, str):
-        return tuple(text_decoding.target(part.strip()) for part in cell.split(";"))
+        return tuple(text_decoding.parse_target(part.strip()) for part in cell.split(";"))
     try:
         return msgspec.convert(cell, tuple[Target, ...])
     except msgspec.ValidationError as fault:

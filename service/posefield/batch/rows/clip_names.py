@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 Digests = NDArray[np.uint64]
 
 
-def generated(index: int) -> str:
+def generated_name(index: int) -> str:
     """Return the name of the row with this index, from 0; it does not depend on skipped rows."""
     return f"clip-{index:06d}"
 
 
-class Seen:
+class UsedNames:
     """Set of the names used so far, as digests of 8 bytes each.
 
     Case is ignored, as in some file systems. Among ten million names, two have equal digests with a
@@ -26,7 +26,7 @@ class Seen:
         # times.
         self._runs: list[Digests] = []
 
-    def repeated(self, names: Sequence[str]) -> list[int]:
+    def find_repeated(self, names: Sequence[str]) -> list[int]:
         """Return the indices of names that occurred before, and add all names to the set."""
         digests = _digests(names)
         order = np.argsort(digests, kind="stable")

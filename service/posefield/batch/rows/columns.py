@@ -1,8 +1,9 @@
 """Columns of query tables, and the parsing of their headings.
 
-There is one column for each control of the model, by its name, and those of `OPTIONS`. A heading
-may state the unit of a control, `speed [m/s]` or `speed (m/s)`, which must then be the model's.
-`controls/NAME` is accepted for any control, and required for one with the name of an option.
+There is one column for each control of the model, by its name, and those of `OPTION_KINDS`. A
+heading may state the unit of a control, `speed [m/s]` or `speed (m/s)`, which must then be the
+model's. `controls/NAME` is accepted for any control, and required for one with the name of an
+option.
 """
 
 import re
@@ -12,15 +13,24 @@ from difflib import get_close_matches
 from functools import partial
 from typing import Any, Literal, get_args, get_origin
 
-from posefield.batch.rows.cells import ExactCell, Flag, Kind, NameCell, Number, Targets, Whole, Word
-from posefield.encode.formats import ENCODERS
+from posefield.batch.rows.cells import (
+    BooleanCell,
+    CellKind,
+    ChoiceCell,
+    ExactCell,
+    IntegerCell,
+    NameCell,
+    NumberCell,
+    TargetsCell,
+)
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.model_file.model_card import ModelCard
 from posefield.question import text_decoding
-from posefield.question.motion_question import Exact, Name, NamedClipQuestion, Target
+from posefield.question.motion_question import ExactControls, Name, NamedClipQuestion, Target
 from posefield.question.text_decoding import Parameter
 
-CONTROL = "controls/"
-LONGEST = 200
+CONTROL_PREFIX = "controls/"
+MAX_TEXT_LENGTH = 200
 """Longest value that a message repeats, characters."""
 WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))")
 
@@ -28,35 +38,37 @@ NO_COLUMN = ("joint_sigma",)
 """Fields of a question without a column."""
 
 
-def _kinds() -> dict[str, Callable[[ModelCard], Kind]]:
-    found: dict[str, Callable[[ModelCard], Kind]] = {"format": lambda _: Word(tuple(ENCODERS))}
+def _option_kinds() -> dict[str, Callable[[ModelCard], CellKind]]:
+    found: dict[str, Callable[[ModelCard], CellKind]] = {
+        "format": lambda _: ChoiceCell(tuple(CLIP_ENCODERS))
+    }
     for parameter in text_decoding.parameters(NamedClipQuestion).values():
         if parameter.field not in NO_COLUMN:
-            found[parameter.field] = partial(_kind, parameter)
+            found[parameter.field] = partial(_cell_kind, parameter)
     return found
 
 
-def _kind(parameter: Parameter, card: ModelCard) -> Kind:
+def _cell_kind(parameter: Parameter, card: ModelCard) -> CellKind:
     """Return the kind of the cells of a field's column."""
     if parameter.field == "performer":
-        return Word(card.performers)
+        return ChoiceCell(card.performers)
     if get_origin(parameter.kind) is Literal:
-        return Word(get_args(parameter.kind))
+        return ChoiceCell(get_args(parameter.kind))
     if parameter.kind is float:
-        return Number(parameter.unit)
-    return KINDS[parameter.kind]
+        return NumberCell(parameter.unit)
+    return CELL_KINDS[parameter.kind]
 
 
-KINDS: Mapping[Any, Kind] = {
-    int: Whole(),
-    bool: Flag(),
-    Exact: ExactCell(),
-    Target: Targets(),
+CELL_KINDS: Mapping[Any, CellKind] = {
+    int: IntegerCell(),
+    bool: BooleanCell(),
+    ExactControls: ExactCell(),
+    Target: TargetsCell(),
     Name: NameCell(),
 }
 """Kind of cells by the type of a field."""
 
-OPTIONS = _kinds()
+OPTION_KINDS = _option_kinds()
 """All columns except the controls: the format, and the fields of a NamedClipQuestion."""
 
 
@@ -69,18 +81,18 @@ class Column:
     """
 
     field: str
-    kind: Kind
+    kind: CellKind
     unit: str | None = None
 
     @property
     def name(self) -> str:
         """Name in messages."""
-        return self.field.removeprefix(CONTROL)
+        return self.field.removeprefix(CONTROL_PREFIX)
 
     @property
     def control(self) -> bool:
         """True for a control, which every row must have."""
-        return self.field.startswith(CONTROL)
+        return self.field.startswith(CONTROL_PREFIX)
 
     def read(self, reader: Callable[[Sequence[Any]], list[Any]], cells: Sequence[Any]) -> list[Any]:
         """Return the values of cells by one of the kind's parsers.
@@ -93,7 +105,7 @@ class Column:
             if self.control and None in values:
                 raise ValueError
         except ValueError as fault:
-            found = "empty" if cells[0] in ("", None) else shown(cells[0])
+            found = "empty" if cells[0] in ("", None) else shortened_text(cells[0])
             raise ValueError(f"{self.name}: {found}, expected {self.kind.expected}") from fault
         return values
 
@@ -124,7 +136,7 @@ class Columns:
             raise ValueError(f"column {twin.name!r} twice, expected once")
         for control in self.controls:
             if control not in found:
-                given = shown(list(titles))
+                given = shortened_text(list(titles))
                 raise ValueError(
                     f"no column {control.name!r}, expected one of numbers in {control.unit}; "
                     f"found {given}"
@@ -139,36 +151,40 @@ class Columns:
         stated = WITH_UNIT.fullmatch(title)
         column = self.titles.get(stated["name"]) if stated else None
         if not stated or not column:
-            raise ValueError(f"unknown column {shown(title)}, {self._instead(title)}")
+            raise ValueError(
+                f"unknown column {shortened_text(title)}, {self._closest_title(title)}"
+            )
         unit = stated["square"] or stated["round"] or ""
         if unit.strip() != column.unit:
             expected = f"{column.unit}" if column.unit else "none"
             raise ValueError(f"column {column.name!r} in the unit {unit!r}, expected {expected}")
         return column
 
-    def _instead(self, title: str) -> str:
-        plain = {name.lower(): name for name in self.titles if not name.startswith(CONTROL)}
+    def _closest_title(self, title: str) -> str:
+        plain = {name.lower(): name for name in self.titles if not name.startswith(CONTROL_PREFIX)}
         near = get_close_matches(title.lower(), plain, n=1)
         if near:
             return f"did you mean {plain[near[0]]!r}?"
         return f"expected one of {', '.join(plain.values())}"
 
 
-def of(card: ModelCard) -> Columns:
+def columns_of(card: ModelCard) -> Columns:
     """Return the columns of tables for a model."""
-    controls = tuple(Column(CONTROL + c.name, Number(c.unit), c.unit) for c in card.controls)
-    options = {name: _option(name, kind(card)) for name, kind in OPTIONS.items()}
+    controls = tuple(
+        Column(CONTROL_PREFIX + c.name, NumberCell(c.unit), c.unit) for c in card.controls
+    )
+    options = {name: _option_column(name, kind(card)) for name, kind in OPTION_KINDS.items()}
     return Columns(
         controls,
         {c.name: c for c in controls} | options | {c.field: c for c in controls},
     )
 
 
-def shown(value: object) -> str:
+def shortened_text(value: object) -> str:
     """Return a value as text for messages, truncated to LONGEST characters."""
     whole = repr(value)
-    return whole if len(whole) <= LONGEST else f"{whole[:LONGEST]}..."
+    return whole if len(whole) <= MAX_TEXT_LENGTH else f"{whole[:MAX_TEXT_LENGTH]}..."
 
 
-def _option(name: str, kind: Kind) -> Column:
-    return Column(name, kind, kind.unit if isinstance(kind, Number) else None)
+def _option_column(name: str, kind: CellKind) -> Column:
+    return Column(name, kind, kind.unit if isinstance(kind, NumberCell) else None)

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TextIO
 
 from posefield.batch.rows.columns import Column, Columns
-from posefield.batch.rows.row_blocks import Block, Broken, Gathering
-from posefield.batch.rows.source_files import Original, lines
+from posefield.batch.rows.row_blocks import BlockBuilder, BrokenRow, RowBlock
+from posefield.batch.rows.source_files import SourceFile, read_lines
 from posefield.common.errors import FileError
 
 
@@ -19,42 +19,42 @@ from posefield.common.errors import FileError
 class CsvFile:
     """A CSV file with a valid heading, as a source of rows."""
 
-    original: Original
+    source_file: SourceFile
     heading: tuple[Column, ...]
 
     def place(self, line: int) -> str:
         """Return the name of a row for messages."""
-        return f"{self.original.path}:{line}"
+        return f"{self.source_file.path}:{line}"
 
-    def blocks(self) -> Iterator[Block | Broken]:
+    def blocks(self) -> Iterator[RowBlock | BrokenRow]:
         """Yield the rows below the heading, in blocks."""
-        return self.original.unchanged(self._blocks())
+        return self.source_file.unchanged(self._blocks())
 
-    def _blocks(self) -> Iterator[Block | Broken]:
-        gathering = Gathering(self.heading, [column.kind.text for column in self.heading])
-        with _open(self.original.path) as file:
-            rows = _rows(self.original.path, file)
+    def _blocks(self) -> Iterator[RowBlock | BrokenRow]:
+        gathering = BlockBuilder(self.heading, [column.kind.text for column in self.heading])
+        with _open(self.source_file.path) as file:
+            rows = _rows(self.source_file.path, file)
             next(rows)
             for row in rows:
-                if isinstance(row, Broken):
+                if isinstance(row, BrokenRow):
                     yield from gathering.broken(row)
                 elif len(row[1]) != len(self.heading):
                     message = f"{len(row[1])} cells, expected {len(self.heading)} as in the heading"
-                    yield from gathering.broken(Broken(row[0], message))
+                    yield from gathering.broken(BrokenRow(row[0], message))
                 elif gathering.add(*row):
                     yield from gathering.flush()
             yield from gathering.flush()
 
 
-def read(original: Original, columns: Columns) -> CsvFile:
+def read(original: SourceFile, columns: Columns) -> CsvFile:
     """Return a CSV file; FileError if its heading does not fit the model."""
     with _open(original.path) as file:
-        first = next(_rows(original.path, file), Broken(1, "empty, expected a heading"))
-    if isinstance(first, Broken):
+        first = next(_rows(original.path, file), BrokenRow(1, "empty, expected a heading"))
+    if isinstance(first, BrokenRow):
         raise FileError(original.path, first.message, first.number)
     line, titles = first
     try:
-        return CsvFile(original, columns.heading([_title(title) for title in titles]))
+        return CsvFile(original, columns.heading([_stripped_title(title) for title in titles]))
     except ValueError as fault:
         separator = ", and commas between columns" if ";" in titles[0] else ""
         raise FileError(original.path, f"{fault}{separator}", line) from fault
@@ -65,9 +65,9 @@ def _open(path: Path) -> TextIO:
     return path.open(encoding="utf-8-sig", errors="surrogateescape", newline="")
 
 
-def _rows(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]] | Broken]:
+def _rows(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]] | BrokenRow]:
     """Yield line number and cells of each row, without blank ones."""
-    reader = csv.reader(lines(path, file.readline), strict=True, skipinitialspace=True)
+    reader = csv.reader(read_lines(path, file.readline), strict=True, skipinitialspace=True)
     while True:
         line = reader.line_num + 1
         try:
@@ -75,13 +75,13 @@ def _rows(path: Path, file: TextIO) -> Iterator[tuple[int, list[str]] | Broken]:
         except StopIteration:
             return
         except csv.Error as fault:
-            yield Broken(line, f"not CSV: {fault}")
+            yield BrokenRow(line, f"not CSV: {fault}")
         else:
             if row:
                 yield line, row
 
 
-def _title(title: str) -> str:
+def _stripped_title(title: str) -> str:
     if not title.isprintable():
         raise ValueError(f"{title!r} in the heading, expected text in UTF-8")
     return title.strip()

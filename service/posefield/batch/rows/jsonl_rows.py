@@ -12,57 +12,57 @@ from typing import Any
 
 import orjson
 
-from posefield.batch.rows.columns import CONTROL, Columns, shown
-from posefield.batch.rows.row_blocks import Block, Broken, Gathering
-from posefield.batch.rows.source_files import Original, lines
+from posefield.batch.rows.columns import CONTROL_PREFIX, Columns, shortened_text
+from posefield.batch.rows.row_blocks import BlockBuilder, BrokenRow, RowBlock
+from posefield.batch.rows.source_files import SourceFile, read_lines
 
 BOM = b"\xef\xbb\xbf"
-HEADINGS = 256
+MAX_CACHED_HEADINGS = 256
 """Number of cached sets of keys: most files have one or a few."""
 
 
 @dataclass(frozen=True)
-class JsonLines:
+class JsonLinesFile:
     """A JSON Lines file as a source of rows."""
 
-    original: Original
+    source_file: SourceFile
     columns: Columns
 
     def place(self, line: int) -> str:
         """Return the name of a row for messages."""
-        return f"{self.original.path}:{line}"
+        return f"{self.source_file.path}:{line}"
 
-    def blocks(self) -> Iterator[Block | Broken]:
+    def blocks(self) -> Iterator[RowBlock | BrokenRow]:
         """Yield blocks of rows, all with the same columns."""
-        return self.original.unchanged(self._blocks())
+        return self.source_file.unchanged(self._blocks())
 
-    def _blocks(self) -> Iterator[Block | Broken]:
+    def _blocks(self) -> Iterator[RowBlock | BrokenRow]:
         all_columns = self.columns.all
-        gathering = Gathering(all_columns, [column.kind.values for column in all_columns])
-        row = _Rows(self.columns)
-        path = self.original.path
+        gathering = BlockBuilder(all_columns, [column.kind.values for column in all_columns])
+        row = _LineParser(self.columns)
+        path = self.source_file.path
         with path.open("rb") as file:
-            for number, line in enumerate(lines(path, file.readline), start=1):
+            for number, line in enumerate(read_lines(path, file.readline), start=1):
                 text = line.removeprefix(BOM) if number == 1 else line
                 if not text.strip():
                     continue
                 try:
                     full = gathering.add(number, row.cells(text))
                 except ValueError as fault:
-                    yield from gathering.broken(Broken(number, str(fault)))
+                    yield from gathering.broken(BrokenRow(number, str(fault)))
                     continue
                 if full:
                     yield from gathering.flush()
             yield from gathering.flush()
 
 
-class _Rows:
+class _LineParser:
     """Parser of lines to cells of all columns."""
 
     def __init__(self, columns: Columns) -> None:
         self._width = len(columns.all)
         place = {column: i for i, column in enumerate(columns.all)}
-        self._places = lru_cache(HEADINGS)(
+        self._places = lru_cache(MAX_CACHED_HEADINGS)(
             lambda titles: [place[column] for column in columns.heading(titles)]
         )
 
@@ -80,8 +80,8 @@ def _pairs(line: bytes) -> tuple[tuple[str, ...], list[Any]]:
     row = _object(line)
     nested = row.pop("controls", {})
     if not isinstance(nested, dict):
-        raise ValueError(f"controls: {shown(nested)}, expected an object")
-    keys = (*row, *(CONTROL + name for name in nested))
+        raise ValueError(f"controls: {shortened_text(nested)}, expected an object")
+    keys = (*row, *(CONTROL_PREFIX + name for name in nested))
     return keys, [*row.values(), *nested.values()]
 
 
@@ -91,23 +91,23 @@ def _object(line: bytes) -> dict[str, Any]:
     except orjson.JSONDecodeError as fault:
         raise ValueError(f"not JSON: {fault}") from fault
     if not isinstance(row, dict):
-        raise ValueError(f"{shown(row)}, expected an object")
+        raise ValueError(f"{shortened_text(row)}, expected an object")
     nested = row.get("controls")
     keys = len(row) + (len(nested) if isinstance(nested, dict) else 0)
     # A key takes one colon: if there are more, a string contains one or a key is repeated.
     if line.count(b":") > keys:
-        _look_for_twins(line)
+        _check_duplicate_keys(line)
     return row
 
 
-def _look_for_twins(line: bytes) -> None:
+def _check_duplicate_keys(line: bytes) -> None:
     try:
-        json.loads(line, object_pairs_hook=_refuse_twins)
+        json.loads(line, object_pairs_hook=_refuse_duplicate_keys)
     except RecursionError as fault:
         raise ValueError("objects or lists in one another too often") from fault
 
 
-def _refuse_twins(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _refuse_duplicate_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     keys = [key for key, _ in pairs]
     twins = sorted({key for key in keys if keys.count(key) > 1})
     if twins:

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from posefield.batch.rows.cells import Flag, Number, Whole
+from posefield.batch.rows.cells import BooleanCell, IntegerCell, NumberCell
 from posefield.batch.rows.columns import Column, Columns
-from posefield.batch.rows.row_blocks import SIZE, Block
-from posefield.batch.rows.source_files import Original
+from posefield.batch.rows.row_blocks import BLOCK_SIZE, RowBlock
+from posefield.batch.rows.source_files import SourceFile
 from posefield.common.errors import FileError
 
 
@@ -19,31 +19,31 @@ from posefield.common.errors import FileError
 class ParquetFile:
     """A Parquet file with valid columns, as a source of rows."""
 
-    original: Original
+    source_file: SourceFile
     heading: tuple[Column, ...]
 
     def place(self, row: int) -> str:
         """Return the name of a row for messages."""
-        return f"{self.original.path} row {row}"
+        return f"{self.source_file.path} row {row}"
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[RowBlock]:
         """Yield the rows in blocks, in order."""
-        return self.original.unchanged(self._blocks())
+        return self.source_file.unchanged(self._blocks())
 
-    def _blocks(self) -> Iterator[Block]:
+    def _blocks(self) -> Iterator[RowBlock]:
         readers = [column.kind.values for column in self.heading]
         first = 0
-        with _opened(self.original) as file:
-            for batch in file.iter_batches(SIZE):
+        with _opened(self.source_file) as file:
+            for batch in file.iter_batches(BLOCK_SIZE):
                 size = len(batch)
                 cells = [column.to_pylist() for column in batch.columns]
                 numbers = range(first + 1, first + size + 1)
                 if size:
-                    yield Block(first, numbers, self.heading, readers, cells)
+                    yield RowBlock(first, numbers, self.heading, readers, cells)
                 first += size
 
 
-def read(original: Original, columns: Columns) -> ParquetFile:
+def read(original: SourceFile, columns: Columns) -> ParquetFile:
     """Return a Parquet file.
 
     Raises FileError if its columns do not fit the model or pyarrow is missing.
@@ -60,7 +60,7 @@ def read(original: Original, columns: Columns) -> ParquetFile:
 
 
 @contextmanager
-def _opened(original: Original) -> Iterator[Any]:
+def _opened(original: SourceFile) -> Iterator[Any]:
     """Open the file with pyarrow; convert pyarrow's errors to FileError."""
     try:
         import pyarrow
@@ -82,14 +82,14 @@ def _check_type(column: Column, kind: Any) -> None:
 
     types = pyarrow.types
     plain = kind.value_type if types.is_dictionary(kind) else kind
-    tests = _TESTS.get(type(column.kind), ("is_string", "is_large_string"))
+    tests = _TYPE_TESTS.get(type(column.kind), ("is_string", "is_large_string"))
     if not any(getattr(types, test)(plain) for test in (*tests, "is_null")):
         raise ValueError(f"column {column.name!r} of type {kind}, expected {column.kind.expected}")
 
 
-_TESTS = {
-    Number: ("is_floating", "is_integer"),
-    Whole: ("is_floating", "is_integer"),
-    Flag: ("is_boolean",),
+_TYPE_TESTS = {
+    NumberCell: ("is_floating", "is_integer"),
+    IntegerCell: ("is_floating", "is_integer"),
+    BooleanCell: ("is_boolean",),
 }
 """Functions of pyarrow.types by kind, for all kinds except strings."""

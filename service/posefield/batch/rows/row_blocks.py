@@ -6,12 +6,12 @@ from typing import Any
 
 from posefield.batch.rows.columns import Column
 
-SIZE = 4096
+BLOCK_SIZE = 4096
 """Rows of a block; larger blocks are no faster."""
 
 
 @dataclass(frozen=True)
-class Block:
+class RowBlock:
     """Consecutive rows of a source.
 
     first: index of the first row. numbers: the line or row number of each, for messages. columns:
@@ -27,13 +27,13 @@ class Block:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def part(self, start: int, stop: int) -> "Block":
+    def part(self, start: int, stop: int) -> "RowBlock":
         """Return the rows from `start` to before `stop`."""
         cells = [column[start:stop] for column in self.cells]
         numbers = self.numbers[start:stop]
-        return Block(self.first + start, numbers, self.columns, self.readers, cells)
+        return RowBlock(self.first + start, numbers, self.columns, self.readers, cells)
 
-    def halves(self) -> Iterator["Block"]:
+    def halves(self) -> Iterator["RowBlock"]:
         """Yield the first and the second half of the rows."""
         middle = len(self) // 2
         yield self.part(0, middle)
@@ -54,7 +54,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Broken:
+class BrokenRow:
     """A row that cannot be split into cells: its line or row number, and the reason."""
 
     number: int
@@ -62,7 +62,7 @@ class Broken:
 
 
 @dataclass
-class Gathering:
+class BlockBuilder:
     """Collector of rows with equal columns, up to the size of a block.
 
     columns: the columns. readers: parser of each column's cells. index: of the next row.
@@ -80,19 +80,19 @@ class Gathering:
         """Add a row; return whether the block is full."""
         self._numbers.append(number)
         self._rows.append(row)
-        return len(self._rows) == SIZE
+        return len(self._rows) == BLOCK_SIZE
 
-    def broken(self, row: Broken) -> Iterator[Block | Broken]:
+    def broken(self, row: BrokenRow) -> Iterator[RowBlock | BrokenRow]:
         """Yield the collected block, then a row without cells."""
         yield from self.flush()
         self.index += 1
         yield row
 
-    def flush(self) -> Iterator[Block]:
+    def flush(self) -> Iterator[RowBlock]:
         """Yield the collected rows as a block, if there are any."""
         numbers, rows = self._numbers, self._rows
         if rows:
             cells = list(zip(*rows, strict=True))
-            yield Block(self.index, numbers, self.columns, self.readers, cells)
+            yield RowBlock(self.index, numbers, self.columns, self.readers, cells)
         self.index += len(rows)
         self._numbers, self._rows = [], []

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from posefield.batch.rows.columns import CONTROL
+from posefield.batch.rows.columns import CONTROL_PREFIX
 from posefield.common.units import Floats
 from posefield.kriging.support import Support
 from posefield.model_file.model_card import ModelCard
@@ -20,34 +20,34 @@ from posefield.validation import input_limits
 Values = Mapping[str, Sequence[Any]]
 
 
-def pass_all(card: ModelCard, support: Support, values: Values, usual: ClipQuestion) -> bool:
+def all_valid(card: ModelCard, support: Support, values: Values, usual: ClipQuestion) -> bool:
     """Return whether all rows are valid; false if one needs validation by itself.
 
     values: by field. usual: defaults of missing values.
     """
     return (
-        _controls_pass(card, support, values, usual)
+        _controls_valid(card, support, values, usual)
         and _within(_column(values, "level", usual.level), 0, len(card.levels) - 1)
-        and _within(_column(values, "fps", usual.fps), *frame_times.RATES)
-        and _window_passes(card, values, usual)
-        and _loops_pass(card, values, usual)
-        and _hold_passes(values)
+        and _within(_column(values, "fps", usual.fps), *frame_times.FPS_RANGE)
+        and _window_valid(card, values, usual)
+        and _loops_valid(card, values, usual)
+        and _constraints_valid(values)
         and (bool(card.roles) or {*values.get("names", ()), usual.names} <= {"own", None})
     )
 
 
-def _controls_pass(card: ModelCard, support: Support, values: Values, usual: ClipQuestion) -> bool:
+def _controls_valid(card: ModelCard, support: Support, values: Values, usual: ClipQuestion) -> bool:
     strict = "refuse" in values.get("extrapolate", ()) or usual.extrapolate == "refuse"
-    allowed = input_limits.sampled if strict else input_limits.reach
-    columns = [np.asarray(values[CONTROL + control.name]) for control in card.controls]
+    allowed = input_limits.sampled_range if strict else input_limits.accepted_range
+    columns = [np.asarray(values[CONTROL_PREFIX + control.name]) for control in card.controls]
     pairs = zip(columns, card.controls, strict=True)
     if not all(_within(column, *allowed(control)) for column, control in pairs):
         return False
-    return not strict or bool(support.holds(np.stack(columns, axis=1)).all())
+    return not strict or bool(support.supported(np.stack(columns, axis=1)).all())
 
 
-def _window_passes(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
-    longest = input_limits.durations(card)[1]
+def _window_valid(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+    longest = input_limits.duration_range(card)[1]
     start = _column(values, "start", usual.start)
     last = _column(values, "end", longest if usual.end is None else usual.end)
     return (
@@ -57,7 +57,7 @@ def _window_passes(card: ModelCard, values: Values, usual: ClipQuestion) -> bool
     )
 
 
-def _loops_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+def _loops_valid(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
     loops = _column(values, "loop", usual.loop) > 0.0
     if not loops.any():
         return True
@@ -66,7 +66,7 @@ def _loops_pass(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
     return card.cyclic and bool(np.all(~loops | (whole & last)))
 
 
-def _hold_passes(values: Values) -> bool:
+def _constraints_valid(values: Values) -> bool:
     """Return whether no row has constraints that need validation by themselves.
 
     The defaults have been validated before.

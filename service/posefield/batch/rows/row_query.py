@@ -6,12 +6,12 @@ from typing import Protocol
 
 from posefield.question.motion_question import ClipQuestion
 
-KEPT = 20
+MAX_KEPT_FAULTS = 20
 """Number of faults that a survey keeps."""
 
 
 @dataclass(frozen=True)
-class Query:
+class ClipQuery:
     """A clip to be made.
 
     name: of the clip. format: of its file. question: its question. place: origin in the source,
@@ -25,7 +25,7 @@ class Query:
 
 
 @dataclass(frozen=True)
-class Fault:
+class RowFault:
     """An invalid row: its origin in the source, and the reason."""
 
     place: str
@@ -33,7 +33,7 @@ class Fault:
 
 
 @dataclass(frozen=True)
-class Survey:
+class RowSurvey:
     """Result of the first pass through all rows.
 
     total: number of rows. faulty: number of invalid ones. faults: the first of those.
@@ -41,10 +41,10 @@ class Survey:
 
     total: int
     faulty: int
-    faults: tuple[Fault, ...]
+    faults: tuple[RowFault, ...]
 
 
-class Source(Protocol):
+class RowSource(Protocol):
     """Source of queries: the same rows in the same order at every reading.
 
     A reader holds a few thousand rows in memory, and 8 bytes of each given name.
@@ -54,8 +54,8 @@ class Source(Protocol):
     def digest(self) -> str:
         """SHA-256 of all parameters and data that determine the queries, except the model."""
 
-    def rows(self) -> Iterator[Query | Fault]:
+    def rows(self) -> Iterator[ClipQuery | RowFault]:
         """Yield every row; FileError if the rest cannot be read or has changed."""
 
-    def survey(self) -> Survey:
+    def survey(self) -> RowSurvey:
         """Validate every row without keeping any; raises as `rows` does."""

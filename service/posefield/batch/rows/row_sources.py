@@ -28,12 +28,12 @@ from posefield.batch.rows import (
     source_files,
 )
 from posefield.batch.rows.columns import Columns
-from posefield.batch.rows.row_blocks import Block, Broken
-from posefield.batch.rows.row_query import Fault, Source
-from posefield.batch.rows.row_validation import Defaults, Reading
-from posefield.batch.rows.source_files import Original
+from posefield.batch.rows.row_blocks import BrokenRow, RowBlock
+from posefield.batch.rows.row_query import RowFault, RowSource
+from posefield.batch.rows.row_validation import Defaults, RowReader
+from posefield.batch.rows.source_files import SourceFile
 from posefield.common.errors import InvalidField, UnknownFormat
-from posefield.encode.formats import ENCODERS
+from posefield.encode.formats import CLIP_ENCODERS
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -41,7 +41,7 @@ METHOD, SEED = "latin", 0
 
 
 @dataclass(frozen=True)
-class Asked:
+class SourceOptions:
     """Source options of the command line: exactly one of path, grid and sample.
 
     path: of a file. grid: NAME=VALUES texts. sample: number of points. method, seed: of a sampling
@@ -55,49 +55,49 @@ class Asked:
     seed: int | None = None
 
 
-class _Blocks(Protocol):
+class _UnparsedRows(Protocol):
     """A source of rows that are not yet parsed."""
 
     def place(self, number: int, /) -> str: ...
-    def blocks(self) -> Iterator[Block | Broken]: ...
+    def blocks(self) -> Iterator[RowBlock | BrokenRow]: ...
 
 
-READERS: Mapping[str, Callable[[Original, Columns], _Blocks]] = {
+READERS: Mapping[str, Callable[[SourceFile, Columns], _UnparsedRows]] = {
     ".csv": csv_rows.read,
-    ".jsonl": jsonl_rows.JsonLines,
-    ".ndjson": jsonl_rows.JsonLines,
+    ".jsonl": jsonl_rows.JsonLinesFile,
+    ".ndjson": jsonl_rows.JsonLinesFile,
     ".parquet": parquet_rows.read,
 }
 
 
-def source(asked: Asked, usual: Defaults, model: Synthesizer) -> Source:
+def open_source(asked: SourceOptions, usual: Defaults, model: Synthesizer) -> RowSource:
     """Return the source of the queries, with defaults for missing values.
 
     Raises InvalidField, UnknownFormat and OutsideSamples for invalid options, and FileError for a
     file that cannot be read or has a heading that does not fit the model.
     """
-    _check_one(asked)
-    _check_usual(usual, model)
-    found, spec = _blocks(asked, model)
+    _check_single_source(asked)
+    _check_defaults(usual, model)
+    found, spec = _unparsed_rows(asked, model)
     digest = _digest({**spec, "format": usual.format, "usual": to_builtins(usual.question)})
-    return Reading(found.blocks, found.place, model, usual, digest)
+    return RowReader(found.blocks, found.place, model, usual, digest)
 
 
 def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
     """Return the controls of each row of a file.
 
-    Raises as `source` does, and InvalidField for an invalid row.
+    Raises as `open_source` does, and InvalidField for an invalid row.
     """
-    rows = source(Asked(path), Defaults("usdc"), model).rows()
+    rows = open_source(SourceOptions(path), Defaults("usdc"), model).rows()
     found = []
     for row in rows:
-        if isinstance(row, Fault):
+        if isinstance(row, RowFault):
             raise InvalidField("candidates", f"{row.place}: {row.message}")
         found.append(dict(row.question.controls))
     return found
 
 
-def _check_one(asked: Asked) -> None:
+def _check_single_source(asked: SourceOptions) -> None:
     given = {
         "a file": asked.path is not None,
         "--grid": bool(asked.grid),
@@ -111,35 +111,39 @@ def _check_one(asked: Asked) -> None:
             raise InvalidField(option, "without --sample, expected with it")
 
 
-def _check_usual(usual: Defaults, model: Synthesizer) -> None:
+def _check_defaults(usual: Defaults, model: Synthesizer) -> None:
     """Validate the defaults alone; rows are validated only in the values that they have."""
-    if usual.format not in ENCODERS:
-        raise UnknownFormat("format", f"{usual.format!r}, expected one of {', '.join(ENCODERS)}")
+    if usual.format not in CLIP_ENCODERS:
+        raise UnknownFormat(
+            "format", f"{usual.format!r}, expected one of {', '.join(CLIP_ENCODERS)}"
+        )
     middle = {control.name: control.default for control in model.session.card.controls}
     clips.check(model, structs.replace(usual.question, controls=middle))
 
 
-def _blocks(asked: Asked, model: Synthesizer) -> tuple[_Blocks, dict[str, Any]]:
+def _unparsed_rows(
+    asked: SourceOptions, model: Synthesizer
+) -> tuple[_UnparsedRows, dict[str, Any]]:
     """Return the unparsed rows of a source, and their parameters as plain values."""
     card = model.session.card
-    known = columns.of(card)
+    known = columns.columns_of(card)
     if asked.path:
-        return _file(asked.path, known)
+        return _file_rows(asked.path, known)
     if asked.grid:
-        points = grid_rows.parse(asked.grid, known, card)
+        points = grid_rows.parse_grid(asked.grid, known, card)
         return points, points.spec()
     method, seed = asked.method or METHOD, SEED if asked.seed is None else asked.seed
     count = asked.sample or 0
-    sampled_rows.check(method, count, seed)
-    drawn = sampled_rows.Drawn(known.controls, card, method, count, seed)
+    sampled_rows.check_sampling(method, count, seed)
+    drawn = sampled_rows.SampledPoints(known.controls, card, method, count, seed)
     return drawn, drawn.spec()
 
 
-def _file(path: Path, known: Columns) -> tuple[_Blocks, dict[str, Any]]:
+def _file_rows(path: Path, known: Columns) -> tuple[_UnparsedRows, dict[str, Any]]:
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise UnknownFormat("queries", f"{path.name!r} ends in none of {', '.join(READERS)}")
-    original = source_files.meet(path)
+    original = source_files.fingerprint(path)
     return reader(original, known), {"file": path.suffix.lower(), "sha256": original.digest}
 
 

@@ -8,16 +8,16 @@ from typing import Any
 from msgspec import structs
 
 from posefield.batch.rows import row_bounds
-from posefield.batch.rows.clip_names import Seen, generated
-from posefield.batch.rows.columns import CONTROL
-from posefield.batch.rows.row_blocks import Block, Broken
-from posefield.batch.rows.row_query import KEPT, Fault, Query, Survey
+from posefield.batch.rows.clip_names import UsedNames, generated_name
+from posefield.batch.rows.columns import CONTROL_PREFIX
+from posefield.batch.rows.row_blocks import BrokenRow, RowBlock
+from posefield.batch.rows.row_query import MAX_KEPT_FAULTS, ClipQuery, RowFault, RowSurvey
 from posefield.common.errors import QueryError
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
-OWN_NAME = "expected a name of its own: an earlier row has it, capitals count for nothing"
+REPEATED_NAME = "expected a name of its own: an earlier row has it, capitals count for nothing"
 
 
 @dataclass(frozen=True)
@@ -29,139 +29,141 @@ class Defaults:
 
 
 @dataclass(frozen=True)
-class Table:
+class ParsedBlock:
     """Parsed rows of a block, valid so far: values by field."""
 
-    block: Block
+    block: RowBlock
     values: dict[str, list[Any]]
 
-    def part(self, start: int, stop: int) -> "Table":
+    def part(self, start: int, stop: int) -> "ParsedBlock":
         """Return the rows from `start` to before `stop`."""
         values = {field: column[start:stop] for field, column in self.values.items()}
-        return Table(self.block.part(start, stop), values)
+        return ParsedBlock(self.block.part(start, stop), values)
 
     def names(self) -> list[str]:
         """Return the name of each row, given or generated."""
         first, size = self.block.first, len(self.block)
         given = self.values.get("name", [None] * size)
-        return [name or generated(first + i) for i, name in enumerate(given)]
+        return [name or generated_name(first + i) for i, name in enumerate(given)]
 
 
 @dataclass(frozen=True)
-class Reading:
+class RowReader:
     """Queries of the rows of a source, for one model.
 
     blocks: yields all blocks anew at each call. place: returns the name of a line or row for
     messages. usual: defaults of missing values. digest: of the source.
     """
 
-    blocks: Callable[[], Iterator[Block | Broken]]
+    blocks: Callable[[], Iterator[RowBlock | BrokenRow]]
     place: Callable[[int], str]
     model: Synthesizer
     usual: Defaults
     digest: str
 
-    def rows(self) -> Iterator[Query | Fault]:
+    def rows(self) -> Iterator[ClipQuery | RowFault]:
         """Yield a query or a fault for every row."""
         for part in self._parts():
-            if isinstance(part, Fault):
+            if isinstance(part, RowFault):
                 yield part
             else:
                 yield from self._queries(part)
 
-    def survey(self) -> Survey:
+    def survey(self) -> RowSurvey:
         """Validate every row without keeping any."""
         total, faulty, faults = 0, 0, []
         for part in self._parts():
-            if isinstance(part, Fault):
+            if isinstance(part, RowFault):
                 faulty += 1
-                faults += [part] if faulty <= KEPT else []
-            total += 1 if isinstance(part, Fault) else len(part.block)
-        return Survey(total, faulty, tuple(faults))
+                faults += [part] if faulty <= MAX_KEPT_FAULTS else []
+            total += 1 if isinstance(part, RowFault) else len(part.block)
+        return RowSurvey(total, faulty, tuple(faults))
 
-    def _parts(self) -> Iterator[Table | Fault]:
+    def _parts(self) -> Iterator[ParsedBlock | RowFault]:
         """Yield tables of valid rows, and faults in their place between them."""
-        seen = Seen()
+        seen = UsedNames()
         for block in self.blocks():
-            if isinstance(block, Broken):
-                yield Fault(self.place(block.number), block.message)
+            if isinstance(block, BrokenRow):
+                yield RowFault(self.place(block.number), block.message)
                 continue
-            for part in self._sound(block):
-                if isinstance(part, Fault) or not _named(block):
+            for part in self._valid_blocks(block):
+                if isinstance(part, RowFault) or not _may_give_names(block):
                     yield part
                 else:
-                    yield from self._apart(part, seen)
+                    yield from self._split_repeated_names(part, seen)
 
-    def _sound(self, block: Block) -> Iterator[Table | Fault]:
+    def _valid_blocks(self, block: RowBlock) -> Iterator[ParsedBlock | RowFault]:
         """Yield tables of rows with valid values, and faults.
 
         A block with an invalid row is halved until that row is alone.
         """
         if len(block) == 1:
-            yield self._alone(block)
+            yield self._parse_alone(block)
             return
-        table = self._together(block)
+        table = self._parse_together(block)
         if table:
             yield table
             return
         for half in block.halves():
-            yield from self._sound(half)
+            yield from self._valid_blocks(half)
 
-    def _together(self, block: Block) -> Table | None:
+    def _parse_together(self, block: RowBlock) -> ParsedBlock | None:
         """Return the parsed rows of a block; None if one of them needs validation by itself."""
         try:
-            table = Table(block, block.values())
+            table = ParsedBlock(block, block.values())
         except ValueError:
             return None
-        card, support = self.model.session.card, self.model.door.support
-        sound = row_bounds.pass_all(card, support, table.values, self.usual.question)
+        card, support = self.model.session.card, self.model.validator.support
+        sound = row_bounds.all_valid(card, support, table.values, self.usual.question)
         return table if sound else None
 
-    def _alone(self, block: Block) -> Table | Fault:
+    def _parse_alone(self, block: RowBlock) -> ParsedBlock | RowFault:
         try:
-            table = Table(block, block.values())
+            table = ParsedBlock(block, block.values())
             clips.check(self.model, next(self._queries(table)).question)
         except (ValueError, QueryError) as fault:
-            return Fault(self.place(block.numbers[0]), str(fault))
+            return RowFault(self.place(block.numbers[0]), str(fault))
         return table
 
-    def _apart(self, table: Table, seen: Seen) -> Iterator[Table | Fault]:
+    def _split_repeated_names(
+        self, table: ParsedBlock, seen: UsedNames
+    ) -> Iterator[ParsedBlock | RowFault]:
         """Yield the rows with new names, and faults for repeated names."""
         names, start = table.names(), 0
-        for place in seen.repeated(names):
+        for place in seen.find_repeated(names):
             if start < place:
                 yield table.part(start, place)
             number = table.block.numbers[place]
-            yield Fault(self.place(number), f"name: {names[place]!r}, {OWN_NAME}")
+            yield RowFault(self.place(number), f"name: {names[place]!r}, {REPEATED_NAME}")
             start = place + 1
         if start < len(names):
             yield table.part(start, len(names)) if start else table
 
-    def _queries(self, table: Table) -> Iterator[Query]:
+    def _queries(self, table: ParsedBlock) -> Iterator[ClipQuery]:
         for name, number, said in zip(
-            table.names(), table.block.numbers, _said(table), strict=True
+            table.names(), table.block.numbers, _row_values(table), strict=True
         ):
             form = said.pop("format", self.usual.format)
             said.pop("name", None)
             controls = self._controls(said)
             question = structs.replace(self.usual.question, controls=controls, **said)
-            yield Query(name, form, question, self.place(number))
+            yield ClipQuery(name, form, question, self.place(number))
 
     def _controls(self, said: dict[str, Any]) -> dict[str, float]:
         """Return the controls of a row in the card's order, removed from `said`."""
-        return {name: said.pop(CONTROL + name) for name in self._names}
+        return {name: said.pop(CONTROL_PREFIX + name) for name in self._names}
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
         return tuple(control.name for control in self.model.session.card.controls)
 
 
-def _named(block: Block) -> bool:
+def _may_give_names(block: RowBlock) -> bool:
     """Return whether rows may give names; generated names are unique."""
     return any(column.field == "name" for column in block.columns)
 
 
-def _said(table: Table) -> Iterator[dict[str, Any]]:
+def _row_values(table: ParsedBlock) -> Iterator[dict[str, Any]]:
     """Yield the given values of each row, by field."""
     fields = list(table.values)
     for row in zip(*table.values.values(), strict=True):

@@ -12,22 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posefield.batch.rows.columns import Column
-from posefield.batch.rows.row_blocks import SIZE, Block
+from posefield.batch.rows.row_blocks import BLOCK_SIZE, RowBlock
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Control, ModelCard
 
-MOST = 10**9
+MAX_POINTS = 10**9
 """Largest number of points; a greater one is considered a typing error."""
 
 ROUNDS = 8
 """Rounds of the Feistel network. Four suffice for large numbers (Luby and Rackoff 1988)."""
 
-Places = NDArray[np.uint64]
+Positions = NDArray[np.uint64]
 
 
 @dataclass(frozen=True)
-class Drawn:
+class SampledPoints:
     """Random points of a model's controls. method: a key of METHODS."""
 
     columns: tuple[Column, ...]
@@ -44,27 +44,27 @@ class Drawn:
         """Return all parameters that determine the points except the model, as plain values."""
         return {"method": self.method, "count": self.count, "seed": self.seed}
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[RowBlock]:
         """Yield the points in blocks, in order."""
         readers = [column.kind.values for column in self.columns]
         first = 0
         for points in METHODS[self.method](self.card, self.count, self.seed):
             numbers = range(first + 1, first + 1 + len(points))
-            yield Block(first, numbers, self.columns, readers, points.T.tolist())
+            yield RowBlock(first, numbers, self.columns, readers, points.T.tolist())
             first += len(points)
 
 
-def check(method: str, count: int, seed: int) -> None:
+def check_sampling(method: str, count: int, seed: int) -> None:
     """Raise InvalidField for an unknown method, a count out of range or a negative seed."""
     if method not in METHODS:
         raise InvalidField("method", f"{method!r}, expected one of {', '.join(METHODS)}")
-    if not 1 <= count <= MOST:
-        raise InvalidField("sample", f"{count}, expected 1 to {MOST}")
+    if not 1 <= count <= MAX_POINTS:
+        raise InvalidField("sample", f"{count}, expected 1 to {MAX_POINTS}")
     if seed < 0:
         raise InvalidField("seed", f"{seed}, expected 0 or more")
 
 
-def latin(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
+def latin_hypercube(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
     """Yield a Latin hypercube over the sampled ranges, in blocks (n, d).
 
     Each of `count` equal parts of each control's range contains one point (McKay et al. 1979). A
@@ -75,13 +75,13 @@ def latin(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
         points = np.empty((size, len(card.controls)))
         for place, control in enumerate(card.controls):
             rows = np.arange(first, first + size, dtype=np.uint64)
-            parts = permuted(rows, count, (seed, place, 1))
+            parts = permute(rows, count, (seed, place, 1))
             jitter = within[place].random(size)
-            points[:, place] = _spread(control, parts, jitter, count)
+            points[:, place] = _control_values(control, parts, jitter, count)
         yield points
 
 
-def _spread(control: Control, parts: Places, jitter: Floats, count: int) -> Floats:
+def _control_values(control: Control, parts: Positions, jitter: Floats, count: int) -> Floats:
     """Return the values (n,) of a control in parts (n,) of `count`.
 
     jitter: (n,), position in each part, 0 to 1.
@@ -92,39 +92,39 @@ def _spread(control: Control, parts: Places, jitter: Floats, count: int) -> Floa
     return control.minimum + share * (control.maximum - control.minimum)
 
 
-def permuted(places: Places, count: int, seed: tuple[int, ...]) -> Places:
+def permute(places: Positions, count: int, seed: tuple[int, ...]) -> Positions:
     """Return the images (n,) of places (n,) under a random permutation of 0 to count - 1.
 
     Each seed has its own permutation, computed place by place. A Feistel network permutes the
     numbers of an even number of bits; images beyond `count` are permuted again until they are below
     it (Black and Rogaway 2002), fewer than four times on average.
     """
-    keys: Places = np.array(np.random.SeedSequence(seed).generate_state(ROUNDS, np.uint64))
+    keys: Positions = np.array(np.random.SeedSequence(seed).generate_state(ROUNDS, np.uint64))
     half = np.uint64(max(1, ((count - 1).bit_length() + 1) // 2))
-    images = _network(places.astype(np.uint64), keys, half)
+    images = _feistel_network(places.astype(np.uint64), keys, half)
     beyond = np.flatnonzero(images >= count)
     while len(beyond):
-        images[beyond] = _network(images[beyond], keys, half)
+        images[beyond] = _feistel_network(images[beyond], keys, half)
         beyond = beyond[images[beyond] >= count]
     return images
 
 
-def _network(numbers: Places, keys: Places, half: np.uint64) -> Places:
+def _feistel_network(numbers: Positions, keys: Positions, half: np.uint64) -> Positions:
     mask = (np.uint64(1) << half) - np.uint64(1)
     left, right = numbers >> half, numbers & mask
     for key in keys:
-        left, right = right, left ^ (_mix(right + key) & mask)
+        left, right = right, left ^ (_scramble(right + key) & mask)
     return (left << half) | right
 
 
-def _mix(numbers: Places) -> Places:
+def _scramble(numbers: Positions) -> Positions:
     """Return numbers scrambled by the finaliser of SplitMix64 (Steele et al. 2014)."""
     numbers = (numbers ^ (numbers >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     numbers = (numbers ^ (numbers >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     return numbers ^ (numbers >> np.uint64(31))
 
 
-def hull(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
+def hull_points(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
     """Yield points in the convex hull of the captured clips' controls, in blocks (n, d).
 
     Each point is uniform in the simplex of d + 1 random clips, so points are denser where clips
@@ -144,12 +144,12 @@ def hull(card: ModelCard, count: int, seed: int) -> Iterator[Floats]:
 
 
 METHODS: dict[str, Callable[[ModelCard, int, int], Iterator[Floats]]] = {
-    "latin": latin,
-    "hull": hull,
+    "latin": latin_hypercube,
+    "hull": hull_points,
 }
 
 
 def _blocks(count: int) -> Iterator[tuple[int, int]]:
     """Yield first row and size of each block."""
-    for first in range(0, count, SIZE):
-        yield first, min(SIZE, count - first)
+    for first in range(0, count, BLOCK_SIZE):
+        yield first, min(BLOCK_SIZE, count - first)

@@ -9,16 +9,16 @@ from typing import AnyStr, TypeVar
 
 from posefield.common.errors import FileError
 
-Read = TypeVar("Read")
+Item = TypeVar("Item")
 
-LONGEST_LINE = 1 << 20
+MAX_LINE_LENGTH = 1 << 20
 """Longest line, characters: a file without line ends is not a table and might not fit into
 memory.
 """
 
 
 @dataclass(frozen=True)
-class Original:
+class SourceFile:
     """A file at its first reading.
 
     path: its path. digest: SHA-256 of its bytes. stamp: size in bytes and modification time, ns.
@@ -28,20 +28,20 @@ class Original:
     digest: str
     stamp: tuple[int, int]
 
-    def unchanged(self, read: Iterable[Read]) -> Iterator[Read]:
+    def unchanged(self, read: Iterable[Item]) -> Iterator[Item]:
         """Yield the items read from the file; FileError before the first one after a change."""
-        self._compare()
+        self._check_unchanged()
         for each in read:
-            self._compare()
+            self._check_unchanged()
             yield each
-        self._compare()
+        self._check_unchanged()
 
-    def _compare(self) -> None:
+    def _check_unchanged(self) -> None:
         if _stamp(self.path) != self.stamp:
             raise FileError(self.path, "changed while it was used, expected what was first read")
 
 
-def meet(path: Path) -> Original:
+def fingerprint(path: Path) -> SourceFile:
     """Return a file's path, digest and stamp; FileError if it cannot be read."""
     if path.exists() and not path.is_file():
         raise FileError(path, "not a file, expected one: it is read more than once")
@@ -51,14 +51,14 @@ def meet(path: Path) -> Original:
             digest = hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as fault:
         raise FileError(path, f"cannot be read: {fault.strerror}") from fault
-    return Original(path, digest, stamp)
+    return SourceFile(path, digest, stamp)
 
 
-def lines(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
+def read_lines(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
     """Yield the lines of an open file; FileError for a line that is too long."""
-    for number, line in enumerate(iter(partial(readline, LONGEST_LINE), readline(0)), start=1):
-        if len(line) == LONGEST_LINE:
-            found = f"a line of {LONGEST_LINE} characters or more"
+    for number, line in enumerate(iter(partial(readline, MAX_LINE_LENGTH), readline(0)), start=1):
+        if len(line) == MAX_LINE_LENGTH:
+            found = f"a line of {MAX_LINE_LENGTH} characters or more"
             raise FileError(path, f"{found}, expected one row a line", number)
         yield line
 

@@ -12,7 +12,7 @@ from posefield.motion.crowd_clip import Motions
 
 
 @dataclass(frozen=True)
-class Moves:
+class AnimationSamples:
     """M motions of one skeleton, concatenated: motion m has the frames starts[m] to starts[m + 1].
 
     rotations (N, J, 4): of all frames, real part last. path (N, 3): root positions, m. offsets (M,
@@ -34,7 +34,7 @@ class Moves:
         local[:, 0] = self.path
         return local
 
-    def parts(self, frames: int) -> Iterator["Moves"]:
+    def parts(self, frames: int) -> Iterator["AnimationSamples"]:
         """Yield the motions in parts of at most `frames` frames, longer motions one by one."""
         first = 0
         while first < len(self):
@@ -43,47 +43,47 @@ class Moves:
             yield self._between(first, last)
             first = last
 
-    def _between(self, first: int, last: int) -> "Moves":
+    def _between(self, first: int, last: int) -> "AnimationSamples":
         frames = slice(self.starts[first], self.starts[last])
         starts = self.starts[first : last + 1] - self.starts[first]
         offsets = self.offsets[first:last]
-        return Moves(self.rotations[frames], self.path[frames], offsets, starts)
+        return AnimationSamples(self.rotations[frames], self.path[frames], offsets, starts)
 
 
-def of_clips(clips: Sequence[Clip]) -> Moves:
+def from_clips(clips: Sequence[Clip]) -> AnimationSamples:
     """Return the moves of clips of one skeleton, with the bone offsets of their first frames."""
     starts = _starts([len(clip) for clip in clips])
     made = _empty(starts, len(clips[0].skeleton))
     for index, clip in enumerate(clips):
         frames = slice(starts[index], starts[index + 1])
-        _last(clip.rotations, made.rotations[frames])
+        _write_real_part_last(clip.rotations, made.rotations[frames])
         made.path[frames] = clip.translations[:, 0]
         made.offsets[index] = clip.translations[0]
-    return _tidy(made)
+    return _normalize(made)
 
 
-def of_motions(batch: Motions) -> Moves:
+def from_motions(batch: Motions) -> AnimationSamples:
     """Return the moves of a crowd's motions."""
     count, frames, joints = batch.rotations.shape[:3]
     made = _empty(_starts([frames] * count), joints)
-    _last(batch.rotations.reshape(-1, joints, 4), made.rotations)
+    _write_real_part_last(batch.rotations.reshape(-1, joints, 4), made.rotations)
     made.path[:] = batch.root_position.reshape(-1, 3)
     made.offsets[:] = batch.bone_offsets
-    return _tidy(made)
+    return _normalize(made)
 
 
 def _starts(frames: Sequence[int]) -> Indices:
     return np.concatenate([[0], np.cumsum(frames)])
 
 
-def _empty(starts: Indices, joints: int) -> Moves:
+def _empty(starts: Indices, joints: int) -> AnimationSamples:
     motions, frames = len(starts) - 1, int(starts[-1])
     rotations = np.empty((frames, joints, 4), np.float32)
     path, offsets = np.empty((frames, 3), np.float32), np.empty((motions, joints, 3), np.float32)
-    return Moves(rotations, path, offsets, starts)
+    return AnimationSamples(rotations, path, offsets, starts)
 
 
-def _last(wxyz: Floats | Singles, xyzw: Singles) -> None:
+def _write_real_part_last(wxyz: Floats | Singles, xyzw: Singles) -> None:
     """Write quaternions with the real part last.
 
     All numbers move by one in a single copy, then the real parts are set.
@@ -93,15 +93,15 @@ def _last(wxyz: Floats | Singles, xyzw: Singles) -> None:
     made[3::4] = given[::4]
 
 
-def _tidy(made: Moves) -> Moves:
-    _unroll(made)
+def _normalize(made: AnimationSamples) -> AnimationSamples:
+    _unroll_quaternions(made)
     for values in (made.rotations, made.path, made.offsets):
         # USD's deduplication does not distinguish -0 from 0.
         values += np.float32(0.0)
     return made
 
 
-def _unroll(made: Moves) -> None:
+def _unroll_quaternions(made: AnimationSamples) -> None:
     """Choose signs so that neighbours lie close: some readers interpolate by component."""
     products = made.rotations[1:] * made.rotations[:-1]
     dots = products[..., 0] + products[..., 1] + products[..., 2] + products[..., 3]

@@ -20,12 +20,12 @@ Integers = npt.NDArray[np.int32]
 # joint. The apexes keep a little off the joints so that no two boxes share a point, and not by
 # the same amount, so that boxes laid head to tail do not share one either.
 # Point, component and box: the boxes come last, for there are most of them.
-ALONG = np.array([0.02, *[0.15] * 4, *[0.8] * 4, 0.99], np.float32)[:, None, None]
-WIDTH = np.array([0.0, *[1.0] * 4, *[0.6] * 4, 0.0], np.float32)[:, None, None]
-CORNERS = np.array([[0, *[1, 0, -1, 0] * 2, 0], [0, *[0, 1, 0, -1] * 2, 0]], np.float32)[
+RING_POSITIONS = np.array([0.02, *[0.15] * 4, *[0.8] * 4, 0.99], np.float32)[:, None, None]
+RING_WIDTHS = np.array([0.0, *[1.0] * 4, *[0.6] * 4, 0.0], np.float32)[:, None, None]
+RING_CORNERS = np.array([[0, *[1, 0, -1, 0] * 2, 0], [0, *[0, 1, 0, -1] * 2, 0]], np.float32)[
     ..., None, None
 ]
-POINTS = len(ALONG)
+POINTS_PER_BOX = len(RING_POSITIONS)
 SIDES = tuple((i, i % 4 + 1) for i in range(1, 5))
 FACES: tuple[tuple[int, ...], ...] = (
     *((0, b, a) for a, b in SIDES),
@@ -57,7 +57,7 @@ class Bones:
 
 
 @dataclass(frozen=True)
-class Boxes:
+class BoneBoxes:
     """Boxes in the rest pose.
 
     starts: near ends (..., K, 3), m. arms: vectors to the far ends (..., K, 3), m. radii: (..., K),
@@ -78,21 +78,21 @@ def bones(skeleton: Skeleton) -> Bones:
     count = len(skeleton)
     owners = np.array([*skeleton.parents[1:], *skeleton.tip_joints], dtype=np.int32)
     ends = np.arange(1, len(owners) + 1, dtype=np.int32)
-    every = boxes(skeleton, Bones(owners, ends, owners), skeleton.offsets)
-    size = _size(skeleton.at_rest(skeleton.offsets))
+    every = bone_boxes(skeleton, Bones(owners, ends, owners), skeleton.offsets)
+    size = _body_size(skeleton.at_rest(skeleton.offsets))
     drawn = np.linalg.norm(every.arms, axis=-1) > SHORTEST * size
     followed = {*skeleton.parents[1:], *owners[count - 1 :][drawn[count - 1 :]].tolist()}
     bare = np.array([j for j in range(count) if j not in followed], dtype=np.int32)
     found = Bones(np.concatenate([owners[drawn], bare]), ends[drawn], owners)
-    return _distinct(skeleton, found)
+    return _distinct_bones(skeleton, found)
 
 
-def boxes(skeleton: Skeleton, bones: Bones, offsets: Floats) -> Boxes:
+def bone_boxes(skeleton: Skeleton, bones: Bones, offsets: Floats) -> BoneBoxes:
     """Return the boxes for joints with rest offsets (..., J, 3) from their parents, m."""
     lead, stubs = offsets.shape[:-2], len(bones.joints) - len(bones.ends)
     tips = np.broadcast_to(skeleton.tip_offsets, (*lead, *skeleton.tip_offsets.shape))
     rest = skeleton.at_rest(offsets)
-    size = _size(rest)[..., None]
+    size = _body_size(rest)[..., None]
     up = np.zeros((*lead, stubs, 3))
     up[..., 1] = 2 * STUB * size
     arms = np.concatenate([np.concatenate([offsets, tips], axis=-2)[..., bones.ends, :], up], -2)
@@ -100,19 +100,21 @@ def boxes(skeleton: Skeleton, bones: Bones, offsets: Floats) -> Boxes:
     starts[..., len(bones.ends) :, :] -= up / 2
     radii = np.clip(THICKNESS * _lengths(arms), THINNEST * size, THICKEST * size)
     radii[..., len(bones.ends) :] = STUB * size
-    return Boxes(starts, arms, radii)
+    return BoneBoxes(starts, arms, radii)
 
 
-def mesh(found: Boxes) -> tuple[Singles, Singles]:
+def points_and_normals(found: BoneBoxes) -> tuple[Singles, Singles]:
     """Return points and normals (..., 10 K, 3) of the boxes; those of zero length point up."""
     lengths = _lengths(found.arms)[..., None]
     up = np.array([0.0, 1.0, 0.0])
     direction = np.where(lengths > 0, found.arms / np.where(lengths > 0, lengths, 1.0), up)
     starts, arms, ahead, *across = map(
-        _rows, (found.starts, found.arms, direction, *_across(direction))
+        _component_rows, (found.starts, found.arms, direction, *_orthogonal_vectors(direction))
     )
-    radial = CORNERS[0] * across[0] + CORNERS[1] * across[1]
-    points = starts + ALONG * arms + WIDTH * np.float32(found.radii.reshape(-1)) * radial
+    radial = RING_CORNERS[0] * across[0] + RING_CORNERS[1] * across[1]
+    points = (
+        starts + RING_POSITIONS * arms + RING_WIDTHS * np.float32(found.radii.reshape(-1)) * radial
+    )
     radial[0], radial[-1] = -ahead, ahead
     shape = (*found.radii.shape[:-1], -1, 3)
     return points.transpose(2, 0, 1).reshape(shape), radial.transpose(2, 0, 1).reshape(shape)
@@ -122,16 +124,16 @@ def faces(bones: Bones) -> tuple[Integers, Integers]:
     """Return the number of corners of each face, and the point index of each corner."""
     counts = np.array([len(face) for face in FACES], dtype=np.int32)
     corners = np.array([point for face in FACES for point in face], dtype=np.int32)
-    starts = np.arange(len(bones.joints), dtype=np.int32)[:, None] * POINTS
+    starts = np.arange(len(bones.joints), dtype=np.int32)[:, None] * POINTS_PER_BOX
     return np.tile(counts, len(starts)), (starts + corners).reshape(-1)
 
 
-def _size(rest: Floats) -> Floats:
+def _body_size(rest: Floats) -> Floats:
     size = np.max(np.ptp(rest, axis=-2), axis=-1)
     return np.where(size > 0, size, 1.0)
 
 
-def _rows(vectors: Floats) -> Singles:
+def _component_rows(vectors: Floats) -> Singles:
     """Return the components (3, boxes) of vectors (..., 3)."""
     return np.ascontiguousarray(vectors.reshape(-1, 3).T, np.float32)
 
@@ -141,9 +143,9 @@ def _lengths(arms: Floats) -> Floats:
     return np.sqrt(x * x + y * y + z * z)
 
 
-def _distinct(skeleton: Skeleton, bones: Bones) -> Bones:
+def _distinct_bones(skeleton: Skeleton, bones: Bones) -> Bones:
     """Return the boxes that do not coincide with an earlier one, with their tints."""
-    found = boxes(skeleton, bones, skeleton.offsets)
+    found = bone_boxes(skeleton, bones, skeleton.offsets)
     places = np.round(np.concatenate([found.starts, found.arms], axis=-1), 5)
     _, first = np.unique(places, axis=0, return_index=True)
     kept = np.sort(first)
@@ -151,7 +153,7 @@ def _distinct(skeleton: Skeleton, bones: Bones) -> Bones:
     return Bones(bones.joints[kept], bones.ends[kept[kept < len(bones.ends)]], tints[kept])
 
 
-def _across(direction: Floats) -> tuple[Floats, Floats]:
+def _orthogonal_vectors(direction: Floats) -> tuple[Floats, Floats]:
     """Return two unit vectors (..., 3) orthogonal to each direction; all three are right-handed."""
     along_z = np.abs(direction[..., 2:]) > 0.9
     helper = np.where(along_z, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
@@ -160,7 +162,7 @@ def _across(direction: Floats) -> tuple[Floats, Floats]:
     return first, quat.cross(direction, first)
 
 
-def _tints(found: Boxes, middle: float) -> Integers:
+def _tints(found: BoneBoxes, middle: float) -> Integers:
     side = found.starts[:, 0] + found.arms[:, 0] / 2 - middle
     aside = np.abs(side) > found.radii / 2
     return np.where(aside, np.where(side > 0, 1, 2), 0).astype(np.int32)

@@ -13,20 +13,20 @@ import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
 from posefield.encode.character import body_mesh
-from posefield.encode.character.animation_samples import Moves
+from posefield.encode.character.animation_samples import AnimationSamples
 from posefield.motion.skeleton import Skeleton
 
-Places = npt.NDArray[np.intp]
+PointIndices = npt.NDArray[np.intp]
 
 # Rounding to float32 accumulates along a chain of joints and far from the origin. Points and joints
 # in a file are rounded separately, and readers compute with them in float32.
-SLACK = 1e-5
-FRAMES = 3200
+RELATIVE_MARGIN = 1e-5
+FRAMES_AT_ONCE = 3200
 """Poses that are computed at a time: their arrays fit the processor's cache."""
 
 
 @dataclass(frozen=True)
-class Generation:
+class TreeLevel:
     """Points of one depth in the tree, and their parents.
 
     points: their places in the tree's order. turns: places, among the turning joints, of those
@@ -36,12 +36,12 @@ class Generation:
 
     points: slice
     turns: slice
-    holders: Places | slice
-    turners: Places | slice
+    parents: PointIndices | slice
+    turning_parents: PointIndices | slice
 
 
 @dataclass(frozen=True)
-class Tree:
+class PointTree:
     """Points of a skeleton: its joints, then its tips.
 
     tips (E, 3): offsets from their joints, m. order (P,): points by depth, those with children
@@ -50,12 +50,12 @@ class Tree:
     """
 
     tips: Floats
-    order: Places
-    turning: Places
-    generations: tuple[Generation, ...]
+    order: PointIndices
+    turning: PointIndices
+    generations: tuple[TreeLevel, ...]
 
 
-def tree(skeleton: Skeleton) -> Tree:
+def tree(skeleton: Skeleton) -> PointTree:
     """Return the points of a skeleton by depth."""
     above = np.array([*skeleton.parents, *skeleton.tip_joints])
     depths = np.zeros(len(above), int)
@@ -64,20 +64,22 @@ def tree(skeleton: Skeleton) -> Tree:
     bare = ~np.isin(np.arange(len(above)), above)
     order = np.lexsort((bare, depths))
     turning = order[~bare[order]]
-    return Tree(skeleton.tip_offsets, order, turning, tuple(_grown(above, depths, order, turning)))
+    return PointTree(
+        skeleton.tip_offsets, order, turning, tuple(_tree_levels(above, depths, order, turning))
+    )
 
 
-def boxes(tree: Tree, moves: Moves, balls: Floats) -> Floats:
+def bounding_boxes(tree: PointTree, moves: AnimationSamples, balls: Floats) -> Floats:
     """Return the lowest and highest corner (M, 2, 3) of each motion in its own frame, m.
 
     balls (M, P): radii about joints and tips, m. The boxes of the motions are independent.
     """
-    found = [_boxes(tree, part) for part in moves.parts(FRAMES)]
+    found = [_point_boxes(tree, part) for part in moves.parts(FRAMES_AT_ONCE)]
     (low, high), radii = np.concatenate(found, axis=-1), balls.T[tree.order]
-    return outwards((low - radii).min(axis=1).T, (high + radii).max(axis=1).T)
+    return enlarged_box((low - radii).min(axis=1).T, (high + radii).max(axis=1).T)
 
 
-def anywhere(skeleton: Skeleton, offsets: Floats, path: Floats) -> Floats:
+def pose_independent_box(skeleton: Skeleton, offsets: Floats, path: Floats) -> Floats:
     """Return a box (2, 3), m, that contains the body in any pose.
 
     offsets: of the bones (J, 3), m. path: root positions (F, 3), m.
@@ -90,42 +92,44 @@ def anywhere(skeleton: Skeleton, offsets: Floats, path: Floats) -> Floats:
         far.append(far[parent] + arm)
     # The body mesh of a skeleton of zero size is drawn as if its size were a metre.
     reached = max(far) + body_mesh.THICKEST * (2.0 * max(far) or 1.0)
-    return outwards(path.min(axis=0) - reached, path.max(axis=0) + reached)
+    return enlarged_box(path.min(axis=0) - reached, path.max(axis=0) + reached)
 
 
-def outwards(low: Floats, high: Floats) -> Floats:
+def enlarged_box(low: Floats, high: Floats) -> Floats:
     """Return corners (..., 2, 3) enlarged to allow for rounding errors.
 
     Each axis grows at both ends by SLACK (1 + its largest absolute coordinate).
     """
-    slack = SLACK * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+    slack = RELATIVE_MARGIN * (1.0 + np.maximum(np.abs(low), np.abs(high)))
     return np.stack([low - slack, high + slack], axis=-2)
 
 
-def _grown(above: Places, depths: Places, order: Places, turning: Places) -> Iterator[Generation]:
+def _tree_levels(
+    above: PointIndices, depths: PointIndices, order: PointIndices, turning: PointIndices
+) -> Iterator[TreeLevel]:
     place, turner = np.argsort(order), {joint: at for at, joint in enumerate(turning.tolist())}
     for depth in range(1, depths.max() + 1):
         points = slice(*np.searchsorted(depths[order], [depth, depth + 1]))
         turns = slice(*np.searchsorted(depths[turning], [depth, depth + 1]))
         holders = above[order[points]]
         turners = np.array([turner[joint] for joint in holders.tolist()])
-        yield Generation(points, turns, _neighbours(place[holders]), _neighbours(turners))
+        yield TreeLevel(points, turns, _as_slice(place[holders]), _as_slice(turners))
 
 
-def _neighbours(places: Places) -> Places | slice:
+def _as_slice(places: PointIndices) -> PointIndices | slice:
     """Return a slice for consecutive places, since it selects a view instead of a copy."""
     first, count = int(places[0]), len(places)
     return slice(first, first + count) if np.all(np.diff(places) == 1) else places
 
 
-def _boxes(tree: Tree, moves: Moves) -> Singles:
+def _point_boxes(tree: PointTree, moves: AnimationSamples) -> Singles:
     """Return the lowest and highest position (2, 3, P, M) of each point."""
-    places = _places(tree, moves)
+    places = _point_positions(tree, moves)
     low = np.minimum.reduceat(places, moves.starts[:-1], axis=-1)
     return np.stack([low, np.maximum.reduceat(places, moves.starts[:-1], axis=-1)])
 
 
-def _places(tree: Tree, moves: Moves) -> Singles:
+def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
     """Return the positions (3, P, N) of points in the tree's order, m.
 
     Components come first, unlike elsewhere, which is ten times as fast. Some are stored twice, so
@@ -133,26 +137,26 @@ def _places(tree: Tree, moves: Moves) -> Singles:
     arithmetic. All operations are elementwise, so that results do not depend on the other motions
     in the arrays.
     """
-    turns = _turns(tree, moves)
-    arms = np.repeat(_arms(tree, moves.offsets), np.diff(moves.starts), axis=-1)
+    turns = _joint_rotations(tree, moves)
+    arms = np.repeat(_parent_offsets(tree, moves.offsets), np.diff(moves.starts), axis=-1)
     places = np.empty((3, *arms.shape[1:]), np.float32)
     places[:, 0] = moves.path.T
     for each in tree.generations:
-        held = _rows(turns, each.turners)
+        held = _select_rows(turns, each.turning_parents)
         here = places[:, each.points]
         _rotate(held, arms[:, each.points], here)
-        here += _rows(places, each.holders)
+        here += _select_rows(places, each.parents)
         # In place: a joint's local rotation is not read after its orientation is computed.
         own = turns[:, each.turns]
-        _turn(held[:, : own.shape[1]], own)
+        _multiply_quaternions(held[:, : own.shape[1]], own)
     return places
 
 
-def _rows(components: Singles, chosen: Places | slice) -> Singles:
+def _select_rows(components: Singles, chosen: PointIndices | slice) -> Singles:
     return components[:, chosen] if isinstance(chosen, slice) else components.take(chosen, 1)
 
 
-def _turns(tree: Tree, moves: Moves) -> Singles:
+def _joint_rotations(tree: PointTree, moves: AnimationSamples) -> Singles:
     """Return the rotations (6, T, N) of the turning joints, as x y z x y w.
 
     Copied by motion, so that a copy fits the processor's cache.
@@ -165,14 +169,14 @@ def _turns(tree: Tree, moves: Moves) -> Singles:
     return made
 
 
-def _arms(tree: Tree, offsets: Singles) -> Singles:
+def _parent_offsets(tree: PointTree, offsets: Singles) -> Singles:
     """Return the offsets (5, P, M) of points from their parents, as x y z x y, m."""
     tips = np.broadcast_to(tree.tips.astype(np.float32), (len(offsets), *tree.tips.shape))
     arms = np.concatenate([offsets, tips], axis=1)[:, tree.order]
     return arms.transpose(2, 1, 0)[[0, 1, 2, 0, 1]]
 
 
-def _turn(a: Singles, b: Singles) -> None:
+def _multiply_quaternions(a: Singles, b: Singles) -> None:
     """Replace each quaternion b, x y z x y w, by the product a b."""
     vector, part = _cross(a, b), np.empty_like(a[:3])
     vector += np.multiply(a[5], b[:3], out=part)

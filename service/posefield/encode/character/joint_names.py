@@ -8,21 +8,23 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-LEGAL = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+LEGAL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-def legal(names: Iterable[str]) -> tuple[str, ...]:
+def legal_names(names: Iterable[str]) -> tuple[str, ...]:
     """Return unique legal names in the given order; legal names are kept.
 
     Of several names that become equal, the later ones get the endings _2, _3, and so on.
     """
     given = list(names)
-    taken = {name for name in given if LEGAL.fullmatch(name)}
+    taken = {name for name in given if LEGAL_NAME.fullmatch(name)}
     counts: Counter[str] = Counter()
-    return tuple(n if n in taken else _unique(_clean(n), taken, counts) for n in given)
+    return tuple(
+        n if n in taken else _unique_name(_legal_characters(n), taken, counts) for n in given
+    )
 
 
-def paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
+def joint_paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
     """Return the joint tokens of UsdSkel: names of ancestors and joint, separated by slashes."""
     found: list[str] = []
     for leaf, parent in zip(leaves, parents, strict=True):
@@ -30,12 +32,12 @@ def paths(leaves: Sequence[str], parents: Sequence[int]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _clean(name: str) -> str:
+def _legal_characters(name: str) -> str:
     cleaned = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    return cleaned if LEGAL.fullmatch(cleaned) else f"_{cleaned}"
+    return cleaned if LEGAL_NAME.fullmatch(cleaned) else f"_{cleaned}"
 
 
-def _unique(name: str, taken: set[str], counts: Counter[str]) -> str:
+def _unique_name(name: str, taken: set[str], counts: Counter[str]) -> str:
     """Return a name that is not taken; counts: the last ending tried, by name."""
     found = name
     while True:

@@ -15,64 +15,68 @@ from posefield.common.units import Floats, Singles
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.motion.clip import Clip
 
-Either = TypeVar("Either", Floats, Singles)
+Coordinates = TypeVar("Coordinates", Floats, Singles)
 
-TURNED = [0, 2, 1]
+Z_UP_ORDER = [0, 2, 1]
 
 
-def places(convention: Convention, metres: Either) -> Either:
+def convert_positions(convention: Convention, metres: Coordinates) -> Coordinates:
     """Return positions or displacements (..., 3) in the unit and axes of a file.
 
     metres: with Y up.
     """
     unit = convention.metres_per_unit
-    return directions(convention, metres if unit == 1.0 else metres / unit)
+    return convert_directions(convention, metres if unit == 1.0 else metres / unit)
 
 
-def directions(convention: Convention, along: Either) -> Either:
+def convert_directions(convention: Convention, along: Coordinates) -> Coordinates:
     """Return directions (..., 3) in the axes of a file.
 
     along: with Y up.
     """
     if convention.up == "y":
         return along
-    return along[..., TURNED] * np.array([1, -1, 1], along.dtype) + along.dtype.type(0.0)
+    return along[..., Z_UP_ORDER] * np.array([1, -1, 1], along.dtype) + along.dtype.type(0.0)
 
 
-def rotations(convention: Convention, turns: Singles) -> Singles:
+def convert_rotations(convention: Convention, turns: Singles) -> Singles:
     """Return quaternions (..., 4), real part last, in the axes of a file.
 
     turns: with Y up.
     """
     if convention.up == "y":
         return turns
-    return turns[..., [*TURNED, 3]] * np.array([1, -1, 1, 1], turns.dtype) + turns.dtype.type(0.0)
+    return turns[..., [*Z_UP_ORDER, 3]] * np.array([1, -1, 1, 1], turns.dtype) + turns.dtype.type(
+        0.0
+    )
 
 
-def moved(convention: Convention, clip: Clip) -> Clip:
+def convert_clip(convention: Convention, clip: Clip) -> Clip:
     """Return the clip, with its skeleton, in the unit and axes of a file."""
     if convention == METRES:
         return clip
     joints, turns = clip.skeleton, clip.rotations
-    offsets, tips = (places(convention, o) for o in (joints.offsets, joints.tip_offsets))
-    turned = np.concatenate([turns[..., :1], directions(convention, turns[..., 1:])], axis=-1)
+    offsets, tips = (convert_positions(convention, o) for o in (joints.offsets, joints.tip_offsets))
+    turned = np.concatenate(
+        [turns[..., :1], convert_directions(convention, turns[..., 1:])], axis=-1
+    )
     return Clip(
         replace(joints, offsets=offsets, tip_offsets=tips),
         turned,
-        places(convention, clip.translations),
+        convert_positions(convention, clip.translations),
         clip.rate,
     )
 
 
-def box(convention: Convention, corners: Floats) -> Floats:
+def convert_box(convention: Convention, corners: Floats) -> Floats:
     """Return the lowest and highest corner (..., 2, 3) of boxes in the unit and axes of a file.
 
     corners: m, with Y up.
     """
-    return np.sort(places(convention, corners), axis=-2)
+    return np.sort(convert_positions(convention, corners), axis=-2)
 
 
-def rounded(convention: Convention, lengths: Floats) -> Floats:
+def rounded_lengths(convention: Convention, lengths: Floats) -> Floats:
     """Return lengths in the unit of a file, rounded to a tenth of a micrometre.
 
     As decimals they are then short, and still near their float32 values.

@@ -26,13 +26,13 @@ METRES = Convention(1.0, "y")
 CENTIMETRES = Convention(0.01, "y")
 
 
-def of(unit: Unit | None, up: Up | None, usual: Convention) -> Convention:
+def requested_convention(unit: Unit | None, up: Up | None, usual: Convention) -> Convention:
     """Return the requested convention; None is the default of the format."""
     length = usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
     return Convention(length, usual.up if up is None else up)
 
 
-def refuse_other(found: Convention, law: Convention, name: str) -> None:
+def check_convention(found: Convention, law: Convention, name: str) -> None:
     """Raise InvalidField for a convention that a format does not allow."""
     if found.metres_per_unit != law.metres_per_unit:
         raise InvalidField(

@@ -24,14 +24,14 @@ _TYPES = {
 }
 
 
-def arrow(table: Table) -> bytes:
+def arrow_stream(table: Table) -> bytes:
     """Return the Arrow IPC stream of a table; equal tables give equal bytes."""
     rows = nanoarrow.struct({n: _field(c) for n, c in table.columns.items()}, nullable=False)
     schema = nanoarrow.c_schema(rows).modify(metadata=_metadata(table))
     batch = nanoarrow.c_array_from_buffers(
         schema, len(table), [None], children=[_array(c) for c in table.columns.values()]
     )
-    pieces = _Pieces()
+    pieces = _ChunkList()
     with StreamWriter.from_writable(pieces) as writer:
         writer.write_stream(batch)
     return b"".join(pieces)
@@ -43,7 +43,7 @@ def _metadata(table: Table) -> dict[str, str]:
     return {PREFIX + key: orjson.dumps(said[key], option=options).decode() for key in said}
 
 
-class _Pieces(list[bytes]):
+class _ChunkList(list[bytes]):
     """Writable list of the written chunks.
 
     Three times as fast as a BytesIO, which reallocates its buffer as it grows.
@@ -61,27 +61,29 @@ def _field(column: Column) -> Any:
     # Without spaces, as other writers have it.
     metadata = json.dumps({"shape": shape}, separators=(",", ":"))
     return nanoarrow.extension_type(
-        _rows(column), "arrow.fixed_shape_tensor", metadata, nullable=False
+        _row_array(column), "arrow.fixed_shape_tensor", metadata, nullable=False
     )
 
 
 def _array(column: Column) -> Any:
     """Return the column as an Arrow array on the same memory."""
     if column.dtype == bool:
-        return _truths(column)
+        return _boolean_array(column)
     numbers = nanoarrow.c_array(column.reshape(-1), _type(column))
     if column.ndim == 1:
         return numbers
-    return nanoarrow.c_array_from_buffers(_rows(column), len(column), [None], children=[numbers])
+    return nanoarrow.c_array_from_buffers(
+        _row_array(column), len(column), [None], children=[numbers]
+    )
 
 
-def _truths(column: Column) -> Any:
+def _boolean_array(column: Column) -> Any:
     """Return booleans as an array of one bit each; nanoarrow would take NumPy's bytes for bits."""
     bits = np.packbits(column, bitorder="little")
     return nanoarrow.c_array_from_buffers(_type(column), len(column), [None, bits])
 
 
-def _rows(column: Column) -> Any:
+def _row_array(column: Column) -> Any:
     return nanoarrow.fixed_size_list(_type(column), column[0].size, nullable=False)
 
 

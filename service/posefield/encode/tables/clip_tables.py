@@ -21,59 +21,59 @@ UNITS = {
     "up": "Y",
     "handedness": "right",
 }
-LENGTHS = {1.0: "metre", 0.01: "centimetre"}
+LENGTH_UNITS = {1.0: "metre", 0.01: "centimetre"}
 DECIMALS = 6
 """Decimals of lengths in JSON: a micrometre, near float32's precision a few metres away."""
 
 
-def json(answer: ClipAnswer, convention: Convention) -> bytes:
+def clip_json(answer: ClipAnswer, convention: Convention) -> bytes:
     """Return one JSON object: the skeleton, all rotations and root positions, and provenance.
 
     Numbers are rounded, unlike those of `table`, since the time to write JSON grows with its
     digits.
     """
-    clip = axis_conversion.moved(convention, answer.clip)
+    clip = axis_conversion.convert_clip(convention, answer.clip)
     content = {
-        "units": units(convention),
+        "units": unit_names(convention),
         "names": clip.skeleton.names,
         "parents": clip.skeleton.parents,
         "rate": clip.rate,
         "frames": len(clip),
-        "times": np.round(times(clip), DECIMALS),
-        **{name: _short(values) for name, values in tracks(clip).items()},
+        "times": np.round(frame_times(clip), DECIMALS),
+        **{name: _rounded(values) for name, values in motion_arrays(clip).items()},
         "trust": answer.trust.facts(),
     }
-    return tables.document(content)
+    return tables.json_object(content)
 
 
 def table(answer: ClipAnswer, convention: Convention) -> Table:
     """Return the clip as a table of one row per frame; bone offsets are one array for all."""
-    clip = axis_conversion.moved(convention, answer.clip)
-    numbers = {name: tables.single(values) for name, values in tracks(clip).items()}
+    clip = axis_conversion.convert_clip(convention, answer.clip)
+    numbers = {name: tables.as_float32(values) for name, values in motion_arrays(clip).items()}
     fixed = {"bone_offsets": numbers.pop("bone_offsets")}
     facts = {
         "names": list(clip.skeleton.names),
         "parents": list(clip.skeleton.parents),
         "rate": clip.rate,
-        "units": units(convention),
+        "units": unit_names(convention),
         "trust": answer.trust.facts(),
     }
-    return Table({"times": times(clip), **numbers}, facts, fixed)
+    return Table({"times": frame_times(clip), **numbers}, facts, fixed)
 
 
-def units(convention: Convention) -> dict[str, str]:
+def unit_names(convention: Convention) -> dict[str, str]:
     """Return the units of a file in a convention."""
     metres = convention.metres_per_unit
-    length = LENGTHS.get(metres, f"{metres:g} metres")
+    length = LENGTH_UNITS.get(metres, f"{metres:g} metres")
     return UNITS | {"length": length, "up": convention.up.upper()}
 
 
-def times(clip: Clip) -> Floats:
+def frame_times(clip: Clip) -> Floats:
     """Return the time of each frame (F,), s."""
     return np.arange(len(clip)) / clip.rate
 
 
-def tracks(clip: Clip) -> dict[str, Floats]:
+def motion_arrays(clip: Clip) -> dict[str, Floats]:
     """Return rotations (F, J, 4), root positions (F, 3) and bone offsets (J, 3).
 
     In the unit of the clip; the root's offset is zero.
@@ -83,7 +83,7 @@ def tracks(clip: Clip) -> dict[str, Floats]:
     return {"rotations": clip.rotations, "root_position": clip.root_path, "bone_offsets": offsets}
 
 
-def _short(values: Floats) -> npt.NDArray[np.float32]:
+def _rounded(values: Floats) -> npt.NDArray[np.float32]:
     return np.ascontiguousarray(np.round(values, DECIMALS), dtype=np.float32)
 
 
@@ -92,9 +92,9 @@ def pose_table(answer: PoseAnswer[Any]) -> Table:
     return Table(
         {
             "times": answer.times,
-            "rotations": tables.single(answer.rotations),
-            "root_position": tables.single(answer.root_position),
+            "rotations": tables.as_float32(answer.rotations),
+            "root_position": tables.as_float32(answer.root_position),
         },
         {"trust": answer.trust.facts()},
-        {"bone_offsets": tables.single(answer.bone_offsets)},
+        {"bone_offsets": tables.as_float32(answer.bone_offsets)},
     )

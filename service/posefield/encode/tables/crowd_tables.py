@@ -9,11 +9,11 @@ import numpy as np
 from posefield.common import atomic_files
 from posefield.common.units import Singles
 from posefield.encode.tables.clip_tables import UNITS
-from posefield.encode.tables.table import Column, Table, single
+from posefield.encode.tables.table import Column, Table, as_float32
 from posefield.motion import quat
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
 
-JSON_LIMIT = 1000
+MAX_JSON_CHARACTERS = 1000
 """Largest number of characters in JSON, 2.6 MB at 31 joints; larger crowds need a binary format."""
 
 
@@ -23,17 +23,17 @@ def table(poses: CrowdPoses) -> Table:
 
 
 def _columns(poses: CrowdPoses) -> dict[str, Column]:
-    found = {name: single(getattr(poses, name)) for name in _SINGLES}
+    found = {name: as_float32(getattr(poses, name)) for name in _FLOAT32_ARRAYS}
     found["supported"] = poses.supported
     # A question names levels up to 127.
     found["levels"] = poses.levels.astype(np.int8)
     if poses.error_px is not None:
-        found["error_px"] = single(poses.error_px)
+        found["error_px"] = as_float32(poses.error_px)
     return found
 
 
-_UNITS = ("length", "time", "rotation", "up", "handedness")
-_SINGLES = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
+_UNIT_NAMES = ("length", "time", "rotation", "up", "handedness")
+_FLOAT32_ARRAYS = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
 
 
 def _facts(poses: CrowdPoses) -> dict[str, Any]:
@@ -41,12 +41,13 @@ def _facts(poses: CrowdPoses) -> dict[str, Any]:
         "model": poses.model,
         "names": list(poses.skeleton.names),
         "parents": list(poses.skeleton.parents),
-        "units": {name: UNITS[name] for name in _UNITS} | {"error_px": "pixel", "frame": "world"},
+        "units": {name: UNITS[name] for name in _UNIT_NAMES}
+        | {"error_px": "pixel", "frame": "world"},
         "warnings": list(poses.warnings),
     }
 
 
-def write(crowd: CrowdClip, path: Path) -> None:
+def write_npz(crowd: CrowdClip, path: Path) -> None:
     """Write a crowd to an .npz file.
 
     rotations: (N, F, J, 4). root_position: (N, F, 3), m. bone_offsets: (N, J, 3), m. rate: frames a
@@ -55,9 +56,9 @@ def write(crowd: CrowdClip, path: Path) -> None:
     made = list(crowd.batches)
     rotations, roots, bones = (
         np.concatenate([getattr(motions, part) for motions in made])[crowd.motion]
-        for part in _PARTS
+        for part in _MOTION_ARRAYS
     )
-    turned, moved = _placed(crowd, rotations, roots)
+    turned, moved = _world_motion(crowd, rotations, roots)
     content = BytesIO()
     np.savez(
         content,
@@ -70,10 +71,10 @@ def write(crowd: CrowdClip, path: Path) -> None:
     atomic_files.write(content.getvalue(), path)
 
 
-_PARTS = ("rotations", "root_position", "bone_offsets")
+_MOTION_ARRAYS = ("rotations", "root_position", "bone_offsets")
 
 
-def _placed(crowd: CrowdClip, rotations: Singles, roots: Singles) -> tuple[Singles, Singles]:
+def _world_motion(crowd: CrowdClip, rotations: Singles, roots: Singles) -> tuple[Singles, Singles]:
     """Return rotations and root positions of all characters in the world."""
     turns = crowd.placement.turns[:, None]
     own = quat.mul(turns, rotations[:, :, 0].astype(np.float64))

@@ -7,17 +7,17 @@ import numpy as np
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import Table
 from posefield.question.results import (
-    Backing,
-    Captured,
-    Reasons,
+    CapturedClip,
+    Explanation,
     SigmaGrid,
     Suggestion,
     Suggestions,
+    SupportReport,
 )
 
 DECIMALS = 9
 """Decimals that do not depend on the machine that solved the kriging system."""
-HEADING = ("gain", "variance", "lacks", "nearest clip", "controls")
+SUGGESTION_HEADING = ("gain", "variance", "lacks", "nearest clip", "controls")
 
 
 def table(grid: SigmaGrid) -> Table:
@@ -25,7 +25,7 @@ def table(grid: SigmaGrid) -> Table:
     arrays = {
         "across_values": grid.across.values,
         "along_values": grid.along.values,
-        "sigma": tables.single(grid.sigma),
+        "sigma": tables.as_float32(grid.sigma),
         "inside": grid.inside,
         "supported": grid.supported,
     }
@@ -38,7 +38,7 @@ def points(grid: SigmaGrid) -> Table:
     columns = {
         "across_values": across.ravel(),
         "along_values": along.ravel(),
-        "sigma": tables.single(grid.sigma).ravel(),
+        "sigma": tables.as_float32(grid.sigma).ravel(),
         "inside": grid.inside.ravel(),
         "supported": grid.supported.ravel(),
     }
@@ -57,26 +57,26 @@ def _facts(grid: SigmaGrid) -> dict[str, Any]:
     }
 
 
-def explanation(found: Reasons) -> dict[str, Any]:
+def explanation(found: Explanation) -> dict[str, Any]:
     """Return the reasons in the schema Reasons of the API."""
     return {
         "model": found.model,
         "controls": found.controls,
         "performer": found.performer,
         "warnings": list(found.warnings),
-        "support": _backing(found.backing),
-        "nearest": [_clip(clip) for clip in found.nearest],
+        "support": _support_facts(found.backing),
+        "nearest": [_clip_facts(clip) for clip in found.nearest],
         "others": {"count": found.others, "weight": round(found.others_weight, DECIMALS)},
         **({"inferred": list(found.inferred)} if found.inferred else {}),
     }
 
 
-def _clip(clip: Captured) -> dict[str, Any]:
+def _clip_facts(clip: CapturedClip) -> dict[str, Any]:
     rounded = {name: round(getattr(clip, name), DECIMALS) for name in ("distance", "weight")}
     return {**vars(clip), **rounded}
 
 
-def _backing(found: Backing) -> dict[str, Any]:
+def _support_facts(found: SupportReport) -> dict[str, Any]:
     return {
         "supported": found.supported,
         "beyond": {name: round(share, DECIMALS) for name, share in found.beyond.items()},
@@ -86,21 +86,22 @@ def _backing(found: Backing) -> dict[str, Any]:
     }
 
 
-def explanation_text(found: Reasons) -> str:
+def explanation_text(found: Explanation) -> str:
     """Return one line for each clip, the nearest first, one for all others, and the support."""
     wide = max(len("clip"), *(len(clip.source) for clip in found.nearest))
     lines = [f"{'clip':{wide}}  distance   weight  "]
     lines += [
-        f"{clip.source:{wide}}  {clip.distance:8.3f}  {100 * clip.weight:6.1f} %  {_said(clip)}"
+        f"{clip.source:{wide}}  {clip.distance:8.3f}  {100 * clip.weight:6.1f} %  "
+        f"{_clip_line(clip)}"
         for clip in found.nearest
     ]
     others = f"{found.others} others"
     lines.append(f"{others:{wide}}  {'':8}  {100 * found.others_weight:6.1f} %")
-    lines.append(_supported(found.backing))
+    lines.append(_support_line(found.backing))
     return "\n".join(line.rstrip() for line in lines)
 
 
-def _supported(found: Backing) -> str:
+def _support_line(found: SupportReport) -> str:
     said = "was captured" if found.supported else "was not captured"
     beyond = ", ".join(
         f"{name} {100 * share:.0f} % of its range beyond it"
@@ -113,7 +114,7 @@ def _supported(found: Backing) -> str:
     )
 
 
-def _said(clip: Captured) -> str:
+def _clip_line(clip: CapturedClip) -> str:
     values = ", ".join(f"{name} {value:g}" for name, value in clip.controls.items())
     return f"{clip.performer}, {values}" if clip.performer else values
 
@@ -124,19 +125,19 @@ def suggestions(found: Suggestions) -> dict[str, Any]:
         "model": found.model,
         "performer": found.performer,
         "candidates": found.candidates,
-        "suggestions": [_suggestion(each) for each in found.suggestions],
+        "suggestions": [_suggestion_facts(each) for each in found.suggestions],
     }
 
 
-def _suggestion(found: Suggestion) -> dict[str, Any]:
+def _suggestion_facts(found: Suggestion) -> dict[str, Any]:
     rounded = {n: round(getattr(found, n), DECIMALS) for n in ("gain", "variance", "gap")}
     return {**vars(found), **rounded}
 
 
 def suggestions_text(found: Suggestions) -> str:
     """Return one line for each point, the largest gain first."""
-    rows = [HEADING, *map(_suggestion_cells, found.suggestions)]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(HEADING))]
+    rows = [SUGGESTION_HEADING, *map(_suggestion_cells, found.suggestions)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(SUGGESTION_HEADING))]
     lines = ("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows)
     return "\n".join(line.rstrip() for line in lines)
 

@@ -17,7 +17,7 @@ import orjson
 from posefield.common import cancellation
 
 Column = npt.NDArray[Any]
-BLOCK = 16_384
+JSON_BLOCK = 16_384
 """Numbers that are written at a time: a millisecond, in which no other thread runs."""
 
 
@@ -42,29 +42,29 @@ class Table:
         return {**self.columns, **self.fixed}
 
 
-def single(values: npt.NDArray[Any]) -> Column:
+def as_float32(values: npt.NDArray[Any]) -> Column:
     """Return an array as float32, the precision of the model."""
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
-def json(table: Table) -> bytes:
+def json_table(table: Table) -> bytes:
     """Return one JSON object, arrays as nested lists."""
-    return document({**table.facts, **table.arrays})
+    return json_object({**table.facts, **table.arrays})
 
 
-def document(content: Mapping[str, Any]) -> bytes:
+def json_object(content: Mapping[str, Any]) -> bytes:
     """Return a JSON object of plain values and arrays, large ones written a few rows at a time.
 
     orjson holds Python's lock while it writes, a tenth of a second for 16 MB.
     """
-    members = (orjson.dumps(name) + b":" + _value(value) for name, value in content.items())
+    members = (orjson.dumps(name) + b":" + _json_value(value) for name, value in content.items())
     return b"{" + b",".join(members) + b"}"
 
 
-def _value(value: Any) -> bytes:
-    if not isinstance(value, np.ndarray) or value.size <= BLOCK:
+def _json_value(value: Any) -> bytes:
+    if not isinstance(value, np.ndarray) or value.size <= JSON_BLOCK:
         return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
-    rows, pieces = max(1, BLOCK * len(value) // value.size), []
+    rows, pieces = max(1, JSON_BLOCK * len(value) // value.size), []
     for first in range(0, len(value), rows):
         cancellation.check()
         block = orjson.dumps(value[first : first + rows], option=orjson.OPT_SERIALIZE_NUMPY)
@@ -73,30 +73,32 @@ def _value(value: Any) -> bytes:
     return b"[" + b",".join(pieces) + b"]"
 
 
-def msgpack(table: Table) -> bytes:
+def msgpack_table(table: Table) -> bytes:
     """Return one MessagePack map; an array is a map of dtype, shape and its little-endian bytes.
 
     As lists the same numbers would take five bytes each, and longer to read than from JSON.
     """
-    return _MSGPACK.encode({**table.facts, **{k: _packed(v) for k, v in table.arrays.items()}})
+    return _MSGPACK.encode(
+        {**table.facts, **{k: _msgpack_array(v) for k, v in table.arrays.items()}}
+    )
 
 
 _MSGPACK = msgspec.msgpack.Encoder()
 
 
-def _packed(values: Column) -> dict[str, Any]:
+def _msgpack_array(values: Column) -> dict[str, Any]:
     own = np.ascontiguousarray(values)
     plain = own.astype(own.dtype.newbyteorder("<"), copy=False)
     return {"dtype": plain.dtype.str, "shape": list(own.shape), "data": plain.tobytes()}
 
 
-def npz(table: Table) -> bytes:
+def npz_table(table: Table) -> bytes:
     """Return an archive that numpy.load opens without pickle.
 
     Strings, numbers and lists of either are arrays too; other facts are JSON texts.
     """
     facts = {name: _array(value) for name, value in table.facts.items()}
-    return archive({**table.arrays, **facts})
+    return npz_archive({**table.arrays, **facts})
 
 
 def _array(value: Any) -> Column:
@@ -110,11 +112,11 @@ def _array(value: Any) -> Column:
 
 
 # The earliest time of the zip format, so that the bytes depend on the arrays alone.
-TIME = (1980, 1, 1, 0, 0, 0)
-READABLE = 0o644 << 16
+MODIFICATION_TIME = (1980, 1, 1, 0, 0, 0)
+READABLE_MODE = 0o644 << 16
 
 
-def archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
+def npz_archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
     """Return an archive of stored members that numpy.load opens without pickle."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as made:
@@ -125,6 +127,6 @@ def archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
 
 
 def _member(name: str) -> zipfile.ZipInfo:
-    member: Any = zipfile.ZipInfo(f"{name}.npy", TIME)
-    member.create_system, member.external_attr = 3, READABLE
+    member: Any = zipfile.ZipInfo(f"{name}.npy", MODIFICATION_TIME)
+    member.create_system, member.external_attr = 3, READABLE_MODE
     return member

@@ -9,48 +9,54 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.encode.character import animation_samples, character, extent
-from posefield.encode.character.animation_samples import Moves
-from posefield.encode.character.character import Rig
+from posefield.encode.character.animation_samples import AnimationSamples
+from posefield.encode.character.character import CharacterRig
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import custom_data
-from posefield.encode.usd.layer_content import Array, Content, Samples
+from posefield.encode.usd.layer_content import Array, LayerContent, Samples
 from posefield.question.results import ClipAnswer
 
-TOGETHER = 3200
+FRAMES_AT_ONCE = 3200
 """Frames of clips that are computed at a time; a longer clip is computed alone."""
 
 
-class Take(NamedTuple):
+class ClipArrays(NamedTuple):
     """Rig, frame rate and layer content of one clip."""
 
-    rig: Rig
+    rig: CharacterRig
     rate: float
-    content: Content
+    content: LayerContent
 
 
-def whole(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Take]:
+def arrays_with_character(
+    answers: Sequence[ClipAnswer], convention: Convention
+) -> Iterator[ClipArrays]:
     """Yield takes in the order of their results, with samples, character values and facts."""
-    for rig, some in _alike(answers):
-        made = animation_samples.of_clips([answer.clip for answer in some])
-        rest = character.resting(rig, made.offsets)
-        boxes = extent.boxes(rig.tree, made, character.balls(rest))
-        values = character.numbers(rest, convention)
-        values["extent"] = axis_conversion.box(convention, boxes).astype(np.float32)
+    for rig, some in _grouped_by_rig(answers):
+        made = animation_samples.from_clips([answer.clip for answer in some])
+        rest = character.rest_pose(rig, made.offsets)
+        boxes = extent.bounding_boxes(rig.tree, made, character.bounding_radii(rest))
+        values = character.character_arrays(rest, convention)
+        values["extent"] = axis_conversion.convert_box(convention, boxes).astype(np.float32)
         for index, samples in enumerate(_samples(made, convention)):
             own = {name: array[index] for name, array in values.items()}
-            yield _take(rig, some[index], samples, own)
+            yield _clip_arrays(rig, some[index], samples, own)
 
 
-def bare(answers: Sequence[ClipAnswer], convention: Convention) -> Iterator[Take]:
+def arrays_without_character(
+    answers: Sequence[ClipAnswer], convention: Convention
+) -> Iterator[ClipArrays]:
     """Yield takes in the order of their results, with samples and facts only."""
-    for rig, some in _alike(answers):
-        made = animation_samples.of_clips([answer.clip for answer in some])
+    for rig, some in _grouped_by_rig(answers):
+        made = animation_samples.from_clips([answer.clip for answer in some])
         for answer, samples in zip(some, _samples(made, convention), strict=True):
-            yield _take(rig, answer, samples, {})
+            yield _clip_arrays(rig, answer, samples, {})
 
 
-def _alike(answers: Sequence[ClipAnswer]) -> Iterator[tuple[Rig, list[ClipAnswer]]]:
+def _grouped_by_rig(
+    answers: Sequence[ClipAnswer],
+) -> Iterator[tuple[CharacterRig, list[ClipAnswer]]]:
     """Yield consecutive results of one skeleton, at most TOGETHER frames at a time."""
     _keep_freed_memory()
     for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
@@ -58,7 +64,7 @@ def _alike(answers: Sequence[ClipAnswer]) -> Iterator[tuple[Rig, list[ClipAnswer
         frames = 0
         for answer in some:
             frames += len(answer.clip)
-            if part and frames > TOGETHER:
+            if part and frames > FRAMES_AT_ONCE:
                 yield character.rig(part[0].clip.skeleton), part
                 part, frames = [], len(answer.clip)
             part.append(answer)
@@ -76,14 +82,16 @@ def _keep_freed_memory() -> None:
     np.empty(31 << 20, np.uint8)
 
 
-def _take(rig: Rig, answer: ClipAnswer, samples: Samples, values: Mapping[str, Array]) -> Take:
+def _clip_arrays(
+    rig: CharacterRig, answer: ClipAnswer, samples: Samples, values: Mapping[str, Array]
+) -> ClipArrays:
     cancellation.check()
-    content = Content(samples, values, custom_data.parted(answer.trust.facts()))
-    return Take(rig, answer.clip.rate, content)
+    content = LayerContent(samples, values, custom_data.split_facts(answer.trust.facts()))
+    return ClipArrays(rig, answer.clip.rate, content)
 
 
-def _samples(made: Moves, convention: Convention) -> Iterator[Samples]:
-    translations = axis_conversion.places(convention, made.translations)
-    rotations = axis_conversion.rotations(convention, made.rotations)
+def _samples(made: AnimationSamples, convention: Convention) -> Iterator[Samples]:
+    translations = axis_conversion.convert_positions(convention, made.translations)
+    rotations = axis_conversion.convert_rotations(convention, made.rotations)
     for first, last in pairwise(made.starts):
         yield {"translations": translations[first:last], "rotations": rotations[first:last]}

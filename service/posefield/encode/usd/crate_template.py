@@ -20,9 +20,15 @@ from pxr import Sdf
 from posefield.common.units import Singles
 from posefield.encode.usd import crate_sections, custom_data, layer_metadata
 from posefield.encode.usd import layer_content as contents
-from posefield.encode.usd.crate_sections import Pieces, Section
-from posefield.encode.usd.custom_data import Facts
-from posefield.encode.usd.layer_content import INLINE, Array, Author, Content, Pattern
+from posefield.encode.usd.crate_sections import CrateParts, CrateSection
+from posefield.encode.usd.custom_data import SplitFacts
+from posefield.encode.usd.layer_content import (
+    INLINE,
+    Array,
+    LayerBuilder,
+    LayerContent,
+    LayerPattern,
+)
 
 Bytes = npt.NDArray[np.uint8]
 
@@ -31,7 +37,7 @@ FLOAT, DOUBLE = struct.Struct("<f"), struct.Struct("<d")
 
 
 @dataclass(frozen=True)
-class Run:
+class SampleRun:
     """Evenly spaced samples in a layer.
 
     offset: of the first one. stride: bytes between neighbours. rows: their indices.
@@ -48,7 +54,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Template:
+class CrateTemplate:
     """Bytes of a layer without its tokens, and the offsets of samples, values and numbers.
 
     numbers: offset, form and index of each number that is stored. short: the pattern of a layer of
@@ -57,28 +63,28 @@ class Template:
     """
 
     values: bytes
-    sections: tuple[Section, ...]
-    samples: Mapping[str, tuple[Run, ...]]
+    sections: tuple[CrateSection, ...]
+    samples: Mapping[str, tuple[SampleRun, ...]]
     places: Mapping[str, int]
     numbers: tuple[tuple[int, struct.Struct, int], ...]
-    short: Pattern
+    short: LayerPattern
     apart: tuple[tuple[str, str], ...]
 
     def __len__(self) -> int:
         """Return the approximate bytes of the template in memory."""
         return len(self.values) + sum(len(section.content) for section in self.sections)
 
-    def write(self, author: Author, content: Content) -> bytes | None:
+    def write(self, author: LayerBuilder, content: LayerContent) -> bytes | None:
         """Return the layer with other content of its pattern.
 
         None where the result would differ from usd-core's.
         """
-        spelt = _words(author, self.short, content.facts.texts)
-        if spelt is None or self._merged(author, content):
+        spelt = _token_section(author, self.short, content.facts.texts)
+        if spelt is None or self._has_equal_arrays(author, content):
             return None
         made = bytearray(self.values)
         for name, runs in self.samples.items():
-            rows = _bytes(content.samples[name])
+            rows = _row_bytes(content.samples[name])
             for run in runs:
                 run.fill(made, rows)
         for name, at in self.places.items():
@@ -86,33 +92,37 @@ class Template:
             made[at : at + len(value)] = value
         for at, form, index in self.numbers:
             form.pack_into(made, at, content.facts.numbers[index])
-        return b"".join((made, crate_sections.tail(made, (spelt, *self.sections))))
+        return b"".join((made, crate_sections.sections_and_table(made, (spelt, *self.sections))))
 
-    def _merged(self, author: Author, content: Content) -> bool:
-        every = _arrays(author, content)
+    def _has_equal_arrays(self, author: LayerBuilder, content: LayerContent) -> bool:
+        every = _all_arrays(author, content)
         return any(contents.alike(every[a], every[b]) for a, b in self.apart)
 
 
-def pattern(author: Author, content: Content) -> Pattern:
+def pattern(author: LayerBuilder, content: LayerContent) -> LayerPattern:
     """Return the pattern that determines the layout of a layer's bytes."""
     return contents.pattern(content, author.numbers)
 
 
-def ordinary(author: Author, content: Content) -> bytes:
+def ordinary(author: LayerBuilder, content: LayerContent) -> bytes:
     """Return the layer as written by usd-core."""
-    return layer_metadata.crate(author.layer(content))
+    return layer_metadata.crate_bytes(author.layer(content))
 
 
-def template(author: Author, content: Content, pattern: Pattern) -> Template | None:
+def template(
+    author: LayerBuilder, content: LayerContent, pattern: LayerPattern
+) -> CrateTemplate | None:
     """Return a template of an author's layers of one pattern; None if it cannot be verified.
 
     It is verified if all offsets are found and if usd-core writes the same bytes for the content
     and for random content of the same pattern.
     """
     texts = len(content.facts.texts)
-    first, second = (contents.marks(pattern, author.numbers, texts, seed) for seed in (1, 2))
-    found = crate_sections.pieces(ordinary(author, first))
-    made = found and _located(author, first, pattern, found)
+    first, second = (
+        contents.random_content(pattern, author.numbers, texts, seed) for seed in (1, 2)
+    )
+    found = crate_sections.split_crate(ordinary(author, first))
+    made = found and _locate_values(author, first, pattern, found)
     if not made:
         return None
     right = all(made.write(author, each) == ordinary(author, each) for each in (content, second))
@@ -120,51 +130,60 @@ def template(author: Author, content: Content, pattern: Pattern) -> Template | N
 
 
 @lru_cache(maxsize=1024)
-def _words(author: Author, short: Pattern, texts: tuple[str, ...]) -> Section | None:
+def _token_section(
+    author: LayerBuilder, short: LayerPattern, texts: tuple[str, ...]
+) -> CrateSection | None:
     """Return the section of tokens of an author's layers that hold those texts.
 
     Cached, since usd-core takes half a millisecond. None if the tokens are numbered differently
     than in other layers: a text that equals the name of a prim shares its token.
     """
-    found, usual = _short(author, short, texts), _usual(author, short, len(texts))
+    found, usual = (
+        _single_frame_parts(author, short, texts),
+        _reference_parts(author, short, len(texts)),
+    )
     return found.sections[0] if found and usual and found.alike(usual) else None
 
 
 @lru_cache(maxsize=16)
-def _usual(author: Author, short: Pattern, count: int) -> Pieces | None:
-    return _short(author, short, tuple(f"text {index}" for index in range(count)))
+def _reference_parts(author: LayerBuilder, short: LayerPattern, count: int) -> CrateParts | None:
+    return _single_frame_parts(author, short, tuple(f"text {index}" for index in range(count)))
 
 
-def _short(author: Author, short: Pattern, texts: tuple[str, ...]) -> Pieces | None:
-    said = Facts(short.facts, (0.0,) * len(short.numbers), texts)
+def _single_frame_parts(
+    author: LayerBuilder, short: LayerPattern, texts: tuple[str, ...]
+) -> CrateParts | None:
+    said = SplitFacts(short.facts, (0.0,) * len(short.numbers), texts)
     made = Sdf.Layer.CreateAnonymous("words.usda")
-    made.TransferContent(_single(author, short, len(texts)))
-    layer_metadata.say(made, custom_data.dictionary(said.whole()))
-    return crate_sections.pieces(layer_metadata.crate(made))
+    made.TransferContent(_single_frame_layer(author, short, len(texts)))
+    layer_metadata.set_custom_data(made, custom_data.usd_dictionary(said.join()))
+    return crate_sections.split_crate(layer_metadata.crate_bytes(made))
 
 
 @lru_cache(maxsize=16)
-def _single(author: Author, short: Pattern, count: int) -> Any:
+def _single_frame_layer(author: LayerBuilder, short: LayerPattern, count: int) -> Any:
     """Return a layer of a single frame to copy others from; building it takes twice as long."""
-    return author.layer(contents.marks(short, author.numbers, count, seed=0))
+    return author.layer(contents.random_content(short, author.numbers, count, seed=0))
 
 
-def _located(author: Author, marks: Content, pattern: Pattern, found: Pieces) -> Template | None:
+def _locate_values(
+    author: LayerBuilder, marks: LayerContent, pattern: LayerPattern, found: CrateParts
+) -> CrateTemplate | None:
     values = found.values
-    samples = {name: _runs(values, rows) for name, rows in marks.samples.items()}
+    samples = {name: _sample_runs(values, rows) for name, rows in marks.samples.items()}
     places = {name: values.find(value.tobytes()) for name, value in marks.values.items()}
     numbers = tuple(
         (values.find(form.pack(marks.facts.numbers[index])), form, index)
-        for form, index in _filled(pattern, len(author.numbers))
+        for form, index in _stored_numbers(pattern, len(author.numbers))
     )
     missing = min((0, *places.values(), *(at for at, _, _ in numbers))) < 0
     if missing or not all(samples.values()):
         return None
-    short, apart = contents.short(pattern), tuple(_apart(author, marks))
-    return Template(values, found.sections[1:], samples, places, numbers, short, apart)
+    short, apart = contents.single_frame_pattern(pattern), tuple(_equal_size_pairs(author, marks))
+    return CrateTemplate(values, found.sections[1:], samples, places, numbers, short, apart)
 
 
-def _filled(pattern: Pattern, known: int) -> Iterator[tuple[struct.Struct, int]]:
+def _stored_numbers(pattern: LayerPattern, known: int) -> Iterator[tuple[struct.Struct, int]]:
     """Yield form and index of each number that is stored.
 
     Inline numbers are; of the others, those that equal no earlier one.
@@ -176,7 +195,7 @@ def _filled(pattern: Pattern, known: int) -> Iterator[tuple[struct.Struct, int]]
             yield DOUBLE, index
 
 
-def _runs(values: bytes, marks: Singles) -> tuple[Run, ...]:
+def _sample_runs(values: bytes, marks: Singles) -> tuple[SampleRun, ...]:
     """Return runs of evenly spaced samples, equal ones stored once; empty if any is not found."""
     first: dict[bytes, int] = {}
     for index, row in enumerate(marks):
@@ -185,32 +204,32 @@ def _runs(values: bytes, marks: Singles) -> tuple[Run, ...]:
     for row in first:
         # Samples are stored in the order of time.
         places.append(values.find(row, places[-1] if places else 0))
-    return () if min(places) < 0 else tuple(_even(list(first.values()), places))
+    return () if min(places) < 0 else tuple(_even_runs(list(first.values()), places))
 
 
-def _even(rows: list[int], places: list[int]) -> Iterator[Run]:
+def _even_runs(rows: list[int], places: list[int]) -> Iterator[SampleRun]:
     while rows:
         stride = places[1] - places[0] if len(places) > 1 else 0
         steps = zip(np.diff(rows).tolist(), np.diff(places).tolist(), strict=True)
         uneven = (index for index, step in enumerate(steps, 1) if step != (1, stride))
         count = next(uneven, len(rows))
-        yield Run(places[0], stride, slice(rows[0], rows[0] + count))
+        yield SampleRun(places[0], stride, slice(rows[0], rows[0] + count))
         rows, places = rows[count:], places[count:]
 
 
-def _arrays(author: Author, content: Content) -> dict[str, Array]:
+def _all_arrays(author: LayerBuilder, content: LayerContent) -> dict[str, Array]:
     known = {f"known {index}": value for index, value in enumerate(author.values)}
     return {**content.samples, **content.values, **known}
 
 
-def _apart(author: Author, marks: Content) -> Iterator[tuple[str, str]]:
+def _equal_size_pairs(author: LayerBuilder, marks: LayerContent) -> Iterator[tuple[str, str]]:
     """Yield pairs of arrays, or of samples and an array, that have one size."""
-    every = _arrays(author, marks)
+    every = _all_arrays(author, marks)
     of_one = {n: v.shape[1:] if n in marks.samples else v.shape for n, v in every.items()}
     for a, b in combinations(every, 2):
         if of_one[a] == of_one[b]:
             yield a, b
 
 
-def _bytes(samples: Singles) -> Bytes:
+def _row_bytes(samples: Singles) -> Bytes:
     return np.ascontiguousarray(samples).view(np.uint8).reshape(len(samples), -1)

@@ -8,43 +8,43 @@ from typing import Any, NamedTuple
 import numpy as np
 from pxr import Vt
 
-LARGEST = 2**63 - 1
+LARGEST_INTEGER = 2**63 - 1
 """Largest integer that every reader of a layer supports."""
 
 
-class Facts(NamedTuple):
+class SplitFacts(NamedTuple):
     """Facts split into a shape, which many results share, and its numbers and texts."""
 
     shape: Hashable
     numbers: tuple[float, ...]
     texts: tuple[str, ...]
 
-    def whole(self) -> Any:
+    def join(self) -> Any:
         """Return the facts as one value."""
-        return _joined(self.shape, iter(self.numbers), iter(self.texts), self.texts)
+        return _join_facts(self.shape, iter(self.numbers), iter(self.texts), self.texts)
 
 
-class Group(NamedTuple):
+class DictionaryShape(NamedTuple):
     """Shape of a dictionary: names, and the shape of each value."""
 
     names: tuple[str, ...]
     shapes: tuple[Hashable, ...]
 
 
-class Several(NamedTuple):
+class ListShape(NamedTuple):
     """Shape of a list of texts or dictionaries."""
 
     shapes: tuple[Hashable, ...]
 
 
-class Again(NamedTuple):
+class RepeatedText(NamedTuple):
     """Shape of a repeated text, the nth of all: USD stores it once."""
 
     nth: int
 
 
 @dataclass(frozen=True)
-class Same:
+class ConstantFact:
     """Shape of a fact that is a constant of the shape.
 
     Any fact that is neither a finite number nor a text, and a text that is also the name of a fact.
@@ -57,23 +57,23 @@ class Same:
 NUMBER, TEXT = "number", "text"
 """Shapes of a finite number and of a text."""
 
-NONE = Facts(Group((), ()), (), ())
+NO_FACTS = SplitFacts(DictionaryShape((), ()), (), ())
 
 
-def parted(facts: Mapping[str, Any]) -> Facts:
+def split_facts(facts: Mapping[str, Any]) -> SplitFacts:
     """Return facts split into shape, numbers and texts."""
-    parting = _Parting(frozenset(_names(facts)))
+    parting = _FactSplitter(frozenset(_fact_names(facts)))
     shape = parting.shape(facts)
-    return Facts(shape, tuple(parting.numbers), tuple(parting.texts))
+    return SplitFacts(shape, tuple(parting.numbers), tuple(parting.texts))
 
 
-def dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
+def usd_dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Return facts as values of a USD dictionary, without those that are None."""
-    return {name: _value(fact) for name, fact in facts.items() if fact is not None}
+    return {name: _usd_value(fact) for name, fact in facts.items() if fact is not None}
 
 
 @dataclass
-class _Parting:
+class _FactSplitter:
     """Numbers and texts of facts, collected in order.
 
     names: of all facts. texts: index by text.
@@ -92,69 +92,69 @@ class _Parting:
         if kind is str:
             return self._text(fact)
         if kind is dict:
-            return Group(tuple(fact), tuple([self.shape(each) for each in fact.values()]))
+            return DictionaryShape(tuple(fact), tuple([self.shape(each) for each in fact.values()]))
         if kind is list and {*map(type, fact)} <= {str}:
-            return Several(tuple([self._text(each) for each in fact]))
+            return ListShape(tuple([self._text(each) for each in fact]))
         if kind is list and {*map(type, fact)} == {dict}:
-            return Several(tuple([self.shape(each) for each in fact]))
-        return Same(repr(fact), fact)
+            return ListShape(tuple([self.shape(each) for each in fact]))
+        return ConstantFact(repr(fact), fact)
 
     def _text(self, text: str) -> Hashable:
         if text in self.names:
-            return Same(repr(text), text)
+            return ConstantFact(repr(text), text)
         if text in self.texts:
-            return Again(self.texts[text])
+            return RepeatedText(self.texts[text])
         self.texts[text] = len(self.texts)
         return TEXT
 
 
-def _names(fact: Any) -> Iterator[str]:
+def _fact_names(fact: Any) -> Iterator[str]:
     """Yield the names of facts, nested ones included."""
     if type(fact) is dict:
         yield from fact
         for each in fact.values():
-            yield from _names(each)
+            yield from _fact_names(each)
     if type(fact) is list:
         for each in fact:
-            yield from _names(each)
+            yield from _fact_names(each)
 
 
-def _joined(
+def _join_facts(
     shape: Hashable, numbers: Iterator[float], texts: Iterator[str], every: Sequence[str]
 ) -> Any:
     match shape:
-        case Group(names, shapes):
-            values = [_joined(each, numbers, texts, every) for each in shapes]
+        case DictionaryShape(names, shapes):
+            values = [_join_facts(each, numbers, texts, every) for each in shapes]
             return dict(zip(names, values, strict=True))
-        case Several(shapes):
-            return [_joined(each, numbers, texts, every) for each in shapes]
-        case Again(nth):
+        case ListShape(shapes):
+            return [_join_facts(each, numbers, texts, every) for each in shapes]
+        case RepeatedText(nth):
             return every[nth]
-        case Same(_, fact):
+        case ConstantFact(_, fact):
             return fact
     return next(numbers) if shape == NUMBER else next(texts)
 
 
-def _value(fact: Any) -> Any:
+def _usd_value(fact: Any) -> Any:
     match fact:
         case np.generic() | np.ndarray():
-            return _value(fact.tolist())
+            return _usd_value(fact.tolist())
         case Mapping():
-            return dictionary(fact)
+            return usd_dictionary(fact)
         case str() | bool() | float():
             return fact
         case int():
-            return fact if abs(fact) <= LARGEST else str(fact)
+            return fact if abs(fact) <= LARGEST_INTEGER else str(fact)
         case Sequence():
-            return _array(fact)
+            return _usd_array(fact)
     raise TypeError(f"a fact of type {type(fact).__name__}, expected text, a number or several")
 
 
-def _array(facts: Sequence[Any]) -> Any:
+def _usd_array(facts: Sequence[Any]) -> Any:
     if all(isinstance(fact, str) for fact in facts):
         return Vt.StringArray(list(facts))
-    if all(isinstance(fact, int) and abs(fact) <= LARGEST for fact in facts):
+    if all(isinstance(fact, int) and abs(fact) <= LARGEST_INTEGER for fact in facts):
         return Vt.Int64Array(list(facts))
     if all(isinstance(fact, float | int) for fact in facts):
         return Vt.DoubleArray(list(facts))
-    return dictionary({str(index): fact for index, fact in enumerate(facts)})
+    return usd_dictionary({str(index): fact for index, fact in enumerate(facts)})

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Singles
-from posefield.encode.usd.custom_data import Facts
+from posefield.encode.usd.custom_data import SplitFacts
 
 Array = npt.NDArray[Any]
 Samples = Mapping[str, Singles]
@@ -22,7 +22,7 @@ Samples = Mapping[str, Singles]
 Repeats = tuple[int, ...] | None
 """For each row of samples the index of the first equal row; None if all rows differ."""
 
-PROBED = 8
+PROBED_NUMBERS = 8
 """Count of leading numbers of a sample whose sum is compared before whole samples are."""
 
 BARE, REPEAT = 1500, 36
@@ -33,7 +33,7 @@ INLINE = -1
 
 
 @dataclass(frozen=True)
-class Content:
+class LayerContent:
     """Content of a layer: samples of attributes, values by name, and facts.
 
     No number is -0, which USD's deduplication does not distinguish from 0.
@@ -41,7 +41,7 @@ class Content:
 
     samples: Samples
     values: Mapping[str, Array]
-    facts: Facts
+    facts: SplitFacts
 
     @property
     def frames(self) -> int:
@@ -49,7 +49,7 @@ class Content:
         return len(next(iter(self.samples.values())))
 
 
-class Author(Protocol):
+class LayerBuilder(Protocol):
     """Kind of layer; equal kinds build equal layers of equal content."""
 
     @property
@@ -60,16 +60,16 @@ class Author(Protocol):
     def values(self) -> tuple[Array, ...]:
         """Return the arrays that every layer of this kind holds."""
 
-    def head(self, content: Content) -> Any:
+    def head(self, content: LayerContent) -> Any:
         """Return the layer without its prims."""
 
-    def layer(self, content: Content) -> Any:
+    def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
 
     def __hash__(self) -> int: ...
 
 
-class Pattern(NamedTuple):
+class LayerPattern(NamedTuple):
     """Properties of a content that determine the layout of its layer's bytes.
 
     samples: name, shape and repeats. values: name, shape and type. numbers: of each number INLINE,
@@ -83,27 +83,29 @@ class Pattern(NamedTuple):
     facts: Hashable
 
 
-def pattern(content: Content, known: tuple[float, ...]) -> Pattern:
+def pattern(content: LayerContent, known: tuple[float, ...]) -> LayerPattern:
     """Return the pattern of a content; known: the numbers of its author."""
-    return Pattern(
+    return LayerPattern(
         tuple((name, rows.shape, _repeats(rows)) for name, rows in content.samples.items()),
         tuple((name, found.shape, found.dtype.char) for name, found in content.values.items()),
-        _equals(content.facts.numbers, known),
+        _first_equal_numbers(content.facts.numbers, known),
         content.facts.shape,
     )
 
 
-def samples_size(content: Content) -> int:
+def samples_size(content: LayerContent) -> int:
     """Return the bytes of the samples of a content."""
     return sum(rows.nbytes for rows in content.samples.values())
 
 
-def size(pattern: Pattern) -> int:
+def pattern_size(pattern: LayerPattern) -> int:
     """Return the approximate bytes of a pattern in memory."""
     return BARE + REPEAT * sum(len(repeats) for _, _, repeats in pattern.samples if repeats)
 
 
-def marks(pattern: Pattern, known: tuple[float, ...], texts: int, seed: int) -> Content:
+def random_content(
+    pattern: LayerPattern, known: tuple[float, ...], texts: int, seed: int
+) -> LayerContent:
     """Return a content of a pattern with random values, each of which occurs once."""
     rng = np.random.default_rng(seed)
     samples = {}
@@ -117,10 +119,10 @@ def marks(pattern: Pattern, known: tuple[float, ...], texts: int, seed: int) -> 
         inline = float(np.float32(drawn))
         numbers.append(inline if equal == INLINE else [*known, *numbers, drawn][equal])
     written = tuple(f"text {seed}.{index}" for index in range(texts))
-    return Content(samples, values, Facts(pattern.facts, tuple(numbers), written))
+    return LayerContent(samples, values, SplitFacts(pattern.facts, tuple(numbers), written))
 
 
-def short(pattern: Pattern) -> Pattern:
+def single_frame_pattern(pattern: LayerPattern) -> LayerPattern:
     """Return the pattern of a layer of a single frame, with numbers that float32 holds."""
     return pattern._replace(
         samples=tuple((name, (1, *shape[1:]), None) for name, shape, _ in pattern.samples),
@@ -135,10 +137,10 @@ def _repeats(rows: Singles) -> Repeats:
     some of these are equal.
     """
     flat = rows.reshape(len(rows), -1)
-    if _distinct(flat[:, 0]):
+    if _all_distinct(flat[:, 0]):
         return None
-    probes = np.add.reduce(flat[:, :PROBED], axis=1)
-    if _distinct(probes):
+    probes = np.add.reduce(flat[:, :PROBED_NUMBERS], axis=1)
+    if _all_distinct(probes):
         return None
     first, sums = dict[Any, int](), probes.tolist()
     alike = [first.setdefault(each, index) for index, each in enumerate(sums)]
@@ -148,12 +150,12 @@ def _repeats(rows: Singles) -> Repeats:
     return tuple(alike) if len(first) < len(rows) else None
 
 
-def _distinct(numbers: Singles) -> bool:
+def _all_distinct(numbers: Singles) -> bool:
     ordered = np.sort(numbers)
     return not np.count_nonzero(ordered[1:] == ordered[:-1])
 
 
-def _equals(numbers: tuple[float, ...], known: tuple[float, ...]) -> tuple[int, ...]:
+def _first_equal_numbers(numbers: tuple[float, ...], known: tuple[float, ...]) -> tuple[int, ...]:
     every = [*known, *numbers]
     return tuple(INLINE if c_float(n).value == n else every.index(n) for n in numbers)
 

@@ -12,16 +12,16 @@ from pxr import Sdf, Tf
 from posefield.common.errors import FileError
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.usd import custom_data
-from posefield.encode.usd.layer_content import Content
+from posefield.encode.usd.layer_content import LayerContent
 
-MEMORY = Path("/dev/shm")
+MEMORY_FOLDER = Path("/dev/shm")
 
 # The first layer of a process makes usd-core load its file formats; two threads that do so at the
 # same time can deadlock. A module is imported by one thread only.
 Sdf.Layer.CreateAnonymous("first.usda")
 
 
-def head(
+def set_layer_metadata(
     made: Any, default: str, frames: int, rate: float, convention: Convention = METRES
 ) -> None:
     """Set default prim, units, axes and times: frames at the time codes 0 to frames - 1.
@@ -36,14 +36,14 @@ def head(
     made.pseudoRoot.SetInfo("upAxis", convention.up.upper())
 
 
-def say(made: Any, said: Mapping[str, Any]) -> None:
+def set_custom_data(made: Any, said: Mapping[str, Any]) -> None:
     """Set the custom layer data `posefield` to facts, unless there are none."""
     if said:
         made.customLayerData = {"posefield": dict(said)}
 
 
 @dataclass(frozen=True)
-class Kind:
+class BaseLayerBuilder:
     """Layers of one rate and convention."""
 
     rate: float
@@ -54,38 +54,38 @@ class Kind:
         """Return the numbers that every layer holds."""
         return (self.rate, self.convention.metres_per_unit)
 
-    def state(self, made: Any, default: str, content: Content) -> None:
+    def set_metadata(self, made: Any, default: str, content: LayerContent) -> None:
         """Set the metadata of a layer, with this default prim, and the facts of its content."""
-        head(made, default, content.frames, self.rate, self.convention)
-        say(made, custom_data.dictionary(content.facts.whole()))
+        set_layer_metadata(made, default, content.frames, self.rate, self.convention)
+        set_custom_data(made, custom_data.usd_dictionary(content.facts.join()))
 
 
-def crate(made: Any, memory: Path = MEMORY) -> bytes:
+def crate_bytes(made: Any, memory: Path = MEMORY_FOLDER) -> bytes:
     """Return the layer in its binary form, which pxr can only write to a file.
 
     memory: folder for that file; the default folder of temporary files if it cannot be used. Raises
     FileError if neither can be written.
     """
     try:
-        return _written(made, memory)
+        return _exported_bytes(made, memory)
     except OSError:
         # It may be missing, full or not writable: containers have 64 MB of it.
         pass
     try:
-        return _written(made, None)
+        return _exported_bytes(made, None)
     except OSError as fault:
         message = f"a temporary file of usd-core cannot be written: {fault.strerror}"
         raise FileError(tempfile.gettempdir(), message) from fault
 
 
-def _written(made: Any, place: Path | None) -> bytes:
+def _exported_bytes(made: Any, place: Path | None) -> bytes:
     with tempfile.TemporaryDirectory(dir=place) as folder:
         path = Path(folder, "layer.usdc")
-        export(made, path)
+        export_layer(made, path)
         return path.read_bytes()
 
 
-def export(made: Any, path: Path) -> None:
+def export_layer(made: Any, path: Path) -> None:
     """Write a layer as text if the path ends in .usda, and in binary form otherwise.
 
     Raises OSError if it cannot be written.

@@ -9,7 +9,7 @@ from pxr import Sdf, Vt
 from posefield.common.units import Floats
 from posefield.encode.usd.layer_content import Samples
 
-Type = Sdf.ValueTypeNames
+ValueTypes = Sdf.ValueTypeNames
 
 
 def prim(parent: Any, name: str, kind: str, apis: Sequence[str] = ()) -> Any:
@@ -20,7 +20,7 @@ def prim(parent: Any, name: str, kind: str, apis: Sequence[str] = ()) -> Any:
     return spec
 
 
-def attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
+def varying_attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
     """Return a new varying attribute, with a default value unless it is None."""
     spec = Sdf.AttributeSpec(owner, name, kind)
     if value is not None:
@@ -28,38 +28,40 @@ def attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
     return spec
 
 
-def uniform(owner: Any, name: str, kind: Any, value: Any = None) -> None:
+def uniform_attribute(owner: Any, name: str, kind: Any, value: Any = None) -> None:
     """Create an attribute that does not vary over time, with a value unless it is None."""
     spec = Sdf.AttributeSpec(owner, name, kind, Sdf.VariabilityUniform)
     if value is not None:
         spec.default = value
 
 
-def per_point(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
+def vertex_attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any:
     """Return a new attribute with one element per point of a mesh."""
-    spec = attribute(owner, name, kind, value)
+    spec = varying_attribute(owner, name, kind, value)
     spec.SetInfo("interpolation", "vertex")
     return spec
 
 
-def relation(owner: Any, name: str, target: Any) -> None:
+def add_relationship(owner: Any, name: str, target: Any) -> None:
     """Create a relationship to the prim at a path."""
     spec = Sdf.RelationshipSpec(owner, name, custom=False)
     spec.targetPathList.explicitItems = [target]
 
 
-def vectors(values: Floats) -> Any:
+def float3_array(values: Floats) -> Any:
     """Return a float3[] of an array (N, 3)."""
     return Vt.Vec3fArray.FromNumpy(values.astype(np.float32))
 
 
-def samples(prim: Any, values: Samples) -> None:
+def set_time_samples(prim: Any, values: Samples) -> None:
     """Set the time samples of translations and rotations of a SkelAnimation."""
-    _samples(prim, "translations", map(Vt.Vec3fArray.FromNumpy, values["translations"]))
-    _samples(prim, "rotations", map(Vt.QuatfArray.FromNumpy, values["rotations"]))
+    _set_attribute_samples(
+        prim, "translations", map(Vt.Vec3fArray.FromNumpy, values["translations"])
+    )
+    _set_attribute_samples(prim, "rotations", map(Vt.QuatfArray.FromNumpy, values["rotations"]))
 
 
-def _samples(prim: Any, name: str, values: Iterable[Any]) -> None:
+def _set_attribute_samples(prim: Any, name: str, values: Iterable[Any]) -> None:
     layer, path = prim.layer, prim.path.AppendProperty(name)
     for frame, value in enumerate(values):
         layer.SetTimeSample(path, frame, value)

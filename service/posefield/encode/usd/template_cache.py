@@ -7,10 +7,10 @@ from typing import Protocol
 
 from posefield.encode.usd import crate_template, text_template
 from posefield.encode.usd import layer_content as contents
-from posefield.encode.usd.layer_content import Author, Content, Pattern
+from posefield.encode.usd.layer_content import LayerBuilder, LayerContent, LayerPattern
 
-Key = tuple[Author, Pattern]
-LARGE = 16_000_000
+TemplateKey = tuple[LayerBuilder, LayerPattern]
+MAX_SAMPLE_BYTES = 16_000_000
 """Bytes of samples beyond which no template is made: it takes several times as much."""
 
 
@@ -20,87 +20,94 @@ class Template(Protocol):
     def __len__(self) -> int:
         """Return the approximate bytes of the template in memory."""
 
-    def write(self, author: Author, content: Content) -> bytes | None:
+    def write(self, author: LayerBuilder, content: LayerContent) -> bytes | None:
         """Return the layer as written by usd-core; None if the template does not apply to it."""
 
 
-class Form(Protocol):
+class TemplateFormat(Protocol):
     """Form of layers, binary or text: the module `crate` or `text`."""
 
-    def pattern(self, author: Author, content: Content) -> Pattern:
+    def pattern(self, author: LayerBuilder, content: LayerContent) -> LayerPattern:
         """Return the pattern that selects the template."""
 
-    def ordinary(self, author: Author, content: Content) -> bytes:
+    def ordinary(self, author: LayerBuilder, content: LayerContent) -> bytes:
         """Return the layer as written by usd-core."""
 
-    def template(self, author: Author, content: Content, pattern: Pattern) -> Template | None:
+    def template(
+        self, author: LayerBuilder, content: LayerContent, pattern: LayerPattern
+    ) -> Template | None:
         """Return a template of an author's layers of one pattern; None if it cannot be verified."""
 
 
 @dataclass(frozen=True)
-class Refused:
+class UnverifiedPattern:
     """Entry of a pattern whose template could not be verified."""
 
     def __len__(self) -> int:
         return 0
 
-    def write(self, author: Author, content: Content) -> bytes | None:
+    def write(self, author: LayerBuilder, content: LayerContent) -> bytes | None:
         """Return None."""
         return None
 
 
 @dataclass(frozen=True)
-class Seen(Refused):
+class FirstOccurrence(UnverifiedPattern):
     """Entry of a pattern that has occurred once."""
 
 
 @dataclass
-class Press:
+class TemplateCache:
     """Writer of layers in one form, with a thread-safe cache of templates.
 
     A template is made when a pattern occurs for the second time. limit: approximate bytes of all
     templates and patterns; the least recently used ones are removed. taken: bytes in use.
     """
 
-    form: Form
+    form: TemplateFormat
     limit: int
-    taken: int = field(default=0, init=False)
-    _kept: OrderedDict[Key, Template] = field(default_factory=OrderedDict)
+    used_bytes: int = field(default=0, init=False)
+    _entries: OrderedDict[TemplateKey, Template] = field(default_factory=OrderedDict)
     _lock: Lock = field(default_factory=Lock)
 
-    def write(self, author: Author, content: Content) -> bytes:
+    def write(self, author: LayerBuilder, content: LayerContent) -> bytes:
         """Return the layer of a content, equal to usd-core's."""
-        if contents.samples_size(content) > LARGE:
+        if contents.samples_size(content) > MAX_SAMPLE_BYTES:
             return self.form.ordinary(author, content)
         pattern = self.form.pattern(author, content)
-        known = self._look((author, pattern))
-        if isinstance(known, Seen):
-            known = self.form.template(author, content, pattern) or Refused()
-            self._keep((author, pattern), known)
+        known = self._find((author, pattern))
+        if isinstance(known, FirstOccurrence):
+            known = self.form.template(author, content, pattern) or UnverifiedPattern()
+            self._store((author, pattern), known)
         elif known is None:
-            known = Seen()
-            self._keep((author, pattern), known)
+            known = FirstOccurrence()
+            self._store((author, pattern), known)
         return known.write(author, content) or self.form.ordinary(author, content)
 
-    def _look(self, key: Key) -> Template | None:
+    def _find(self, key: TemplateKey) -> Template | None:
         with self._lock:
-            known = self._kept.get(key)
+            known = self._entries.get(key)
             if known is not None:
-                self._kept.move_to_end(key)
+                self._entries.move_to_end(key)
             return known
 
-    def _keep(self, key: Key, known: Template) -> None:
+    def _store(self, key: TemplateKey, known: Template) -> None:
         with self._lock:
-            before = self._kept.pop(key, None)
-            self._kept[key] = known
-            self.taken += _size(key, known) - (0 if before is None else _size(key, before))
-            while self.taken > self.limit:
-                self.taken -= _size(*self._kept.popitem(last=False))
+            before = self._entries.pop(key, None)
+            self._entries[key] = known
+            self.used_bytes += _entry_size(key, known) - (
+                0 if before is None else _entry_size(key, before)
+            )
+            while self.used_bytes > self.limit:
+                self.used_bytes -= _entry_size(*self._entries.popitem(last=False))
 
 
-def _size(key: Key, known: Template) -> int:
-    return contents.size(key[1]) + len(known)
+def _entry_size(key: TemplateKey, known: Template) -> int:
+    return contents.pattern_size(key[1]) + len(known)
 
 
-CRATES, TEXTS = Press(crate_template, 64_000_000), Press(text_template, 8_000_000)
+CRATE_CACHE, TEXTS = (
+    TemplateCache(crate_template, 64_000_000),
+    TemplateCache(text_template, 8_000_000),
+)
 """Writers of this process, of binary and text layers."""

@@ -9,14 +9,14 @@ import orjson
 from posefield.common.units import Floats, Singles
 from posefield.encode.usd import custom_data
 from posefield.encode.usd import layer_content as contents
-from posefield.encode.usd.layer_content import Array, Author, Content, Pattern
+from posefield.encode.usd.layer_content import Array, LayerBuilder, LayerContent, LayerPattern
 
 INDENT = b"            "
 """Indentation of time samples in the layers of this package."""
 
 
 @dataclass(frozen=True)
-class Template:
+class TextTemplate:
     """Text between the arrays of a layer, and the names of the arrays in order."""
 
     between: tuple[bytes, ...]
@@ -26,62 +26,64 @@ class Template:
         """Return the approximate bytes of the template in memory."""
         return sum(map(len, self.between))
 
-    def write(self, author: Author, content: Content) -> bytes | None:
+    def write(self, author: LayerBuilder, content: LayerContent) -> bytes | None:
         """Return the layer with other content of its shape.
 
         None if orjson and usd-core format some number differently.
         """
-        if not all(map(plain, (*content.samples.values(), *content.values.values()))):
+        if not all(map(all_plain, (*content.samples.values(), *content.values.values()))):
             return None
-        spelt, parts = _spelt(content), [b""] * (2 * len(self.names) + 1)
+        spelt, parts = _array_texts(content), [b""] * (2 * len(self.names) + 1)
         parts[::2], parts[1::2] = self.between, [spelt[name] for name in self.names]
         return b"".join((_head(author, content), *parts))
 
 
-def pattern(author: Author, content: Content) -> Pattern:
+def pattern(author: LayerBuilder, content: LayerContent) -> LayerPattern:
     """Return the shapes of the arrays of a content, on which alone its template depends."""
     samples = tuple((name, rows.shape, None) for name, rows in content.samples.items())
     values = tuple((name, found.shape, found.dtype.char) for name, found in content.values.items())
-    return Pattern(samples, values, (), custom_data.NONE.shape)
+    return LayerPattern(samples, values, (), custom_data.NO_FACTS.shape)
 
 
-def ordinary(author: Author, content: Content) -> bytes:
+def ordinary(author: LayerBuilder, content: LayerContent) -> bytes:
     """Return the layer as written by usd-core."""
     text: str = author.layer(content).ExportToString()
     return text.encode()
 
 
-def template(author: Author, content: Content, pattern: Pattern) -> Template | None:
+def template(
+    author: LayerBuilder, content: LayerContent, pattern: LayerPattern
+) -> TextTemplate | None:
     """Return a template of an author's layers of one shape; None if it cannot be verified.
 
     It is verified if it writes the same text as usd-core for the content.
     """
-    marks = contents.marks(pattern, author.numbers, 0, seed=1)
+    marks = contents.random_content(pattern, author.numbers, 0, seed=1)
     body = ordinary(author, marks).removeprefix(_head(author, marks))
-    holes = sorted(_holes(body, _spelt(marks)))
+    holes = sorted(_array_spans(body, _array_texts(marks)))
     starts, ends = [0, *(end for _, end, _ in holes)], [*(at for at, _, _ in holes), len(body)]
     between = tuple(body[start:end] for start, end in zip(starts, ends, strict=True))
-    made = Template(between, tuple(name for _, _, name in holes))
+    made = TextTemplate(between, tuple(name for _, _, name in holes))
     return made if made.write(author, content) == ordinary(author, content) else None
 
 
-def _head(author: Author, content: Content) -> bytes:
+def _head(author: LayerBuilder, content: LayerContent) -> bytes:
     text: str = author.head(content).ExportToString()
     return text.encode()
 
 
-def _spelt(content: Content) -> dict[str, bytes]:
-    samples = {name: _samples(rows) for name, rows in content.samples.items()}
-    return samples | {name: array(value) for name, value in content.values.items()}
+def _array_texts(content: LayerContent) -> dict[str, bytes]:
+    samples = {name: _samples_text(rows) for name, rows in content.samples.items()}
+    return samples | {name: array_text(value) for name, value in content.values.items()}
 
 
-def _samples(rows: Singles) -> bytes:
+def _samples_text(rows: Singles) -> bytes:
     """Return time samples as text, from the first time code to the last bracket."""
-    spelt = quaternions(rows) if rows.shape[-1] == 4 else moves(rows)
+    spelt = quaternion_texts(rows) if rows.shape[-1] == 4 else vector_texts(rows)
     return (b",\n" + INDENT).join(b"%d: [(%b)]" % each for each in enumerate(spelt))
 
 
-def _holes(body: bytes, spelt: dict[str, bytes]) -> Iterator[tuple[int, int, str]]:
+def _array_spans(body: bytes, spelt: dict[str, bytes]) -> Iterator[tuple[int, int, str]]:
     """Yield start, end and name of each array in a text."""
     for name, text in spelt.items():
         at = body.find(text)
@@ -90,46 +92,46 @@ def _holes(body: bytes, spelt: dict[str, bytes]) -> Iterator[tuple[int, int, str
             at = body.find(text, at + len(text))
 
 
-LARGEST = 1e13
+LARGEST_PLAIN = 1e13
 """Smallest number that orjson writes with an exponent; usd-core starts later."""
-SMALLEST = 1e-5
+SMALLEST_PLAIN = 1e-5
 """Largest float64 below which orjson writes an exponent; usd-core starts later."""
 
 
-def plain(values: Array) -> bool:
+def all_plain(values: Array) -> bool:
     """Return whether orjson and usd-core agree on all numbers; they do not on NaN and infinity."""
     sizes = np.abs(values)
-    small = values.dtype == np.float64 and np.any((sizes < SMALLEST) & (sizes > 0))
-    return not small and bool(np.all(sizes < LARGEST))
+    small = values.dtype == np.float64 and np.any((sizes < SMALLEST_PLAIN) & (sizes > 0))
+    return not small and bool(np.all(sizes < LARGEST_PLAIN))
 
 
-def array(values: Array) -> bytes:
+def array_text(values: Array) -> bytes:
     """Return vectors (N, 3) in float32 or matrices (N, 4, 4) in float64, in square brackets."""
     if values.ndim == 2:
-        return b"[(%b)]" % vectors(values[None])[0]
-    return b"[%b]" % b", ".join(b"( (%b) )" % rows for rows in vectors(values))
+        return b"[(%b)]" % row_texts(values[None])[0]
+    return b"[%b]" % b", ".join(b"( (%b) )" % rows for rows in row_texts(values))
 
 
-def moves(rows: Singles) -> list[bytes]:
+def vector_texts(rows: Singles) -> list[bytes]:
     """Return the text of each row of vectors (F, N, 3).
 
     If all but the first vector are constant, those are formatted once.
     """
     if rows.shape[1] == 1 or np.any(rows[:, 1:] != rows[:1, 1:]):
-        return vectors(rows)
-    (same,) = vectors(rows[:1, 1:])
-    return [b"%b), (%b" % (first, same) for first in vectors(rows[:, :1])]
+        return row_texts(rows)
+    (same,) = row_texts(rows[:1, 1:])
+    return [b"%b), (%b" % (first, same) for first in row_texts(rows[:, :1])]
 
 
-def quaternions(rows: Singles) -> list[bytes]:
+def quaternion_texts(rows: Singles) -> list[bytes]:
     """Return the text of each row of quaternions (F, N, 4).
 
     The real part is last in the array and first in the text.
     """
-    return vectors(rows[..., [3, 0, 1, 2]])
+    return row_texts(rows[..., [3, 0, 1, 2]])
 
 
-def vectors(rows: Singles | Floats) -> list[bytes]:
+def row_texts(rows: Singles | Floats) -> list[bytes]:
     """Return the text of each row of (F, N, n) without the outer brackets: `1, 2), (3, 4`."""
     data = orjson.dumps(np.ascontiguousarray(rows), option=orjson.OPT_SERIALIZE_NUMPY)
     if np.any(rows == np.trunc(rows)):

@@ -8,16 +8,16 @@ from pxr import Sdf
 
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import character_prims, clip_arrays, prim_specs
-from posefield.encode.usd.layer_content import Array, Content
-from posefield.encode.usd.layer_metadata import Kind
-from posefield.encode.usd.template_cache import CRATES
+from posefield.encode.usd.layer_content import Array, LayerContent
+from posefield.encode.usd.layer_metadata import BaseLayerBuilder
+from posefield.encode.usd.template_cache import CRATE_CACHE
 from posefield.question.results import ClipAnswer
 
-PRIM = "Anim"
+ANIMATION_NAME = "Anim"
 
 
 @dataclass(frozen=True)
-class Animations(Kind):
+class AnimationLayerBuilder(BaseLayerBuilder):
     """Layers of an animation of joints with given paths."""
 
     paths: tuple[str, ...]
@@ -27,23 +27,27 @@ class Animations(Kind):
         """Return the arrays that every layer holds."""
         return ()
 
-    def head(self, content: Content) -> Any:
+    def head(self, content: LayerContent) -> Any:
         """Return the layer without its prims."""
         made = Sdf.Layer.CreateAnonymous("animation.usda")
-        self.state(made, PRIM, content)
+        self.set_metadata(made, ANIMATION_NAME, content)
         return made
 
-    def layer(self, content: Content) -> Any:
+    def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
         made = self.head(content)
         with Sdf.ChangeBlock():
-            prim_specs.samples(character_prims.animation(made, PRIM, self.paths), content.samples)
+            prim_specs.set_time_samples(
+                character_prims.animation(made, ANIMATION_NAME, self.paths), content.samples
+            )
         return made
 
 
 def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, with the facts and without a character."""
     return [
-        CRATES.write(Animations(take.rate, convention, take.rig.paths), take.content)
-        for take in clip_arrays.bare(answers, convention)
+        CRATE_CACHE.write(
+            AnimationLayerBuilder(take.rate, convention, take.rig.paths), take.content
+        )
+        for take in clip_arrays.arrays_without_character(answers, convention)
     ]

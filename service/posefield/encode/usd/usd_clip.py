@@ -13,13 +13,13 @@ import numpy as np
 from pxr import Sdf
 
 from posefield.encode.character import body_mesh
-from posefield.encode.character.character import Rig
+from posefield.encode.character.character import CharacterRig
 from posefield.encode.files import zip_archive
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import character_prims, clip_arrays, prim_specs
-from posefield.encode.usd.layer_content import Array, Content
-from posefield.encode.usd.layer_metadata import Kind
-from posefield.encode.usd.template_cache import CRATES, TEXTS
+from posefield.encode.usd.layer_content import Array, LayerContent
+from posefield.encode.usd.layer_metadata import BaseLayerBuilder
+from posefield.encode.usd.template_cache import CRATE_CACHE, TEXTS
 from posefield.question.results import ClipAnswer
 
 ROOT = Sdf.Path("/Character")
@@ -28,68 +28,72 @@ TINTS = body_mesh.TINTS.astype(np.float32)
 
 
 @dataclass(frozen=True)
-class Clips(Kind):
+class ClipLayerBuilder(BaseLayerBuilder):
     """Layers of clips of one skeleton."""
 
-    rig: Rig
+    rig: CharacterRig
 
     @property
     def values(self) -> tuple[Array, ...]:
         """Return the arrays that every layer holds."""
         return (TINTS,)
 
-    def head(self, content: Content) -> Any:
+    def head(self, content: LayerContent) -> Any:
         """Return the layer without its prims."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
-        self.state(made, ROOT.name, content)
+        self.set_metadata(made, ROOT.name, content)
         return made
 
-    def layer(self, content: Content) -> Any:
+    def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
-        made.TransferContent(_prims(self.rig))
+        made.TransferContent(_character_prims(self.rig))
         with Sdf.ChangeBlock():
-            self.state(made, ROOT.name, content)
-            character_prims.fill(made.GetPrimAtPath(ROOT), character_prims.values(content.values))
-            prim_specs.samples(made.GetPrimAtPath(ANIMATION), content.samples)
+            self.set_metadata(made, ROOT.name, content)
+            character_prims.set_values(
+                made.GetPrimAtPath(ROOT), character_prims.values(content.values)
+            )
+            prim_specs.set_time_samples(made.GetPrimAtPath(ANIMATION), content.samples)
         return made
 
 
 @lru_cache(maxsize=16)
-def _prims(rig: Rig) -> Any:
+def _character_prims(rig: CharacterRig) -> Any:
     """Return a layer of a character and its animation without numbers.
 
     Cached, since building it takes as long as exporting it.
     """
     made = Sdf.Layer.CreateAnonymous("prims.usda")
     root = character_prims.root(made, ROOT.name, rig)
-    character_prims.bind(root, character_prims.animation(root, ANIMATION.name, rig.paths).path)
+    character_prims.bind_animation(
+        root, character_prims.animation(root, ANIMATION.name, rig.paths).path
+    )
     return made
 
 
 def usda(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Return USD layers as text."""
-    return [TEXTS.write(*each) for each in authored(answers, convention)]
+    return [TEXTS.write(*each) for each in builders_and_contents(answers, convention)]
 
 
 def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Return USD layers in binary form."""
-    return [CRATES.write(*each) for each in authored(answers, convention)]
+    return [CRATE_CACHE.write(*each) for each in builders_and_contents(answers, convention)]
 
 
 def usdz(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Return USDZ files of one binary layer each."""
-    return list(map(package, usdc(answers, convention)))
+    return list(map(usdz_package, usdc(answers, convention)))
 
 
-def package(layer: bytes) -> bytes:
+def usdz_package(layer: bytes) -> bytes:
     """Return a USDZ file that holds one binary layer."""
-    return b"".join(zip_archive.archive([zip_archive.whole("clip.usdc", layer)]))
+    return b"".join(zip_archive.zip_chunks([zip_archive.whole("clip.usdc", layer)]))
 
 
-def authored(
+def builders_and_contents(
     answers: Sequence[ClipAnswer], convention: Convention
-) -> Iterator[tuple[Clips, Content]]:
+) -> Iterator[tuple[ClipLayerBuilder, LayerContent]]:
     """Yield the author and the content of the layer of each answer."""
-    for take in clip_arrays.whole(answers, convention):
-        yield Clips(take.rate, convention, take.rig), take.content
+    for take in clip_arrays.arrays_with_character(answers, convention):
+        yield ClipLayerBuilder(take.rate, convention, take.rig), take.content

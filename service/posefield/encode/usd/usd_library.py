@@ -28,13 +28,13 @@ from posefield.question.results import ClipAnswer
 
 ROOT = Sdf.Path("/Character")
 CLIPS = ROOT.AppendChild("Clips")
-OPENING = f'def Scope "{CLIPS.name}"\n    {{\n'
+CLIPS_SCOPE = f'def Scope "{CLIPS.name}"\n    {{\n'
 
 Corner = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Entry:
+class LibraryEntry:
     """Clip of a library: its name, and the path of its layer relative to the stage.
 
     low, high: corners of a box that contains the character in all frames, m.
@@ -48,66 +48,68 @@ class Entry:
     high: Corner
 
 
-def entry(name: str, file: str, answer: ClipAnswer) -> Entry:
+def library_entry(name: str, file: str, answer: ClipAnswer) -> LibraryEntry:
     """Return the entry of a result; its box holds for any rotations of the joints."""
     clip = answer.clip
-    low, high = reach.anywhere(clip.skeleton, clip.translations[0], clip.root_path).tolist()
-    return Entry(name, file, len(clip), clip.rate, tuple(low), tuple(high))
+    low, high = reach.pose_independent_box(
+        clip.skeleton, clip.translations[0], clip.root_path
+    ).tolist()
+    return LibraryEntry(name, file, len(clip), clip.rate, tuple(low), tuple(high))
 
 
-def stage(
-    skeleton: Skeleton, convention: Convention, rate: float, entries: Sequence[Entry]
+def library_stage(
+    skeleton: Skeleton, convention: Convention, rate: float, entries: Sequence[LibraryEntry]
 ) -> bytes:
     """Return the USD text of the stage; names of clips are made legal names of prims.
 
     rate: of the stage, frames a second. The stage is as long as the longest clip.
     """
-    prims = joint_names.legal(each.name for each in entries)
-    text = _character(skeleton, convention, rate, entries, prims[:1])
-    head, opening, tail = text.rpartition(OPENING)
-    clips = "\n".join(_clips(prims, entries))
+    prims = joint_names.legal_names(each.name for each in entries)
+    text = _character_text(skeleton, convention, rate, entries, prims[:1])
+    head, opening, tail = text.rpartition(CLIPS_SCOPE)
+    clips = "\n".join(_clip_prims(prims, entries))
     return "".join((head, opening, clips, tail)).encode()
 
 
-def _character(
+def _character_text(
     skeleton: Skeleton,
     convention: Convention,
     rate: float,
-    entries: Sequence[Entry],
+    entries: Sequence[LibraryEntry],
     bound: tuple[str, ...],
 ) -> str:
     """Return the text of the stage without its clips."""
     rig, made = character.rig(skeleton), Sdf.Layer.CreateAnonymous("library.usda")
     lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
-    layer_metadata.head(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
+    layer_metadata.set_layer_metadata(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
     root = character_prims.root(made, ROOT.name, rig)
-    numbers = character.at_rest(rig, convention)
-    extent = _box(numbers["extent"], entries, convention)
-    character_prims.fill(root, character_prims.values({**numbers, "extent": extent}))
+    numbers = character.rest_pose_arrays(rig, convention)
+    extent = _library_box(numbers["extent"], entries, convention)
+    character_prims.set_values(root, character_prims.values({**numbers, "extent": extent}))
     prim_specs.prim(root, CLIPS.name, "Scope")
     for name in bound:
-        character_prims.bind(root, CLIPS.AppendChild(name))
+        character_prims.bind_animation(root, CLIPS.AppendChild(name))
     text: str = made.ExportToString()
     return text
 
 
-def _clips(prims: Sequence[str], entries: Sequence[Entry]) -> Iterator[str]:
+def _clip_prims(prims: Sequence[str], entries: Sequence[LibraryEntry]) -> Iterator[str]:
     for name, each in zip(prims, entries, strict=True):
         yield (
             f'        def SkelAnimation "{name}" (\n'
-            f"            prepend payload = {_asset(each.file)}\n"
+            f"            prepend payload = {_asset_path(each.file)}\n"
             "        )\n        {\n        }\n"
         )
 
 
-def _asset(file: str) -> str:
+def _asset_path(file: str) -> str:
     """Return the path of a layer beside the stage as USD text."""
     path = f"./{file}"
     return f"@@@{path}@@@" if "@" in path else f"@{path}@"
 
 
-def _box(rest: Floats, entries: Sequence[Entry], convention: Convention) -> Floats:
+def _library_box(rest: Floats, entries: Sequence[LibraryEntry], convention: Convention) -> Floats:
     """Return the lowest and highest corner (2, 3) of the rest pose and all clips."""
     boxes = np.array([(each.low, each.high) for each in entries]).reshape(-1, 2, 3)
-    every = np.concatenate([rest[None], axis_conversion.box(convention, boxes)])
+    every = np.concatenate([rest[None], axis_conversion.convert_box(convention, boxes)])
     return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)]).astype(np.float32)

@@ -13,19 +13,19 @@ import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
 from posefield.encode.character import body_mesh, extent
-from posefield.encode.character.animation_samples import Moves
-from posefield.encode.character.character import Rig
-from posefield.encode.character.extent import Tree
+from posefield.encode.character.animation_samples import AnimationSamples
+from posefield.encode.character.character import CharacterRig
+from posefield.encode.character.extent import PointTree
 from posefield.motion import quat
 from posefield.motion.crowd_clip import Placement
 
-Places = npt.NDArray[np.intp]
+PointIndices = npt.NDArray[np.intp]
 
 CORNERS = np.array(list(product((False, True), repeat=3)))
 
 
 @dataclass(frozen=True)
-class Hull:
+class BodyHull:
     """The E ends of a body's boxes, and the points about which spheres bound them.
 
     ends (E, 3): in the frame of the joint that each is skinned to, m. radii: (E,), m. holders (E,):
@@ -33,37 +33,37 @@ class Hull:
     bone offsets.
     """
 
-    tree: Tree
-    holders: Places
+    tree: PointTree
+    holders: PointIndices
     moved: npt.NDArray[np.bool_]
     ends: Floats
     radii: Floats
 
 
-def hull(rig: Rig) -> Hull:
+def hull(rig: CharacterRig) -> BodyHull:
     """Return the hull of a rig's body."""
     joints, offsets = rig.skeleton, rig.skeleton.offsets
-    drawn, turning = body_mesh.boxes(joints, rig.bones, offsets), rig.bones.joints
+    drawn, turning = body_mesh.bone_boxes(joints, rig.bones, offsets), rig.bones.joints
     starts = drawn.starts - joints.at_rest(offsets)[turning]
     ends, turned = np.concatenate([starts, starts + drawn.arms]), np.tile(turning, 2)
-    holders = np.array([_holder(rig, *end) for end in zip(turned, ends, strict=True)])
-    return Hull(rig.tree, holders, holders != turned, ends, np.tile(drawn.radii, 2))
+    holders = np.array([_holder_index(rig, *end) for end in zip(turned, ends, strict=True)])
+    return BodyHull(rig.tree, holders, holders != turned, ends, np.tile(drawn.radii, 2))
 
 
-def boxes(hull: Hull, made: Moves) -> Floats:
+def boxes(hull: BodyHull, made: AnimationSamples) -> Floats:
     """Return the lowest and highest corner (M, 2, 3) of each motion in its own frame, m."""
-    return extent.boxes(hull.tree, made, _balls(hull, made.offsets))
+    return extent.bounding_boxes(hull.tree, made, _sphere_radii(hull, made.offsets))
 
 
-def placed(placement: Placement, boxes: Floats) -> Floats:
+def placed_box(placement: Placement, boxes: Floats) -> Floats:
     """Return a box (2, 3) in the world, m, around boxes (N, 2, 3) of placed characters."""
     low, high = boxes[:, 0], boxes[:, 1]
     corners = np.where(CORNERS, high[:, None], low[:, None])
     moved = quat.rotate(placement.turns[:, None], corners) + placement.positions[:, None]
-    return extent.outwards(moved.min(axis=(0, 1)), moved.max(axis=(0, 1)))
+    return extent.enlarged_box(moved.min(axis=(0, 1)), moved.max(axis=(0, 1)))
 
 
-def _holder(rig: Rig, joint: int, end: Floats) -> int:
+def _holder_index(rig: CharacterRig, joint: int, end: Floats) -> int:
     above = (*rig.skeleton.parents, *rig.skeleton.tip_joints)
     arms = np.concatenate([rig.skeleton.offsets, rig.skeleton.tip_offsets])
     near = {point: arms[point] for point, holder in enumerate(above) if holder == joint}
@@ -71,7 +71,7 @@ def _holder(rig: Rig, joint: int, end: Floats) -> int:
     return min(near, key=lambda holder: float(np.linalg.norm(end - near[holder])))
 
 
-def _balls(hull: Hull, offsets: Singles) -> Floats:
+def _sphere_radii(hull: BodyHull, offsets: Singles) -> Floats:
     """Return the radius (M, P) of the sphere about each joint and tip, m."""
     tips = np.broadcast_to(hull.tree.tips, (len(offsets), *hull.tree.tips.shape))
     anchors = np.concatenate([offsets, tips], axis=1)[:, hull.holders]

@@ -12,7 +12,7 @@ from pxr import Sdf
 from posefield.common.errors import InvalidField
 from posefield.encode.character import character
 from posefield.encode.files import zip_archive
-from posefield.encode.files.zip_archive import Member
+from posefield.encode.files.zip_archive import ZipMember
 from posefield.encode.usd import character_prims, layer_metadata, prim_specs
 from posefield.encode.usd_crowd import crowd_motions, crowd_scene, crowd_summary
 from posefield.motion.crowd_clip import CrowdClip
@@ -24,65 +24,65 @@ FOLDER, CHARACTER, SUMMARY = "crowd_clips", "character.usdc", "summary.usdc"
 SAMPLE, FRAME, LAYER, EACH, REST = 4 * (3 + 4), 40, 8_000, 2_000, 100_000
 
 
-def size(crowd: CrowdClip) -> int:
+def size_bound(crowd: CrowdClip) -> int:
     """Return an upper bound of the bytes of all layers."""
     layer = LAYER + crowd.frames * (FRAME + SAMPLE * len(crowd.skeleton))
-    return REST + crowd_motions.count(crowd) * layer + len(crowd.motion) * EACH
+    return REST + crowd_motions.motion_count(crowd) * layer + len(crowd.motion) * EACH
 
 
-def fits(crowd: CrowdClip) -> None:
+def check_size(crowd: CrowdClip) -> None:
     """Raise InvalidField if an archive of the crowd could exceed the limits of a zip."""
-    taken, members = size(crowd), crowd_motions.count(crowd) + 3
+    taken, members = size_bound(crowd), crowd_motions.motion_count(crowd) + 3
     if taken > zip_archive.BYTES or members > zip_archive.MEMBERS:
         found = f"{taken / 1e9:.1f} GB in {members} layers"
         expected = f"{zip_archive.BYTES / 1e9:.1f} GB in {zip_archive.MEMBERS}"
         raise InvalidField("format", f"{found}, expected at most {expected} in a usdz; take usd")
 
 
-def entry(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
+def root_layer(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
     """Return the root layer, which refers to the others in a folder beside it."""
-    made = crowd_scene.new(crowd, "usdc")
+    made = crowd_scene.new_layer(crowd, "usdc")
     root = made.GetPrimAtPath(crowd_scene.ROOT)
     made.subLayerPaths.append(f"./{folder}/{SUMMARY}")
     with Sdf.ChangeBlock():
         prototype = prim_specs.prim(root, crowd_scene.PROTOTYPE.name, "SkelRoot")
         prototype.specifier, prototype.kind = Sdf.SpecifierClass, "component"
-        crowd_scene.payload(prototype, f"./{folder}/{CHARACTER}")
+        crowd_scene.set_payload(prototype, f"./{folder}/{CHARACTER}")
         group = prim_specs.prim(root, crowd_scene.MOTIONS.name, "Scope")
-        for name in map(crowd_scene.motion, range(crowd_motions.count(crowd))):
-            crowd_scene.payload(
+        for name in map(crowd_scene.motion_name, range(crowd_motions.motion_count(crowd))):
+            crowd_scene.set_payload(
                 prim_specs.prim(group, name, "SkelAnimation"), f"./{folder}/{name}.usdc"
             )
-    crowd_scene.referring(made, crowd, instanced)
-    return layer_metadata.crate(made)
+    crowd_scene.add_references(made, crowd, instanced)
+    return layer_metadata.crate_bytes(made)
 
 
-def parts(crowd: CrowdClip) -> Iterator[tuple[str, bytes]]:
+def referenced_layers(crowd: CrowdClip) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each other layer, one at a time."""
     rig, notes = character.rig(crowd.skeleton), []
     standing = _layer("Character", crowd)
     prim = character_prims.root(standing, "Character", rig)
-    character_prims.fill(prim, character_prims.values(character.at_rest(rig)))
-    yield CHARACTER, layer_metadata.crate(standing)
-    for index, motion in enumerate(crowd_motions.each(crowd, rig)):
-        notes.append(motion.note)
+    character_prims.set_values(prim, character_prims.values(character.rest_pose_arrays(rig)))
+    yield CHARACTER, layer_metadata.crate_bytes(standing)
+    for index, motion in enumerate(crowd_motions.all_motions(crowd, rig)):
+        notes.append(motion.summary)
         yield (
-            f"{crowd_scene.motion(index)}.usdc",
-            crowd_motions.layer(rig, crowd.rate, motion.samples),
+            f"{crowd_scene.motion_name(index)}.usdc",
+            crowd_motions.motion_layer(rig, crowd.rate, motion.samples),
         )
     last = _layer(crowd_scene.ROOT.name, crowd)
-    crowd_summary.referring(last, crowd, notes)
-    yield SUMMARY, layer_metadata.crate(last)
+    crowd_summary.add_to_references(last, crowd, notes)
+    yield SUMMARY, layer_metadata.crate_bytes(last)
 
 
-def members(crowd: CrowdClip, instanced: bool) -> Iterator[Member]:
+def members(crowd: CrowdClip, instanced: bool) -> Iterator[ZipMember]:
     """Yield all layers as members of an archive, the entry first."""
-    yield zip_archive.whole("crowd.usdc", entry(crowd, instanced, FOLDER))
-    for name, content in parts(crowd):
+    yield zip_archive.whole("crowd.usdc", root_layer(crowd, instanced, FOLDER))
+    for name, content in referenced_layers(crowd):
         yield zip_archive.whole(f"{FOLDER}/{name}", content)
 
 
 def _layer(default: str, crowd: CrowdClip) -> Any:
     made = Sdf.Layer.CreateAnonymous("part.usdc")
-    layer_metadata.head(made, default, crowd.frames, crowd.rate)
+    layer_metadata.set_layer_metadata(made, default, crowd.frames, crowd.rate)
     return made

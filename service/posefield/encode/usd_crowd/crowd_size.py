@@ -16,7 +16,7 @@ TEXT_JOINT, TEXT_BODY = 120, 1_200
 
 
 @dataclass(frozen=True)
-class Counts:
+class CrowdCounts:
     """Number of joints, of characters, of motions, and of frames of each motion."""
 
     joints: int
@@ -25,7 +25,7 @@ class Counts:
     frames: int
 
 
-def file(counts: Counts, ending: str, flat: bool) -> int:
+def file_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     """Return an upper bound of the bytes of a crowd as usda, usdc or usdz."""
     binary = _characters(counts, flat) + counts.motions * _motion(counts)
     if ending != "usda":
@@ -35,16 +35,16 @@ def file(counts: Counts, ending: str, flat: bool) -> int:
     return max(binary, text + TEXT_BODY * counts.joints * counts.characters * flat)
 
 
-def layer(counts: Counts, ending: str, flat: bool) -> int:
+def layer_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     """Return an upper bound of the bytes of the largest layer of a crowd."""
     if ending == "usdz" and not flat:
         return max(_characters(counts, flat), _motion(counts))
-    return file(counts, ending, flat)
+    return file_size_bound(counts, ending, flat)
 
 
-def _characters(counts: Counts, flat: bool) -> int:
+def _characters(counts: CrowdCounts, flat: bool) -> int:
     return counts.characters * (FLAT if flat else CHARACTER)
 
 
-def _motion(counts: Counts) -> int:
+def _motion(counts: CrowdCounts) -> int:
     return MOTION + counts.frames * (POSE + JOINT * counts.joints)

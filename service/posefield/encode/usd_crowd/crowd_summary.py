@@ -11,62 +11,64 @@ from pxr import Sdf
 
 from posefield.common.units import Floats
 from posefield.encode.usd import prim_specs
-from posefield.encode.usd.prim_specs import Type
+from posefield.encode.usd.prim_specs import ValueTypes
 from posefield.encode.usd_crowd import crowd_extent, crowd_scene
-from posefield.encode.usd_crowd.crowd_motions import Note
+from posefield.encode.usd_crowd.crowd_motions import MotionSummary
 from posefield.motion.crowd_clip import CrowdClip
 
-LEVEL = "posefield:level"
+LEVEL_ATTRIBUTE = "posefield:level"
 """Level of detail of a motion's frames, with a time sample at each change."""
 
 
-def referring(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
+def add_to_references(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
     """Add extents to a crowd of references to one prototype, and levels to its motions."""
-    _boxes(made, crowd, notes)
-    every = _round([note.box for note in notes])
+    _placed_boxes(made, crowd, notes)
+    every = _enlarged_float32([note.box for note in notes])
     with Sdf.ChangeBlock():
         for path in (crowd_scene.PROTOTYPE, crowd_scene.PROTOTYPE.AppendChild("Body")):
-            _extent(made, path, every)
+            _set_extent(made, path, every)
         for index, note in enumerate(notes):
-            _levels(made, crowd_scene.MOTIONS.AppendChild(crowd_scene.motion(index)), note)
+            _set_levels(made, crowd_scene.MOTIONS.AppendChild(crowd_scene.motion_name(index)), note)
 
 
-def flat(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
+def add_to_flat(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
     """Add extents and levels to a crowd in which each character has its own body and motion."""
-    _boxes(made, crowd, notes)
-    for some in crowd_scene.blocks(crowd):
+    _placed_boxes(made, crowd, notes)
+    for some in crowd_scene.character_blocks(crowd):
         with Sdf.ChangeBlock():
             for index, played in zip(some, crowd.motion[some], strict=True):
-                path = crowd_scene.place_of(index)
-                _extent(made, path.AppendChild("Body"), notes[played].box)
-                _levels(made, path.AppendChild(crowd_scene.character(index)), notes[played])
+                path = crowd_scene.character_path(index)
+                _set_extent(made, path.AppendChild("Body"), notes[played].box)
+                _set_levels(
+                    made, path.AppendChild(crowd_scene.character_name(index)), notes[played]
+                )
 
 
-def _boxes(made: Any, crowd: CrowdClip, notes: Sequence[Note]) -> None:
+def _placed_boxes(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
     own = np.array([notes[played].box for played in crowd.motion])
-    for some in crowd_scene.blocks(crowd):
+    for some in crowd_scene.character_blocks(crowd):
         with Sdf.ChangeBlock():
             for index in some:
-                _extent(made, crowd_scene.place_of(index), own[index])
-    whole = prim_specs.vectors(crowd_extent.placed(crowd.placement, own))
+                _set_extent(made, crowd_scene.character_path(index), own[index])
+    whole = prim_specs.float3_array(crowd_extent.placed_box(crowd.placement, own))
     for path in (crowd_scene.ROOT, crowd_scene.CHARACTERS):
-        _attribute(made, path.AppendProperty("extentsHint"), Type.Float3Array).default = whole
+        _attribute(made, path.AppendProperty("extentsHint"), ValueTypes.Float3Array).default = whole
 
 
-def _round(boxes: Sequence[Floats]) -> Floats:
+def _enlarged_float32(boxes: Sequence[Floats]) -> Floats:
     corners = np.array(boxes)
     return np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
 
-def _extent(made: Any, prim: Any, box: Floats) -> None:
-    _attribute(made, prim.AppendProperty("extent"), Type.Float3Array).default = prim_specs.vectors(
-        box
-    )
+def _set_extent(made: Any, prim: Any, box: Floats) -> None:
+    _attribute(
+        made, prim.AppendProperty("extent"), ValueTypes.Float3Array
+    ).default = prim_specs.float3_array(box)
 
 
-def _levels(made: Any, prim: Any, note: Note) -> None:
-    path = prim.AppendProperty(LEVEL)
-    _attribute(made, path, Type.Int).custom = True
+def _set_levels(made: Any, prim: Any, note: MotionSummary) -> None:
+    path = prim.AppendProperty(LEVEL_ATTRIBUTE)
+    _attribute(made, path, ValueTypes.Int).custom = True
     for frame, level in note.levels.items():
         made.SetTimeSample(path, frame, level)
 

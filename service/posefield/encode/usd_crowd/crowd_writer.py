@@ -20,10 +20,10 @@ from posefield.encode.usd_crowd import (
     encoding_process,
     single_layer,
 )
-from posefield.encode.usd_crowd.crowd_size import Counts
+from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 from posefield.motion.crowd_clip import CrowdClip
 
-APART = 32_000_000
+CHILD_PROCESS_SIZE = 32_000_000
 """Bytes of a layer that usd-core writes in about 0.2 s, in which no other thread runs."""
 
 
@@ -36,14 +36,14 @@ def write(crowd: CrowdClip, path: Path, instancing: str = "references") -> None:
     crowd too large for a usdz, and FileError if the file cannot be written.
     """
     ending = path.suffix.removeprefix(".")
-    _door(crowd, ending, FILES, instancing)
+    _validate(crowd, ending, FILES, instancing)
     if ending == "usdz":
-        atomic_files.stream(_usdz(crowd, instancing), path)
+        atomic_files.write_chunks(_usdz(crowd, instancing), path)
     elif ending == "usd" and instancing != "flatten":
         _write_folder(crowd, path, instancing == "scenegraph")
     else:
         with atomic_files.replacing(path) as made:
-            layer_metadata.export(_layer(crowd, _form(ending), instancing), made)
+            layer_metadata.export_layer(_layer(crowd, _form(ending), instancing), made)
 
 
 def stream(crowd: CrowdClip, ending: str, instancing: str = "references") -> Iterator[bytes]:
@@ -53,27 +53,29 @@ def stream(crowd: CrowdClip, ending: str, instancing: str = "references") -> Ite
     disk, which is removed when the stream is closed. Large layers are written by a child process.
     Raises InvalidField at once, as `write` does.
     """
-    _door(crowd, ending, STREAMS, instancing)
-    counts = Counts(
-        len(crowd.skeleton), len(crowd.motion), crowd_motions.count(crowd), crowd.frames
+    _validate(crowd, ending, STREAMS, instancing)
+    counts = CrowdCounts(
+        len(crowd.skeleton), len(crowd.motion), crowd_motions.motion_count(crowd), crowd.frames
     )
-    apart = crowd_size.layer(counts, ending, instancing == "flatten") > APART
-    return (encoding_process.stream if apart else encoded)(crowd, ending, instancing)
+    apart = (
+        crowd_size.layer_size_bound(counts, ending, instancing == "flatten") > CHILD_PROCESS_SIZE
+    )
+    return (encoding_process.stream if apart else encode_here)(crowd, ending, instancing)
 
 
-def encoded(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
+def encode_here(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
     """Return the bytes of a crowd as `stream` does, encoded by this process whatever its size."""
-    return _usdz(crowd, instancing) if ending == "usdz" else _single(crowd, ending, instancing)
+    return _usdz(crowd, instancing) if ending == "usdz" else _single_file(crowd, ending, instancing)
 
 
-def _door(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancing: str) -> None:
-    _known("format", ending, endings)
-    _known("instancing", instancing, INSTANCING)
+def _validate(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancing: str) -> None:
+    _check_choice("format", ending, endings)
+    _check_choice("instancing", instancing, INSTANCING)
     if ending == "usdz":
-        crowd_package.fits(crowd)
+        crowd_package.check_size(crowd)
 
 
-def _known(field: str, found: str, expected: tuple[str, ...]) -> None:
+def _check_choice(field: str, found: str, expected: tuple[str, ...]) -> None:
     if found not in expected:
         raise InvalidField(field, f"{found!r}, expected one of {', '.join(expected)}")
 
@@ -84,31 +86,31 @@ def _form(ending: str) -> str:
 
 def _layer(crowd: CrowdClip, form: str, instancing: str) -> Any:
     if instancing == "flatten":
-        return single_layer.flat(crowd, form)
-    return single_layer.referring(crowd, form, instancing == "scenegraph")
+        return single_layer.flat_layer(crowd, form)
+    return single_layer.referencing_layer(crowd, form, instancing == "scenegraph")
 
 
-def _single(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
+def _single_file(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, f"crowd.{ending}")
-        layer_metadata.export(_layer(crowd, _form(ending), instancing), path)
-        yield from atomic_files.pieces(path)
+        layer_metadata.export_layer(_layer(crowd, _form(ending), instancing), path)
+        yield from atomic_files.read_chunks(path)
 
 
 def _usdz(crowd: CrowdClip, instancing: str) -> Iterator[bytes]:
     if instancing != "flatten":
-        return zip_archive.archive(crowd_package.members(crowd, instancing == "scenegraph"))
+        return zip_archive.zip_chunks(crowd_package.members(crowd, instancing == "scenegraph"))
     return _flat_usdz(crowd)
 
 
 def _flat_usdz(crowd: CrowdClip) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, "crowd.usdc")
-        layer_metadata.export(single_layer.flat(crowd, "usdc"), path)
-        yield from zip_archive.archive([zip_archive.lying(path.name, path)])
+        layer_metadata.export_layer(single_layer.flat_layer(crowd, "usdc"), path)
+        yield from zip_archive.zip_chunks([zip_archive.member_of_file(path.name, path)])
 
 
-OURS = re.compile(r"(m\d{5,}|character|summary)\.usdc")
+CROWD_LAYER_NAME = re.compile(r"(m\d{5,}|character|summary)\.usdc")
 
 
 def _write_folder(crowd: CrowdClip, path: Path, instanced: bool) -> None:
@@ -117,15 +119,15 @@ def _write_folder(crowd: CrowdClip, path: Path, instanced: bool) -> None:
     Raises FileError if the folder contains other files than a crowd's layers, which would be lost.
     """
     folder = path.with_name(f"{path.stem}_clips")
-    _ours(folder)
+    _check_crowd_folder(folder)
     with atomic_files.replacing_pair(path, folder) as (entry, inside):
-        entry.write_bytes(crowd_package.entry(crowd, instanced, folder.name))
-        for name, content in crowd_package.parts(crowd):
+        entry.write_bytes(crowd_package.root_layer(crowd, instanced, folder.name))
+        for name, content in crowd_package.referenced_layers(crowd):
             (inside / name).write_bytes(content)
 
 
-def _ours(folder: Path) -> None:
+def _check_crowd_folder(folder: Path) -> None:
     found = [folder] if folder.is_file() else sorted(folder.glob("*"))
     for path in found:
-        if not OURS.fullmatch(path.name):
+        if not CROWD_LAYER_NAME.fullmatch(path.name):
             raise FileError(path, "in the way; expected nothing here but an earlier crowd's layers")

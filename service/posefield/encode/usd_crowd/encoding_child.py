@@ -23,12 +23,12 @@ def main() -> None:
     """
     path, instancing = Path(sys.argv[1]), sys.argv[2]
     given = sys.stdin.buffer
-    crowd = replace(pickle.load(given), batches=_batches(given))
+    crowd = replace(pickle.load(given), batches=_received_batches(given))
     with path.open("wb") as file:
-        file.writelines(crowd_writer.encoded(crowd, path.suffix[1:], instancing))
+        file.writelines(crowd_writer.encode_here(crowd, path.suffix[1:], instancing))
 
 
-def _batches(given: IO[bytes]) -> Iterator[Motions]:
+def _received_batches(given: IO[bytes]) -> Iterator[Motions]:
     while (batch := pickle.load(given)) is not None:
         yield batch
 

@@ -21,8 +21,8 @@ from posefield.common import cancellation as cancel
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.motion.crowd_clip import CrowdClip
 
-CHILD = "posefield.encode.usd_crowd.encoding_child"
-LOOK = 0.1
+CHILD_MODULE = "posefield.encode.usd_crowd.encoding_child"
+POLL_INTERVAL = 0.1
 """Seconds between two checks of the cancellation."""
 
 
@@ -38,16 +38,16 @@ def stream(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
     """
     with TemporaryDirectory() as folder:
         path = Path(folder, f"crowd.{ending}")
-        words = [sys.executable, "-P", "-m", CHILD, str(path), instancing]
+        words = [sys.executable, "-P", "-m", CHILD_MODULE, str(path), instancing]
         with subprocess.Popen(words, stdin=subprocess.PIPE) as child:
             assert child.stdin is not None
-            with _fed(_Feeder(crowd, child.stdin, Cancellation()), child) as feeder:
+            with _running_feeder(_Feeder(crowd, child.stdin, Cancellation()), child) as feeder:
                 _wait(child)
         if feeder.fault is not None:
             raise feeder.fault
         if child.returncode:
             raise EncoderDied(f"it ended with {child.returncode}")
-        yield from atomic_files.pieces(path)
+        yield from atomic_files.read_chunks(path)
 
 
 @dataclass
@@ -87,7 +87,7 @@ class _Feeder:
 
 
 @contextmanager
-def _fed(feeder: _Feeder, child: subprocess.Popen[bytes]) -> Iterator[_Feeder]:
+def _running_feeder(feeder: _Feeder, child: subprocess.Popen[bytes]) -> Iterator[_Feeder]:
     """Run a feeder during the block; both it and the child have ended after the block."""
     thread = threading.Thread(target=feeder.run, name="crowd")
     thread.start()
@@ -104,4 +104,4 @@ def _wait(child: subprocess.Popen[bytes]) -> None:
     while child.poll() is None:
         cancel.check()
         with suppress(subprocess.TimeoutExpired):
-            child.wait(LOOK)
+            child.wait(POLL_INTERVAL)

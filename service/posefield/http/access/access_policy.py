@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 from posefield.common.errors import FileError, InvalidField
 from posefield.http.access import api_keys
-from posefield.http.access.api_keys import Keys
+from posefield.http.access.api_keys import ApiKeys
 from posefield.http.api.settings import PREFIX, Settings
 
 if TYPE_CHECKING:
-    from posefield.http.access.bearer_tokens import Tokens
+    from posefield.http.access.bearer_tokens import TokenVerifier
 
 ALGORITHMS = (
     *("RS256", "RS384", "RS512", "PS256", "PS384", "PS512"),
@@ -21,41 +21,43 @@ ALGORITHMS = (
 
 
 @dataclass(frozen=True)
-class Policy:
+class AccessPolicy:
     """Accepted credentials; without any, every request is allowed.
 
     keys: API keys. tokens: verifier of bearer tokens, None without an issuer. metrics_open: the
     metrics need no credentials.
     """
 
-    keys: Keys
-    tokens: "Tokens | None"
+    keys: ApiKeys
+    tokens: "TokenVerifier | None"
     metrics_open: bool
 
     @property
-    def closed(self) -> bool:
+    def requires_credentials(self) -> bool:
         """True if requests need credentials."""
         return bool(self.keys.known) or self.tokens is not None
 
 
-def of(settings: Settings) -> Policy:
+def from_settings(settings: Settings) -> AccessPolicy:
     """Return the policy of the settings.
 
     Raises InvalidField and FileError for invalid keys or an unusable source of keys.
     """
     text = settings.keys
     if settings.keys_file:
-        text = f"{_text(settings.keys_file)}\n{text}"
-    known = api_keys.read(text, f"{PREFIX}KEYS" if not settings.keys_file else settings.keys_file)
-    return Policy(known, _tokens(settings), settings.metrics_open)
+        text = f"{_file_text(settings.keys_file)}\n{text}"
+    known = api_keys.parse_keys(
+        text, f"{PREFIX}KEYS" if not settings.keys_file else settings.keys_file
+    )
+    return AccessPolicy(known, _token_verifier(settings), settings.metrics_open)
 
 
-def check_exposure(settings: Settings, policy: Policy) -> None:
+def check_exposure(settings: Settings, policy: AccessPolicy) -> None:
     """Raise InvalidField if the service would listen beyond loopback without credentials.
 
     The setting `open` allows that.
     """
-    if policy.closed or settings.open or _is_loopback(settings.host):
+    if policy.requires_credentials or settings.open or _is_loopback(settings.host):
         return
     raise InvalidField(
         f"{PREFIX}HOST",
@@ -73,14 +75,14 @@ def _is_loopback(host: str) -> bool:
         return False
 
 
-def _text(path: str) -> str:
+def _file_text(path: str) -> str:
     try:
         return Path(path).read_text("utf-8")
     except (OSError, UnicodeDecodeError) as fault:
         raise FileError(path, f"no file of keys: {fault}") from fault
 
 
-def _tokens(settings: Settings) -> "Tokens | None":
+def _token_verifier(settings: Settings) -> "TokenVerifier | None":
     """Return the verifier of tokens, None where the settings name no issuer."""
     given = {
         "JWT_KEYS": settings.jwt_keys,
@@ -100,4 +102,4 @@ def _tokens(settings: Settings) -> "Tokens | None":
     # Imported here since its libraries are an optional dependency.
     from posefield.http.access import bearer_tokens
 
-    return bearer_tokens.of(settings)
+    return bearer_tokens.from_settings(settings)

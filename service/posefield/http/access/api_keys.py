@@ -16,7 +16,7 @@ from posefield.common.errors import InvalidField
 from posefield.http.access import principal
 from posefield.http.access.principal import Principal
 
-PREFIX = "pf_"
+KEY_PREFIX = "pf_"
 """Prefix of every key, by which secret scanners recognise a published one."""
 
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
@@ -24,7 +24,7 @@ _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
-class Known:
+class RegisteredKey:
     """A registered key: its SHA-256 digest and its principal."""
 
     digest: bytes
@@ -32,13 +32,13 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Keys:
+class ApiKeys:
     """Registered keys.
 
     known: by the first 8 bytes of their digests.
     """
 
-    known: Mapping[bytes, Known]
+    known: Mapping[bytes, RegisteredKey]
 
     def find(self, key: str) -> Principal | None:
         """Return the principal of a key; None for an unknown key.
@@ -53,9 +53,9 @@ class Keys:
         return known.principal
 
 
-def make() -> str:
+def generate_key() -> str:
     """Return a new random key."""
-    return PREFIX + base64.urlsafe_b64encode(secrets.token_bytes(32)).rstrip(b"=").decode()
+    return KEY_PREFIX + base64.urlsafe_b64encode(secrets.token_bytes(32)).rstrip(b"=").decode()
 
 
 def line(name: str, scopes: Iterable[str], key: str) -> str:
@@ -66,25 +66,25 @@ def line(name: str, scopes: Iterable[str], key: str) -> str:
     if not _NAME.fullmatch(name):
         raise InvalidField("name", f"{name!r}, expected {_NAME.pattern}")
     text = " ".join((name, hashlib.sha256(key.encode()).hexdigest(), *scopes))
-    _of_line(text, "key")
+    _parse_line(text, "key")
     return text
 
 
-def read(text: str, field: str) -> Keys:
+def parse_keys(text: str, field: str) -> ApiKeys:
     """Return the keys of a text with one key per line; `;` also separates, `#` begins a comment.
 
     field: name of the source in messages. Raises InvalidField for an invalid line and for two keys
     of one name; the message gives the line's number and quotes at most the key's name.
     """
-    known: dict[bytes, Known] = {}
+    known: dict[bytes, RegisteredKey] = {}
     names: set[str] = set()
     for where, words in _lines(text, field):
-        key = _of_line(words, where)
+        key = _parse_line(words, where)
         if key.principal.name in names:
             raise InvalidField(where, f"a second key named {key.principal.name!r}")
         names.add(key.principal.name)
         known[key.digest[:8]] = key
-    return Keys(known)
+    return ApiKeys(known)
 
 
 def _lines(text: str, field: str) -> Iterator[tuple[str, str]]:
@@ -93,7 +93,7 @@ def _lines(text: str, field: str) -> Iterator[tuple[str, str]]:
             yield f"{field}:{number}", words
 
 
-def _of_line(text: str, where: str) -> Known:
+def _parse_line(text: str, where: str) -> RegisteredKey:
     # Messages do not quote the digest: an operator may have put the key itself in its place.
     name, digest, *scopes = (*text.split(), "", "")
     scopes = list(filter(None, scopes))
@@ -105,4 +105,4 @@ def _of_line(text: str, where: str) -> Known:
         raise InvalidField(
             where, f"the scopes of {name!r}, expected some of read:*, read:MODEL, metrics"
         )
-    return Known(bytes.fromhex(digest), principal.of(name, scopes))
+    return RegisteredKey(bytes.fromhex(digest), principal.from_scopes(name, scopes))

@@ -12,7 +12,7 @@ import orjson
 log = logging.getLogger(__name__)
 
 
-class Call(NamedTuple):
+class AuditedRequest(NamedTuple):
     """A request in the audit log.
 
     request: its id. method: HTTP method. path: path template of the contract, not the requested
@@ -24,7 +24,7 @@ class Call(NamedTuple):
     path: str
 
 
-def refused(call: Call, status: int, who: str, why: str) -> None:
+def log_refusal(call: AuditedRequest, status: int, who: str, why: str) -> None:
     """Log a refused request.
 
     status: of the response. who: name of the principal. why: reason of the refusal.

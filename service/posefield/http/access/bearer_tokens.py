@@ -14,19 +14,19 @@ from typing import Any
 import jwt
 
 from posefield.http.access import principal
-from posefield.http.access.principal import Principal, Rejected
-from posefield.http.access.token_keys import Keys, KeySet
+from posefield.http.access.principal import InvalidCredentials, Principal
+from posefield.http.access.token_keys import KeySet, PublicKeys
 from posefield.http.api.settings import Settings
 
-CACHED = 10_000
+CACHE_SIZE = 10_000
 """Entries of the cache of verified tokens (2 MB); only valid tokens are cached."""
 
 # 9999-12-31T23:59:59Z, the last second that RFC 3339 can represent.
-LAST_MOMENT = 253_402_300_799
+LATEST_TIME = 253_402_300_799
 
 
 @dataclass
-class Tokens:
+class TokenVerifier:
     """Verifier of the tokens of one issuer; caches valid tokens until they expire.
 
     most: entries of the cache.
@@ -34,15 +34,15 @@ class Tokens:
 
     settings: Settings
     keys: KeySet
-    most: int = CACHED
+    most: int = CACHE_SIZE
     _valid: dict[bytes, tuple[float, Principal]] = field(init=False, default_factory=dict)
-    _under: Keys | None = field(init=False, default=None)
+    _cached_keys: PublicKeys | None = field(init=False, default=None)
 
     def find(self, token: str) -> Principal:
         """Return the principal of a token; raises Rejected for an invalid one."""
-        if self.keys.keys is not self._under:
+        if self.keys.keys is not self._cached_keys:
             # The keys were refreshed: tokens of a withdrawn key must be verified again, and fail.
-            self._valid, self._under = {}, self.keys.keys
+            self._valid, self._cached_keys = {}, self.keys.keys
         digest = hashlib.sha256(token.encode()).digest()
         ends, known = self._valid.pop(digest, (0.0, None))
         if known is None or time.time() >= ends:
@@ -56,16 +56,18 @@ class Tokens:
         """Return the expiry time of a token, s since 1970, and its principal; raises Rejected."""
         try:
             claims = self._claims(token)
-            ends = _moment(claims["exp"]) + self.settings.jwt_leeway
+            ends = _numeric_date(claims["exp"]) + self.settings.jwt_leeway
             scopes = _scopes(claims.get(self.settings.jwt_scopes))
-            return ends, principal.of(_pseudonym(claims), scopes)
-        except _FAULTS as fault:
-            raise Rejected(_WORDS.get(type(fault), "not a token that can be verified")) from None
+            return ends, principal.from_scopes(_pseudonym(claims), scopes)
+        except _TOKEN_ERRORS as fault:
+            raise InvalidCredentials(
+                _REASONS.get(type(fault), "not a token that can be verified")
+            ) from None
 
     def _claims(self, token: str) -> Mapping[str, Any]:
         key = self.keys.find(jwt.get_unverified_header(token).get("kid"))
         if key is None:
-            raise Rejected("signed by a key that is not known")
+            raise InvalidCredentials("signed by a key that is not known")
         return jwt.decode(
             token,
             key,
@@ -77,21 +79,21 @@ class Tokens:
         )
 
 
-def of(settings: Settings) -> Tokens:
+def from_settings(settings: Settings) -> TokenVerifier:
     """Return the verifier of the settings, and start the thread that refreshes its keys.
 
     Raises FileError for an unusable source of keys.
     """
     keys = KeySet(settings.jwt_keys, settings.jwt_algorithm)
     threading.Thread(target=keys.watch, args=(settings.jwt_refresh,), daemon=True).start()
-    return Tokens(settings, keys)
+    return TokenVerifier(settings, keys)
 
 
 # Beside PyJWT's own errors: signed tokens can hold deeply nested JSON, claims of another type,
 # times out of range and unpaired surrogates.
-_FAULTS = (jwt.PyJWTError, RecursionError, OverflowError, TypeError, ValueError)
+_TOKEN_ERRORS = (jwt.PyJWTError, RecursionError, OverflowError, TypeError, ValueError)
 
-_WORDS: dict[type[Exception], str] = {
+_REASONS: dict[type[Exception], str] = {
     jwt.ExpiredSignatureError: "expired",
     jwt.ImmatureSignatureError: "not valid yet",
     jwt.InvalidAudienceError: "meant for another audience",
@@ -102,13 +104,13 @@ _WORDS: dict[type[Exception], str] = {
 }
 
 
-def _moment(claim: object) -> float:
+def _numeric_date(claim: object) -> float:
     """Return a NumericDate (RFC 7519, 2), s.
 
     Raises ValueError for text, Booleans and large numbers, which PyJWT accepts.
     """
-    if isinstance(claim, bool) or not isinstance(claim, int | float) or claim > LAST_MOMENT:
-        raise ValueError(f"exp is {type(claim).__name__}, expected a number up to {LAST_MOMENT}")
+    if isinstance(claim, bool) or not isinstance(claim, int | float) or claim > LATEST_TIME:
+        raise ValueError(f"exp is {type(claim).__name__}, expected a number up to {LATEST_TIME}")
     return float(claim)
 
 

@@ -10,7 +10,7 @@ METRICS = "metrics"
 _ALL = f"{READ}:*"
 
 
-class Rejected(Exception):
+class InvalidCredentials(Exception):
     """Error of invalid credentials; the message gives the reason and quotes no credentials."""
 
 
@@ -38,11 +38,11 @@ class Principal:
 EVERYONE = Principal("everyone", None, True)
 """Principal of every request to a service without keys and tokens."""
 
-NOBODY = Principal("nobody", frozenset(), False)
+NO_ACCESS = Principal("nobody", frozenset(), False)
 """Principal of a request without credentials."""
 
 
-def of(name: str, scopes: Iterable[str]) -> Principal:
+def from_scopes(name: str, scopes: Iterable[str]) -> Principal:
     """Return the principal of scopes `read:*`, `read:MODEL` and `metrics`; ignore others."""
     given = frozenset(scopes)
     models = frozenset(s.removeprefix(f"{READ}:") for s in given if s.startswith(f"{READ}:"))

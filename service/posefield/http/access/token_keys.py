@@ -19,14 +19,14 @@ log = logging.getLogger(__name__)
 
 # PyJWKClient's own cache fetches in the thread that looks a key up, here the event loop's, and is
 # empty once it has expired while the issuer is down: docs/decisions/0011.
-COOLDOWN = 10.0
+REFRESH_COOLDOWN = 10.0
 """Minimum time between two reads of the source, s: unknown key ids cannot cause more reads."""
 
 _TIMEOUT = 5.0
 _LOOPBACK = ("127.0.0.1", "localhost", "::1")
-_FAULTS = (jwt.PyJWTError, OSError, ValueError, RecursionError)
+_SOURCE_ERRORS = (jwt.PyJWTError, OSError, ValueError, RecursionError)
 
-Keys = Mapping[str | None, jwt.PyJWK]
+PublicKeys = Mapping[str | None, jwt.PyJWK]
 
 
 class _Document(msgspec.Struct):
@@ -45,7 +45,7 @@ class KeySet:
 
     source: str
     algorithm: str
-    keys: Keys = field(init=False)
+    keys: PublicKeys = field(init=False)
     _unknown: threading.Event = field(init=False, default_factory=threading.Event)
 
     def __post_init__(self) -> None:
@@ -62,7 +62,7 @@ class KeySet:
             self._unknown.set()
         return found
 
-    def watch(self, seconds: float, cooldown: float = COOLDOWN) -> None:
+    def watch(self, seconds: float, cooldown: float = REFRESH_COOLDOWN) -> None:
         """Refresh the keys periodically, in a loop without end.
 
         seconds: period, shortened by a request for an unknown key. cooldown: minimum time between
@@ -81,17 +81,17 @@ class KeySet:
         except FileError as fault:
             log.warning("the keys stay as they are: %s", fault)
 
-    def _read(self) -> Keys:
+    def _read(self) -> PublicKeys:
         try:
-            keys = dict(_fitting(_document(self.source), self.algorithm))
-        except _FAULTS as fault:
+            keys = dict(_keys_for_algorithm(_read_document(self.source), self.algorithm))
+        except _SOURCE_ERRORS as fault:
             raise FileError(self.source, f"no key set: {fault!r}") from fault
         if not keys:
             raise FileError(self.source, f"no public key for {self.algorithm}, expected one")
         return keys
 
 
-def _document(source: str) -> _Document:
+def _read_document(source: str) -> _Document:
     parts = urlsplit(source)
     if not parts.scheme:
         return msgspec.json.decode(Path(source).read_bytes(), type=_Document)
@@ -102,7 +102,9 @@ def _document(source: str) -> _Document:
     return msgspec.convert(client.fetch_data(), _Document)
 
 
-def _fitting(document: _Document, algorithm: str) -> Iterator[tuple[str | None, jwt.PyJWK]]:
+def _keys_for_algorithm(
+    document: _Document, algorithm: str
+) -> Iterator[tuple[str | None, jwt.PyJWK]]:
     for entry in document.keys:
         if entry.get("use", "sig") == "sig" and entry.get("alg", algorithm) == algorithm:
             # Key sets may also hold keys of other types.

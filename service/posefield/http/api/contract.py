@@ -33,7 +33,7 @@ class Operation:
     scope: str | None = None
 
     @cached_property
-    def sheds(self) -> bool:
+    def sheddable(self) -> bool:
         """True if it is refused under overload; monitoring operations are not."""
         return self.scope == "read"
 
@@ -60,13 +60,13 @@ class Contract:
         return str(self.document["info"]["version"])
 
 
-def load() -> Contract:
+def load_contract() -> Contract:
     """Return the contract in openapi.yaml beside this module."""
     source = Path(__file__).with_name("openapi.yaml").read_bytes()
-    return parse(source)
+    return parse_contract(source)
 
 
-def parse(source: bytes) -> Contract:
+def parse_contract(source: bytes) -> Contract:
     """Return the contract of a YAML document."""
     document = yaml.load(source, yaml.CSafeLoader)
     return Contract(source, document, tuple(_operations(document)))

@@ -19,17 +19,17 @@ from posefield.common.errors import (
     UnknownFormat,
     UnknownModel,
 )
-from posefield.question.json_decoding import pointer
+from posefield.question.json_decoding import json_pointer
 
 MEDIA_TYPE = "application/problem+json"
 TYPE_PREFIX = "urn:posefield:problem:"
 PAGE = "/problems"
-LONGEST = 1000
+MAX_DETAIL_LENGTH = 1000
 """Maximum characters of a detail."""
 
 
 @dataclass(frozen=True)
-class Kind:
+class ProblemKind:
     """A kind of problem.
 
     status: HTTP status code. name: last part of the type. title: short text for people.
@@ -50,28 +50,28 @@ class Kind:
         return f'<{PAGE}#{self.name}>; rel="help"'
 
 
-BAD_PARAMETER = Kind(400, "bad-parameter", "A query parameter cannot be read")
-BAD_BODY = Kind(400, "bad-body", "The body cannot be read")
-UNAUTHENTICATED = Kind(401, "unauthenticated", "Nobody known asks")
-FORBIDDEN = Kind(403, "forbidden", "Whoever asks may not")
-NO_SUCH_PATH = Kind(404, "no-such-path", "Nothing lies at this path")
-METHOD_NOT_ALLOWED = Kind(405, "method-not-allowed", "This path does not take this method")
-NOT_ACCEPTABLE = Kind(406, "not-acceptable", "Nothing that is accepted is there")
-BODY_TOO_LARGE = Kind(413, "body-too-large", "The body is too large")
-URL_TOO_LONG = Kind(414, "url-too-long", "The URL is too long")
-NOT_JSON = Kind(415, "unsupported-media-type", "The body must be JSON")
-OVERLOADED = Kind(503, "overloaded", "The service has too much to do; ask again soon")
-LATE = Kind(503, "late", "The answer took too long")
-NOT_READY = Kind(503, "not-ready", "The service should not be sent requests now")
-INTERNAL = Kind(500, "internal-error", "The service failed; the fault is not in the request")
+BAD_PARAMETER = ProblemKind(400, "bad-parameter", "A query parameter cannot be read")
+BAD_BODY = ProblemKind(400, "bad-body", "The body cannot be read")
+UNAUTHENTICATED = ProblemKind(401, "unauthenticated", "Nobody known asks")
+FORBIDDEN = ProblemKind(403, "forbidden", "Whoever asks may not")
+NO_SUCH_PATH = ProblemKind(404, "no-such-path", "Nothing lies at this path")
+METHOD_NOT_ALLOWED = ProblemKind(405, "method-not-allowed", "This path does not take this method")
+NOT_ACCEPTABLE = ProblemKind(406, "not-acceptable", "Nothing that is accepted is there")
+BODY_TOO_LARGE = ProblemKind(413, "body-too-large", "The body is too large")
+URL_TOO_LONG = ProblemKind(414, "url-too-long", "The URL is too long")
+NOT_JSON = ProblemKind(415, "unsupported-media-type", "The body must be JSON")
+OVERLOADED = ProblemKind(503, "overloaded", "The service has too much to do; ask again soon")
+DEADLINE_EXCEEDED = ProblemKind(503, "late", "The answer took too long")
+NOT_READY = ProblemKind(503, "not-ready", "The service should not be sent requests now")
+INTERNAL = ProblemKind(500, "internal-error", "The service failed; the fault is not in the request")
 
-UNKNOWN_HOST = Kind(421, "unknown-host", "The service does not answer under this name")
-HEAD_TOO_LARGE = Kind(431, "head-too-large", "The request's head is too large")
+UNKNOWN_HOST = ProblemKind(421, "unknown-host", "The service does not answer under this name")
+HEAD_TOO_LARGE = ProblemKind(431, "head-too-large", "The request's head is too large")
 
-OF_HEAD = (UNKNOWN_HOST, URL_TOO_LONG, HEAD_TOO_LARGE)
+HEAD_PROBLEMS = (UNKNOWN_HOST, URL_TOO_LONG, HEAD_TOO_LARGE)
 """Kinds raised before routing; see service/posefield/http/middleware/request_head.py."""
-OF_LOAD = (OVERLOADED, LATE, NOT_READY)
-OF_REQUEST = (
+LOAD_PROBLEMS = (OVERLOADED, DEADLINE_EXCEEDED, NOT_READY)
+REQUEST_PROBLEMS = (
     BAD_PARAMETER,
     BAD_BODY,
     UNAUTHENTICATED,
@@ -83,22 +83,30 @@ OF_REQUEST = (
     NOT_JSON,
 )
 
-TABLE: dict[type[QueryError], Kind] = {
-    UnknownModel: Kind(404, "unknown-model", "No model of that name"),
-    UnknownFormat: Kind(404, "unknown-format", "No format of that name"),
-    InvalidField: Kind(422, "invalid-field", "A field is missing, unknown or out of range"),
-    OutsideSamples: Kind(422, "outside-samples", "The controls lie outside what was sampled"),
-    OutOfReach: Kind(422, "out-of-reach", "A target cannot be reached"),
+QUERY_ERROR_PROBLEMS: dict[type[QueryError], ProblemKind] = {
+    UnknownModel: ProblemKind(404, "unknown-model", "No model of that name"),
+    UnknownFormat: ProblemKind(404, "unknown-format", "No format of that name"),
+    InvalidField: ProblemKind(422, "invalid-field", "A field is missing, unknown or out of range"),
+    OutsideSamples: ProblemKind(
+        422, "outside-samples", "The controls lie outside what was sampled"
+    ),
+    OutOfReach: ProblemKind(422, "out-of-reach", "A target cannot be reached"),
 }
 
-KINDS = (*OF_REQUEST, *OF_HEAD, *OF_LOAD, *TABLE.values(), INTERNAL)
+PROBLEM_KINDS = (
+    *REQUEST_PROBLEMS,
+    *HEAD_PROBLEMS,
+    *LOAD_PROBLEMS,
+    *QUERY_ERROR_PROBLEMS.values(),
+    INTERNAL,
+)
 
-_IN_THE_PATH = ("model", "format")
-_REPEATED = {"times": "time", "targets": "target"}
+_PATH_PARAMETERS = ("model", "format")
+_REPEATED_PARAMETERS = {"times": "time", "targets": "target"}
 """Fields that a query string gives as one parameter per element."""
 
 
-class RequestFault(Exception):
+class RequestError(Exception):
     """Error of a request, with its kind of problem.
 
     kind: of the problem. detail: text for the client. place: location of the error, as
@@ -107,7 +115,7 @@ class RequestFault(Exception):
 
     def __init__(
         self,
-        kind: Kind,
+        kind: ProblemKind,
         detail: str,
         place: Mapping[str, str] | None = None,
         headers: Mapping[str, str] | None = None,
@@ -119,81 +127,85 @@ class RequestFault(Exception):
         self.headers = headers
 
 
-def of_fault(request: Request, fault: RequestFault) -> Response:
+def request_error_response(request: Request, fault: RequestError) -> Response:
     """Return the response to a RequestFault."""
-    detail = _cut(fault.detail)
+    detail = _shortened(fault.detail)
     errors = [{**fault.place, "detail": detail}] if fault.place else []
-    return _answer(request, fault.kind, detail, errors, fault.headers)
+    return _problem_response(request, fault.kind, detail, errors, fault.headers)
 
 
-def of_query_error(request: Request, error: QueryError) -> Response:
+def query_error_response(request: Request, error: QueryError) -> Response:
     """Return the response to a QueryError."""
-    place = _place(error, in_body=request.method == "POST")
-    errors = [{**place, "detail": _cut(error.message)}]
-    return _answer(request, _kind(error, request.method), _cut(str(error)), errors)
+    place = _error_location(error, in_body=request.method == "POST")
+    errors = [{**place, "detail": _shortened(error.message)}]
+    return _problem_response(
+        request, _problem_kind(error, request.method), _shortened(str(error)), errors
+    )
 
 
-def _kind(error: QueryError, method: str) -> Kind:
+def _problem_kind(error: QueryError, method: str) -> ProblemKind:
     if isinstance(error, FormError):
         return BAD_BODY if method == "POST" else BAD_PARAMETER
-    return TABLE[type(error)]
+    return QUERY_ERROR_PROBLEMS[type(error)]
 
 
-def within(error: QueryError, where: str) -> RequestFault:
+def nested_error(error: QueryError, where: str) -> RequestError:
     """Return the fault of one question of many.
 
     where: JSON pointer to that question in the body.
     """
-    place = where + _place(error, in_body=True)["pointer"]
+    place = where + _error_location(error, in_body=True)["pointer"]
     detail = f"{place.removeprefix('/')}: {error.message}"
-    return RequestFault(TABLE[type(error)], detail, {"pointer": place})
+    return RequestError(QUERY_ERROR_PROBLEMS[type(error)], detail, {"pointer": place})
 
 
-def internal(request: Request) -> Response:
+def internal_error_response(request: Request) -> Response:
     """Return the response to an unexpected exception: the request id and no details."""
-    return _answer(request, INTERNAL, "see the service's log under the id in `instance`", [])
+    return _problem_response(
+        request, INTERNAL, "see the service's log under the id in `instance`", []
+    )
 
 
-def _cut(detail: str) -> str:
+def _shortened(detail: str) -> str:
     """Return the detail, shortened in the middle to LONGEST: it may quote the request."""
-    if len(detail) <= LONGEST:
+    if len(detail) <= MAX_DETAIL_LENGTH:
         return detail
-    return f"{detail[: LONGEST - 105]} ... {detail[-100:]}"
+    return f"{detail[: MAX_DETAIL_LENGTH - 105]} ... {detail[-100:]}"
 
 
-def _place(error: QueryError, in_body: bool) -> dict[str, str]:
+def _error_location(error: QueryError, in_body: bool) -> dict[str, str]:
     """Return the location of an error's field in its request: a pointer or a parameter."""
     head, _, rest = error.field.partition("/")
     if isinstance(error, FormError) and in_body:
         return {"pointer": f"/{error.field}" if error.field else ""}
-    if error.field in _IN_THE_PATH:
+    if error.field in _PATH_PARAMETERS:
         return {"parameter": error.field}
     if in_body:
         # A control's name is one key, even if it contains slashes.
         keys = [rest] if head == "controls" else rest.split("/")
         index = "" if error.index is None else str(error.index)
-        return {"pointer": pointer(*filter(None, (head, *keys, index)))}
+        return {"pointer": json_pointer(*filter(None, (head, *keys, index)))}
     if head == "camera":
         return {"parameter": "camera" if rest == "position" else rest or head}
-    if head in _REPEATED:
-        return {"parameter": _REPEATED[head]}
+    if head in _REPEATED_PARAMETERS:
+        return {"parameter": _REPEATED_PARAMETERS[head]}
     return {"parameter": rest or head}
 
 
-def _answer(
+def _problem_response(
     request: Request,
-    kind: Kind,
+    kind: ProblemKind,
     detail: str,
     errors: list[dict[str, str]],
     headers: Mapping[str, str] | None = None,
 ) -> Response:
-    content = document(kind, detail, request.state.request_id, errors)
+    content = problem_document(kind, detail, request.state.request_id, errors)
     sent = {"Link": kind.help, **(headers or {})}
     return Response(orjson.dumps(content), kind.status, sent, MEDIA_TYPE)
 
 
-def document(
-    kind: Kind, detail: str, instance: str, errors: Sequence[Mapping[str, str]]
+def problem_document(
+    kind: ProblemKind, detail: str, instance: str, errors: Sequence[Mapping[str, str]]
 ) -> dict[str, object]:
     """Return a Problem (schema of the contract)."""
     return {

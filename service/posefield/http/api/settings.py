@@ -99,39 +99,39 @@ class Settings:
     jwt_refresh: int = 300
 
     def __post_init__(self) -> None:
-        _within("port", self.port, 0, 65535)
-        _within("body_limit", self.body_limit, 1, 64 * 1024 * 1024)
-        _within("crowd_body_limit", self.crowd_body_limit, 1, 1024 * 1024 * 1024)
-        _within("crowd_limit", self.crowd_limit, 1, 10_000_000)
-        _within("crowd_poses", self.crowd_poses, 1, 50_000_000)
-        _within("crowd_frames", self.crowd_frames, 1, 50_000_000)
-        _within("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
-        _within("clips_limit", self.clips_limit, 1, 1_000_000)
-        _within("clips_poses", self.clips_poses, 1, 1_000_000_000)
-        _within("clips_targets", self.clips_targets, 1, 1_000_000)
-        _within("output_limit", self.output_limit, 64 * 1024, 1 << 34)
-        _within("grid_limit", self.grid_limit, 4, 1024 * 1024)
-        _within("grace", self.grace, 0, 600)
-        _within("concurrency", self.concurrency, 1, 1_000_000)
-        _within("deadline", self.deadline, 1, 3600)
-        _within("alias_seconds", self.alias_seconds, 0, 31_536_000)
+        _check_range("port", self.port, 0, 65535)
+        _check_range("body_limit", self.body_limit, 1, 64 * 1024 * 1024)
+        _check_range("crowd_body_limit", self.crowd_body_limit, 1, 1024 * 1024 * 1024)
+        _check_range("crowd_limit", self.crowd_limit, 1, 10_000_000)
+        _check_range("crowd_poses", self.crowd_poses, 1, 50_000_000)
+        _check_range("crowd_frames", self.crowd_frames, 1, 50_000_000)
+        _check_range("clips_body_limit", self.clips_body_limit, 1, 1024 * 1024 * 1024)
+        _check_range("clips_limit", self.clips_limit, 1, 1_000_000)
+        _check_range("clips_poses", self.clips_poses, 1, 1_000_000_000)
+        _check_range("clips_targets", self.clips_targets, 1, 1_000_000)
+        _check_range("output_limit", self.output_limit, 64 * 1024, 1 << 34)
+        _check_range("grid_limit", self.grid_limit, 4, 1024 * 1024)
+        _check_range("grace", self.grace, 0, 600)
+        _check_range("concurrency", self.concurrency, 1, 1_000_000)
+        _check_range("deadline", self.deadline, 1, 3600)
+        _check_range("alias_seconds", self.alias_seconds, 0, 31_536_000)
         if self.log not in ("on", "off"):
             raise InvalidField(PREFIX + "LOG", f"{self.log!r}, expected on or off")
-        _within("drain", self.drain, 0, 600)
-        _within("workers", self.workers, 0, 256)
-        _within("reload", self.reload, 0, 86_400)
-        _within("versions", self.versions, 0, 1000)
-        _within("versions_memory", self.versions_memory, 0, 1 << 40)
-        _within("url_limit", self.url_limit, 256, 64 * 1024)
-        _within("head_limit", self.head_limit, 1024, 256 * 1024)
-        _within("idle_time", self.idle_time, 1, 3600)
-        _within("bodies_memory", self.bodies_memory, 1024 * 1024, 1 << 40)
-        _within("unresponsive", self.unresponsive, 0, 3600)
-        _within("jwt_leeway", self.jwt_leeway, 0, 600)
-        _within("jwt_refresh", self.jwt_refresh, 10, 86_400)
+        _check_range("drain", self.drain, 0, 600)
+        _check_range("workers", self.workers, 0, 256)
+        _check_range("reload", self.reload, 0, 86_400)
+        _check_range("versions", self.versions, 0, 1000)
+        _check_range("versions_memory", self.versions_memory, 0, 1 << 40)
+        _check_range("url_limit", self.url_limit, 256, 64 * 1024)
+        _check_range("head_limit", self.head_limit, 1024, 256 * 1024)
+        _check_range("idle_time", self.idle_time, 1, 3600)
+        _check_range("bodies_memory", self.bodies_memory, 1024 * 1024, 1 << 40)
+        _check_range("unresponsive", self.unresponsive, 0, 3600)
+        _check_range("jwt_leeway", self.jwt_leeway, 0, 600)
+        _check_range("jwt_refresh", self.jwt_refresh, 10, 86_400)
 
 
-def read(
+def read_settings(
     host: str | None = None, port: int | None = None, environ: Mapping[str, str] = os.environ
 ) -> Settings:
     """Return the settings of the environment; host and port of the command line override them.
@@ -140,7 +140,7 @@ def read(
     """
     found = {f.name: (f.default, environ.get(PREFIX + f.name.upper())) for f in fields(Settings)}
     values = {
-        name: _parse(name, default, text)
+        name: _parse_value(name, default, text)
         for name, (default, text) in found.items()
         if text is not None
     }
@@ -152,7 +152,7 @@ def read(
     )
 
 
-def _parse(name: str, default: object, text: str) -> str | int:
+def _parse_value(name: str, default: object, text: str) -> str | int:
     """Return the value of a variable, of the type of the setting's default.
 
     Raises InvalidField for invalid text.
@@ -168,6 +168,6 @@ def _parse(name: str, default: object, text: str) -> str | int:
     return int(text)
 
 
-def _within(name: str, value: int, low: int, high: int) -> None:
+def _check_range(name: str, value: int, low: int, high: int) -> None:
     if not low <= value <= high:
         raise InvalidField(PREFIX + name.upper(), f"{value}, expected {low} to {high}")

@@ -19,21 +19,23 @@ Result = TypeVar("Result")
 Arguments = TypeVarTuple("Arguments")
 
 CORES = os.cpu_count() or 1
-WORK = CapacityLimiter(CORES)
+SYNTHESIS_LIMITER = CapacityLimiter(CORES)
 """Limit on threads for work of up to tenths of a second: long clips, lists of times, grids,
 compression. More threads than cores would delay the event loop several times as long (decision
 0030)."""
-SOLVER = CapacityLimiter(CORES)
-CROWDS = CapacityLimiter(CORES)
-CLIPS = CapacityLimiter(CORES)
+SOLVER_LIMITER = CapacityLimiter(CORES)
+CROWD_LIMITER = CapacityLimiter(CORES)
+ARCHIVE_LIMITER = CapacityLimiter(CORES)
 """Limits on threads for work of seconds, separate so that other work does not wait for it."""
 
 # The limiters above count the threads; anyio's own limit must not apply.
 _UNBOUNDED = CapacityLimiter(math.inf)
 
 
-async def run(
-    work: Callable[[*Arguments], Result], *arguments: *Arguments, places: CapacityLimiter = WORK
+async def run_in_thread(
+    work: Callable[[*Arguments], Result],
+    *arguments: *Arguments,
+    places: CapacityLimiter = SYNTHESIS_LIMITER,
 ) -> Result:
     """Call `work` in a thread within the limit `places`, and return its result.
 
@@ -45,7 +47,7 @@ async def run(
 
 
 async def within(work: Callable[[*Arguments], Result], *arguments: *Arguments) -> Result:
-    """Call `work` in a thread as `run` does, for a caller that holds a place already."""
+    """Call `work` in a thread as `run_in_thread` does, for a caller that holds a place already."""
     cancellation = Cancellation()
     token = cancel.current.set(cancellation)
     try:
@@ -56,11 +58,11 @@ async def within(work: Callable[[*Arguments], Result], *arguments: *Arguments) -
         return await asyncio.shield(thread)
     except asyncio.CancelledError:
         cancellation.cancel()
-        await _ended(thread)
+        await _wait_until_ended(thread)
         raise
 
 
-async def _ended(thread: "asyncio.Future[Result]") -> None:
+async def _wait_until_ended(thread: "asyncio.Future[Result]") -> None:
     """Wait until a thread has ended, even if the waiting task is cancelled again.
 
     Log the exception of work that failed for another reason than its cancellation.

@@ -2,34 +2,34 @@
 
 from collections.abc import Mapping, Sequence
 
-from posefield.batch.clip_archive import Order
+from posefield.batch.clip_archive import ArchiveOrder
 from posefield.batch.rows import clip_names
-from posefield.batch.rows.row_query import Query
+from posefield.batch.rows.row_query import ClipQuery
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError
-from posefield.encode.formats import Encoder, poses_within
+from posefield.encode.formats import ClipEncoder, max_poses
 from posefield.http.api import problems
 from posefield.http.api.settings import Settings
 from posefield.question import json_decoding as bodies
-from posefield.question.json_decoding import pointer
+from posefield.question.json_decoding import json_pointer
 from posefield.question.motion_question import ClipsQuestion, NamedClipQuestion
 from posefield.synthesis import clips
-from posefield.synthesis.clips import Prospect
-from posefield.synthesis.frame_times import MOST_POSES
+from posefield.synthesis.clips import ClipPreview
+from posefield.synthesis.frame_times import MAX_POSES
 from posefield.synthesis.synthesizer import Synthesizer
 
-OWN_NAME = "expected a name of its own: an earlier clip has it, capitals count for nothing"
+REPEATED_NAME = "expected a name of its own: an earlier clip has it, capitals count for nothing"
 
 
-def order(
-    model: Synthesizer, encoders: Mapping[str, Encoder], content: bytes, settings: Settings
-) -> Order:
+def decode_order(
+    model: Synthesizer, encoders: Mapping[str, ClipEncoder], content: bytes, settings: Settings
+) -> ArchiveOrder:
     """Return the validated order of a JSON body, which later steps do not refuse.
 
     Raises FormError for a malformed body, RequestFault for an invalid clip and InvalidField for a
     request beyond the limits.
     """
-    body = bodies.question(ClipsQuestion, content)
+    body = bodies.decode_question(ClipsQuestion, content)
     if body.format not in encoders:
         detail = f"{body.format!r}, expected one of {', '.join(encoders)}"
         raise FormError("format", detail)
@@ -38,30 +38,30 @@ def order(
         raise InvalidField("clips", f"{len(body.clips)} clips, {expected}")
     encoder = encoders[body.format]
     convention = encoder.convention(body.unit, body.up)
-    queries = [_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
+    queries = [_clip_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
     _check_names(queries)
     _check_targets(model, queries, settings.clips_targets)
-    within = poses_within(
-        settings.output_limit, len(model.session.card.skeleton), encoder.per_joint
+    within = max_poses(
+        settings.output_limit, len(model.session.card.skeleton), encoder.bytes_per_joint
     )
-    prospects = _prospects(model, queries, min(within, MOST_POSES), settings.clips_poses)
-    return Order(model, encoder, convention, queries, prospects)
+    prospects = _check_prospects(model, queries, min(within, MAX_POSES), settings.clips_poses)
+    return ArchiveOrder(model, encoder, convention, queries, prospects)
 
 
-def _query(index: int, asked: NamedClipQuestion, extension: str) -> Query:
+def _clip_query(index: int, asked: NamedClipQuestion, extension: str) -> ClipQuery:
     cancellation.check()
-    name = clip_names.generated(index) if asked.name is None else asked.name
-    return Query(name, extension, asked, pointer("clips", str(index)))
+    name = clip_names.generated_name(index) if asked.name is None else asked.name
+    return ClipQuery(name, extension, asked, json_pointer("clips", str(index)))
 
 
-def _check_names(queries: Sequence[Query]) -> None:
+def _check_names(queries: Sequence[ClipQuery]) -> None:
     called = [each.name for each in queries]
-    for index in clip_names.Seen().repeated(called):
-        error = InvalidField("name", f"{called[index]!r}, {OWN_NAME}")
-        raise problems.within(error, queries[index].place)
+    for index in clip_names.UsedNames().find_repeated(called):
+        error = InvalidField("name", f"{called[index]!r}, {REPEATED_NAME}")
+        raise problems.nested_error(error, queries[index].place)
 
 
-def _check_targets(model: Synthesizer, queries: Sequence[Query], most: int) -> None:
+def _check_targets(model: Synthesizer, queries: Sequence[ClipQuery], most: int) -> None:
     cost = sum(clips.solver_cost(model, each.question) for each in queries)
     if cost > most:
         raise InvalidField(
@@ -71,9 +71,9 @@ def _check_targets(model: Synthesizer, queries: Sequence[Query], most: int) -> N
         )
 
 
-def _prospects(
-    model: Synthesizer, queries: Sequence[Query], longest: int, most: int
-) -> list[Prospect]:
+def _check_prospects(
+    model: Synthesizer, queries: Sequence[ClipQuery], longest: int, most: int
+) -> list[ClipPreview]:
     """Return the prospect of each clip.
 
     longest: maximum frames of one clip. most: maximum frames of all clips.
@@ -82,9 +82,9 @@ def _prospects(
     for each in queries:
         cancellation.check()
         try:
-            found.append(clips.prospect(model, each.question, longest))
+            found.append(clips.preview_clip(model, each.question, longest))
         except QueryError as error:
-            raise problems.within(error, each.place) from None
+            raise problems.nested_error(error, each.place) from None
         poses += found[-1].frames
     if poses > most:
         raise InvalidField("clips", f"{poses} frames in all, expected at most {most}")

@@ -14,20 +14,20 @@ import numpy as np
 from posefield.common.errors import FormError, InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.encode.usd_crowd import crowd_size
-from posefield.encode.usd_crowd.crowd_size import Counts
-from posefield.http.api.problems import BODY_TOO_LARGE, RequestFault
+from posefield.encode.usd_crowd.crowd_size import CrowdCounts
+from posefield.http.api.problems import BODY_TOO_LARGE, RequestError
 from posefield.http.api.settings import Settings
-from posefield.inference.level_selection import Camera, View
+from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.locomotion import crowd_order as orders
 from posefield.locomotion import walking_crowd
-from posefield.locomotion.crowd_order import Order
+from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion.crowd_clip import Placement
 from posefield.question import json_decoding as bodies
-from posefield.question.motion_question import Policy, Root
+from posefield.question.motion_question import ExtrapolationPolicy, RootMode
 from posefield.question.walk_question import WalkQuestion
 from posefield.validation.crowd_question import Blending, CrowdQuestion
 
-PIXELS = 1.0
+DEFAULT_PIXELS = 1.0
 VALUES, FEWEST = 64, 100_000
 """Maximum values of a character, and minimum number of characters that the limit allows for."""
 # float, since JSON has one number type: 1.0 is a valid level.
@@ -59,8 +59,8 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     camera: CameraBody | None = None
     pixels: Annotated[float, msgspec.Meta(ge=0)] | None = None
     budget_ms: Annotated[float, msgspec.Meta(gt=0)] | None = None
-    root: Root = "travelling"
-    extrapolate: Policy = "warn"
+    root: RootMode = "travelling"
+    extrapolate: ExtrapolationPolicy = "warn"
 
 
 def of_body(content: bytes, most: float) -> CrowdQuestion:
@@ -70,7 +70,7 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
     invalid values and RequestFault 413 for too many values.
     """
     _check_values(content, most)
-    body = bodies.question(CrowdBody, content)
+    body = bodies.decode_question(CrowdBody, content)
     count = _count(body, most)
     performers, performer = _performers(body.performer, count)
     return CrowdQuestion(
@@ -90,7 +90,7 @@ def _check_values(content: bytes, most: float) -> None:
     """Raise RequestFault for more values than a valid body has: decoded, each takes 32 bytes."""
     found, limit = content.count(b","), VALUES * max(most, FEWEST)
     if found > limit:
-        raise RequestFault(BODY_TOO_LARGE, f"{found} values, expected at most {limit:.0f}")
+        raise RequestError(BODY_TOO_LARGE, f"{found} values, expected at most {limit:.0f}")
 
 
 def _count(body: CrowdBody, most: float) -> int:
@@ -130,7 +130,7 @@ def _performers(
     return tuple(places), np.fromiter(map(places.__getitem__, given), np.int64, len(given))
 
 
-def _detail(body: CrowdBody, count: int) -> Indices | View:
+def _detail(body: CrowdBody, count: int) -> Indices | LevelCriteria:
     if body.level == "auto":
         return _view(body)
     for name in ("previous_level", "camera", "pixels", "budget_ms"):
@@ -158,34 +158,40 @@ def _blending(body: CrowdBody, count: int) -> Blending | None:
     return Blending(_levels("from_level", body.from_level), _column(body.blend, count))
 
 
-def _view(body: CrowdBody) -> View:
+def _view(body: CrowdBody) -> LevelCriteria:
     if body.camera is None:
         raise InvalidField("camera", 'missing; level "auto" needs one')
     lens = body.camera
     previous = body.previous_level
-    return View(
+    return LevelCriteria(
         Camera(np.array(lens.position), lens.fov, lens.height),
-        PIXELS if body.pixels is None else body.pixels,
+        DEFAULT_PIXELS if body.pixels is None else body.pixels,
         None if body.budget_ms is None else body.budget_ms / 1000.0,
         None if previous is None else _levels("previous_level", previous),
     )
 
 
-def walk_order(question: WalkQuestion, ending: str, joints: int, settings: Settings) -> Order:
+def checked_order(
+    question: WalkQuestion, ending: str, joints: int, settings: Settings
+) -> CrowdOrder:
     """Return the order of a question.
 
     ending: extension of the format. joints: of the model's skeleton. Raises InvalidField for
     characters, poses, frames or bytes beyond the limits of the settings.
     """
-    made, flat = orders.of(question), question.instancing == "flatten"
+    made, flat = orders.from_question(question), question.instancing == "flatten"
     _check_size(made, flat, settings)
     _check_output(made, flat, ending, joints, settings)
     return made
 
 
-def _check_output(order: Order, flat: bool, ending: str, joints: int, settings: Settings) -> None:
+def _check_output(
+    order: CrowdOrder, flat: bool, ending: str, joints: int, settings: Settings
+) -> None:
     motions, frames = order.motions or order.count, walking_crowd.frames(order.seconds, order.fps)
-    taken = crowd_size.file(Counts(joints, order.count, motions, frames), ending, flat)
+    taken = crowd_size.file_size_bound(
+        CrowdCounts(joints, order.count, motions, frames), ending, flat
+    )
     if taken > settings.output_limit:
         raise InvalidField(
             "count",
@@ -194,7 +200,7 @@ def _check_output(order: Order, flat: bool, ending: str, joints: int, settings: 
         )
 
 
-def _check_size(order: Order, flat: bool, settings: Settings) -> None:
+def _check_size(order: CrowdOrder, flat: bool, settings: Settings) -> None:
     if order.count > settings.crowd_limit:
         raise InvalidField("count", f"{order.count}, expected at most {settings.crowd_limit}")
     # A flattened layer has a copy of the motion for each character.

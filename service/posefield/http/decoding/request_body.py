@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 from starlette.requests import Request
 
-from posefield.http.api.problems import BAD_BODY, BODY_TOO_LARGE, NOT_JSON, OVERLOADED, RequestFault
+from posefield.http.api.problems import BAD_BODY, BODY_TOO_LARGE, NOT_JSON, OVERLOADED, RequestError
 
 MEDIA_TYPE = "application/json"
 
-FREE = 64 * 1024
+FREE_BYTES = 64 * 1024
 """Bytes of each body that do not count: the number of open requests bounds their memory, and small
 requests succeed while large bodies exhaust the limit."""
 
@@ -27,7 +27,7 @@ class BodyMemory:
         """Add `size` bytes; raises RequestFault 503 beyond the limit."""
         if self.used + size > self.limit:
             detail = f"bodies of other requests take {self.used} of {self.limit} bytes"
-            raise RequestFault(OVERLOADED, detail, headers=_CLOSE | {"Retry-After": "1"})
+            raise RequestError(OVERLOADED, detail, headers=_CLOSE | {"Retry-After": "1"})
         self.used += size
 
     def release(self, size: int) -> None:
@@ -35,7 +35,7 @@ class BodyMemory:
         self.used -= size
 
 
-async def read(request: Request, limit: int, memory: BodyMemory) -> bytes:
+async def read_body(request: Request, limit: int, memory: BodyMemory) -> bytes:
     """Return the body of a JSON request, with a Content-Length or chunked.
 
     limit: bytes. `request.scope["body_memory"]` is set to the bytes taken from `memory`, also when
@@ -43,7 +43,7 @@ async def read(request: Request, limit: int, memory: BodyMemory) -> bytes:
     incomplete body (400) and exhausted memory (503).
     """
     _check_media_type(request.headers.get("content-type", ""))
-    declared = _declared(request)
+    declared = _declared_length(request)
     if declared > limit:
         raise _too_large(limit)
     found, taken = bytearray(), 0
@@ -51,13 +51,13 @@ async def read(request: Request, limit: int, memory: BodyMemory) -> bytes:
         found += chunk
         if len(found) > limit:
             raise _too_large(limit)
-        if (beyond := len(found) - FREE) > taken:
+        if (beyond := len(found) - FREE_BYTES) > taken:
             memory.take(beyond - taken)
             request.scope["body_memory"] = taken = beyond
     if declared != len(found) and declared:
         # httptools skips the body of a request with an Upgrade to another protocol (h2c).
         detail = f"{len(found)} of {declared} bytes arrived; send HTTP/1.1 without `Upgrade`"
-        raise RequestFault(BAD_BODY, detail, {"pointer": ""}, _CLOSE)
+        raise RequestError(BAD_BODY, detail, {"pointer": ""}, _CLOSE)
     return bytes(found)
 
 
@@ -65,17 +65,17 @@ def _check_media_type(given: str) -> None:
     name, _, parameters = given.partition(";")
     charset = parameters.strip().lower()
     if name.strip().lower() != MEDIA_TYPE or charset not in ("", "charset=utf-8"):
-        raise RequestFault(NOT_JSON, f"Content-Type {given!r}, expected {MEDIA_TYPE!r}")
+        raise RequestError(NOT_JSON, f"Content-Type {given!r}, expected {MEDIA_TYPE!r}")
 
 
-def _declared(request: Request) -> int:
+def _declared_length(request: Request) -> int:
     length = request.headers.get("content-length", "")
     return int(length) if length.isascii() and length.isdigit() and len(length) < 20 else 0
 
 
-def _too_large(limit: int) -> RequestFault:
+def _too_large(limit: int) -> RequestError:
     detail = f"more than {limit} bytes, expected at most {limit}"
-    return RequestFault(BODY_TOO_LARGE, detail, headers=_CLOSE)
+    return RequestError(BODY_TOO_LARGE, detail, headers=_CLOSE)
 
 
 # The client may still be sending the rest of the body: closing the connection stops it.

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import posefield
 
-ALWAYS_NEW = b"no-store"
-FOR_EVER = b"max-age=31536000, immutable"
-AGAIN = b"no-cache"
+NO_STORE = b"no-store"
+IMMUTABLE = b"max-age=31536000, immutable"
+NO_CACHE = b"no-cache"
 PUBLIC = b"public, "
 
 LIBRARIES = ("backports.zstd", "msgspec", "nanoarrow", "numpy", "onnxruntime", "orjson", "usd-core")
@@ -24,7 +24,7 @@ class NotModified(Exception):
     """The client's cached response is current (304)."""
 
 
-def code() -> bytes:
+def code_digest() -> bytes:
     """Return a digest of the sources, the library versions and the machine type.
 
     Responses depend on these, on the model and on the request.
@@ -40,7 +40,7 @@ def code() -> bytes:
     return digest.digest()
 
 
-def tag(*parts: bytes, coding: str | None = None) -> str:
+def entity_tag(*parts: bytes, coding: str | None = None) -> str:
     """Return the strong entity tag of a response that depends only on `parts`.
 
     coding: content coding of the response, if any.
@@ -49,7 +49,7 @@ def tag(*parts: bytes, coding: str | None = None) -> str:
     return f'"{digest}-{coding}"' if coding else f'"{digest}"'
 
 
-def held(given: str, own: str) -> bool:
+def matches_tag(given: str, own: str) -> bool:
     """Return True if an If-None-Match header matches an entity tag.
 
     The comparison is weak (RFC 9110, 13.1.2). given: the header. own: the tag.
@@ -59,7 +59,7 @@ def held(given: str, own: str) -> bool:
     return given.strip() == "*" or own in (t.strip().removeprefix("W/") for t in given.split(","))
 
 
-def lifetime(model: str, alias_seconds: int, closed: bool) -> bytes:
+def cache_control(model: str, alias_seconds: int, closed: bool) -> bytes:
     """Return the Cache-Control of a response of a model.
 
     model: key in the path; with a hash the response is immutable, with the name alone it stays
@@ -68,5 +68,5 @@ def lifetime(model: str, alias_seconds: int, closed: bool) -> bytes:
     """
     whose = b"private, " if closed else PUBLIC
     if "@" in model:
-        return whose + FOR_EVER
-    return whose + (b"max-age=%d" % alias_seconds if alias_seconds else AGAIN)
+        return whose + IMMUTABLE
+    return whose + (b"max-age=%d" % alias_seconds if alias_seconds else NO_CACHE)

@@ -11,7 +11,7 @@ from typing import Any
 
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-MOST = 64 * 1024
+MAX_BUFFER = 64 * 1024
 """Maximum bytes of the buffer: flow control must see larger amounts."""
 
 
@@ -37,7 +37,7 @@ class CoalescingTransport:
     def __init__(self, transport: asyncio.Transport) -> None:
         self._transport = transport
         self._call_soon = asyncio.get_running_loop().call_soon
-        self._held: list[bytes] = []
+        self._buffer: list[bytes] = []
         self._size = 0
 
     def __getattr__(self, name: str) -> Any:
@@ -45,11 +45,11 @@ class CoalescingTransport:
 
     def write(self, data: bytes) -> None:
         """Buffer data; it is sent in the next iteration or when the buffer exceeds its maximum."""
-        if not self._held:
+        if not self._buffer:
             self._call_soon(self._flush)
-        self._held.append(data)
+        self._buffer.append(data)
         self._size += len(data)
-        if self._size > MOST:
+        if self._size > MAX_BUFFER:
             self._flush()
 
     def writelines(self, pieces: Iterable[bytes]) -> None:
@@ -63,7 +63,7 @@ class CoalescingTransport:
         self._transport.close()
 
     def _flush(self) -> None:
-        held, self._held, self._size = self._held, [], 0
+        held, self._buffer, self._size = self._buffer, [], 0
         # A client that has reset its connection closes the transport before the next iteration;
         # uvloop raises an error for a write to a closed one.
         if held and not self._transport.is_closing():

@@ -6,33 +6,33 @@ from asyncio import Task
 from collections.abc import Awaitable
 from typing import Any, TypeVar
 
-from posefield.http.api.problems import LATE, RequestFault
+from posefield.http.api.problems import DEADLINE_EXCEEDED, RequestError
 from posefield.http.telemetry import metrics
 
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
-LOOK = 0.1
+CHECK_INTERVAL = 0.1
 """Seconds between two checks: a timer per request would take a tenth of a pose request's time."""
 
 # RFC 7240, 4.3: time after which the client needs no response, s.
 _WAIT = re.compile(rb"(?:^|[,;\s])wait\s*=\s*([0-9]{1,6})(?![0-9])", re.IGNORECASE)
 
 
-def seconds(prefer: bytes | None, most: float) -> float:
+def requested_deadline(prefer: bytes | None, most: float) -> float:
     """Return the deadline of a request, s: `wait` of its Prefer header, at most `most`."""
     found = _WAIT.search(prefer) if prefer else None
     return min(most, float(found[1])) if found else most
 
 
-class Watch:
+class DeadlineTimer:
     """Requests of an event loop with their deadlines."""
 
     def __init__(self) -> None:
         self._until: dict[Task[Any], float] = {}
         self._late: set[Task[Any]] = set()
-        self._looks = False
+        self._checking = False
 
-    async def within(self, limit: float, answer: Awaitable[Answer]) -> Answer:
+    async def within(self, limit: float, answer: Awaitable[Result]) -> Result:
         """Await a response; raises RequestFault 503 if it takes longer than `limit` seconds.
 
         The awaiting task is cancelled then, and `threads.run` asks the thread's work to stop.
@@ -40,9 +40,9 @@ class Watch:
         task, loop = asyncio.current_task(), asyncio.get_running_loop()
         assert task is not None
         self._until[task] = loop.time() + limit
-        if not self._looks:
-            self._looks = True
-            loop.call_later(LOOK, self._look)
+        if not self._checking:
+            self._checking = True
+            loop.call_later(CHECK_INTERVAL, self._check)
         try:
             return await answer
         except asyncio.CancelledError:
@@ -50,18 +50,18 @@ class Watch:
                 raise
             task.uncancel()
             detail = f"no answer within {limit:g} s"
-            raise RequestFault(LATE, detail, headers={"Retry-After": "1"}) from None
+            raise RequestError(DEADLINE_EXCEEDED, detail, headers={"Retry-After": "1"}) from None
         finally:
             del self._until[task]
             self._late.discard(task)
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         loop = asyncio.get_running_loop()
-        self._looks = bool(self._until)
-        if self._looks:
-            loop.call_later(LOOK, self._look)
+        self._checking = bool(self._until)
+        if self._checking:
+            loop.call_later(CHECK_INTERVAL, self._check)
         now = loop.time()
-        metrics.open_now(len(self._until))
+        metrics.set_open_requests(len(self._until))
         late = [task for task, until in self._until.items() if until < now]
         for task in late:
             if task not in self._late:

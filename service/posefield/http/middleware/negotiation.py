@@ -11,10 +11,10 @@ from functools import lru_cache
 
 from starlette.requests import Request
 
-from posefield.http.api.problems import NOT_ACCEPTABLE, RequestFault
+from posefield.http.api.problems import NOT_ACCEPTABLE, RequestError
 
 VARY = "Accept"
-LONG = 1000
+MAX_ACCEPT_LENGTH = 1000
 Offers = tuple[tuple[str, str], ...]
 """Names and media types of formats, the default first."""
 
@@ -31,7 +31,7 @@ UTF8 = ("charset", "utf-8")
 
 
 @dataclass(frozen=True)
-class _Range:
+class _MediaRange:
     """A media range of Accept, with its weight from 0 to 1; `*` matches any kind or subtype."""
 
     kind: str
@@ -51,25 +51,25 @@ class _Range:
         return 0 if (self.kind, self.subtype) == ("*", "*") else -1
 
 
-def format_of(request: Request, offers: Offers) -> str:
+def negotiated_format(request: Request, offers: Offers) -> str:
     """Return the format that a request prefers; raises RequestFault 406 if it accepts none."""
     lines = [value.decode("latin-1") for name, value in request["headers"] if name == b"accept"]
     if not lines:
         return offers[0][0]
     accept = ", ".join(lines)
     # Long headers are not cached: 256 of them would take megabytes.
-    find = preferred if len(accept) <= LONG else preferred.__wrapped__
+    find = preferred_format if len(accept) <= MAX_ACCEPT_LENGTH else preferred_format.__wrapped__
     found = find(accept, offers)
     if found is None:
         there = ", ".join(media_type for _, media_type in offers)
         detail = f"Accept {accept[:200]!r}, expected one of {there}"
-        raise RequestFault(NOT_ACCEPTABLE, detail, headers={"Vary": VARY})
+        raise RequestError(NOT_ACCEPTABLE, detail, headers={"Vary": VARY})
     return found
 
 
 # Most clients send one of few headers; the cache evicts the others.
 @lru_cache(maxsize=256)
-def preferred(accept: str, offers: Offers) -> str | None:
+def preferred_format(accept: str, offers: Offers) -> str | None:
     """Return the format of the greatest weight; None if no format is accepted.
 
     Among equal weights the most specific match wins, then the first offer. An empty header accepts
@@ -77,7 +77,7 @@ def preferred(accept: str, offers: Offers) -> str | None:
     """
     if not accept.strip():
         return offers[0][0]
-    ranges = list(_ranges(accept))
+    ranges = list(_media_ranges(accept))
     best, found = (0.0, -1), None
     for name, media_type in offers:
         own = max(((r.precedence(media_type), r.weight) for r in ranges), default=(-1, 0.0))
@@ -86,16 +86,16 @@ def preferred(accept: str, offers: Offers) -> str | None:
     return found
 
 
-def _ranges(accept: str) -> Iterator[_Range]:
+def _media_ranges(accept: str) -> Iterator[_MediaRange]:
     """Yield the valid media ranges; skip those with parameters that no offer has."""
     for member in _MEMBER.finditer(accept):
         found = _RANGE.fullmatch(member[0])
-        weight = _weight(found[3]) if found else None
+        weight = _range_weight(found[3]) if found else None
         if found and weight is not None:
-            yield _Range(found[1].lower(), found[2].lower(), weight)
+            yield _MediaRange(found[1].lower(), found[2].lower(), weight)
 
 
-def _weight(parameters: str) -> float | None:
+def _range_weight(parameters: str) -> float | None:
     """Return the weight of a member; None if it or a media type parameter excludes all offers."""
     for name, value in _PARAMETER.findall(parameters):
         if name.lower() == "q":

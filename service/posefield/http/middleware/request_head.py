@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from starlette.types import Scope
 
 from posefield.common.errors import InvalidField
-from posefield.http.api.problems import HEAD_TOO_LARGE, UNKNOWN_HOST, URL_TOO_LONG, RequestFault
+from posefield.http.api.problems import HEAD_TOO_LARGE, UNKNOWN_HOST, URL_TOO_LONG, RequestError
 
 LOOPBACK = ("localhost",)
 """Default of the accepted host names; IP addresses are always accepted."""
-FIELDS = 100
+MAX_FIELDS = 100
 """Maximum number of header lines of a request; browsers send 20."""
 
 
@@ -36,28 +36,28 @@ class HeadLimits:
         # raw_path is optional in ASGI.
         path = scope.get("raw_path") or scope["path"].encode()
         if len(path) + len(scope["query_string"]) > self.url:
-            raise RequestFault(URL_TOO_LONG, f"expected at most {self.url} bytes")
+            raise RequestError(URL_TOO_LONG, f"expected at most {self.url} bytes")
         size, hosts, count = 0, [], 0
         for name, value in scope["headers"]:
             size += len(name) + len(value)
             count += 1
             if name == b"host":
                 hosts.append(value)
-        if size > self.headers or count > FIELDS:
-            detail = f"expected at most {self.headers} bytes in at most {FIELDS} headers"
-            raise RequestFault(HEAD_TOO_LARGE, detail)
+        if size > self.headers or count > MAX_FIELDS:
+            detail = f"expected at most {self.headers} bytes in at most {MAX_FIELDS} headers"
+            raise RequestError(HEAD_TOO_LARGE, detail)
         # HTTP/1.0 has no Host; load balancers still use it for health checks.
         if len(hosts) > 1 or (not hosts and scope["http_version"] != "1.0"):
-            raise RequestFault(UNKNOWN_HOST, f"{len(hosts)} Host headers, expected one")
+            raise RequestError(UNKNOWN_HOST, f"{len(hosts)} Host headers, expected one")
         if hosts and hosts[0] not in self._known:
             self._check_host(hosts[0])
 
     def _check_host(self, given: bytes) -> None:
         name = _without_port(given.decode("latin-1").lower())
-        if not (_is_address(name) or any(_fits(name, known) for known in self.names)):
-            expected = ", ".join(_shown(known) for known in self.names)
+        if not (_is_address(name) or any(_matches(name, known) for known in self.names)):
+            expected = ", ".join(_joined_names(known) for known in self.names)
             detail = f"{name[:100]!r}, expected an address or one of {expected} (POSEFIELD_HOSTS)"
-            raise RequestFault(UNKNOWN_HOST, detail)
+            raise RequestError(UNKNOWN_HOST, detail)
         # Bounded: clients can make up any number of accepted Host values.
         if len(self._known) < 100:
             self._known.add(given)
@@ -79,11 +79,11 @@ def names(text: str, setting: str) -> tuple[str, ...]:
 _NAME = frozenset("abcdefghijklmnopqrstuvwxyz0123456789.-_")
 
 
-def _fits(name: str, known: str) -> bool:
+def _matches(name: str, known: str) -> bool:
     return known in ("*", name) or (known.startswith(".") and name.endswith(known))
 
 
-def _shown(known: str) -> str:
+def _joined_names(known: str) -> str:
     return f"*{known}" if known.startswith(".") else known
 
 

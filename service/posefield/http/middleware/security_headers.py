@@ -13,10 +13,10 @@ COMMON = (
 """Headers of data responses."""
 
 PAGES = tuple(pair for pair in COMMON if pair[0] != b"content-security-policy")
-"""Headers of HTML pages; `page` returns their own Content-Security-Policy."""
+"""Headers of HTML pages; `page_headers` returns their own Content-Security-Policy."""
 
 
-def of(media_type: str | None, status: int = 200) -> tuple[tuple[bytes, bytes], ...]:
+def headers_for(media_type: str | None, status: int = 200) -> tuple[tuple[bytes, bytes], ...]:
     """Return the security headers of a response.
 
     A 304 has no Content-Security-Policy: it would replace that of the browser's cached page, which
@@ -25,7 +25,7 @@ def of(media_type: str | None, status: int = 200) -> tuple[tuple[bytes, bytes], 
     return PAGES if media_type == "text/html" or status == 304 else COMMON
 
 
-def page(script: str, style: str) -> dict[str, str]:
+def page_headers(script: str, style: str) -> dict[str, str]:
     """Return the headers of an HTML page that loads nothing from other origins.
 
     script, style: sources of a Content-Security-Policy.

@@ -8,26 +8,26 @@ import orjson
 from posefield.http.api import contract
 from posefield.http.api.contract import Contract
 from posefield.http.pages import static_page
-from posefield.http.pages.static_page import Page
+from posefield.http.pages.static_page import StaticPage
 
 
-def made(agreed: Contract) -> dict[str, Page]:
+def static_pages(agreed: Contract) -> dict[str, StaticPage]:
     """Return the pages by operationId."""
     return {
-        "getContract": Page(contract.MEDIA_TYPE, lambda: agreed.source),
-        "getContractJson": Page("application/json", lambda: orjson.dumps(agreed.document)),
-        "getDocs": _html(partial(static_page.built, static_page.DOCS)),
-        "getProblems": _html(_problems),
-        "getViewer": _html(partial(static_page.built, static_page.VIEWER)),
+        "getContract": StaticPage(contract.MEDIA_TYPE, lambda: agreed.source),
+        "getContractJson": StaticPage("application/json", lambda: orjson.dumps(agreed.document)),
+        "getDocs": _html_page(partial(static_page.built_page, static_page.DOCS)),
+        "getProblems": _html_page(_problems),
+        "getViewer": _html_page(partial(static_page.built_page, static_page.VIEWER)),
     }
 
 
-def _html(make: Callable[[], bytes]) -> Page:
-    return Page("text/html", make, static_page.headers)
+def _html_page(make: Callable[[], bytes]) -> StaticPage:
+    return StaticPage("text/html", make, static_page.headers)
 
 
 def _problems() -> bytes:
     # Jinja and the Markdown parser take 40 ms to import.
     from posefield.http.pages import problems_page
 
-    return problems_page.content()
+    return problems_page.problems_html()

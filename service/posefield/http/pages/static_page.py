@@ -12,7 +12,7 @@ from posefield.http.middleware import security_headers
 
 
 @dataclass(frozen=True)
-class Page:
+class StaticPage:
     """A static document, created at the first request.
 
     make: returns the content. headers_of: returns the response headers for a content.
@@ -43,7 +43,7 @@ VIEWER = _PAGES / "viewer/index.html"
 DOCS = _PAGES / "docs/index.html"
 
 
-def built(path: Path) -> bytes:
+def built_page(path: Path) -> bytes:
     """Return the page that `make page` has built; a page of instructions if it is missing."""
     try:
         return path.read_bytes()
@@ -55,13 +55,13 @@ def built(path: Path) -> bytes:
 
 def headers(content: bytes) -> dict[str, str]:
     """Return the headers of a page, which allow its inline scripts and styles only."""
-    found = _Inline()
+    found = _InlineTextParser()
     found.feed(content.decode())
     found.close()
-    return security_headers.page(found.sources("script"), found.sources("style"))
+    return security_headers.page_headers(found.sources("script"), found.sources("style"))
 
 
-class _Inline(HTMLParser):
+class _InlineTextParser(HTMLParser):
     """Parser that collects the texts of a page's inline scripts and styles."""
 
     def __init__(self) -> None:

@@ -14,29 +14,29 @@ from typing import Any
 
 import orjson
 
-MOMENT = 0.05
+FLUSH_DELAY = 0.05
 """Maximum time of a line in the buffer, s."""
 
-PIECE = 4096
+WRITE_SIZE = 4096
 """Bytes that a pipe accepts atomically, so that lines of several processes do not interleave."""
 
 
-class Lines:
+class LogBuffer:
     """Buffer of log lines for a file descriptor."""
 
     def __init__(self, target: int) -> None:
         self._target = target
-        self._held: list[bytes] = []
+        self._buffer: list[bytes] = []
 
     def add(self, content: Mapping[str, Any]) -> None:
         """Buffer a line of JSON; a flush follows within MOMENT. Needs a running event loop."""
-        if not self._held:
-            asyncio.get_running_loop().call_later(MOMENT, self.flush)
-        self._held.append(orjson.dumps(content, option=orjson.OPT_APPEND_NEWLINE))
+        if not self._buffer:
+            asyncio.get_running_loop().call_later(FLUSH_DELAY, self.flush)
+        self._buffer.append(orjson.dumps(content, option=orjson.OPT_APPEND_NEWLINE))
 
     def flush(self) -> None:
         """Write the buffer."""
-        held, self._held = self._held, []
+        held, self._buffer = self._buffer, []
         for piece in _pieces(held):
             _write(self._target, piece)
 
@@ -50,7 +50,7 @@ def _pieces(lines: list[bytes]) -> list[bytes]:
     """Return the lines joined to pieces of at most PIECE bytes; a longer line is a piece."""
     pieces, size = [[]], 0  # type: list[list[bytes]], int
     for line in lines:
-        if size + len(line) > PIECE and pieces[-1]:
+        if size + len(line) > WRITE_SIZE and pieces[-1]:
             pieces.append([])
             size = 0
         pieces[-1].append(line)
@@ -58,20 +58,20 @@ def _pieces(lines: list[bytes]) -> list[bytes]:
     return [b"".join(own) for own in pieces if own]
 
 
-def to_standard_error() -> Lines:
+def to_standard_error() -> LogBuffer:
     """Return a log buffer for standard error."""
-    return Lines(sys.stderr.fileno())
+    return LogBuffer(sys.stderr.fileno())
 
 
-def moment(seconds: float) -> str:
+def timestamp(seconds: float) -> str:
     """Return a time in RFC 3339 form, UTC.
 
     seconds: since 1970.
     """
     whole = int(seconds)
-    return f"{_second(whole)}.{int(1000 * (seconds - whole)):03d}Z"
+    return f"{_whole_second(whole)}.{int(1000 * (seconds - whole)):03d}Z"
 
 
 @lru_cache(1)
-def _second(whole: int) -> str:
+def _whole_second(whole: int) -> str:
     return datetime.fromtimestamp(whole, UTC).strftime("%Y-%m-%dT%H:%M:%S")

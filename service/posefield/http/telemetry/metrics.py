@@ -17,27 +17,46 @@ from prometheus_client import multiprocess
 from posefield import __version__
 
 MEDIA_TYPE = prometheus.CONTENT_TYPE_LATEST
-FOLDER = "PROMETHEUS_MULTIPROC_DIR"
+FOLDER_VARIABLE = "PROMETHEUS_MULTIPROC_DIR"
 
-SECONDS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-ROWS = (1, 2, 4, 8, 16, 32, 64)
+LATENCY_BUCKETS = (
+    1e-4,
+    2e-4,
+    5e-4,
+    1e-3,
+    2e-3,
+    5e-3,
+    0.01,
+    0.02,
+    0.05,
+    0.1,
+    0.2,
+    0.5,
+    1.0,
+    2.0,
+    5.0,
+    10.0,
+)
+BATCH_BUCKETS = (1, 2, 4, 8, 16, 32, 64)
 
 _LATENCY = prometheus.Histogram(
     "posefield_request_seconds",
     "Time from a request's head to the end of its answer",
     ("operation", "format", "status"),
-    buckets=SECONDS,
+    buckets=LATENCY_BUCKETS,
 )
 _BYTES = prometheus.Counter(
     "posefield_sent_bytes", "Bytes of bodies of answers", ("operation", "format")
 )
-_HELD = prometheus.Counter(
+_NOT_MODIFIED = prometheus.Counter(
     "posefield_not_modified",
     "Answers that clients had already: no model was asked",
     ("operation", "format"),
 )
 _BATCH = prometheus.Histogram(
-    "posefield_batch_rows", "Poses that one call of a graph answered together", buckets=ROWS
+    "posefield_batch_rows",
+    "Poses that one call of a graph answered together",
+    buckets=BATCH_BUCKETS,
 )
 _OPEN = prometheus.Gauge(
     "posefield_open_requests",
@@ -50,7 +69,7 @@ _MODEL = prometheus.Gauge(
     ("model", "hash"),
     multiprocess_mode="mostrecent",
 )
-_LOOKS = prometheus.Gauge(
+_RELOADS = prometheus.Gauge(
     "posefield_reloads",
     "Looks for new models, versions opened, attempts that failed, and faults there are now",
     ("what",),
@@ -64,10 +83,10 @@ _BUILD.labels(__version__).set(1)
 # Cached since labels() takes a lock and builds a tuple; there are some hundred label sets.
 _latency = lru_cache(None)(_LATENCY.labels)
 _bytes = lru_cache(None)(_BYTES.labels)
-_held = lru_cache(None)(_HELD.labels)
+_not_modified = lru_cache(None)(_NOT_MODIFIED.labels)
 
 
-def answered(operation: str, form: str, status: int, seconds: float, size: int) -> None:
+def count_request(operation: str, form: str, status: int, seconds: float, size: int) -> None:
     """Count a request.
 
     form: format of the response, empty without a choice. seconds: duration. size: bytes sent.
@@ -75,10 +94,10 @@ def answered(operation: str, form: str, status: int, seconds: float, size: int) 
     _latency(operation, form, status).observe(seconds)
     _bytes(operation, form).inc(size)
     if status == 304:
-        _held(operation, form).inc()
+        _not_modified(operation, form).inc()
 
 
-def batched(rows: int) -> None:
+def count_inference(rows: int) -> None:
     """Count an inference call.
 
     rows: poses of its batch.
@@ -86,12 +105,12 @@ def batched(rows: int) -> None:
     _BATCH.observe(rows)
 
 
-def open_now(count: int) -> None:
+def set_open_requests(count: int) -> None:
     """Set the number of open requests."""
     _OPEN.set(count)
 
 
-def models(identities: Iterable[str], reloads: Mapping[str, int]) -> None:
+def set_models(identities: Iterable[str], reloads: Mapping[str, int]) -> None:
     """Set the versions of models in service and the counts of their reloads.
 
     identities: as name@hash.
@@ -101,15 +120,15 @@ def models(identities: Iterable[str], reloads: Mapping[str, int]) -> None:
         _MODEL.labels(*labels).set(labels in now)
     _known.update(now)
     for what, number in reloads.items():
-        _LOOKS.labels(what).set(number)
+        _RELOADS.labels(what).set(number)
 
 
 _known: set[tuple[str, ...]] = set()
 
 
-def page() -> bytes:
+def metrics_text() -> bytes:
     """Return all metrics as text, aggregated over the processes that share a folder."""
-    if FOLDER not in os.environ:
+    if FOLDER_VARIABLE not in os.environ:
         return prometheus.generate_latest()
     registry = prometheus.CollectorRegistry()
     multiprocess.MultiProcessCollector(registry)
@@ -117,17 +136,17 @@ def page() -> bytes:
 
 
 @contextmanager
-def shared() -> Iterator[str]:
+def shared_folder() -> Iterator[str]:
     """Yield a temporary folder for the metrics of several processes, and set FOLDER to it."""
     with TemporaryDirectory(prefix="posefield-metrics-") as folder:
-        os.environ[FOLDER] = folder
+        os.environ[FOLDER_VARIABLE] = folder
         yield folder
 
 
-def gone(process: int) -> None:
+def remove_process(process: int) -> None:
     """Remove the live gauges of a process that has ended.
 
     process: its id.
     """
-    if Path(os.environ.get(FOLDER, "")).is_dir():
+    if Path(os.environ.get(FOLDER_VARIABLE, "")).is_dir():
         multiprocess.mark_process_dead(process)

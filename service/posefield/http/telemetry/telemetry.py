@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from posefield.http.telemetry.log import Lines
+from posefield.http.telemetry.log import LogBuffer
 from posefield.http.telemetry.tracing import Tracer
 
 # Header traceparent of the W3C Trace Context, version 00.
@@ -13,17 +13,17 @@ _PARENT = re.compile(rb"00-([0-9a-f]{32})-[0-9a-f]{16}-[0-9a-f]{2}")
 
 
 @dataclass(frozen=True)
-class Telling:
+class Telemetry:
     """Telemetry outputs.
 
     lines: request log. tracer: of spans. Each is None if disabled.
     """
 
-    lines: Lines | None = None
+    lines: LogBuffer | None = None
     tracer: Tracer | None = None
 
     @property
-    def wanted(self) -> bool:
+    def enabled(self) -> bool:
         """True if the log or tracing is enabled."""
         return self.lines is not None or self.tracer is not None
 
@@ -49,10 +49,10 @@ class Telling:
             self.tracer.close()
 
 
-SILENT = Telling()
+NO_TELEMETRY = Telemetry()
 
 
-def trace(headers: Mapping[bytes, bytes]) -> str | None:
+def trace_id(headers: Mapping[bytes, bytes]) -> str | None:
     """Return the trace id in a request's headers; None without a valid one."""
     found = _PARENT.fullmatch(headers.get(b"traceparent", b""))
     return found[1].decode() if found else None

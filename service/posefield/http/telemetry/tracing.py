@@ -59,7 +59,7 @@ _ATTRIBUTES = {
 }
 
 
-def of(environ: Mapping[str, str] = os.environ) -> Tracer | None:
+def from_environment(environ: Mapping[str, str] = os.environ) -> Tracer | None:
     """Return the tracer of the configured endpoint; None without an endpoint.
 
     Raises InvalidField for an endpoint without the SDK installed.

@@ -6,8 +6,8 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.constraints import constrained_motion
-from posefield.constraints.constrained_motion import Bench, Held
-from posefield.constraints.constraint import Place
+from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints.constraint import PositionConstraint
 from posefield.inference.session import Session
 from posefield.motion.measures import Measure
 
@@ -17,31 +17,31 @@ class Begun:
     """An open model, the bench of its finest level, and a motion of it."""
 
     opened: Session
-    bench: Bench
-    held: Held
+    bench: LevelCorrector
+    held: ConstrainedMotion
 
     def joint(self, name) -> int:
         return self.opened.card.skeleton.names.index(name)
 
-    def place(self, name, frame, by=(0.0, 0.0, 0.0)) -> Place:
+    def place(self, name, frame, by=(0.0, 0.0, 0.0)) -> PositionConstraint:
         """Aim that moves a joint at a frame by so much, m."""
         joint = self.joint(name)
-        at, _ = self.held.scene.place(self.held.numbers, joint, frame)
+        at, _ = self.held.scene.position_and_gradient(self.held.numbers, joint, frame)
         moment = Measure("height", (joint,), "landmark")
-        return Place((name,), moment, (0, 1, 2), at + np.array(by), frame)
+        return PositionConstraint((name,), moment, (0, 1, 2), at + np.array(by), frame)
 
 
 def begin(opened: Session, level: int = 0) -> Begun:
     """A motion in the middle of the controls, of the first performer."""
-    bench = constrained_motion.bench(opened, level)
+    bench = constrained_motion.build_corrector(opened, level)
     point = np.array([[control.default for control in opened.card.controls]])
     performers = len(opened.card.performers)
     state = opened.state(point, np.array([0.0, 0.3, 0.61]), np.eye(1, performers), level)
-    return Begun(opened, bench, bench.begun(state))
+    return Begun(opened, bench, bench.predict(state))
 
 
 def covariance(begun: Begun) -> Floats:
     """The metric of corrections in full."""
     own = begun.bench.spread
     eye = np.eye(begun.held.scene.numbers)
-    return own.shrunk(eye)
+    return own.apply_shrunk(eye)

@@ -5,24 +5,25 @@ import pytest
 from scipy.spatial import distance as apart
 from scipy.stats import chi
 
-from posefield.constraints import constraint as looking
-from posefield.constraints import reachability
-from posefield.constraints.reachability import Reach
+from posefield.constraints import constraint, reachability
+from posefield.constraints.reachability import Reachability
 
 
-def looked_at(begun, aims) -> Reach:
+def looked_at(begun, aims) -> Reachability:
     scene, numbers = begun.held.scene, begun.held.numbers
-    seen = looking.look(aims, scene, numbers)
-    return reachability.of(scene, begun.bench.spread, begun.held.state.sigma, numbers, aims, seen)
+    seen = constraint.evaluate(aims, scene, numbers)
+    return reachability.assess(
+        scene, begun.bench.spread, begun.held.state.sigma, numbers, aims, seen
+    )
 
 
 @pytest.mark.parametrize("values", [1, 2, 3, 6, 12, 30])
 def test_the_limit_is_as_unlikely_whatever_the_number_of_values(values):
     """Oracle: the chi distribution of SciPy; the formula is an approximation of it."""
-    share = chi.sf(reachability.FAR, 3)
-    assert chi.sf(reachability.far(values), values) == pytest.approx(share, rel=0.15)
+    share = chi.sf(reachability.MAX_DEVIATIONS, 3)
+    assert chi.sf(reachability.distance_limit(values), values) == pytest.approx(share, rel=0.15)
     # Negative control: that of three is no limit for others.
-    assert values == 3 or abs(chi.sf(reachability.FAR, values) / share - 1.0) > 0.15
+    assert values == 3 or abs(chi.sf(reachability.MAX_DEVIATIONS, values) / share - 1.0) > 0.15
 
 
 def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
@@ -36,9 +37,11 @@ def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
         spread.captured, spread.predicted, spread.sigmas, strict=True
     ):
         pair = [np.concatenate([motion, rest]) for motion in (captured, predicted)]
-        there, told = (scene.place(own, walking.joint("LeftFoot"), 9.0)[0] for own in pair)
+        there, told = (
+            scene.position_and_gradient(own, walking.joint("LeftFoot"), 9.0)[0] for own in pair
+        )
         total += np.outer(there - told, there - told) / sigma**2
-    _, gradients = aim.look(scene, numbers)
+    _, gradients = aim.evaluate(scene, numbers)
     beside = gradients[:, spread.captured.shape[1] :]
     total += beside @ spread.beside @ beside.T
     own = 0.9 * total + 0.1 * np.trace(total) / 3.0 * np.eye(3)
@@ -52,21 +55,26 @@ def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
 
 
 def test_all_of_the_way_is_gone_within_the_limit():
-    near = Reach(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), np.ones((3, 1)))
-    assert near.distance < reachability.far(3)
-    assert np.array_equal(near.way, near.left)
-    far = Reach(10.0 * near.left, near.covariance, near.members)
-    assert np.allclose(far.way, reachability.far(3) / far.distance * far.left, rtol=1e-6, atol=0)
-    assert not np.array_equal(far.way, far.left)
+    near = Reachability(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), np.ones((3, 1)))
+    assert near.distance < reachability.distance_limit(3)
+    assert np.array_equal(near.reachable, near.differences)
+    far = Reachability(10.0 * near.differences, near.covariance, near.members)
+    assert np.allclose(
+        far.reachable,
+        reachability.distance_limit(3) / far.distance * far.differences,
+        rtol=1e-6,
+        atol=0,
+    )
+    assert not np.array_equal(far.reachable, far.differences)
 
 
 def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
     left = np.array([0.01, 0.0, 0.02, 3.0, 2.0, 1.0])
     own = 0.02 * rng.standard_normal((6, 6))
-    found = Reach(left, own @ own.T + 1e-3 * np.eye(6), np.repeat(np.eye(2), 3, axis=0))
-    shares = found.way / np.where(left == 0.0, 1.0, left)
-    length = np.sqrt(found.way @ np.linalg.solve(found.covariance, found.way))
-    assert length <= reachability.far(6) * (1.0 + 1e-6)
+    found = Reachability(left, own @ own.T + 1e-3 * np.eye(6), np.repeat(np.eye(2), 3, axis=0))
+    shares = found.reachable / np.where(left == 0.0, 1.0, left)
+    length = np.sqrt(found.reachable @ np.linalg.solve(found.covariance, found.reachable))
+    assert length <= reachability.distance_limit(6) * (1.0 + 1e-6)
     assert np.ptp(shares[[0, 2]]) < 1e-9 and np.ptp(shares[3:]) < 1e-9
     assert np.all((0.0 <= shares) & (shares <= 1.0))
     assert shares[5] < 0.5
@@ -74,8 +82,8 @@ def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
 
 def test_the_worth_of_values_does_not_hang_on_their_units():
     """Metres and degrees: what is missed counts in its own scatter."""
-    mixed = Reach(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), np.eye(2))
-    counted = mixed.worth * np.square(mixed.left)
+    mixed = Reachability(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), np.eye(2))
+    counted = mixed.weights * np.square(mixed.differences)
     assert counted[0] == pytest.approx(counted[1])
-    alike = Reach(mixed.left, mixed.covariance, np.ones((2, 1)))
-    assert alike.worth[0] == alike.worth[1]
+    alike = Reachability(mixed.differences, mixed.covariance, np.ones((2, 1)))
+    assert alike.weights[0] == alike.weights[1]

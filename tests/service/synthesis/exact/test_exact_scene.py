@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 from beginning import begin
 
-from posefield.constraints.constraint import Place, Step, Travelled
+from posefield.constraints.constraint import (
+    PositionConstraint,
+    StepLengthConstraint,
+    TravelConstraint,
+)
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
 
@@ -16,14 +20,14 @@ def aims(begun) -> list:
     feet = begun.opened.card.feet or (begun.joint("LeftFoot"), begun.joint("RightFoot"))
     places = [
         begun.place(begun.opened.card.skeleton.names[-1], 17.3),
-        Place(("x",), Measure("height", feet, "highest"), (1,), np.zeros(1)),
-        Place(("x",), Measure("left", feet[:1], "farthest"), (0, 2), np.zeros(2)),
-        Step(("x",), Measure("step_length", feet), np.zeros(1)),
+        PositionConstraint(("x",), Measure("height", feet, "highest"), (1,), np.zeros(1)),
+        PositionConstraint(("x",), Measure("left", feet[:1], "farthest"), (0, 2), np.zeros(2)),
+        StepLengthConstraint(("x",), Measure("step_length", feet), np.zeros(1)),
     ]
     if not begun.opened.card.cyclic:
         return places
     ways = [("speed", "m/s"), ("turn", "deg"), ("stride_length", "m")]
-    return [*places, *(Travelled(("x",), name, np.zeros(1), unit) for name, unit in ways)]
+    return [*places, *(TravelConstraint(("x",), name, np.zeros(1), unit) for name, unit in ways)]
 
 
 @pytest.mark.parametrize("name", ["reaching", "walking"])
@@ -31,9 +35,9 @@ def test_gradients_are_derivatives(name, request, rng):
     begun = request.getfixturevalue(name)
     scene, numbers = begun.held.scene, begun.held.numbers
     for aim in aims(begun):
-        _, gradients = aim.look(scene, numbers)
+        _, gradients = aim.evaluate(scene, numbers)
         along = rng.standard_normal(len(numbers))
-        ends = [aim.look(scene, numbers + step * along)[0] for step in (SMALL, -SMALL)]
+        ends = [aim.evaluate(scene, numbers + step * along)[0] for step in (SMALL, -SMALL)]
         rise = (ends[0] - ends[1]) / (2.0 * SMALL)
         size = 1e-3 + np.abs(rise).max()
         assert np.abs(gradients @ along - rise).max() < 1e-5 * size
@@ -71,12 +75,12 @@ def test_positions_are_those_of_the_poses(name, request):
     frames = np.array([0.0, 7.25, float(scene.reduced.frames - 1)])
     rotations, roots = begun.held.poses(frames)
     translations = skeleton.translations(scene.bones[None], roots[None])
-    positions, _ = skeleton.forward(scene.parents, rotations[None], translations)
+    positions, _ = skeleton.forward_kinematics(scene.parents, rotations[None], translations)
     for joint in range(len(scene.parents)):
         found = scene.positions(numbers, joint, frames)
         # Rotations of single precision are not quite of length one.
         assert np.abs(found - positions[0, :, joint]).max() < 1e-7
-        one, _ = scene.place(numbers, joint, frames[1])
+        one, _ = scene.position_and_gradient(numbers, joint, frames[1])
         assert np.abs(one - found[1]).max() < 1e-12
         # Negative control: a hundredth of a frame later they are elsewhere.
         later = scene.positions(numbers, joint, frames + np.array([0.01, 0.01, -0.01]))
@@ -87,8 +91,10 @@ def test_places_among_motions_are_those_of_each(walking):
     """With the travel and the body of the motion that they are compared with."""
     scene, numbers, spread = walking.held.scene, walking.held.numbers, walking.bench.spread
     joint, size = walking.joint("LeftFoot"), spread.captured.shape[1]
-    found = scene.among(numbers, spread.captured, joint, 11.5)
+    found = scene.evaluate_motions(numbers, spread.captured, joint, 11.5)
     for motion, place in zip(spread.captured, found, strict=True):
         own = np.concatenate([motion, numbers[size:]])
-        assert np.allclose(place, scene.place(own, joint, 11.5)[0], rtol=0, atol=1e-12)
+        assert np.allclose(
+            place, scene.position_and_gradient(own, joint, 11.5)[0], rtol=0, atol=1e-12
+        )
     assert np.ptp(found, axis=0).max() > 1e-3

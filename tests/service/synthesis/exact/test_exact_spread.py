@@ -15,7 +15,7 @@ from posefield_train.graph import onnx_export
 
 def strays(trained) -> np.ndarray:
     """What training's leave-one-out misses of each clip's coefficients (n, r3), standardised."""
-    pose, laid, model = trained.pose, trained.laid, trained.model
+    pose, laid, model = trained.pose, trained.samples, trained.model
     left_out = leave_one_out.leave_out(pose.hyper, laid.points, laid.groups)
     sigmas = np.sqrt(model.bank.sill * pose.variances * len(laid.points))
     return left_out @ model.decoder.reduced.bases[2] / sigmas[:, None]
@@ -34,11 +34,11 @@ def gap(found, trained) -> float:
 def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_exported):
     """The file holds its samples in an order of its own."""
     opened = session.open_bytes(labelled_exported.content, "labelled.onnx")
-    weights = subgraph.weights(opened.content)
-    samples = opened.weigher.samples
-    found = residual_covariance.coefficients(opened.card, weights, samples)
+    weights = subgraph.initializers(opened.content)
+    samples = opened.kriging_weights.samples
+    found = residual_covariance.sample_coefficients(opened.card, weights, samples)
     bases = labelled.model.decoder.reduced.bases[2]
-    order = residual_covariance.order_of(opened.card, weights, samples)
+    order = residual_covariance.importance_order(opened.card, weights, samples)
     assert np.abs(found - bases).max() < 1e-5
     assert not np.array_equal(order, np.arange(len(order)))
     # Negative control: in the order of the file they are other clips'.
@@ -47,7 +47,7 @@ def test_coefficients_are_read_off_the_weights_of_the_file(labelled, labelled_ex
 
 def read(content):
     """Spread of a file's finest level, and its rank of samples."""
-    own = constrained_motion.bench(session.open_bytes(content, "x.onnx"), 0)
+    own = constrained_motion.build_corrector(session.open_bytes(content, "x.onnx"), 0)
     return own.spread, own.reduced.core.shape[2]
 
 
@@ -68,7 +68,7 @@ def test_clips_at_the_same_controls_are_not_confused(labelled_recipe, examples):
     twice = [*examples[:-1], replace(examples[-1], controls=examples[-2].controls)]
     twice[-1] = replace(twice[-1], row=replace(twice[-1].row, performer=twice[-2].row.performer))
     trained = train.train(labelled_recipe, twice, lambda _: None)
-    found = read(onnx_export.finest(labelled_recipe, trained))
+    found = read(onnx_export.export_finest(labelled_recipe, trained))
     assert gap(found, trained) < 1e-3
 
 
@@ -76,7 +76,7 @@ def test_clips_at_the_same_controls_are_not_confused(labelled_recipe, examples):
 def test_a_coarser_level_strays_by_what_it_keeps(reaching, level):
     """Its residuals are those of the finest, in the leading parts that it has."""
     whole = reaching.bench
-    own = constrained_motion.bench(reaching.opened, level)
+    own = constrained_motion.build_corrector(reaching.opened, level)
     t, d, _ = own.reduced.core.shape
     r2, r1, _ = whole.reduced.core.shape
     kept = whole.spread.captured.reshape(-1, r2, r1)[:, :t, :d]
@@ -89,11 +89,11 @@ def test_a_coarser_level_strays_by_what_it_keeps(reaching, level):
 
 def test_the_metric_is_a_covariance(walking, rng):
     own, size = walking.bench.spread, walking.held.scene.numbers
-    full = own.shrunk(np.eye(size))
+    full = own.apply_shrunk(np.eye(size))
     assert np.abs(full - full.T).max() < 1e-12 * np.abs(full).max()
     assert np.linalg.eigvalsh(full).min() > -1e-12 * np.abs(full).max()
     gradients = rng.standard_normal((2, size))
-    assert np.allclose(own.shrunk(gradients), full @ gradients.T)
+    assert np.allclose(own.apply_shrunk(gradients), full @ gradients.T)
     # Shrinking keeps the size of it all.
     inner = own.residuals @ own.residuals.T
     kept = np.trace(full) - np.trace(own.beside)

@@ -11,7 +11,7 @@ from posefield.inference import session
 from posefield.model_file.model_card import Event
 from posefield.motion.measures import Measure
 from posefield.question.motion_question import MotionQuestion, Target
-from posefield.validation.question_validation import Door
+from posefield.validation.question_validation import QuestionValidator
 
 PLACE = (0.3, 1.2, 0.4)
 
@@ -28,22 +28,24 @@ def card(labelled_path):
 
 def question(card, **changed):
     controls = {control.name: control.default for control in card.controls}
-    return replace(Door(card).question(controls, "warn", None, 0), **changed)
+    return replace(QuestionValidator(card).question(controls, "warn", None, 0), **changed)
 
 
 def found(card, *targets, exact="auto"):
-    return goals.of(card, question(card), MotionQuestion(controls={}, exact=exact, targets=targets))
+    return goals.from_question(
+        card, question(card), MotionQuestion(controls={}, exact=exact, targets=targets)
+    )
 
 
 def test_auto_holds_to_what_is_measured_on_the_motion(card):
     assert [name for name, _, _ in found(card).controls] == ["target_height"]
-    assert found(card, exact="none") == goals.NOTHING
+    assert found(card, exact="none") == goals.NO_CONSTRAINTS
     assert not found(card, exact="none")
 
 
 def test_auto_does_not_hold_to_what_nobody_gave(card):
     inferred = question(card, inferred=("target_height",))
-    assert not goals.of(card, inferred, MotionQuestion(controls={}))
+    assert not goals.from_question(card, inferred, MotionQuestion(controls={}))
 
 
 @pytest.mark.parametrize(
@@ -63,7 +65,7 @@ def test_a_control_that_cannot_be_exact_is_named(card, exact, said):
 def test_a_control_that_was_not_given_cannot_be_exact(card):
     inferred = question(card, inferred=("target_height",))
     with pytest.raises(InvalidField, match="was not given"):
-        goals.of(card, inferred, MotionQuestion(controls={}, exact=("target_height",)))
+        goals.from_question(card, inferred, MotionQuestion(controls={}, exact=("target_height",)))
 
 
 @pytest.mark.parametrize(
@@ -107,10 +109,10 @@ def test_a_joint_has_one_target_at_a_moment(card, when):
 
 
 def test_more_targets_than_anybody_has_joints_for_are_refused(card):
-    many = [Target("LeftHand", PLACE, 0.01 * i) for i in range(goals.MOST_TARGETS + 1)]
+    many = [Target("LeftHand", PLACE, 0.01 * i) for i in range(goals.MAX_TARGETS + 1)]
     with pytest.raises(InvalidField, match="more than 32"):
         found(card, *many)
-    assert len(found(card, *many[:-1]).targets) == goals.MOST_TARGETS
+    assert len(found(card, *many[:-1]).targets) == goals.MAX_TARGETS
 
 
 def test_a_target_counts_before_the_control_of_the_same_joint(card):

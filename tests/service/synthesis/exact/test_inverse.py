@@ -26,13 +26,15 @@ def captured(model, index):
     """Controls of a captured clip, and where the model puts the hand there."""
     card = model.session.card
     controls = {c.name: v for c, v in zip(card.controls, card.examples[index], strict=True)}
-    clip = clips.clip(model, ClipQuestion(controls=controls, fps=200.0, exact="none")).clip
+    clip = clips.synthesize_clip(
+        model, ClipQuestion(controls=controls, fps=200.0, exact="none")
+    ).clip
     return controls, clip.positions()[-1, card.skeleton.names.index("RightHand")]
 
 
 def asked(model, place, joint="RightHand", **given):
     hold = {"targets": (Target(joint, tuple(place), at="end"),)}
-    return clips.clip(model, ClipQuestion(controls=given, **hold)).trust
+    return clips.synthesize_clip(model, ClipQuestion(controls=given, **hold)).trust
 
 
 def off(model, controls, truth):
@@ -47,7 +49,7 @@ def test_controls_are_those_of_motions_that_get_there(reach):
     for index in range(0, 46, 5):
         truth, place = captured(reach, index)
         found = asked(reach, place)
-        nothing = clips.clip(reach, ClipQuestion(controls={})).trust
+        nothing = clips.synthesize_clip(reach, ClipQuestion(controls={})).trust
         gains.append(off(reach, found.controls, truth) / off(reach, nothing.controls, truth))
         assert set(found.inferred) == set(truth)
         misses.append(found.targets[0].miss)
@@ -74,8 +76,8 @@ def test_what_is_given_stays(reach):
 def test_the_chosen_controls_give_the_same_clip(reach):
     _, place = captured(reach, 30)
     hold = {"targets": (Target("RightHand", tuple(place), at="end"),)}
-    partial = clips.clip(reach, ClipQuestion(controls={}, **hold))
-    whole = clips.clip(reach, ClipQuestion(controls=partial.trust.controls, **hold))
+    partial = clips.synthesize_clip(reach, ClipQuestion(controls={}, **hold))
+    whole = clips.synthesize_clip(reach, ClipQuestion(controls=partial.trust.controls, **hold))
     assert np.array_equal(partial.clip.rotations, whole.clip.rotations)
     assert whole.trust.inferred == ()
 
@@ -83,9 +85,9 @@ def test_the_chosen_controls_give_the_same_clip(reach):
 @pytest.mark.parametrize("height", [2.8, 50.0])
 def test_a_target_beyond_reach_breaks_no_pose(reach, height):
     controls = {c.name: c.default for c in reach.session.card.controls}
-    whole = clips.clip(reach, ClipQuestion(controls=controls))
+    whole = clips.synthesize_clip(reach, ClipQuestion(controls=controls))
     hold = {"targets": (Target("RightHand", (-0.2, height, 0.5), at="end"),)}
-    far = clips.clip(reach, ClipQuestion(controls={}, **hold))
+    far = clips.synthesize_clip(reach, ClipQuestion(controls={}, **hold))
     control = reach.session.card.control("target_height")
     assert far.trust.controls["target_height"] == control.maximum
     # As high as hips get that stand; the control itself would have lifted them off the floor.

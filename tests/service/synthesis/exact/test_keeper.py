@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.constraints.targets import NOTHING, Goals
+from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
 from posefield.inference import session
 from posefield.inference.session import Session
 from posefield.model_file.model_card import Event
@@ -52,11 +52,13 @@ def joint(model, answer, name) -> np.ndarray:
 
 def test_a_hand_ends_where_it_is_told_to(reach):
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls=controls, **FREE))
+    free = clips.synthesize_clip(reach, ClipQuestion(controls=controls, **FREE))
     goal = joint(reach, free, "RightHand")[-1] + [0.03, 0.02, -0.04]
     target = Target("RightHand", tuple(goal), free.trust.duration)
     hold = {"exact": FREE["exact"], "targets": (target,)}
-    held = clips.clip(reach, ClipQuestion(controls=controls, fps=10 / free.trust.duration, **hold))
+    held = clips.synthesize_clip(
+        reach, ClipQuestion(controls=controls, fps=10 / free.trust.duration, **hold)
+    )
     assert np.linalg.norm(joint(reach, held, "RightHand")[-1] - goal) < 1e-4
     assert np.linalg.norm(joint(reach, free, "RightHand")[-1] - goal) > 0.05
     (met,) = held.trust.targets
@@ -65,7 +67,9 @@ def test_a_hand_ends_where_it_is_told_to(reach):
 
 def test_a_measured_control_is_met_unless_asked_otherwise(reach):
     controls = middle(reach)
-    held, free = (clips.clip(reach, ClipQuestion(controls=controls, **hold)) for hold in ({}, FREE))
+    held, free = (
+        clips.synthesize_clip(reach, ClipQuestion(controls=controls, **hold)) for hold in ({}, FREE)
+    )
     off = free.trust.measured["target_height"] - controls["target_height"]
     assert abs(off) > 1e-3
     assert held.trust.measured["target_height"] == pytest.approx(
@@ -75,7 +79,7 @@ def test_a_measured_control_is_met_unless_asked_otherwise(reach):
 
 
 def test_what_is_measured_is_what_the_clip_shows(reach):
-    answer = clips.clip(reach, ClipQuestion(controls=middle(reach), fps=240.0, **FREE))
+    answer = clips.synthesize_clip(reach, ClipQuestion(controls=middle(reach), fps=240.0, **FREE))
     shown = joint(reach, answer, "RightHand")[-1, 1]
     # The last frame of 240 a second is up to 4 ms before the end.
     assert answer.trust.measured["target_height"] == pytest.approx(shown, abs=5e-3)
@@ -85,12 +89,12 @@ def test_what_is_measured_is_what_the_clip_shows(reach):
 def test_poses_and_clips_of_a_held_motion_agree(reach):
     controls = middle(reach)
     hold = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=0.5),)}
-    clip = clips.clip(reach, ClipQuestion(controls=controls, fps=10.0, **hold))
-    pose = poses.pose(reach, PoseQuestion(controls=controls, times=[0.0, 0.5], **hold))
+    clip = clips.synthesize_clip(reach, ClipQuestion(controls=controls, fps=10.0, **hold))
+    pose = poses.synthesize_poses(reach, PoseQuestion(controls=controls, times=[0.0, 0.5], **hold))
     assert np.array_equal(pose.rotations[1], clip.clip.rotations[5])
     translations = skeleton.translations(pose.bone_offsets, pose.root_position)
     card = reach.session.card
-    places, _ = skeleton.forward(card.skeleton.parents, pose.rotations, translations)
+    places, _ = skeleton.forward_kinematics(card.skeleton.parents, pose.rotations, translations)
     hand = places[1, card.skeleton.names.index("LeftHand")]
     miss = np.linalg.norm(hand - [0.3, 1.2, 0.4])
     assert miss == pytest.approx(pose.trust.targets[-1].miss, abs=1e-6)
@@ -99,11 +103,15 @@ def test_poses_and_clips_of_a_held_motion_agree(reach):
 @pytest.mark.parametrize("level", [0, 1, 3])
 def test_every_level_of_detail_meets_its_targets(reach, level):
     controls = middle(reach)
-    free = poses.pose(reach, PoseQuestion(controls=controls, times=[0.5], level=level, **FREE))
+    free = poses.synthesize_poses(
+        reach, PoseQuestion(controls=controls, times=[0.5], level=level, **FREE)
+    )
     root = free.root_position[0].astype(float)
     target = Target("Hips", tuple(np.add(root, [0.003, -0.003, 0.002])), time=0.5)
     hold = {"exact": "none", "targets": (target,)}
-    held = poses.pose(reach, PoseQuestion(controls=controls, times=[0.5], level=level, **hold))
+    held = poses.synthesize_poses(
+        reach, PoseQuestion(controls=controls, times=[0.5], level=level, **hold)
+    )
     assert np.linalg.norm(held.root_position[0] - root - [0.003, -0.003, 0.002]) < 1e-4
     assert held.trust.level == level
 
@@ -111,61 +119,67 @@ def test_every_level_of_detail_meets_its_targets(reach, level):
 def test_a_time_after_the_end_is_refused(reach):
     late = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=5.0),)}
     with pytest.raises(InvalidField, match="expected 0 to") as fault:
-        clips.clip(reach, ClipQuestion(controls=middle(reach), **late))
+        clips.synthesize_clip(reach, ClipQuestion(controls=middle(reach), **late))
     assert fault.value.field == "targets/0/time"
     endless = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=1e300),)}
     with pytest.raises(InvalidField, match="expected 0 to"):
-        clips.clip(reach, ClipQuestion(controls=middle(reach), **endless))
+        clips.synthesize_clip(reach, ClipQuestion(controls=middle(reach), **endless))
 
 
 @pytest.mark.parametrize("moment", ["start", "end"])
 def test_a_time_that_is_another_targets_moment_is_refused(reach, moment):
     controls = middle(reach)
-    duration = clips.clip(reach, ClipQuestion(controls=controls, **FREE)).trust.duration
+    duration = clips.synthesize_clip(reach, ClipQuestion(controls=controls, **FREE)).trust.duration
     time = duration if moment == "end" else 0.0
     twins = Target("LeftHand", (0.3, 1.0, 0.3), moment), Target("LeftHand", (0.3, 1.1, 0.3), time)
     with pytest.raises(InvalidField, match="has a target already") as fault:
-        clips.clip(reach, ClipQuestion(controls=controls, exact="none", targets=twins))
+        clips.synthesize_clip(reach, ClipQuestion(controls=controls, exact="none", targets=twins))
     assert fault.value.field == "targets/1"
     apart = twins[0], Target("LeftHand", (0.3, 1.1, 0.3), 0.5 * duration)
-    both = clips.clip(reach, ClipQuestion(controls=controls, exact="none", targets=apart))
+    both = clips.synthesize_clip(
+        reach, ClipQuestion(controls=controls, exact="none", targets=apart)
+    )
     assert len(both.trust.targets) == 2
 
 
 def test_a_target_at_the_time_of_a_control_is_the_nearer_word(reach):
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls=controls, fps=200.0, **FREE))
+    free = clips.synthesize_clip(reach, ClipQuestion(controls=controls, fps=200.0, **FREE))
     place = np.add(joint(reach, free, "RightHand")[-1], [0.0, 0.01, 0.0])
     target = Target("RightHand", tuple(place), free.trust.duration)
-    (met,) = clips.clip(reach, ClipQuestion(controls=controls, targets=(target,))).trust.targets
+    (met,) = clips.synthesize_clip(
+        reach, ClipQuestion(controls=controls, targets=(target,))
+    ).trust.targets
     assert met.reached and met.what.startswith("RightHand at")
     earlier = Target("RightHand", tuple(place), time=0.5)
-    both = clips.clip(reach, ClipQuestion(controls=controls, targets=(earlier,))).trust.targets
+    both = clips.synthesize_clip(
+        reach, ClipQuestion(controls=controls, targets=(earlier,))
+    ).trust.targets
     assert [each.what for each in both] == ["target_height", "RightHand at 0.5 s"]
 
 
 def test_what_is_met_already_does_not_hinder_what_is_out_of_reach(reach):
     controls = middle(reach)
-    free = poses.pose(reach, PoseQuestion(controls=controls, times=[0.5], **FREE))
+    free = poses.synthesize_poses(reach, PoseQuestion(controls=controls, times=[0.5], **FREE))
     stays = Target("Hips", tuple(map(float, free.root_position[0])), time=0.5)
-    question = reach.door.question(controls, "warn", None, 0)
-    begun = reach.keeper.held(question, NOTHING)
+    question = reach.validator.question(controls, "warn", None, 0)
+    begun = reach.solver.solve(question, NO_CONSTRAINTS)
     hips = begun.scene.positions(begun.numbers, 0, np.array([0.0]))[0]
     exactly = Target("Hips", tuple(hips), at="start"), Target("LeftHand", (0.3, 2.5, 0.7), at="end")
     for targets in (exactly, (stays, exactly[1])):
         asked = ClipQuestion(controls=controls, exact="none", targets=targets)
-        near, far = clips.clip(reach, asked).trust.targets
+        near, far = clips.synthesize_clip(reach, asked).trust.targets
         assert near.miss < 1e-3 < far.miss
 
 
 def test_a_speed_is_met_by_way_and_duration(walk):
-    question = walk.door.question(middle(walk), "warn", None, 0)
-    free = walk.keeper.held(question, NOTHING)
+    question = walk.validator.question(middle(walk), "warn", None, 0)
+    free = walk.solver.solve(question, NO_CONSTRAINTS)
     before = np.hypot(*free.travel[:2]) / free.duration
-    goals = Goals((("haste", Measure("speed"), 1.003 * before),), ())
-    held = walk.keeper.held(question, goals)
+    goals = ConstraintSet((("haste", Measure("speed"), 1.003 * before),), ())
+    held = walk.solver.solve(question, goals)
     assert np.hypot(*held.travel[:2]) / held.duration == pytest.approx(1.003 * before, rel=1e-5)
-    assert held.met[0].reached and held.met[0].unit == "m/s"
+    assert held.results[0].reached and held.results[0].unit == "m/s"
     # Captured walkers who are faster take longer steps and shorter ones in time.
     assert held.duration < free.duration and np.hypot(*held.travel[:2]) > np.hypot(*free.travel[:2])
     assert np.array_equal(held.scene.motion(held.numbers), free.scene.motion(free.numbers))
@@ -173,18 +187,20 @@ def test_a_speed_is_met_by_way_and_duration(walk):
 
 def test_a_held_cycle_closes(walk):
     controls = middle(walk)
-    place = joint(walk, clips.clip(walk, ClipQuestion(controls=controls)), "LeftFoot")[0] + [
+    place = joint(walk, clips.synthesize_clip(walk, ClipQuestion(controls=controls)), "LeftFoot")[
+        0
+    ] + [
         0.02,
         0.02,
         0.0,
     ]
     hold = {"exact": "none", "targets": (Target("LeftFoot", tuple(place), time=0.2),)}
-    loop = clips.clip(
+    loop = clips.synthesize_clip(
         walk, ClipQuestion(controls=controls, root="in_place", loop=True, **hold)
     ).clip
     assert np.abs(loop.positions()[0] - loop.positions()[-1]).max() < 1e-9
     assert np.abs(loop.positions()[0] - loop.positions()[5]).max() > 1e-2
-    free = clips.clip(
+    free = clips.synthesize_clip(
         walk, ClipQuestion(controls=controls, root="in_place", loop=True, **FREE)
     ).clip
     assert np.abs(free.positions() - loop.positions()).max() > 1e-3
@@ -194,10 +210,11 @@ def test_what_is_held_to_nothing_is_what_the_graph_says(reach, labelled_path):
     controls = middle(reach)
     plain = Synthesizer("reach", session.load(labelled_path))
     graph, own = (
-        clips.clip(model, ClipQuestion(controls=controls, **FREE)).clip for model in (plain, reach)
+        clips.synthesize_clip(model, ClipQuestion(controls=controls, **FREE)).clip
+        for model in (plain, reach)
     )
     assert np.array_equal(graph.rotations, own.rotations)
-    held = clips.clip(reach, ClipQuestion(controls=controls)).clip
+    held = clips.synthesize_clip(reach, ClipQuestion(controls=controls)).clip
     assert not np.array_equal(graph.rotations, held.rotations)
 
 
@@ -208,7 +225,8 @@ def test_the_same_question_gives_the_same_numbers(reach, labelled_path):
         labelled_path, {"target_height": Measure("height", (names.index("RightHand"),), "end")}
     )
     both = [
-        clips.clip(m, ClipQuestion(controls=middle(m), **hold)).clip for m in (reach, other, reach)
+        clips.synthesize_clip(m, ClipQuestion(controls=middle(m), **hold)).clip
+        for m in (reach, other, reach)
     ]
     assert np.array_equal(both[0].rotations, both[1].rotations)
     assert np.array_equal(both[0].rotations, both[2].rotations)
@@ -216,11 +234,11 @@ def test_the_same_question_gives_the_same_numbers(reach, labelled_path):
 
 def test_an_extreme_is_met_where_it_is(reach):
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls=controls, fps=200.0, **FREE))
+    free = clips.synthesize_clip(reach, ClipQuestion(controls=controls, fps=200.0, **FREE))
     path = joint(reach, free, "LeftHand")
     top = path[np.argmax(path[:, 1])]
     target = Target("LeftHand", tuple(np.add(top, [0.0, 0.03, 0.0])), at="highest")
-    held = clips.clip(
+    held = clips.synthesize_clip(
         reach, ClipQuestion(controls=controls, fps=200.0, exact="none", targets=(target,))
     )
     assert joint(reach, held, "LeftHand")[:, 1].max() == pytest.approx(top[1] + 0.03, abs=2e-3)
@@ -232,7 +250,9 @@ def test_the_event_needs_no_landmark(reach):
     model = Synthesizer("reach", replace(reach.session, card=card))
     hold = {"exact": "none", "targets": (Target("LeftHand", (0.3, 1.1, 0.2), at="event"),)}
     assert (
-        clips.clip(model, ClipQuestion(controls=middle(model), **hold)).trust.targets[0].what
+        clips.synthesize_clip(model, ClipQuestion(controls=middle(model), **hold))
+        .trust.targets[0]
+        .what
         == "LeftHand at event"
     )
 
@@ -243,11 +263,11 @@ def test_pinned_feet_stay_where_they_stand(reach):
     card = replace(reach.session.card, feet=feet)
     reach = Synthesizer("reach", replace(reach.session, card=card))
     controls = middle(reach)
-    free = clips.clip(reach, ClipQuestion(controls=controls, fps=60.0, **FREE))
+    free = clips.synthesize_clip(reach, ClipQuestion(controls=controls, fps=60.0, **FREE))
     goal = np.add(joint(reach, free, "RightHand")[-1], [0.02, -0.01, 0.02])
     targets = (Target("RightHand", tuple(goal), at="end"),)
     held, pinned = (
-        clips.clip(
+        clips.synthesize_clip(
             reach,
             ClipQuestion(controls=controls, fps=60.0, exact="none", targets=targets, pin_feet=pin),
         )
@@ -267,5 +287,5 @@ def test_pinned_feet_stay_where_they_stand(reach):
 def test_feet_that_nobody_named_cannot_be_pinned(reach):
     model = Synthesizer("reach", replace(reach.session, card=replace(reach.session.card, feet=())))
     with pytest.raises(InvalidField, match="names no feet") as fault:
-        clips.clip(model, ClipQuestion(controls=middle(model), pin_feet=True))
+        clips.synthesize_clip(model, ClipQuestion(controls=middle(model), pin_feet=True))
     assert fault.value.field == "pin_feet"

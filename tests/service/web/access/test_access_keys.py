@@ -6,38 +6,38 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.http.access import api_keys, principal
-from posefield.http.access.principal import EVERYONE, METRICS, NOBODY, READ
+from posefield.http.access.principal import EVERYONE, METRICS, NO_ACCESS, READ
 
 DIGEST = "0" * 64
 
 
 def test_a_key_is_256_random_bits_and_none_twice():
-    made = {api_keys.make() for _ in range(100)}
+    made = {api_keys.generate_key() for _ in range(100)}
     assert len(made) == 100
     assert all(key.startswith("pf_") and len(key) == 3 + 43 for key in made)
 
 
 def test_a_key_is_found_by_what_its_line_says():
-    key, other = api_keys.make(), api_keys.make()
+    key, other = api_keys.generate_key(), api_keys.generate_key()
     lines = [
         api_keys.line("a", ["read:reach"], key),
         api_keys.line("b", ["read:*", "metrics"], other),
     ]
-    known = api_keys.read("\n".join(lines), "KEYS")
-    assert known.find(key) == principal.of("a", ["read:reach"])
-    assert known.find(other) == principal.of("b", ["read:*", "metrics"])
+    known = api_keys.parse_keys("\n".join(lines), "KEYS")
+    assert known.find(key) == principal.from_scopes("a", ["read:reach"])
+    assert known.find(other) == principal.from_scopes("b", ["read:*", "metrics"])
 
 
 def test_a_line_does_not_hold_the_key():
-    key = api_keys.make()
+    key = api_keys.generate_key()
     line = api_keys.line("a", ["read:*"], key)
     assert key not in line and key.removeprefix("pf_") not in line
     assert line.split()[1] == hashlib.sha256(key.encode()).hexdigest()
 
 
 def test_what_is_nearly_a_key_is_none():
-    key = api_keys.make()
-    known = api_keys.read(api_keys.line("a", ["read:*"], key), "KEYS")
+    key = api_keys.generate_key()
+    known = api_keys.parse_keys(api_keys.line("a", ["read:*"], key), "KEYS")
     last = "A" if key[-1] != "A" else "B"
     for wrong in ("", "pf_", key[:-1], key + "A", key[:-1] + last, key.upper(), f" {key}"):
         assert known.find(wrong) is None
@@ -45,16 +45,16 @@ def test_what_is_nearly_a_key_is_none():
 
 
 def test_a_hash_that_only_begins_alike_is_another_key():
-    key = api_keys.make()
+    key = api_keys.generate_key()
     digest = hashlib.sha256(key.encode()).hexdigest()
     forged = digest[:16] + "".join("0" if c != "0" else "1" for c in digest[16:])
-    assert api_keys.read(f"a {forged} read:*", "KEYS").find(key) is None
+    assert api_keys.parse_keys(f"a {forged} read:*", "KEYS").find(key) is None
 
 
 def test_comments_semicolons_and_empty_lines():
     text = f"# two\n\n  a {DIGEST} read:*  # first\n;b {DIGEST[:-1]}1 metrics;\n"
-    assert {k.principal.name for k in api_keys.read(text, "KEYS").known.values()} >= {"b"}
-    assert api_keys.read("# none\n\n", "KEYS").known == {}
+    assert {k.principal.name for k in api_keys.parse_keys(text, "KEYS").known.values()} >= {"b"}
+    assert api_keys.parse_keys("# none\n\n", "KEYS").known == {}
 
 
 @pytest.mark.parametrize(
@@ -72,25 +72,25 @@ def test_comments_semicolons_and_empty_lines():
 )
 def test_a_line_that_is_none_is_refused_by_its_place(text, words):
     with pytest.raises(InvalidField, match=words.replace("*", r"\*")):
-        api_keys.read(text, "KEYS")
+        api_keys.parse_keys(text, "KEYS")
 
 
 def test_a_key_in_the_place_of_its_hash_is_not_repeated():
-    key = api_keys.make()
+    key = api_keys.generate_key()
     with pytest.raises(InvalidField) as refused:
-        api_keys.read(f"a {key} read:*", "KEYS")
+        api_keys.parse_keys(f"a {key} read:*", "KEYS")
     assert key not in str(refused.value)
     with pytest.raises(InvalidField) as refused:
-        api_keys.read(f"{key} read:*", "KEYS")
+        api_keys.parse_keys(f"{key} read:*", "KEYS")
     assert "expected 64" in str(refused.value) and "read:*" not in str(refused.value)
 
 
 def test_scopes_say_what_may_be_read():
-    some = principal.of("a", ["read:reach", "other", "metricsx"])
+    some = principal.from_scopes("a", ["read:reach", "other", "metricsx"])
     assert (some.may_read("reach"), some.may_read("walk")) == (True, False)
     assert (some.may(READ), some.may(METRICS)) == (True, False)
-    every = principal.of("a", ["read:reach", "read:*"])
+    every = principal.from_scopes("a", ["read:reach", "read:*"])
     assert every.may_read("walk") and every.may(READ)
-    assert not principal.of("a", ["metrics"]).may(READ)
+    assert not principal.from_scopes("a", ["metrics"]).may(READ)
     assert EVERYONE.may(READ) and EVERYONE.may(METRICS) and EVERYONE.may_read("any")
-    assert not (NOBODY.may(READ) or NOBODY.may(METRICS) or NOBODY.may_read("any"))
+    assert not (NO_ACCESS.may(READ) or NO_ACCESS.may(METRICS) or NO_ACCESS.may_read("any"))

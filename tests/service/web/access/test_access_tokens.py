@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 from posefield.common.errors import FileError
 from posefield.http.access import access_policy
-from posefield.http.access.bearer_tokens import LAST_MOMENT, Tokens
-from posefield.http.access.principal import Rejected
+from posefield.http.access.bearer_tokens import LATEST_TIME, TokenVerifier
+from posefield.http.access.principal import InvalidCredentials
 from posefield.http.access.token_keys import KeySet
 from posefield.http.api.settings import Settings
 
@@ -47,7 +47,7 @@ def source(pairs, tmp_path):
 
 @pytest.fixture
 def checker(source):
-    return Tokens(SETTINGS, KeySet(str(source), "RS256"))
+    return TokenVerifier(SETTINGS, KeySet(str(source), "RS256"))
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def signing(pairs, tmp_path_factory):
     """Tokens whose key stays, and that key."""
     path = tmp_path_factory.mktemp("issuer") / "jwks.json"
     path.write_text(json.dumps({"keys": [pairs["one"][1]]}))
-    return Tokens(SETTINGS, KeySet(str(path), "RS256")), pairs["one"][0]
+    return TokenVerifier(SETTINGS, KeySet(str(path), "RS256")), pairs["one"][0]
 
 
 @pytest.fixture
@@ -107,10 +107,10 @@ def test_the_log_gets_a_pseudonym_that_stays(checker, token):
         ({"exp": float("nan")}, UNREADABLE),
         ({"exp": 10**400}, UNREADABLE),
         ({"exp": 10**4200}, UNREADABLE),
-        ({"exp": LAST_MOMENT + 1}, UNREADABLE),
-        ({"exp": str(LAST_MOMENT)}, UNREADABLE),
+        ({"exp": LATEST_TIME + 1}, UNREADABLE),
+        ({"exp": str(LATEST_TIME)}, UNREADABLE),
         ({"exp": "1" + 400 * "0"}, UNREADABLE),
-        ({"exp": [LAST_MOMENT]}, UNREADABLE),
+        ({"exp": [LATEST_TIME]}, UNREADABLE),
         ({"exp": {}}, UNREADABLE),
         ({"exp": True}, "expired"),
         ({"exp": -(10**400)}, "expired"),
@@ -134,11 +134,11 @@ def test_the_log_gets_a_pseudonym_that_stays(checker, token):
     ],
 )
 def test_what_is_wrong_with_a_token_keeps_it_out(changes, why, checker, token):
-    with pytest.raises(Rejected, match=why):
+    with pytest.raises(InvalidCredentials, match=why):
         checker.find(token(**changes))
 
 
-@pytest.mark.parametrize("end", [LAST_MOMENT, float(LAST_MOMENT)])
+@pytest.mark.parametrize("end", [LATEST_TIME, float(LATEST_TIME)])
 def test_the_last_moment_of_the_calendar_is_an_end(end, checker, token):
     assert checker.find(token(exp=end)).may_read("reach")
 
@@ -148,13 +148,13 @@ def test_signed_claims_that_nest_deeply_keep_it_out(checker, pairs):
     claims = {"iss": "https://issuer", "aud": "posefield", "exp": time.time() + 60, "scope": "S"}
     text = json.dumps(claims).replace('"S"', "[" * 10_000 + "]" * 10_000)
     signed = jwt.PyJWS().encode(text.encode(), pairs["one"][0], "RS256", {"kid": "one"})
-    with pytest.raises(Rejected, match=UNREADABLE):
+    with pytest.raises(InvalidCredentials, match=UNREADABLE):
         checker.find(signed)
     shallow = json.dumps(claims).replace('"S"', "[[]]").encode()
     assert checker.find(jwt.PyJWS().encode(shallow, pairs["one"][0], "RS256", {"kid": "one"}))
 
 
-NUMBERS = st.integers() | st.floats() | st.sampled_from([10**400, -(10**400), LAST_MOMENT])
+NUMBERS = st.integers() | st.floats() | st.sampled_from([10**400, -(10**400), LATEST_TIME])
 VALUES = st.recursive(
     st.none() | st.booleans() | NUMBERS | st.text(st.characters(), max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner),
@@ -172,7 +172,7 @@ def test_whatever_was_signed_is_let_in_or_rejected(changes, signing):
     checker, key = signing
     claims = {"iss": "https://issuer", "aud": "posefield", "exp": time.time() + 60, **changes}
     text = json.dumps(claims).encode()
-    with contextlib.suppress(Rejected):
+    with contextlib.suppress(InvalidCredentials):
         assert checker.find(jwt.PyJWS().encode(text, key, "RS256", {"kid": "one"}))
 
 
@@ -194,7 +194,7 @@ def test_a_token_cannot_choose_how_it_is_checked(checker, pairs):
         signature = signer.sign(body, text)
         tokens_.append(body.decode() + "." + base64.urlsafe_b64encode(signature).decode())
     for each in tokens_:
-        with pytest.raises(Rejected):
+        with pytest.raises(InvalidCredentials):
             checker.find(each)
 
 
@@ -212,13 +212,13 @@ def test_a_token_cannot_choose_how_it_is_checked(checker, pairs):
     ],
 )
 def test_rubbish_is_rejected_and_nothing_worse(text, checker):
-    with pytest.raises(Rejected):
+    with pytest.raises(InvalidCredentials):
         checker.find(text)
 
 
 def test_no_address_in_a_token_is_asked(checker, token, listener):
     url, asked = listener
-    with pytest.raises(Rejected):
+    with pytest.raises(InvalidCredentials):
         checker.find(token(kid="two", headers={"jku": url, "x5u": url, "kid": url}))
     checker.keys.refresh()
     assert asked == []
@@ -227,7 +227,7 @@ def test_no_address_in_a_token_is_asked(checker, token, listener):
 def test_without_an_id_the_only_key_is_meant(checker, pairs):
     claims = {"iss": "https://issuer", "aud": "posefield", "exp": time.time() + 60}
     assert checker.find(jwt.encode(claims, pairs["one"][0], "RS256"))
-    with pytest.raises(Rejected):
+    with pytest.raises(InvalidCredentials):
         checker.find(jwt.encode(claims, pairs["two"][0], "RS256"))
 
 
@@ -235,15 +235,15 @@ def test_a_token_is_kept_and_only_until_it_ends(checker, token):
     given = token(exp=time.time() + 1)
     assert checker.find(given) is checker.find(given)
     time.sleep(1.1)
-    with pytest.raises(Rejected, match="expired"):
+    with pytest.raises(InvalidCredentials, match="expired"):
         checker.find(given)
 
 
 def test_no_more_tokens_are_kept_than_said(source, token):
-    checker = Tokens(SETTINGS, KeySet(str(source), "RS256"), most=2)
+    checker = TokenVerifier(SETTINGS, KeySet(str(source), "RS256"), most=2)
     first, second, third = (token(jti=str(index)) for index in range(3))
     found = {given: checker.find(given) for given in (first, second)}
-    with pytest.raises(Rejected):
+    with pytest.raises(InvalidCredentials):
         checker.find("rubbish")
     assert checker.find(first) is found[first]
     checker.find(third)
@@ -257,7 +257,7 @@ def test_a_key_that_goes_takes_its_tokens_with_it(checker, token, source, pairs)
     checker.find(given)
     source.write_text(json.dumps({"keys": [pairs["two"][1]]}))
     checker.keys.refresh()
-    with pytest.raises(Rejected, match="not known"):
+    with pytest.raises(InvalidCredentials, match="not known"):
         checker.find(given)
     assert checker.find(token(kid="two"))
 
@@ -273,7 +273,7 @@ def watched(source, cooldown, seconds=300):
     """Tokens whose keys are read again from now on."""
     keys = KeySet(str(source), "RS256")
     threading.Thread(target=keys.watch, args=(seconds, cooldown), daemon=True).start()
-    return Tokens(SETTINGS, keys)
+    return TokenVerifier(SETTINGS, keys)
 
 
 def assert_soon(is_so):
@@ -286,7 +286,7 @@ def assert_soon(is_so):
 def test_a_new_key_is_read_soon_after_it_was_asked_for(source, token, pairs):
     checker = watched(source, cooldown=0.01)
     source.write_text(json.dumps({"keys": [pairs["one"][1], pairs["two"][1]]}))
-    with pytest.raises(Rejected, match="not known"):
+    with pytest.raises(InvalidCredentials, match="not known"):
         checker.find(token(kid="two"))
     assert_soon(lambda: "two" in checker.keys.keys)
     assert checker.find(token(kid="two"))
@@ -302,12 +302,12 @@ def test_unknown_keys_make_no_more_fetches_than_the_cooldown_allows(token, liste
     url, asked = listener
     checker = watched(f"{url}/keys", cooldown=60)
     for index in range(100):
-        with pytest.raises(Rejected, match="not known"):
+        with pytest.raises(InvalidCredentials, match="not known"):
             checker.find(token(headers={"kid": f"unknown-{index}"}))
     assert asked == ["/keys"]
     # Negative control: with a short one, an unknown key leads to a fetch.
     hasty = watched(f"{url}/keys", cooldown=0.01)
-    with pytest.raises(Rejected, match="not known"):
+    with pytest.raises(InvalidCredentials, match="not known"):
         hasty.find(token(kid="two"))
     assert_soon(lambda: len(asked) >= 3)
 
@@ -317,17 +317,19 @@ def test_no_token_waits_for_the_issuer(token, listener):
     url, asked = listener
     checker = watched(f"{url}/keys", cooldown=0.01)
     checker.keys.source = f"{url}/hanging"
-    with pytest.raises(Rejected, match="not known"):
+    with pytest.raises(InvalidCredentials, match="not known"):
         checker.find(token(kid="two"))
     assert_soon(lambda: "/hanging" in asked)
     assert checker.find(token())
-    with pytest.raises(Rejected, match="not known"):
+    with pytest.raises(InvalidCredentials, match="not known"):
         checker.find(token(kid="two"))
 
 
 def test_an_issuer_that_is_down_changes_nothing(pairs, token, caplog):
     server, asked = serve(pairs)
-    checker = Tokens(SETTINGS, KeySet(f"http://127.0.0.1:{server.server_port}/keys", "RS256"))
+    checker = TokenVerifier(
+        SETTINGS, KeySet(f"http://127.0.0.1:{server.server_port}/keys", "RS256")
+    )
     server.shutdown()
     server.server_close()
     checker.keys.refresh()
