@@ -176,3 +176,24 @@ def test_a_crowded_folder_is_found(own, plant):
         code.files[f"posefield.common.m{number}"] = code.files["posefield.common.m0"]
     (found,) = faults(code)
     assert found.startswith("posefield.common has ")
+
+
+def test_a_boolean_of_a_question_stands_in_few_files():
+    """`pin_feet`: its type, the contract, its check, and the signatures of the Python client."""
+    folders = (ROOT / folder for folder in ("service", "model_export", "clients", "api"))
+    kinds = {".py", ".ts", ".yaml", ".json"}
+    files = (path for folder in folders for path in folder.rglob("*") if path.suffix in kinds)
+    made = {"generated.py", "schema.ts", "request.json"}
+    own = [path for path in files if path.name not in made and "node_modules" not in path.parts]
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in own
+        if not path.is_symlink() and "pin_feet" in path.read_text()
+    }
+    assert found == {
+        "api/openapi.yaml",
+        "clients/python/posefield_client/files.py",
+        "clients/python/posefield_client/questions.py",
+        "service/posefield/constraints/targets.py",
+        "service/posefield/question/motion_question.py",
+    }

@@ -85,8 +85,8 @@ def clip(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
-        **asking.said(joint_sigma=joint_sigma),
-        **holding.said(exact, targets, pin_feet),
+        **asking.said(joint_sigma=joint_sigma, pin_feet=pin_feet),
+        **holding.said(exact, targets),
     )
     return Files(CLIP, lambda ending: asking.either("ClipInFormat", model, question, ending))
 
@@ -113,7 +113,7 @@ def _named(place: int, given: NamedClipQuestion | Mapping[str, Any]) -> NamedCli
     if isinstance(given, NamedClipQuestion):
         return given
     controls = asking.controls(given.get("controls"), {})
-    held = holding.said(given.get("exact"), given.get("targets"), given.get("pin_feet"))
+    held = holding.said(given.get("exact"), given.get("targets"))
     plain = {**asking.sayable(f"clip {place}", given), "controls": controls, **held}
     try:
         return msgspec.convert(plain, NamedClipQuestion)

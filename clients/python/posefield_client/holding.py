@@ -16,15 +16,13 @@ Exact = Literal["auto", "none"] | str | Sequence[str]
 Targets = Iterable[Target | Mapping[str, Any]]
 
 
-def said(exact: Exact | None, targets: Targets | None, pin_feet: bool | None) -> dict[str, Any]:
+def said(exact: Exact | None, targets: Targets | None) -> dict[str, Any]:
     """Return the arguments that are not None, as fields of a question."""
     found: dict[str, Any] = {}
     if exact is not None:
         found["exact"] = _exact(exact)
     if targets is not None:
         found["targets"] = tuple(_target(place, each) for place, each in enumerate(targets))
-    if pin_feet is not None:
-        found["pin_feet"] = bool(pin_feet)
     return found
 
 

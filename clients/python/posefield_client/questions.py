@@ -75,8 +75,8 @@ def pose(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
-        **asking.said(joint_sigma=joint_sigma),
-        **holding.said(exact, targets, pin_feet),
+        **asking.said(joint_sigma=joint_sigma, pin_feet=pin_feet),
+        **holding.said(exact, targets),
     )
     return Call(asking.either("PoseInFormat", model, question, "msgpack"), numbers.pose)
 

@@ -13,11 +13,17 @@ from pydantic import (
 )
 
 from posefield.motion import measures
+from posefield.question import text_decoding
+from posefield.question.model_question import SigmaQuestion, WhyQuestion
+from posefield.question.motion_question import FileQuestion, PoseQuestion
 
-# Parameters that a clip query has besides the controls.
-RESERVED = frozenset(
-    "fps start end time times extrapolate performer level format names root loop unit up "
-    "across along columns rows margin nearest joint_sigma exact target targets pin_feet".split()
+# Parameters that stand beside the controls in a URL, a body or a table.
+RESERVED = {"format"}.union(
+    *(
+        (parameter.field, parameter.word)
+        for form in (PoseQuestion, FileQuestion, SigmaQuestion, WhyQuestion)
+        for parameter in text_decoding.parameters(form).values()
+    )
 )
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
 Text = Annotated[str, Field(min_length=1)]

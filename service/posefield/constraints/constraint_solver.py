@@ -175,7 +175,7 @@ class ConstraintSolver:
         if not asked.constraints:
             return begun
         aims = constraint.from_controls(asked.constraints.controls, bench.reduced.frames)
-        pins = bench.pins(begun) if asked.constraints.pin_feet else []
+        pins = bench.pins(begun) if asked.constraints.pinned else []
         last = bench.reduced.frames - 1.0
         for _ in range(MAX_ROUNDS):
             aimed = self._target_constraints(question, asked.constraints.targets, held)

@@ -14,6 +14,10 @@ from posefield.validation.question_validation import ValidatedQuestion
 # Largest coordinate of a target, m: beyond any human reach, and well within float32.
 MAX_COORDINATE = 100.0
 MAX_TARGETS = 32
+OPEN_COST, PIN_COST = 4, 4
+"""Cost of a target of a clip with open controls, and of pinned feet, relative to the cost of a
+target.
+"""
 
 
 @dataclass(frozen=True)
@@ -34,18 +38,27 @@ class ConstraintSet:
     """Constraints of a question.
 
     controls: measured controls with their target values. targets: target positions of joints.
-    pin_feet: true if planted feet keep their positions.
+    pinned: joints that keep their predicted positions while they are planted.
     """
 
     controls: tuple[tuple[str, Measure, float], ...]
     targets: tuple[JointTarget, ...]
-    pin_feet: bool = False
+    pinned: tuple[int, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.controls or self.targets)
 
 
 NO_CONSTRAINTS = ConstraintSet((), ())
+
+
+def solver_cost(card: ModelCard, asked: MotionQuestion) -> int:
+    """Return the cost of solving the constraints of a question, in units of a plain target.
+
+    Open controls and pinned feet cost several units each (decision 0028).
+    """
+    each = OPEN_COST if len(asked.controls) < len(card.controls) else 1
+    return each * len(asked.targets) + PIN_COST * asked.pin_feet
 
 
 def from_question(
@@ -76,7 +89,7 @@ def from_question(
                 raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
             continue
         controls.append((control.name, own, question.controls[control.name]))
-    return ConstraintSet(tuple(controls), targets, asked.pin_feet)
+    return ConstraintSet(tuple(controls), targets, tuple(card.feet) if asked.pin_feet else ())
 
 
 def _exact_controls(

@@ -95,6 +95,10 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return self.exact != "auto" or bool(self.targets) or self.pin_feet
 
 
+CONSTRAINING = ("targets", "pin_feet")
+"""Fields that constrain an answer whatever their value, unless it is empty or false."""
+
+
 class PoseQuestion(MotionQuestion, frozen=True, kw_only=True):
     """Query for poses of a motion."""
 

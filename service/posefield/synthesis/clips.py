@@ -19,11 +19,6 @@ from posefield.synthesis.poses import POSE_OUTPUTS
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 
-OPEN_COST, PIN_COST = 4, 4
-"""Cost of a target of a clip with open controls, and of pinned feet, relative to the cost of a
-target.
-"""
-
 
 @dataclass(frozen=True)
 class ClipPreview:
@@ -79,16 +74,6 @@ def preview_clip(
     times = frame_times.sample_times(asked, duration, most)
     # A loop ends with its first frame again.
     return ClipPreview(len(times) + asked.loop, question.warnings, misses)
-
-
-def solver_cost(model: Synthesizer, asked: ClipQuestion) -> int:
-    """Return the cost of solving the targets of a clip, in units of a plain target.
-
-    Open controls and pinned feet cost several units each (decision 0028).
-    """
-    targets, controls = len(asked.targets), len(model.session.card.controls)
-    each = OPEN_COST if len(asked.controls) < controls else 1
-    return each * targets + PIN_COST * asked.pin_feet
 
 
 def _named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:

@@ -13,7 +13,7 @@ from posefield.batch.rows.columns import CONTROL_PREFIX
 from posefield.common.units import Floats
 from posefield.kriging.support import Support
 from posefield.model_file.model_card import ModelCard
-from posefield.question.motion_question import ClipQuestion
+from posefield.question.motion_question import CONSTRAINING, ClipQuestion
 from posefield.synthesis import frame_times
 from posefield.validation import input_limits
 
@@ -72,7 +72,7 @@ def _constraints_valid(values: Values) -> bool:
     The defaults have been validated before.
     """
     plain = {"auto", "none", None}.issuperset(values.get("exact", ()))
-    return plain and not any(values.get("targets", ())) and not any(values.get("pin_feet", ()))
+    return plain and not any(any(values.get(name, ())) for name in CONSTRAINING)
 
 
 def _column(values: Values, field: str, usual: float) -> Floats:

@@ -7,6 +7,7 @@ from posefield.batch.rows import clip_names
 from posefield.batch.rows.row_query import ClipQuery
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError
+from posefield.constraints import targets
 from posefield.encode.formats import ClipEncoder, max_poses
 from posefield.http.api import problems
 from posefield.http.api.settings import Settings
@@ -62,12 +63,13 @@ def _check_names(queries: Sequence[ClipQuery]) -> None:
 
 
 def _check_targets(model: Synthesizer, queries: Sequence[ClipQuery], most: int) -> None:
-    cost = sum(clips.solver_cost(model, each.question) for each in queries)
+    cost = sum(targets.solver_cost(model.session.card, each.question) for each in queries)
     if cost > most:
         raise InvalidField(
             "clips",
             f"targets of all clips cost {cost}, expected at most {most}; a target counts as one, "
-            f"as {clips.OPEN_COST} where controls are left open, pinned feet as {clips.PIN_COST}",
+            f"as {targets.OPEN_COST} where controls are left open, "
+            f"pinned feet as {targets.PIN_COST}",
         )
 
 
