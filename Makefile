@@ -78,6 +78,7 @@ lint: $(ENV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
+	$(BIN)/python .ci/prose
 
 .PHONY: types
 types: $(ENV)

@@ -1,4 +1,4 @@
-"""What ships: the stateless motion service, its command line and the shared motion floor."""
+"""The stateless motion service, its commands and the packages that training shares."""
 
 import os
 

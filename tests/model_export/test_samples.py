@@ -70,7 +70,7 @@ def test_one_performer_is_told_apart_from_nobody_and_it_is_noted():
     laid, performers = sample_points.make_samples(recipe(), examples(who=["ann"] * 6))
     assert (performers, laid.labelled) == ((), False)
     said = sample_points.data_notes(recipe(), examples(who=["ann"] * 6))
-    assert said == ["all clips are of one performer, 'ann': kriging.label tells nobody apart"]
+    assert said == ["all clips are of one performer, 'ann': kriging.label has no effect"]
     assert sample_points.data_notes(recipe(), examples()) == []
     assert sample_points.data_notes(recipe(label=None), examples(who=["ann"] * 6)) == []
 

@@ -36,7 +36,7 @@ def _models(own, _context):
 def _performers(own, _context):
     card = session.current.card
     found = [(name, name, f"As {name} moves") for name in (card.performers if card else ())]
-    nobody = (ANYBODY, "Anybody", "Somebody who was never seen")
+    nobody = (ANYBODY, "Anybody", "An unseen performer")
     if own.performer_name and all(name != own.performer_name for name, _, _ in found):
         found.append((own.performer_name, own.performer_name, "Not known to this model"))
     return _items("performers", [nobody, *found])

@@ -21,7 +21,7 @@ test("who moves has a mark of its own where performers are told apart", () => {
   const known = { supported: true, performer: "kim", performer_seen: true };
   assert.deepEqual(words(known), ["Captured near here", "kim was captured"]);
   const nobody = { supported: true, performer: null, performer_seen: false };
-  assert.deepEqual(words(nobody)[1], "Moves as somebody never captured");
+  assert.deepEqual(words(nobody)[1], "Moves as an unseen performer");
 });
 
 test("of what an older service does not say there is no mark", () => {

@@ -222,7 +222,7 @@ test("whether anything like it was captured has a mark beside sigma, and who mov
   on(WALK, async (page) => {
     const [support, who] = ["support", "performer"].map((of) => page.locator(`[data-mark=${of}]`));
     await support!.getByText("Captured near here").waitFor();
-    await who!.getByText("Moves as somebody never captured").waitFor();
+    await who!.getByText("Moves as an unseen performer").waitFor();
     const sign = () => support!.locator("path").getAttribute("d");
     const before = await sign();
     // Within the range of each control, and nobody walked so.

@@ -169,7 +169,7 @@ def refuse_outliers(adaptable: AdaptableModel, moved: CanonicalClips) -> None:
         if distance > OUTLIER_SIGMAS * sigma:
             raise TrainingError(
                 f"{example.row.named}: lies {100 * distance:.1f} cm from what the model expects of "
-                f"somebody never seen, {distance / sigma:.1f} times the {100 * sigma:.1f} cm by "
+                f"an unseen performer, {distance / sigma:.1f} times the {100 * sigma:.1f} cm by "
                 "which it expects them to differ, expected at most "
                 f"{OUTLIER_SIGMAS:g} times; is it of "
                 "another action, cut elsewhere, or in another unit?"

@@ -80,7 +80,7 @@ def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     laid, performers = make_samples(recipe, examples)
     if recipe.kriging.label and not performers:
         name = examples[0].row.performer
-        said.append(f"all clips are of one performer, {name!r}: kriging.label tells nobody apart")
+        said.append(f"all clips are of one performer, {name!r}: kriging.label has no effect")
     if len(np.unique(laid.groups)) > len(np.unique(take_numbers(examples))):
         said.append(
             "clips of one file are not left out together: those of the other files alone could "

@@ -330,7 +330,7 @@ class Recipe(RecipePart):
         if quantity in CYCLE_QUANTITIES and not self.motion.cyclic:
             return (
                 f"found {quantity!r} and motion.cyclic = false, expected a cycle: of a motion that "
-                "ends elsewhere it hangs on where it was cut"
+                "ends elsewhere it depends on the cut"
             )
         if quantity in ("speed", "stride_length") and self.motion.root == "in_place":
             return f"found {quantity!r} and motion.root = 'in_place', expected one that travels"

@@ -139,7 +139,7 @@ def test_a_new_armature_stands_on_the_ground_and_no_bone_is_without_length(clip)
             "3 bones, the clip 4 joints: it lacks Head$",
         ),
         (PARENTS | {"Hat": "Head"}, "it has besides Hat$"),
-        (PARENTS | {"Head": "Hips"}, r"Head \(hangs on Hips, expected Spine\)"),
+        (PARENTS | {"Head": "Hips"}, r"Head \(child of Hips, expected Spine\)"),
         ({f"B{i}": None for i in range(9)}, "besides B0, B1, B2, B3 and 5 more"),
     ],
 )

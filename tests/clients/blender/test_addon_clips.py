@@ -55,7 +55,7 @@ def test_whether_anything_like_it_was_captured_is_said_in_words():
 
 def test_whether_who_moves_was_captured_is_said_where_performers_are_told_apart():
     nobody = told(supported=True, performer=None, performer_seen=False)
-    assert nobody[1] == (False, "Moves as somebody never captured")
+    assert nobody[1] == (False, "Moves as an unseen performer")
     assert told(performer="kim", performer_seen=True)[1] == (True, "kim was captured")
     assert told(supported=True, performer=None)[1] is None
 

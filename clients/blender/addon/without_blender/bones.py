@@ -117,7 +117,7 @@ def check(clip: Clip, found: dict[str, str | None]) -> None:
     missing = [name for name in clip.names if name not in found]
     superfluous = [name for name in found if name not in clip.parents]
     elsewhere = [
-        f"{name} (hangs on {found[name]}, expected {parent})"
+        f"{name} (child of {found[name]}, expected {parent})"
         for name, parent in clip.parents.items()
         if name in found and found[name] != parent
     ]

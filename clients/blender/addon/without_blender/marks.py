@@ -29,4 +29,4 @@ def performer(trust: dict[str, Any]) -> Mark | None:
     if found is None:
         return None
     known = f"{trust['performer']} was captured"
-    return Mark(found, known if found else "Moves as somebody never captured")
+    return Mark(found, known if found else "Moves as an unseen performer")

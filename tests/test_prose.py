@@ -1,0 +1,46 @@
+"""Tests of the prose check: all that ships passes, and planted sentences do not."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CHECK = Path(__file__).parents[1] / ".ci/prose"
+
+
+def check(*files):
+    words = [sys.executable, str(CHECK), *map(str, files)]
+    return subprocess.run(words, capture_output=True, text=True, check=False)
+
+
+def test_what_ships_is_in_plain_words():
+    done = check()
+    assert done.returncode == 0, done.stdout
+    # Negative control: it has read something.
+    assert int(done.stdout.split()[0]) > 400
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ('"""What the answer is held to."""', "'held to' in: "),
+        ('"""What the answer is."""', "begins with 'What'"),
+        ("# Somebody never seen.", "'Somebody' in: "),
+        ('said = f"nobody knows {name}"', "'nobody' in: "),
+        ('"""Return the answer."""', ""),
+        ("nobody = [somebody]", ""),
+        ('said = f"a {nobody} performer"', ""),
+    ],
+)
+def test_a_sentence_is_judged(line, fault, tmp_path):
+    file = tmp_path / "planted.py"
+    file.write_text(f"{line}\n")
+    done = check(file)
+    assert (done.returncode, fault in done.stdout) == (int(bool(fault)), True), done.stdout
+
+
+def test_the_lint_step_runs_it():
+    makefile = (CHECK.parents[1] / "Makefile").read_text()
+    lint = makefile.partition("\nlint:")[2].partition("\n\n")[0]
+    assert ".ci/prose" in lint
