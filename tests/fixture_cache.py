@@ -25,8 +25,12 @@ FOLDER = ROOT / "build" / "fixtures"
 SOURCES = (
     "model_export",
     "service/posefield/__init__.py",
+    "service/posefield/common",
+    "service/posefield/inference",
+    "service/posefield/kriging",
+    "service/posefield/model_file",
     "service/posefield/motion",
-    "service/posefield/synthesis",
+    "service/posefield/question",
     "tests/fixture_cache.py",
     "tests/fixture_models.py",
 )

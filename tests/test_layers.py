@@ -111,7 +111,7 @@ def test_every_import_stays_within_its_layer():
         ),
         (
             "model_export/posefield_train/train.py",
-            "import posefield.inference.session",
+            "import posefield.synthesis.clips",
             "the training job uses",
         ),
         (

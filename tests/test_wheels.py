@@ -103,10 +103,10 @@ def test_the_service_alone_tells_how_to_get_the_training_commands(dist, tmp_path
     assert all(command in helped for command in ("serve", "train", "evaluate"))
     for words in (["train", "a.toml", "--output", "b.onnx"], ["sample", "--help"]):
         told = run(bin_ / "posefield", *words, cwd=tmp_path, code=2).stderr
-        assert told == (
-            "posefield: needs posefield_train, scipy, onnx, pydantic, matplotlib: "
-            'pip install "posefield[train]"\n'
-        )
+        # Another package may have brought pydantic.
+        missing = "posefield_train, scipy, onnx, (pydantic, )?matplotlib"
+        line = re.escape(': pip install "posefield[train]"\n')
+        assert re.fullmatch(f"posefield: needs {missing}{line}", told), told
 
 
 def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):

@@ -103,7 +103,7 @@ def meant(clip):
 @pytest.mark.system
 def test_files_are_the_same_in_every_process(folder, tmp_path):
     script = "import sys, pathlib; from posefield_train.sample import sample_files; "
-    script += "sample_files.family(pathlib.Path(sys.argv[1]))"
+    script += "sample_files.write_family(pathlib.Path(sys.argv[1]))"
     runs = [
         subprocess.Popen(
             [sys.executable, "-c", script, str(tmp_path / seed)],
