@@ -11,6 +11,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 MOST_MODULES = 14
+MOST_PARAMETERS = 6
 SMALL = 60
 """Lines below which a module with one importer belongs into that importer."""
 COMMANDS = "cli"
@@ -176,6 +177,26 @@ def test_a_crowded_folder_is_found(own, plant):
         code.files[f"posefield.common.m{number}"] = code.files["posefield.common.m0"]
     (found,) = faults(code)
     assert found.startswith("posefield.common has ")
+
+
+def long_signatures(files):
+    """Public functions with more parameters than a reader keeps in mind; self counts for none."""
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                own = node.args.posonlyargs + node.args.args + node.args.kwonlyargs
+                names = [each.arg for each in own if each.arg not in ("self", "cls")]
+                if len(names) > MOST_PARAMETERS and not node.name.startswith("_"):
+                    yield f"{file.name}: {node.name}"
+
+
+def test_public_functions_have_few_parameters(own, tmp_path):
+    assert list(long_signatures(own.files.values())) == []
+    planted = tmp_path / "long.py"
+    planted.write_text(
+        "def seven(a, b, c, /, d, e, *, f, g): ...\ndef six(self, a, b, c, d, e, f): ..."
+    )
+    assert list(long_signatures([planted])) == ["long.py: seven"]
 
 
 def test_a_boolean_of_a_question_stands_in_few_files():

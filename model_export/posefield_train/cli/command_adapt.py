@@ -1,5 +1,6 @@
 """Command `posefield adapt`: a new performer for an existing model."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -8,6 +9,7 @@ import typer
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, ModelPath
+from posefield.console.question_options import with_option_groups
 from posefield_train.cli import output_files
 from posefield_train.cli.progress_messages import ProgressPrinter
 
@@ -15,36 +17,43 @@ Up = Literal["y", "z"]
 RootOffset = Literal["replace", "add"]
 
 
-def adapt(
-    model: ModelPath,
+@dataclass(frozen=True)
+class ClipArguments:
+    """Files of the new clips, and the conventions that they are written in."""
+
+    unit: Annotated[
+        float, typer.Option(help="length of the files' unit in metres", metavar="METRES")
+    ]
+    up: Annotated[Up, typer.Option(help="up axis of the files")]
     clips: Annotated[
         list[Path] | None,
         typer.Argument(
             help="BVH files of one new performer: one or more, typically up to five",
             metavar="CLIP...",
         ),
-    ] = None,
-    *,
-    output: Annotated[Path, typer.Option("--output", "-o", help="output .onnx file")],
-    performer: Annotated[str, typer.Option(help="performer's name, used in requests")],
-    unit: Annotated[
-        float, typer.Option(help="length of the files' unit in metres", metavar="METRES")
-    ],
-    up: Annotated[Up, typer.Option(help="up axis of the files")],
-    licence: Annotated[
-        str, typer.Option(help="licence of the new clips, with its required attribution")
-    ],
+    ] = None
     table: Annotated[
         Path | None,
         typer.Option(
             help="instead of clips: CSV with columns file, first_frame, last_frame and one column "
             "per control; controls that the model can measure may be omitted"
         ),
-    ] = None,
+    ] = None
     root_offset: Annotated[
         RootOffset | None,
         typer.Option(help="whether root position channels replace the root's OFFSET or add to it"),
-    ] = None,
+    ] = None
+
+
+@with_option_groups
+def adapt(
+    model: ModelPath,
+    files: ClipArguments,
+    output: Annotated[Path, typer.Option("--output", "-o", help="output .onnx file")],
+    performer: Annotated[str, typer.Option(help="performer's name, used in requests")],
+    licence: Annotated[
+        str, typer.Option(help="licence of the new clips, with its required attribution")
+    ],
     json: Json = False,
 ) -> None:
     """Add a performer to a model from a few clips, without the model's training data."""
@@ -53,22 +62,22 @@ def adapt(
     from posefield_train.source.recipe import Source
 
     output_files.expect_onnx(output)
-    if bool(clips) == bool(table):
+    if bool(files.clips) == bool(files.table):
         raise InvalidField("clips", "expected either motion files or --table")
-    if not (0.0 < unit < float("inf")):
-        raise InvalidField("unit", f"{unit}, expected a length in metres")
+    if not (0.0 < files.unit < float("inf")):
+        raise InvalidField("unit", f"{files.unit}, expected a length in metres")
     if not licence.strip():
         raise InvalidField("licence", "blank, expected a text")
     progress = ProgressPrinter()
     progress(f"reading {model}")
     known = model_reconstruction.load(model)
     adapted_file.check_name(known.card, performer)
-    source = Source(metres_per_unit=unit, up=up, root_offset=root_offset)
+    source = Source(metres_per_unit=files.unit, up=files.up, root_offset=files.root_offset)
     progress("reading clips")
-    if table:
-        examples, notes = new_clips.examples_of_table(known, table, source, performer)
+    if files.table:
+        examples, notes = new_clips.examples_of_table(known, files.table, source, performer)
     else:
-        examples, notes = new_clips.examples_of_files(known, clips or [], source, performer)
+        examples, notes = new_clips.examples_of_files(known, files.clips or [], source, performer)
     progress("adapting, and comparing the graph with the reference")
     made = adapted_file.export_adapted(known, NewPerformer(performer, examples, licence, notes))
     atomic_files.write(made.content, output)

@@ -10,6 +10,7 @@ import typer
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.console.output import as_json
+from posefield.console.question_options import with_option_groups
 from posefield_train.cli import executors, output_files
 from posefield_train.cli.executors import Scheduler
 from posefield_train.source import shipped_recipes
@@ -30,26 +31,21 @@ class Protocol(StrEnum):
     TRUTH = "truth"
 
 
-def evaluate(
-    recipe: Annotated[
-        Path,
-        typer.Argument(help="recipe (TOML file or name of a shipped recipe)", metavar="RECIPE"),
-    ],
-    data: Annotated[
-        Path | None,
-        typer.Option(help="folder of the motion data; default: the recipe's folder"),
-    ] = None,
+@dataclass(frozen=True)
+class EvaluateOptions:
+    """Options of an evaluation. protocol: None for all that the recipe allows."""
+
     protocol: Annotated[
         list[Protocol] | None,
         typer.Option(
             help="hold out clips or performers, or compare with the noise-free truth; may be "
             "repeated; default: all"
         ),
-    ] = None,
-    report: Annotated[Path | None, typer.Option(help="output .html report")] = None,
+    ] = None
+    report: Annotated[Path | None, typer.Option(help="output .html report")] = None
     json_file: Annotated[
         Path | None, typer.Option("--json", help="output .json file", metavar="FILE")
-    ] = None,
+    ] = None
     joined: Annotated[
         Path | None,
         typer.Option(
@@ -57,37 +53,41 @@ def evaluate(
             "support flag detects",
             metavar="RECIPE",
         ),
-    ] = None,
+    ] = None
     learning: Annotated[
         bool,
         typer.Option(
             help="compare the errors after suggested and after random captures, for the "
             "procedural family"
         ),
-    ] = False,
-    scheduler: Scheduler = None,
+    ] = False
+    scheduler: Scheduler = None
+
+    @property
+    def protocols(self) -> list[str]:
+        """Names of the wanted protocols; empty for all that the recipe allows."""
+        return [one.value for one in self.protocol or []]
+
+
+@with_option_groups
+def evaluate(
+    recipe: Annotated[
+        Path,
+        typer.Argument(help="recipe (TOML file or name of a shipped recipe)", metavar="RECIPE"),
+    ],
+    wanted: EvaluateOptions,
+    data: Annotated[
+        Path | None,
+        typer.Option(help="folder of the motion data; default: the recipe's folder"),
+    ] = None,
 ) -> None:
     """Measure the error of a recipe's models on held-out motions, and compare other methods.
 
     Each fold fits the whole model again without the held-out clips.
     """
-    output_files.expect_html(report)
-    asked = [one.value for one in protocol or []]
-    wanted = _EvaluateOptions(asked, report, json_file, scheduler, joined, learning)
+    output_files.expect_html(wanted.report)
     recipe_file = shipped_recipes.file_of(recipe, data)
     _evaluate(recipe_file, data or recipe_file.parent, wanted)
-
-
-@dataclass(frozen=True)
-class _EvaluateOptions:
-    """Options of the command. protocols: empty for all that the recipe allows."""
-
-    protocols: list[str]
-    report: Path | None
-    json_file: Path | None
-    scheduler: str | None
-    joined: Path | None
-    learning: bool
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class _Family:
     examples: "list[Example]"
 
 
-def _evaluate(recipe_file: Path, data: Path, wanted: _EvaluateOptions) -> None:
+def _evaluate(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> None:
     from posefield_train.evaluate import evaluation_summary
 
     # Errors in the arguments are reported before minutes of work.
@@ -119,7 +119,7 @@ def _evaluate(recipe_file: Path, data: Path, wanted: _EvaluateOptions) -> None:
         )
 
 
-def _family(recipe_file: Path, data: Path, wanted: _EvaluateOptions) -> _Family:
+def _family(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> _Family:
     """Read a recipe's family. Raises InvalidField for options that it does not allow."""
     from posefield_train.evaluate import protocol
     from posefield_train.source import ingest, recipe
@@ -143,7 +143,7 @@ class _JoinedFamily:
     flags: "SupportFlags"
 
 
-def _joined(own: _Family, data: Path, wanted: _EvaluateOptions) -> _JoinedFamily | None:
+def _joined(own: _Family, data: Path, wanted: EvaluateOptions) -> _JoinedFamily | None:
     """Return None if no other family is named."""
     from posefield_train.evaluate import support_flags
     from posefield_train.source import ingest, recipe
@@ -157,7 +157,7 @@ def _joined(own: _Family, data: Path, wanted: _EvaluateOptions) -> _JoinedFamily
     )
 
 
-def _protocols(own: _Family, wanted: _EvaluateOptions) -> "list[EvaluationResult]":
+def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]":
     """Run the protocols and print each result when it is complete."""
     from posefield.console.progress import ProgressBar
     from posefield_train.evaluate import corrections, evaluation_summary, protocol
@@ -200,7 +200,7 @@ def _extra_results(
     return more
 
 
-def _learning(wanted: _EvaluateOptions) -> "Learning | None":
+def _learning(wanted: EvaluateOptions) -> "Learning | None":
     """Measure the learning curves; None if they are not wanted."""
     from posefield.console.progress import ProgressBar
     from posefield_train.evaluate import learning_curves

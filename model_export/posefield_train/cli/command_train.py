@@ -9,8 +9,9 @@ from posefield.common import atomic_files
 from posefield.common.errors import InvalidField, TrainingError
 from posefield.console.arguments import Json
 from posefield.console.output import as_json
+from posefield.console.question_options import with_option_groups
 from posefield_train.cli import executors, output_files
-from posefield_train.cli.executors import ExecutorOptions, Scheduler
+from posefield_train.cli.executors import ExecutorOptions
 from posefield_train.cli.progress_messages import ProgressPrinter
 from posefield_train.source import shipped_recipes
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from posefield_train.source.recipe import Recipe
 
 
+@with_option_groups
 def train_command(
     recipes: Annotated[
         list[Path],
@@ -31,6 +33,7 @@ def train_command(
         Path,
         typer.Option("--output", "-o", help="output .onnx file; for several recipes, a folder"),
     ],
+    executor: ExecutorOptions,
     data: Annotated[
         Path | None,
         typer.Option(help="folder of the motion data; default: the recipe's folder"),
@@ -41,21 +44,17 @@ def train_command(
             help="output .html report of the training; a .json file is written next to it"
         ),
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(help="for several recipes: number of processes")
-    ] = None,
-    scheduler: Scheduler = None,
     json: Json = False,
 ) -> None:
     """Train the model of each recipe and write it as one .onnx file."""
     output_files.expect_html(report)
     recipe_files = [shipped_recipes.file_of(given, data) for given in recipes]
-    if len(recipe_files) == 1 and (jobs, scheduler) == (None, None):
+    if len(recipe_files) == 1 and executor == ExecutorOptions():
         _train(recipe_files[0], data, output, report, json)
     elif report:
         raise InvalidField("report", "of several recipes or on a cluster, expected none")
     else:
-        _sweep(recipe_files, data, output, ExecutorOptions(jobs, scheduler), json)
+        _sweep(recipe_files, data, output, executor, json)
 
 
 def _train(

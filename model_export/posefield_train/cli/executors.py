@@ -28,8 +28,10 @@ class ExecutorOptions:
     None for this machine.
     """
 
-    jobs: int | None
-    scheduler: str | None
+    jobs: Annotated[int | None, typer.Option(help="for several recipes: number of processes")] = (
+        None
+    )
+    scheduler: Scheduler = None
 
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:

@@ -5,6 +5,7 @@ import signal
 import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Self
@@ -24,69 +25,84 @@ from posefield.batch.run import RunOutcome, Shard
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, ModelPath
 from posefield.console.output import as_json
-from posefield.console.question_options import with_question_options
+from posefield.console.question_options import with_option_groups, with_question_options
 from posefield.model_file import checked_file
 from posefield.question.motion_question import FileQuestion
 from posefield.registry import model_loading
 
 
-@with_question_options(FileQuestion, without={"controls", "targets", "joint_sigma"})
-def export(
-    model: ModelPath,
-    output: Annotated[
-        str, typer.Option("--output", "-o", help="output folder or URL of an object store")
-    ],
-    question: FileQuestion,
+@dataclass(frozen=True)
+class RowArguments:
+    """Rows of an export, and the format of their clips."""
+
     table: Annotated[
         Path | None,
         typer.Argument(
             help="CSV, Parquet or JSON Lines file, one row per clip", metavar="[QUERIES]"
         ),
-    ] = None,
+    ] = None
     grid: Annotated[
         list[str] | None,
         typer.Option(
             help="instead of a table: values of a control; exports every combination",
             metavar="NAME=VALUES",
         ),
-    ] = None,
+    ] = None
     sample: Annotated[
         int | None, typer.Option(help="instead of a table: number of random control points")
-    ] = None,
+    ] = None
     method: Annotated[
         str | None, typer.Option(help="sampling method of --sample: latin or hull")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="random seed of --sample")] = None,
-    form: Annotated[str, typer.Option("--format", help="file format of the clips")] = "usdc",
-    layout: Annotated[
-        str, typer.Option(help=f"layout of the output: {', '.join(LAYOUTS)}")
-    ] = "folder",
+    ] = None
+    seed: Annotated[int | None, typer.Option(help="random seed of --sample")] = None
+    form: Annotated[str, typer.Option("--format", help="file format of the clips")] = "usdc"
+
+
+@dataclass(frozen=True)
+class RunArguments:
+    """Execution of an export, and the layout of its files."""
+
+    layout: Annotated[str, typer.Option(help=f"layout of the output: {', '.join(LAYOUTS)}")] = (
+        "folder"
+    )
     chunk: Annotated[
         int | None, typer.Option(help="rows per chunk; also the clips per archive")
-    ] = None,
+    ] = None
     workers: Annotated[
         int | None, typer.Option(help="number of processes; default: one per core")
-    ] = None,
+    ] = None
     scheduler: Annotated[
         str | None,
         typer.Option(
             help="run on the workers of this Dask scheduler; posefield must be installed on them",
             metavar="tcp://HOST:PORT",
         ),
-    ] = None,
+    ] = None
     shard: Annotated[
         str, typer.Option(help="export only part I of N; I is 0 to N-1", metavar="I/N")
-    ] = "0/1",
+    ] = "0/1"
     skip_errors: Annotated[
         bool, typer.Option("--skip-errors", help="skip invalid rows and list them")
-    ] = False,
+    ] = False
     verify: Annotated[
         bool,
         typer.Option(
             "--verify",
             help="verify the SHA-256 of files from earlier runs; default: verify only sizes",
         ),
-    ] = False,
+    ] = False
+
+
+@with_question_options(FileQuestion, without={"controls", "targets", "joint_sigma"})
+@with_option_groups
+def export(
+    model: ModelPath,
+    output: Annotated[
+        str, typer.Option("--output", "-o", help="output folder or URL of an object store")
+    ],
+    question: FileQuestion,
+    rows: RowArguments,
+    execution: RunArguments,
     json: Json = False,
 ) -> None:
     """Write a clip for each row of a table, or for each point of a grid or a sampling.
@@ -96,28 +112,29 @@ def export(
     """
     content = checked_file.read(model)
     opened = model_loading.open_model(model.stem, model, content)
-    asked = SourceOptions(table, tuple(grid or ()), sample, method, seed)
-    source = row_sources.open_source(asked, Defaults(form, question), opened)
-    rows = layouts.find_layout(layout).chunk if chunk is None else chunk
-    digest = hashlib.sha256(content).hexdigest()
+    asked = SourceOptions(rows.table, tuple(rows.grid or ()), rows.sample, rows.method, rows.seed)
+    source = row_sources.open_source(asked, Defaults(rows.form, question), opened)
+    found = layouts.find_layout(execution.layout)
     job = ExportJob(
         opened.identity,
-        digest,
+        hashlib.sha256(content).hexdigest(),
         source.digest,
-        layout,
-        rows,
+        execution.layout,
+        found.chunk if execution.chunk is None else execution.chunk,
         question.unit,
         question.up,
         question.names,
     )
-    part = Shard.parse(shard)
-    with _runner(workers, scheduler) as runner, ExportMonitor() as monitor:
-        work = WorkerInput(job, content, _absolute(output) if scheduler else output, skip_errors)
-        outcome = run.run(work, source, monitor, runner, part, verify)
-    _finish(output, outcome, monitor, verify, json)
+    part = Shard.parse(execution.shard)
+    place = _absolute(output) if execution.scheduler else output
+    with _runner(execution) as runner, ExportMonitor() as monitor:
+        work = WorkerInput(job, content, place, execution.skip_errors)
+        outcome = run.run(work, source, monitor, runner, part, execution.verify)
+    _finish(output, outcome, monitor, execution.verify, json)
 
 
-def _runner(workers: int | None, scheduler: str | None) -> AbstractContextManager[Runner]:
+def _runner(execution: RunArguments) -> AbstractContextManager[Runner]:
+    workers, scheduler = execution.workers, execution.scheduler
     if workers is not None and scheduler is not None:
         raise InvalidField("workers", f"{workers}, but a scheduler has its own; expected one")
     if workers is not None and workers < 1:

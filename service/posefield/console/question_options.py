@@ -1,9 +1,10 @@
-"""Command-line options generated from the fields of a command's question."""
+"""Command-line options from the fields of a command's question and of its option groups."""
 
 import functools
 import inspect
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import Annotated, Any, Literal, get_origin
+from dataclasses import MISSING, fields, is_dataclass
+from typing import Annotated, Any, Literal, get_origin, get_type_hints
 
 import typer
 from msgspec import Struct
@@ -60,6 +61,41 @@ def with_question_options(
         return run
 
     return decorate
+
+
+def with_option_groups(command: Command) -> Command:
+    """Return the command with an option for each field of its parameters that are dataclasses.
+
+    The fields have typer's annotations, as parameters would.
+    """
+    own = inspect.signature(command, eval_str=True).parameters.values()
+    groups: dict[str, Any] = {p.name: p.annotation for p in own if is_dataclass(p.annotation)}
+
+    @functools.wraps(command)
+    def run(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{f.name: given.pop(f.name) for f in fields(group)})
+        command(**given)
+
+    every = [q for p in own for q in (_members(groups[p.name]) if p.name in groups else [p])]
+    every = [p.replace(kind=p.KEYWORD_ONLY) for p in every]
+    run.__signature__ = inspect.Signature(every)  # type: ignore[attr-defined]
+    run.__annotations__ = {p.name: p.annotation for p in every}
+    return run
+
+
+def _members(group: Any) -> list[inspect.Parameter]:
+    """Return a parameter for each field of a dataclass."""
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        inspect.Parameter(
+            each.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=inspect.Parameter.empty if each.default is MISSING else each.default,
+            annotation=hints[each.name],
+        )
+        for each in fields(group)
+    ]
 
 
 def _option(parameter: Parameter, default: Any) -> inspect.Parameter:
