@@ -1,6 +1,6 @@
-"""What a pose costs by posefield_client, beside httpx alone: the same URL, the same body, read into
-the same arrays. The first asks for keywords, makes the URL, looks whether it has the answer, checks
-what came and would ask again; the second has a URL.
+"""Cost of a pose by posefield_client, beside httpx alone: the same URL, the same body, read into
+the same arrays. The first takes keywords, builds the URL, looks in its cache, checks the response
+and would retry; the second has a URL.
 
     .venv/bin/python benchmarks/client.py [MODEL]
 
@@ -35,7 +35,7 @@ def main() -> None:
 
 
 def rows(model: Path) -> list[Row]:
-    """How many times as long a pose takes; once with the real service, once with none."""
+    """Return the time of a pose relative to httpx alone, with the real service and with none."""
     with serve_process.posefield(model) as real, Client(real.url) as client:
         asked = client.model(model.stem)
         controls = {name: control.default for name, control in asked.controls.items()}

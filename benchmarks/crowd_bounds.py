@@ -1,4 +1,4 @@
-"""What bounds a pose: floating-point work or memory, and which operators take the time."""
+"""Limits of a pose's time: floating-point work or memory, and the time of each operator."""
 
 from collections.abc import Callable
 

@@ -15,7 +15,7 @@ from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import UniversalKriging
 
 Answer = Callable[[], list[Singles]]
-"""What answers with rotations (N, J, 4)."""
+"""Function that returns rotations (N, J, 4)."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What one core of this machine can do at most, as far as plain code finds out."""
+"""Peak speed of one core of this machine, as far as plain code can measure it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

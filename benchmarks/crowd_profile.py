@@ -1,7 +1,7 @@
-"""Where the time of a level goes in the graph, by onnxruntime's own profiler.
+"""Time of a level by groups of the graph's operators, by onnxruntime's own profiler.
 
-Operators are told apart by which of the graph's outputs hang on them, so that nothing here depends
-on how the graph is written inside.
+Operators are grouped by the graph's outputs that depend on them, so that nothing here assumes how
+the graph is written inside.
 """
 
 import json
@@ -26,7 +26,7 @@ RUNS = 200
 
 @dataclass(frozen=True)
 class Part:
-    """What a group of operators takes of a run: seconds; numbers that it puts out."""
+    """Cost of a group of operators in a run: seconds; numbers that it outputs."""
 
     seconds: float
     numbers: int
@@ -72,7 +72,7 @@ QUATERNIONS, REST = "quaternions, made and put in order", "everything else"
 
 
 def _groups(graph: Any) -> dict[str, str]:
-    """Group of each node by its name: of the first output, in this order, that hangs on it."""
+    """Return each node's group by its name: of the first output, in this order, that needs it."""
     made_by = {output: node for node in graph.node for output in node.output}
     rules: dict[str, Callable[[Any], str]] = {
         "duration": lambda node: KRIGING if _is_product(node) else COVARIANCES,
@@ -94,7 +94,7 @@ def _is_product(node: Any) -> bool:
 
 
 def _behind(output: str, made_by: dict[str, Any]) -> list[Any]:
-    """Nodes that an output hangs on."""
+    """Return the nodes that an output needs."""
     found: dict[str, Any] = {}
     waiting = [output]
     while waiting:

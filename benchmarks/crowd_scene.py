@@ -1,4 +1,4 @@
-"""A crowd around a camera: what is asked of it, and at which levels."""
+"""Crowd around a camera: its questions and levels of detail."""
 
 import math
 from collections.abc import Callable
@@ -38,7 +38,7 @@ class Scene:
         return len(self.times)
 
     def poses(self, detail: Indices | LevelCriteria) -> Callable[[], CrowdPoses]:
-        """What answers for the crowd, from controls to quaternions where everybody stands."""
+        """Return a function that makes the crowd's placed quaternions from its controls."""
         names = (control.name for control in self.model.session.card.controls)
         question = CrowdQuestion(
             dict(zip(names, self.controls.T, strict=True)),

@@ -23,7 +23,7 @@ from posefield.motion.skeleton import Skeleton
 
 CHARACTERS, FRAMES, JOINTS, SHARED, BATCH = 500, 100, 31, 20, 50
 LISTED, COPIED = 10, 50
-"""How many characters the schema API is timed with; its time grows with their number."""
+"""Numbers of characters to time the schema API with; its time grows with their number."""
 SIZE = f"{CHARACTERS} characters × {FRAMES} frames × {JOINTS} joints"
 
 
@@ -124,7 +124,7 @@ def _arrays(made: Motions, index: int, frame: int) -> tuple[Any, Any]:
 def _schemas(
     person: Skeleton, made: Motions, count: int, convert: Convert, path: Path
 ) -> Callable[[], None]:
-    """What writes so many characters as the schema API's own examples do."""
+    """Return a function that writes `count` characters as the schema API's examples do."""
 
     def run() -> None:
         path.unlink(missing_ok=True)

@@ -36,8 +36,8 @@ APART = 15
 @dataclass(frozen=True)
 class Walk:
     """K = F N poses of N characters, frame after frame: controls (K, d), labels (K, p) and times
-    (K, 1), s, as the graph takes them, and pixels (K,) that a metre covers on each; none where the
-    camera is in somebody's body, who is then at the finest level."""
+    (K, 1), s, as the graph takes them, and pixels (K,) per metre at each; NaN where the camera is
+    inside a character, which is then at the finest level."""
 
     model: Synthesizer
     controls: Singles
@@ -54,7 +54,7 @@ class Walk:
         return levels
 
     def posed(self, levels: Indices) -> Callable[[], None]:
-        """What makes all poses, those of a level together."""
+        """Return a function that makes all poses, level by level."""
 
         def run() -> None:
             for level, rows in _parts(levels):
@@ -63,7 +63,7 @@ class Walk:
         return run
 
     def live(self, levels: Indices) -> Callable[[], None]:
-        """What makes all poses, one frame after the other."""
+        """Return a function that makes all poses, frame by frame."""
 
         def run() -> None:
             for first in range(0, len(levels), COUNT):
@@ -123,7 +123,7 @@ def _walk(gait: Gait, plan: LocomotionPlan) -> Walk:
 
 
 def _scale(model: Synthesizer, plan: LocomotionPlan) -> Floats:
-    """Pixels (K,) that a metre covers on each to somebody who stands in the middle."""
+    """Return the pixels (K,) per metre at each character, seen from the middle."""
     middle = plan.places[:, 0].mean()
     camera = Camera(floor_plane.at_height(middle, np.array(EYES)), FOV, HEIGHT)
     bodies = floor_plane.at_height(plan.places.T.ravel(), np.zeros(1)) + model.rest_position

@@ -1,4 +1,4 @@
-"""What it costs to hold an answer to a target: a clip and a pose, beside those as predicted."""
+"""Cost of constraining an answer to a target: a clip and a pose, beside the predicted ones."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Asked:
     targets: tuple[PositionConstraint, ...]
 
     def state(self, frames: int) -> PredictionState:
-        """What the poses of some frames are made of."""
+        """Return the prediction state of some frames."""
         return self.opened.state(self.point, self.times[-frames:])
 
     def plain(self, frames: int) -> Callable[[], object]:
@@ -41,7 +41,7 @@ class Asked:
         return lambda: self.opened.run(self.point, self.times[None, -frames:], *OUTPUTS)
 
     def exact(self, frames: int) -> Callable[[], object]:
-        """Poses held to one target after the other."""
+        """Return a function that poses with the next target."""
         target = cycle(self.targets)
 
         def run() -> object:
@@ -53,7 +53,7 @@ class Asked:
 
 
 def rows(made: Family) -> list[Row]:
-    """A clip and a pose held to a target, beside one another and beside plain ones."""
+    """Compare a clip and a pose constrained to a target with each other and plain ones."""
     asked = _asked(made)
     runs = {
         "plain clip": asked.plain(FRAMES),

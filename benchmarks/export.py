@@ -1,4 +1,4 @@
-"""How fast many clips become files, where the time goes, and what memory it takes.
+"""Speed of exporting many clips to files, the time of each stage, and the memory.
 
     python benchmarks/export.py MODEL [--clips 2000] [--format usdc] [--long 100000]
 
@@ -147,7 +147,7 @@ def _processes(bench: Bench, clips: int, form: str) -> Row:
 
 
 def _shares(bench: Bench, form: str, whole: float) -> list[Row]:
-    """What each stage takes of a clip, and what is left of the whole for all else."""
+    """Return the time of a clip in each stage, and the rest of the whole."""
     seconds = _stages(bench, form)
     seconds["all else: chunks, parts, folders"] = whole - sum(seconds.values())
     return [

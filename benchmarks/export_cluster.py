@@ -1,4 +1,4 @@
-"""How an export scales over Dask workers, and what Dask costs against a pool of processes.
+"""Scaling of an export over Dask workers, and the cost of Dask against a pool of processes.
 
     python benchmarks/export_cluster.py MODEL [--clips 8192] [--format usdc]
 

@@ -24,7 +24,7 @@ GOALS = {"glb": 5.0, "bvh": 5.0}
 
 
 def rows(made: Family) -> list[Row]:
-    """What a clip of 100 frames takes to synthesise, and what to write in each format."""
+    """Time the synthesis of a clip of 100 frames, and its writing in each format."""
     model = Synthesizer("reaching", session.open_bytes(made.exported.content, "reaching"))
     question = _question(model)
     answers = [clips.synthesize_clip(model, question)] * BATCH

@@ -123,7 +123,7 @@ def _package(answers: list[ClipAnswer]) -> list[Row]:
 
 
 def _others(answers: list[ClipAnswer]) -> list[Row]:
-    """What an animation alone takes, a clip that warns, the first clips of a length, a library."""
+    """Time an animation alone, a clip that warns, the first clips of a length, a library."""
     taken = in_turn(
         {
             "whole": lambda: usd_clip.usdc(answers, METRES),

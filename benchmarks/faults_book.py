@@ -1,4 +1,4 @@
-"""What became of requests, and what must never become of one."""
+"""Record of the requests' outcomes, and of those that must never occur."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -12,7 +12,7 @@ UNAVAILABLE = ("overloaded", "late", "not-ready", "unsaid")
 """Problems that may be answered with 503, as the contract says; an answer to HEAD has no body."""
 
 GONE = (OSError, EOFError, TimeoutError)
-"""What a connection raises that does not answer."""
+"""Errors of a connection that does not answer."""
 
 NOTICED = 5.0
 """Seconds after which a client that shares a busy machine has noticed that a connection broke."""
@@ -21,7 +21,7 @@ NOTICED = 5.0
 @dataclass
 class Book:
     """right: right answers by status. refused: documented 503 by their problem. faulty: answers to
-    clients that broke the rules, by status. away: connections refused while nobody listened.
+    clients that broke the rules, by status. away: connections refused while no server ran.
     killed: when a process was killed; broken: connections that this ended. versions: answers under
     a plain name by which version they were of. scene: what began last, and when. wrong: what must
     not be, a line each."""

@@ -125,14 +125,14 @@ async def sending_too_much(site: Site, rng: random.Random) -> None:
 
 
 async def sending_garbage(site: Site, rng: random.Random) -> None:
-    """What is no request."""
+    """Send bytes that are not a request."""
     name = rng.choice([*GARBAGE, "noise"])
     content = GARBAGE.get(name) or rng.randbytes(rng.randint(1, 3000)) + b"\r\n\r\n"
     await _break(site, name, content, {400})
 
 
 async def watching(site: Site, rng: random.Random) -> None:
-    """What operators ask."""
+    """Request the operators' endpoints."""
     wire = await _connected(site)
     for path in ("/livez", "/readyz", "/metrics", "/v1/models"):
         try:

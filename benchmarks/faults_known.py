@@ -29,7 +29,7 @@ JSON = ("Content-Type: application/json",)
 
 @dataclass(frozen=True)
 class Answer:
-    """What came back; headers by their names in small letters."""
+    """HTTP response; headers by their names in lower case."""
 
     status: int
     headers: Mapping[str, str]
@@ -44,7 +44,7 @@ class Answer:
         return str(orjson.loads(self.body)["type"]) if self.body else "unsaid"
 
     def is_like(self, other: "Answer") -> bool:
-        """Whether it says the same, to the byte but for what no two answers share."""
+        """Compare byte for byte, except for values unique to each answer."""
         if (self.status, self.headers.get("etag")) != (other.status, other.headers.get("etag")):
             return False
         if self.status >= 400:
@@ -207,7 +207,7 @@ def _grids(controls: Sequence[Control], rng: random.Random) -> Iterator[Question
 
 
 def _refused(controls: Sequence[Control], rng: random.Random) -> Iterator[Question]:
-    """What breaks the contract's form, or has no answer."""
+    """Yield questions that violate the contract, or have no answer."""
     point = _point(controls, rng)
     asked = urlencode({**point, "time": 0.1})
     yield Question("GET", f"/pose?{asked}&time=nan")

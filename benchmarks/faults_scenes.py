@@ -1,4 +1,4 @@
-"""What is done to the service and its models while clients ask."""
+"""Disturbances of the service and its models during requests."""
 
 import asyncio
 import os

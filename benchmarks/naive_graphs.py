@@ -25,8 +25,8 @@ ABOUT = {"producer_name": "posefield", "producer_version": "naive"}
 
 
 def numbers(made: Family) -> Floats:
-    """What naive kriging averages (N, T, 3 + 4 J): root positions, and rotation vectors turned
-    beforehand as they are in the model, so that decoding costs both the same."""
+    """Return the values (N, T, 3 + 4 J) that naive kriging averages: root positions, and rotation
+    vectors turned beforehand as in the model, so that decoding costs both the same."""
     means = made.trained.model.decoder.means
     vectors = decoder.half_angle_products(means, made.vectors[..., 3:])
     return np.concatenate([made.vectors[..., :3], vectors], axis=-1)

@@ -1,4 +1,4 @@
-"""What a newcomer waits for."""
+"""Time of a newcomer's first demo."""
 
 import subprocess
 import tempfile

@@ -19,7 +19,7 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Whether the goal is met; None where there is none."""
+        """Return whether the goal is met; None without a goal."""
         if self.goal is None:
             return None
         return self.value <= self.goal if self.ratio is None else self.ratio >= self.goal

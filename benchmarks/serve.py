@@ -1,4 +1,4 @@
-"""What requests cost the service, beside a handler that does nothing but ask the model.
+"""Cost of requests to the service, beside a handler that does nothing but run the model.
 
     make build/models/reaching.onnx && .venv/bin/python benchmarks/serve.py [MODEL]
 
@@ -188,7 +188,7 @@ def _share(name: str, own: Sequence[Cost], base: Sequence[Cost], goal: float | N
 
 
 def _gain(name: str, own: Sequence[Cost], base: Sequence[Cost]) -> Row:
-    """How many times the processor time the bare handler's 200 takes: at least as much."""
+    """Return the bare handler's processor time of a 200 as a multiple: at least 1."""
     ratios = [b.each / a.each for a, b in zip(own, base, strict=True)]
     value = _best(cost.each for cost in own)
     return Row(name, value, "µs", _words(own, base, ratios), statistics.median(ratios), 1.0)

@@ -47,7 +47,7 @@ def main() -> None:
 
 
 async def run(folder: Path, model: bytes, seconds: float, seed: int) -> list[str]:
-    """What was wrong, a line each."""
+    """Return the faults, a line each."""
     book, contents = Book(), (model, faults_known.other_version(model))
     known = await asyncio.to_thread(faults_known.of, ("reaching", "plain"), contents)
     print(f"{len(known)} questions of known answers", flush=True)
@@ -86,7 +86,7 @@ def report(stage: Stage, seconds: float) -> None:
 
 
 def _untried(stage: Stage) -> list[str]:
-    """What did not happen, so that nothing can be said of it."""
+    """List the scenes, versions and statuses that did not occur."""
     scenes = [scene.__name__ for scene in (*MODEL_SCENES, killing, restarting)]
     lines = [f"{name} was not tried" for name in scenes if not stage.done[name]]
     if len(stage.book.versions) < len(stage.contents):

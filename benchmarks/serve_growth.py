@@ -1,4 +1,4 @@
-"""Whether the service's memory grows over a million requests.
+"""Growth of the service's memory over a million requests.
 
     make build/models/reaching.onnx && .venv/bin/python benchmarks/serve_growth.py [MODEL]
 
@@ -27,7 +27,7 @@ FLAT = 1.0
 
 
 def rows(model: Path, total: int = TOTAL) -> list[Row]:
-    """What memory grows by, and by how much a request on average."""
+    """Return the growth of memory, in all and per request."""
     counts, sizes = measured(model, total)
     slope = np.polyfit(counts[1:], sizes[1:], 1)[0] * 1e6
     said = (

@@ -17,8 +17,8 @@ SCRIPT = Path(__file__).with_name("serve_load.lua")
 
 @dataclass(frozen=True)
 class Load:
-    """What wrk sends: requests in their order, again and again, over so many connections for so
-    many whole seconds, each connection waiting `think` ms on average before it asks again."""
+    """Load by wrk: requests in their order, repeatedly, over `connections` for whole `seconds`;
+    each connection waits `think` ms on average before it asks again."""
 
     requests: tuple[bytes, ...]
     connections: int
@@ -28,7 +28,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Cost:
-    """What came of it: requests, seconds, the server's processor time, and latencies, s.
+    """Result of a load: requests, seconds, the server's processor time, and latencies, s.
 
     size: bytes of an answer, its head among them.
     """

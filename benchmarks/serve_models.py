@@ -1,4 +1,4 @@
-"""What models cost the process that answers for them: start, memory, and waiting while one changes.
+"""Cost of models to the process that serves them: start, memory, and waiting while one changes.
 
 .venv/bin/python benchmarks/serve_models.py [MODEL]
 

@@ -43,7 +43,7 @@ Read = Callable[[Any], Any]
 
 @dataclass(frozen=True)
 class Place:
-    """Where a rival runs: its programs, a folder of its own, the model and a port."""
+    """Place of a rival: its programs, a folder of its own, the model and a port."""
 
     programs: Path
     folder: Path

@@ -32,7 +32,7 @@ IDLE = 0.3
 
 @dataclass(frozen=True)
 class Cost:
-    """What a request took: seconds of CPU time and peak megabytes of the service's process and of
+    """Cost of a request: seconds of CPU time and peak megabytes of the service's process and of
     the largest that it started.
 
     late: seconds of CPU time that the same request takes once no client waits for it, until the

@@ -125,7 +125,7 @@ def unpacked(kind: str, content: bytes) -> dict[str, bytes]:
 
 
 def contains(whole: Any, part: Any) -> bool:
-    """Whether `part` is an excerpt of `whole`: fewer keys, the same values."""
+    """Return whether `part` is an excerpt of `whole`: fewer keys, the same values."""
     if isinstance(part, dict):
         return all(key in whole and contains(whole[key], part[key]) for key in part)
     if isinstance(part, list):

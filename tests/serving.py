@@ -39,7 +39,7 @@ def started(command, **environ):
 
 
 def address(child) -> str:
-    """Where the service says it listens: the one line that it prints."""
+    """Return the service's address, from the one line that it prints."""
     return child.stdout.readline().decode().split()[-1]
 
 
@@ -55,7 +55,7 @@ def children(pid):
 
 
 def within(seconds, is_so):
-    """Whether something becomes so in time."""
+    """Wait for `is_so()`; return its last value."""
     until = time.monotonic() + seconds
     while not (found := is_so()) and time.monotonic() < until:
         time.sleep(0.02)

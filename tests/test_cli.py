@@ -248,7 +248,7 @@ def test_train_tells_people_the_same(posefield, train_words, tmp_path):
 
 
 def test_train_finds_its_data_beside_the_recipe(posefield, quick, tmp_path):
-    """Where --data is not given; this recipe stands elsewhere, so its table is not found."""
+    """Omit --data; this recipe stands elsewhere, so its table is not found."""
     said = refused_after_progress(posefield, 3, "train", quick, "-o", tmp_path / "x.onnx")
     assert f"{quick.parent}: no file 'clips.csv'" in said
 

@@ -48,7 +48,7 @@ def canonical(name: str) -> str:
 
 
 def shipped() -> dict[str, Distribution]:
-    """What is installed with the service, the training job and the client, with every extra."""
+    """Return the packages installed with the service, training job and client, with every extra."""
     found: dict[str, Distribution] = {}
     seen: set[tuple[str, str]] = set()
     wanted = [("posefield", ""), ("posefield-client", "")]
@@ -87,7 +87,7 @@ def alternatives(expression: str) -> list[str]:
 
 
 def free(found: list[str]) -> bool:
-    """Whether there is a licence to choose that is not copyleft."""
+    """Return whether a licence can be chosen that is not copyleft."""
     return any(not COPYLEFT.search(each) for each in found)
 
 

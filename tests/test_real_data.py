@@ -80,7 +80,7 @@ WRITTEN = 0.00051
 
 @pytest.fixture(scope="module")
 def table(made, real_data):
-    """What others measured of the clips, by column."""
+    """Return others' measurements of the clips, by column."""
     own, examples, *_ = made
     with data_folder.find(real_data, own.clips.table).open("rb") as file:
         # The heading is line one.

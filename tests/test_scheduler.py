@@ -31,7 +31,7 @@ except ClusterError as fault:
 
 
 def connect(address):
-    """What connecting ends in."""
+    """Connect, and return the outcome."""
     words = [sys.executable, "-c", CONNECT, address]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     return done.stdout.strip()

@@ -78,7 +78,7 @@ def patches(tree: ast.Module) -> Iterator[int]:
 
 
 def asserts(test: ast.AST) -> bool:
-    """Whether a test asserts in its own words, or calls what says in its name that it does."""
+    """Return whether a test asserts, or calls a function whose name says that it does."""
     for node in ast.walk(test):
         if isinstance(node, ast.Assert):
             return True

@@ -18,7 +18,7 @@ BIN = Path(sys.executable).parent
 
 @pytest.fixture(scope="module")
 def address(models):
-    """Where a service listens that is a process of its own, with the models of api/examples."""
+    """Yield the address of a service in its own process, with the models of api/examples."""
     with serving.process(models) as child:
         yield serving.address(child)
 

@@ -62,7 +62,7 @@ def signed(tmp_path_factory):
 
 @pytest.fixture
 def as_(guarded, issued):
-    """Ask as somebody, by the name of their key."""
+    """Return a function that asks with a named key."""
     ask = asker(guarded)
     bearer = {name: {"Authorization": f"Bearer {key}"} for name, key in issued.items()}
     return lambda who, method, url, **content: ask(method, url, headers=bearer[who], **content)

@@ -49,7 +49,7 @@ def asked(controls, count, extension="usdc"):
 
 
 def settled(made):
-    """How many were made when no more are."""
+    """Return the final number of clips made."""
     count = -1
     while count != len(made):
         count = len(made)

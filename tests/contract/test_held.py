@@ -155,7 +155,7 @@ def test_what_is_held_to_nothing_takes_no_targets(ask, operation):
 
 
 def places(clip, joint):
-    """Where a joint of a clip's JSON is in each frame."""
+    """Return a joint's positions in the frames of a clip's JSON."""
     rotations, roots = np.array(clip["rotations"]), np.array(clip["root_position"])
     offsets = np.array(clip["bone_offsets"])
     translations = np.repeat(offsets[None], len(roots), axis=0)

@@ -65,7 +65,7 @@ def test_strange_escapes_are_no_failure(path, place):
 
 
 def test_a_wish_for_http_2_is_not_heeded_and_its_body_not_taken_for_empty(place):
-    """What Java's client sends first; httptools stops reading after such a head."""
+    """Send the first head of Java's client, after which httptools stops reading."""
     wish = b"Connection: Upgrade, HTTP2-Settings\r\nUpgrade: h2c\r\nHTTP2-Settings: AA\r\n"
     (answer,) = exchange(place, LIVE.replace(b"\r\n\r\n", b"\r\n" + wish + b"\r\n"))
     assert answer.status == 200

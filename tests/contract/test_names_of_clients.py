@@ -104,7 +104,7 @@ def request(example):
 
 
 def by_hook(models, plant):
-    """Answers to all that is asked, and what the process asked of the system meanwhile."""
+    """Return the answers to all requests, and the process's audit events meanwhile."""
     reading, writing = os.pipe()
     environ = {"WATCH": str(writing), **({"PLANT": "1"} if plant else {})}
     answers = served(models, [sys.executable], environ, (writing,), plant)

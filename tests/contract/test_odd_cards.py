@@ -111,7 +111,7 @@ class Tried:
         return answer.json()
 
     def answers(self, session: Session) -> list[Any]:
-        """What the graph alone decides of the answers of a session, of which there is each kind."""
+        """Request each kind of answer of a session; return the parts that the graph decides."""
         card = session.card
         self.models.registry = ModelRegistry({"odd": Synthesizer("odd", session)})
         self.schema.validate(self.get())

@@ -70,7 +70,7 @@ def test_a_closed_service_shows_its_pages_to_everybody(loaded):
 
 
 def loads(page: str) -> list[str]:
-    """What a page would fetch."""
+    """Return the markup that makes a page fetch."""
     return re.findall(r"<link|<iframe|<img|<object|\ssrc=|\son\w+=|\sstyle=|@import", page)
 
 

@@ -61,7 +61,7 @@ def made(form):
 
 
 def compare(name, form):
-    """What differs between a schema of the contract and a type."""
+    """Yield the differences between a schema of the contract and a type."""
     agreed, (own, resolve) = AGREED.document["components"]["schemas"][name], made(form)
     yield from agreed["properties"].keys() ^ own["properties"].keys()
     yield from set(agreed["required"]) ^ set(own["required"])

@@ -230,8 +230,8 @@ def narrowed(spec, card):
 
 
 def narrow_holds(parts, card, times):
-    """What this model can be held to: no control of it is measured, it has no feet to pin, and
-    which places are out of reach, or that two targets differ, cannot be said in a schema."""
+    """Narrow the constraints to this model's: none of its controls is measured, it has no feet to
+    pin, and no schema can say which places are out of reach, or that two targets differ."""
     parts["schemas"]["PinFeet"] = {"type": "boolean", "enum": [False]}
     parts["schemas"]["Exact"] = parts["parameters"]["exact"]["schema"] = {"enum": ["auto", "none"]}
     parts["schemas"]["Extrapolate"] = {"enum": ["warn"]}

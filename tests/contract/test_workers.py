@@ -62,7 +62,7 @@ def is_alive(pid):
 
 
 def answers(url):
-    """Whether a new connection is answered; one to a process that has just died may not be."""
+    """Return whether a new connection is answered; one to a process that just died may not be."""
     try:
         return httpx.get(url + "/readyz", timeout=10).status_code == 200
     except httpx.TransportError:

@@ -40,7 +40,7 @@ Models = dict[str, tuple[Synthesizer, bytes]]
 
 @dataclass(frozen=True)
 class Row:
-    """How far the joints are from what is expected of them, or must not be."""
+    """Largest differences of the joints; within tolerance just where `meant`."""
 
     name: str
     metres: float
@@ -49,12 +49,12 @@ class Row:
 
     @property
     def good(self) -> bool:
-        """Whether it is as it should be."""
+        """Return whether it is as `meant`."""
         return (self.metres <= FURTHEST and self.turn <= TURNED) == self.meant
 
 
 def faults() -> list[str]:
-    """What is not as it should be, in both Blenders."""
+    """Return the add-on's faults in both Blenders."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         models = _models()
@@ -85,7 +85,7 @@ def _built(folder: Path) -> Path:
 
 
 def _driven(python: Path, archive: Path, folder: Path, models: Models) -> dict[str, Any]:
-    """What the add-on did in one Blender, with a service of its own."""
+    """Return the add-on's results in one Blender, with a service of its own."""
     result = folder / f"{python.parents[1].name}.npz"
     # Nothing of the Blender that somebody uses here is read or changed.
     told = {"BLENDER_USER_RESOURCES": str(folder / python.parents[1].name), "POSEFIELD_LOG": "off"}
@@ -156,7 +156,7 @@ def _row(name: str, found: Any, meant: Clip, case: dict[str, Any], right: bool) 
 
 @dataclass(frozen=True)
 class _Expected:
-    """What a case should be, or what another question or body would give."""
+    """Expected clip of a case, or of another question or body."""
 
     case: dict[str, Any]
     offsets: Any

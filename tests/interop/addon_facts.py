@@ -12,7 +12,7 @@ def faults(facts: dict[str, Any]) -> list[str]:
 
 
 def _holds(*words: str) -> Any:
-    """Whether all words stand in what was said."""
+    """Return a check for all words in a text."""
     return lambda said: all(word in str(said) for word in words)
 
 

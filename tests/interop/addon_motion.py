@@ -93,7 +93,7 @@ def onto_existing():
 
 
 def existing(change):
-    """An armature as somebody else could have made it, with an action and Euler angles."""
+    """Return an armature as by another program, with an action and Euler angles."""
     afresh("reaching")
     bpy.ops.posefield.import_clip()
     armature = settings().character

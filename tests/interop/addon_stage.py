@@ -130,7 +130,7 @@ def wait():
 
 
 def said(call, **told):
-    """What an operator says when it fails; empty where it does not."""
+    """Return an operator's error message; empty if it succeeds."""
     try:
         call(**told)
     except RuntimeError as refusal:
@@ -146,14 +146,14 @@ def snapshot():
 
 
 def values(group):
-    """What a group of properties holds, by name; of what it points to, the name."""
+    """Return a group's properties by name; for a pointer, its target's name."""
     found = {name: getattr(group, name) for name in group.bl_rna.properties.keys()}
     del found["rna_type"]
     return {name: getattr(value, "name", value) for name, value in found.items()}
 
 
 def made():
-    """What an import makes, and the times of the scene."""
+    """Return the scene's objects, keyframes and times."""
     scene = bpy.context.scene
     keys = {}
     for action in bpy.data.actions:
@@ -200,7 +200,7 @@ def threads():
 
 
 def left():
-    """What of the add-on Blender knows."""
+    """Return the add-on's properties and handlers in Blender."""
     calls = (*bpy.app.handlers.load_pre, *bpy.app.handlers.load_post)
     known = [name for name in dir(bpy.types.Scene) if "posefield" in name]
     return known + [call.__name__ for call in calls if "posefield" in call.__module__]

@@ -26,7 +26,7 @@ from addon_stage import (
 )
 
 ELSEWHERE = "http://203.0.113.1:8000"
-"""An address that is nobody's."""
+"""Address without a host."""
 
 NOBODY = "no service answers at"
 
@@ -147,7 +147,7 @@ def hung_elsewhere(index, bone):
 
 
 def losses(file):
-    """What may happen between a question and its answer."""
+    """Disturb Blender between a question and its answer."""
     afresh("reaching")
     bpy.ops.posefield.import_clip()
     settings().live = True
@@ -190,7 +190,7 @@ def reload(file):
 
 
 def switched():
-    """The armature got an action of somebody else meanwhile, which must stay as it is."""
+    """Give the armature another action meanwhile, which must stay as it is."""
     afresh("reaching")
     bpy.ops.posefield.import_clip()
     settings().live = True

@@ -48,12 +48,12 @@ class Site:
     query: dict[str, float]
 
     def get(self, path: str, **headers: str) -> tuple[str, httpx.Response]:
-        """How the cache came by its answer, and the answer."""
+        """Return the cache status of an answer, and the answer."""
         answer = self.cache.get(path, params=self.query, headers=headers)
         return answer.headers.get("x-cache-status", ""), answer
 
     def asked(self, form: str, status: int) -> int:
-        """How often the service itself has answered with a clip of that format."""
+        """Count the service's own answers with a clip of that format."""
         labels = f'format="{form}",operation="getClipInFormat",status="{status}"'
         pattern = rf"^posefield_request_seconds_count{{{labels}}} (\S+)"
         found = re.search(pattern, self.service.get("/metrics").text, re.MULTILINE)
@@ -61,7 +61,7 @@ class Site:
 
 
 def faults() -> list[str]:
-    """What the cache does that it should not, or does not that it should, a line each."""
+    """Return the wrong and the missing actions of the cache, a line each."""
     if reason := proxy.missing():
         print(f"no cache before the service: {reason}")
         return []
@@ -182,7 +182,7 @@ def _at(site: Site, fps: float) -> Site:
 
 
 def _crowded(site: Site, crowd: ThreadPoolExecutor, path: str) -> int:
-    """How many different answers twenty get who ask together."""
+    """Count the different answers to twenty simultaneous requests."""
     together = Barrier(20)
 
     def ask() -> bytes:

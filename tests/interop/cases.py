@@ -108,7 +108,7 @@ def matrices_of(clip: Clip) -> dict[str, np.ndarray]:
 
 
 def _names(clip: Clip, extension: str) -> np.ndarray:
-    """What joints are called in a format: glTF allows any names."""
+    """Return the joint names in a format: glTF allows any names."""
     own = clip.skeleton.names
     return np.array(own if extension == "glb" else joint_names.legal_names(own))
 

@@ -7,9 +7,9 @@ import numpy as np
 
 # Readers compute in float32, and Blender a skeleton of ten joints deep keeps 1e-6 of a metre.
 FURTHEST = 1e-4
-"""How far a joint may be from where it was meant to be, m."""
+"""Largest distance of a joint from its expected place, m."""
 TURNED = 1e-3
-"""How far an entry of a joint's rotation matrix may be from what was meant."""
+"""Largest error of an entry of a joint's rotation matrix."""
 
 Motion = tuple[list[str], np.ndarray]
 Characters = dict[str, Motion]
@@ -18,7 +18,7 @@ NOBODY: Motion = ([], np.empty((0, 0, 4, 4)))
 
 @dataclass(frozen=True)
 class Row:
-    """What one reader made of one file: the largest differences, or why there are none."""
+    """Result of one reader with one file: the largest differences, or a fault."""
 
     file: str
     reader: str
@@ -28,12 +28,12 @@ class Row:
 
     @property
     def good(self) -> bool:
-        """Whether the file was read as it was meant."""
+        """Return whether the file was read correctly."""
         return not self.fault and self.metres <= FURTHEST and self.turn <= TURNED
 
 
 def compare(file: str, reader: str, found: Characters, meant: dict[str, Path]) -> Row:
-    """What a reader made of a file's characters, of whom each is as good as the worst."""
+    """Compare a reader's characters of a file with the expected ones; the worst counts."""
     rows = [_character(file, reader, found.get(who, NOBODY), meant[who]) for who in meant]
     return Row(
         file,

@@ -33,7 +33,7 @@ PATIENCE, STILL = 15.0, 60.0
 
 
 def faults() -> list[str]:
-    """What is wrong with the image, a line each."""
+    """Return the image's faults, a line each."""
     if reason := debian.missing(image.TOOLS):
         print(f"the image is not built: {reason}")
         return []

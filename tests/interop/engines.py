@@ -42,7 +42,7 @@ Tensors = Mapping[str, np.ndarray]
 
 
 def faults(node: Path, npm: Path) -> list[str]:
-    """What is wrong with any engine's answers, a line each."""
+    """Return the faults of any engine's answers, a line each."""
     python = environment.packages(VENV, PACKAGES)
     web = environment.modules(WEB, WEB_PACKAGES, node, npm)
     model, content = trained.family()

@@ -29,7 +29,7 @@ def write(folder: Path) -> dict[str, dict[str, Path]]:
 
 
 def faults(folder: Path) -> list[str]:
-    """What is wrong with any of the thousand files, a line each."""
+    """Return the faults of the thousand files, a line each."""
     files = sorted((folder / "export").rglob("clips/**/*.usd*"))
     found = [f"{path}: {finding}" for path in files for finding in check(path)]
     return found if len(files) == CLIPS else [f"{len(files)} files, expected {CLIPS}", *found]

@@ -22,7 +22,7 @@ BREAKS = {
 
 
 def faults(node: Path) -> list[str]:
-    """What is wrong with the contract, or with who looks at it, a line each."""
+    """Return the faults of the contract and of its linter, a line each."""
     found = [f"contract: {rule} at {place}" for rule, place in _found(node, CONTRACT)]
     return found + [f"contract: {rule} is not seen" for rule in _unseen(node)]
 

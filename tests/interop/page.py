@@ -17,7 +17,7 @@ REAL = "cmu_walk"
 
 
 def faults(node: Path) -> list[str]:
-    """What is wrong with the page, a line each; what the browser's tests say is printed."""
+    """Return the page's faults, a line each; print the output of the browser's tests."""
     if reason := debian.missing({"chromium": "chromium"}):
         print(f"no browser: {reason}")
         return []

@@ -29,7 +29,7 @@ def started(command: Sequence[str | Path], said: Path, **told: str) -> Iterator[
 
 
 def wait(ready: Callable[[], bool]) -> None:
-    """Return once it is so; nobody listening is no failure until patience ends."""
+    """Return once it is ready; ignore failed connections until PATIENCE ends."""
     end = time.monotonic() + PATIENCE
     while True:
         try:
@@ -43,7 +43,7 @@ def wait(ready: Callable[[], bool]) -> None:
 
 
 def ports(count: int) -> list[int]:
-    """Ports that nobody listens at."""
+    """Return free TCP ports."""
     held = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
     found = [each.getsockname()[1] for each in held]
     for each in held:

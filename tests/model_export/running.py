@@ -15,9 +15,9 @@ def outputs(
     level: int | None = None,
     **inputs: Floats,
 ) -> list[Floats]:
-    """What `build(net, *names of the inputs)` answers, in float32; axes: how many each has.
+    """Return the float32 outputs of `build(net, *input names)`; axes: number of axes of each.
 
-    level: of detail, for what is built with a ladder; the default of its graph if not said.
+    level: of detail, for a graph with a ladder; the graph's default if None.
     """
     net = GraphBuilder()
     built = build(net, *inputs)

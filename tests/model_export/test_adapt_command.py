@@ -80,7 +80,7 @@ def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp
 
 
 def head(path, who, level=0):
-    """Path of the head in a clip of somebody, on the whole."""
+    """Return the head's mean position in a performer's clip."""
     model = Synthesizer("small", session.load(path))
     answer = clips.synthesize_clip(
         model, ClipQuestion(controls={"speed": 4.0}, performer=who, level=level)

@@ -74,7 +74,7 @@ def to_the_mean(values):
 
 
 def to_the_prediction(family):
-    """What the others predict for each by a field over its size, as training has it."""
+    """Return a predictor of each from the others by kriging over its size, as in training."""
     sizes = np.array([e.controls for e in family])
     laid = SamplePoints(
         half_ranges(sizes, sizes.min(axis=0), sizes.max(axis=0)), 1, np.arange(CLIPS)
@@ -230,7 +230,7 @@ def turned(family, angle, shift):
 
 
 def placed(family):
-    """What ingest does: the first frame stands over the origin and faces straight ahead."""
+    """Place clips as ingest does: the first frame over the origin, facing straight ahead."""
     return [
         replace(
             e,

@@ -112,7 +112,7 @@ def worlds(joints, rows, **kwargs):
 
 
 def text_of(joints, rows):
-    """A file of the joints, which may only hang on the one before."""
+    """Return the BVH text of joints, which must form a chain."""
     lines = ["HIERARCHY"]
     for name, parent, offset, channels in joints:
         count = len(channels.split())

@@ -85,7 +85,7 @@ def small_clip():
 
 
 def random_clip(rng, parents, frames=5, rate=30.0):
-    """Full random motion: every second joint slides, tips hang on random joints."""
+    """Return full random motion: every second joint slides, tips have random parents."""
     joints = len(parents)
     names = tuple(f"joint {index}" for index in range(joints))
     owners = tuple(int(owner) for owner in rng.integers(0, joints, size=3))

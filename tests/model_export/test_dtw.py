@@ -117,7 +117,7 @@ def test_known_warp_is_recovered(exponent):
 
 
 def test_long_steps_bring_no_gain(rng):
-    """What is passed over is paid for: the cost of a path is its length times its mean cost."""
+    """Check that skipped frames cost: the cost of a path is its length times its mean cost."""
     frames = 30
     sequence = np.zeros((1, frames, 1))
     assert abs(dtw.total_cost(sequence, np.ones((frames, 1)))[0] - (2 * frames - 1)) < TOLERANCE

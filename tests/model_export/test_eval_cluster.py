@@ -96,7 +96,7 @@ def ran(marks):
 
 
 def evaluate(recipe, output, *words):
-    """What the command says and writes."""
+    """Run the command; return its process and file."""
     own = [sys.executable, "-c", MAIN, "evaluate", recipe, "--json", output, *words]
     done = subprocess.run(own, capture_output=True, text=True, check=False)
     return done, output.read_bytes() if output.exists() else b""

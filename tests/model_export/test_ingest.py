@@ -217,7 +217,7 @@ def test_in_place_takes_the_straight_travel_out_and_nothing_else(read):
 
 
 def tilt_between(clip):
-    """How far the last root is from a turn about the vertical of the first, rad."""
+    """Return the last root's tilt off a vertical turn of the first, rad."""
     step = quat.log(quat.mul(clip.rotations[-1, 0], quat.conj(clip.rotations[0, 0])))
     return np.abs(step * FLOOR).max()
 

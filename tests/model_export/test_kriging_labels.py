@@ -134,7 +134,7 @@ def test_the_order_of_performers_does_not_matter(hyper, laid, values):
 
 
 def test_a_performer_left_out_is_a_stranger(hyper, laid, names, values):
-    """Groups may be whole performers: then the rest knows nobody of that label."""
+    """Leave out whole performers, whose labels the rest then does not know."""
     _, groups = np.unique(names, return_inverse=True)
     found = universal_kriging.leave_out(hyper, laid, groups) @ values
     for performer in range(3):

@@ -32,7 +32,7 @@ def rng():
 
 
 def mixed(performers, batch=BATCH):
-    """Labels (B, p) of everybody in turn, nobody among them."""
+    """Return labels (B, p) of each performer and of none in turn."""
     return np.eye(performers + 1, performers)[np.arange(batch) % (performers + 1)]
 
 

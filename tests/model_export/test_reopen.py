@@ -28,7 +28,7 @@ def reopened(content):
 
 
 def asked(model, count=200):
-    """Controls, times and labels of questions within what was sampled; some are about nobody."""
+    """Return controls, times and labels within the samples' ranges; some without a performer."""
     rng = np.random.Generator(np.random.PCG64(8))
     controls = rng.uniform(model.bank.low, model.bank.high, (count, len(model.bank.low)))
     performers = len(model.bank.performers)

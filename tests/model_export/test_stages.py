@@ -72,7 +72,7 @@ def asked():
 
 
 def points(own, controls):
-    """Points of nobody in particular."""
+    """Return points without labels."""
     return own.points(controls, np.zeros((len(controls), 0)))
 
 

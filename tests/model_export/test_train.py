@@ -21,7 +21,7 @@ EXACT = 1e-6
 
 
 def quiet(_):
-    """A report that nobody reads."""
+    """Discard a report."""
 
 
 def with_size(recipe, nugget, ranks):

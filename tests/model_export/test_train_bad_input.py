@@ -174,7 +174,7 @@ def test_a_zip_that_cannot_be_unpacked_ends_training_with_one_sentence(
 
 
 def test_a_whole_zip_trains_the_model_that_its_folder_trains(tmp_path):
-    """What the test above spoils is right otherwise."""
+    """Check that the test above spoils a valid zip."""
     own = zipped(tmp_path / "whole", bytes)
     found, _ = ingest.ingest(recipe.read(own), own.parent)
     write_clips(tmp_path, EIGHT)

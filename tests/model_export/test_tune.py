@@ -26,7 +26,7 @@ def guess(samples, values, covariance="matern52"):
 
 
 def alone(samples):
-    """Samples each of its own group, of performers that nobody tells apart."""
+    """Return samples, each its own group, without performer labels."""
     return SamplePoints(samples, samples.shape[1], np.arange(len(samples)))
 
 
@@ -147,7 +147,7 @@ PEOPLE, TAKES = 4, 20
 
 @pytest.fixture
 def people():
-    """Who moved in each of fifty samples, and in which take: no take is of two people."""
+    """Return the performer and take of each of fifty samples: a take has one performer."""
     take = np.arange(50) % TAKES
     return take % PEOPLE, take
 
@@ -233,7 +233,7 @@ def test_tuning_twice_gives_the_same_bits(samples, people, rng):
 
 
 def alike(a, b):
-    """Whether two fields are one: the simplex stops when its corners lie within a per cent."""
+    """Compare two fields: the simplex stops when its corners lie within a per cent."""
     near = np.max(np.abs(np.log(a.hyper.scales / b.hyper.scales))) < 0.05
     return near and abs(a.unexplained - b.unexplained) < 1e-4
 

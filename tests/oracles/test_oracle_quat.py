@@ -22,7 +22,7 @@ def theirs(q):
 
 
 def same(q, rotation):
-    """Whether quaternions mean what SciPy's rotations do."""
+    """Return whether quaternions equal SciPy's rotations."""
     return np.max(np.abs(quat.to_matrix(q) - rotation.as_matrix())) < TOLERANCE
 
 

@@ -57,7 +57,7 @@ def chained(local):
 
 
 def posed(channels, rest):
-    """What Blender makes of channels: parent's pose, rest between the two, own channels."""
+    """Return Blender's poses of channels: parent's pose, rest between the two, own channels."""
     places = np.tile(channels.shifts, (FRAMES, 1, 1))
     places[:, 0] = channels.path
     between = rest.matrices.copy()

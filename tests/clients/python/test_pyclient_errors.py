@@ -32,7 +32,7 @@ def subclasses(kind):
 
 
 def raised(address, ask=lambda client: client.models(), retry=NEVER, **given):
-    """What the client raises that waits."""
+    """Return the error of the blocking client."""
     with (
         Client(address, retry=retry, **given) as client,
         pytest.raises(PosefieldError) as caught,
@@ -42,7 +42,7 @@ def raised(address, ask=lambda client: client.models(), retry=NEVER, **given):
 
 
 def raised_later(address, ask=lambda client: client.models(), **given):
-    """What the client raises that is awaited."""
+    """Return the error of the async client."""
 
     async def go():
         async with AsyncClient(address, retry=NEVER, **given) as client:

@@ -226,7 +226,7 @@ def test_it_is_asked_as_in_the_example_and_answered(name, form, ask, place, reco
 
 
 def as_promised(name, form, request, found, place):
-    """What the client gives is the example's body, or for a file what the service sends."""
+    """Assert that the client returns the example's body, or the file that the service sends."""
     if isinstance(found, bytes):
         sent = httpx.request(request["method"], place + request["path"], json=request.get("body"))
         assert found == sent.content
@@ -246,7 +246,7 @@ SHOWN_BY_TABLES = {
 
 
 def table_of(found):
-    """What is told of a clip's numbers, or of a table."""
+    """Return a clip's rate and length, or a table's columns and length."""
     if hasattr(found, "rate"):
         return found.rate, len(found.times)
     return ["levels" if "levels" in found.column_names else found.column_names, found.num_rows]
@@ -262,7 +262,7 @@ def test_another_answer_would_be_seen():
 
 
 def alike(method, target, body):
-    """What a request says, in whatever order."""
+    """Return the content of a request, sorted."""
     path, _, query = target.partition("?")
     said = sorted((name, value(text)) for name, text in parse_qsl(query))
     content = json.loads(body) if body.strip(b'"') else None

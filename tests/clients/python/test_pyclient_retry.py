@@ -92,7 +92,7 @@ def test_the_last_error_is_the_one_that_is_raised():
 
 
 def waited(*answers):
-    """How long was waited for, and how often asked, by both clients."""
+    """Return the waits and the number of requests, equal for both clients."""
     found = []
     for ask in (by_waiting, by_awaiting):
         seconds = []

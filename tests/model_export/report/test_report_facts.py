@@ -219,7 +219,7 @@ def test_sigma_is_right_on_average_by_construction(trained):
 
 
 def test_sigma_of_a_captured_point_is_the_graphs(trained):
-    """Where the clip itself is known, and so less than where it is left out."""
+    """Check that sigma is less at a known clip than where it is left out."""
     bank = trained.model.bank
     sigma = bank.sigma(bank.numpy(bank.pose.samples)[VARIANCE])
     assert np.all(sigma < calibration.measure_calibration(trained).predicted)

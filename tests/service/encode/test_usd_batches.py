@@ -60,7 +60,7 @@ def written(given, convention=METRES, write=usd_clip.usdc):
 
 
 def both(given, convention=METRES):
-    """Whether both forms are written as usd-core does."""
+    """Return whether both forms equal usd-core's output."""
     return written(given, convention) == ordinary(given, convention) and (
         written(given, convention, usd_clip.usda) == ordinary(given, convention, text_template)
     )
@@ -185,7 +185,7 @@ def test_any_facts_are_written_as_usd_does(said):
 
 
 def held(count, frames, reached=True):
-    """Clips that differ in what they were held to, and by how much they miss it."""
+    """Yield clips that differ in their constraints and in their errors."""
     rng = np.random.default_rng(5)
     for index, one in enumerate(answers(count, frames)):
         misses = rng.uniform(0, 1e-5, 3)
@@ -206,7 +206,7 @@ def test_what_clips_were_held_to_is_written_as_usd_does(reached):
 
 
 def pressed(form, given):
-    """How clips are written by a new press: by usd-core, and templates that are made."""
+    """Count usd-core's writes and the new templates when a new cache writes clips."""
     counted = Counted(form)
     own = template_cache.TemplateCache(counted, 64_000_000)
     for author, content in usd_clip.builders_and_contents(given, METRES):

@@ -62,6 +62,6 @@ def test_an_archive_of_many_members_is_aligned_and_whole(tmp_path):
 
 
 def starts(data, entry):
-    """Where a member's data start: its header's last two fields are the lengths in between."""
+    """Return a member's data offset: its header's last two fields are the lengths in between."""
     name, extra = struct.unpack_from("<2H", data, entry.header_offset + 26)
     return entry.header_offset + 30 + name + extra

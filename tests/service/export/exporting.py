@@ -47,7 +47,7 @@ class Recorder:
 
 
 def question(**more):
-    """What is asked of the small model, with more said of it."""
+    """Return a question to the small model, with more fields."""
     return ClipQuestion(controls=CONTROLS, **more)
 
 

@@ -44,7 +44,7 @@ def undisturbed(words, tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory):
-    """Two workers, of whom nobody is to come to harm."""
+    """Yield two workers that tests must not harm."""
     with started(tmp_path_factory.mktemp("cluster"), 2) as own:
         yield own
 

@@ -97,7 +97,7 @@ def test_every_option_but_name_and_format_is_a_field_of_a_question():
 
 
 def test_a_refusal_before_a_row_is_the_same_as_in_one(model, table):
-    """What the command line says holds for rows as if they said it."""
+    """Apply the command line's options to rows that do not set them."""
     usual = Defaults("usdc", ClipQuestion(controls={}, extrapolate="refuse"))
     beyond = write_csv(table, [{**POINT, "turn": 99.0}])
     (fault,) = rows(model, beyond, usual)

@@ -28,7 +28,7 @@ def model(labelled_path):
 
 
 def holds(model, path, usual=None):
-    """What the questions of rows say beyond a plain one's, by field."""
+    """Return the fields of the rows' questions that a plain one lacks."""
     plain = structs.asdict(ClipQuestion(controls={}))
     asked = [structs.asdict(each.question) for each in rows(model, path, usual)]
     return [{k: one[k] for k in HELD if one[k] != plain[k]} for one in asked]
@@ -115,7 +115,7 @@ def test_a_cell_that_is_empty_says_nothing(model, tmp_path):
 
 
 def test_lines_are_json(model, tmp_path):
-    """What is nested is no key that is there twice."""
+    """Accept nested keys of the same name."""
     path = tmp_path / "q.jsonl"
     path.write_text(json.dumps({"controls": POINT, "targets": [HAND, FOOT]}) + "\n")
     assert holds(model, path) == [{"targets": BOTH}]

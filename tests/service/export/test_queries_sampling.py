@@ -66,7 +66,7 @@ def continua(card):
 
 
 def strata_hit_once(points):
-    """Whether each of n parts of each axis holds one of the points (n, d) of the unit cube."""
+    """Return whether each nth of each axis holds one of the points (n, d) of the unit cube."""
     parts = np.arange(len(points))[:, None]
     scaled = np.sort(points, axis=0) * len(points)
     # A point may lie at the edge of its part, to rounding.
@@ -131,7 +131,7 @@ def test_a_control_of_few_values_takes_them_in_equal_shares(card):
 
 
 def in_hull(point, examples):
-    """Whether a point (d,) is a mixture of examples (n, d): a linear programme's feasibility."""
+    """Return whether a point (d,) is a mixture of examples (n, d), by a linear programme."""
     equal = np.vstack([examples.T, np.ones(len(examples))])
     found = linprog(np.zeros(len(examples)), A_eq=equal, b_eq=[*point, 1.0], bounds=(0, None))
     return found.status == 0

@@ -328,7 +328,7 @@ def test_a_file_that_changes_while_it_is_read_is_refused(model, tmp_path):
 
 @pytest.mark.parametrize("grown", [0, 1])
 def test_no_row_is_given_of_a_file_that_has_changed(grown, model, tmp_path):
-    """Of a block that was read before; whoever exports the next would keep its clips."""
+    """Check a block read before the change; the next export would keep its clips."""
     path = write_csv(tmp_path / "q.csv", [POINT] * 3 * BLOCK_SIZE)
     under_way = source(model, path).rows()
     next(under_way)

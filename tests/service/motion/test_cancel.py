@@ -98,7 +98,7 @@ LOOKS = 3_000_000
 
 @pytest.mark.parametrize(("turns", "check"), [(True, cancel.check), (False, cancel.current.get)])
 def test_other_threads_run_beside_a_loop_that_checks(cancellation, turns, check):
-    """The interpreter takes the lock from nobody: whoever runs has to give it away."""
+    """Keep the interpreter from switching threads: the running one must release the lock."""
     began, done, looks = threading.Event(), [], []
 
     def loop() -> None:

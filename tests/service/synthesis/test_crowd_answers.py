@@ -32,7 +32,7 @@ def walk(walk_path):
 
 
 def asked(model, count=COUNT, **given):
-    """A crowd all over a model, each character somebody at some time somewhere."""
+    """Return a crowd of random controls, performers, times and places."""
     rng = np.random.Generator(np.random.PCG64(2))
     card = model.session.card
     ends = [(c.minimum, c.maximum) for c in card.controls]
@@ -173,7 +173,7 @@ def test_levels_are_those_that_the_camera_asks_for(model):
 
 
 def test_what_the_viewer_sees_of_a_level_is_less_than_the_limit(model):
-    """Against the finest level nobody is off by a pixel, and hardly one joint in a hundred."""
+    """Check that each character is within a pixel of the finest level, and 98 % of the joints."""
     camera = Camera(np.array([0.0, 1.7, 0.0]), math.radians(60.0), 1080.0)
     rng = np.random.Generator(np.random.PCG64(4))
     count = 2_000

@@ -91,7 +91,7 @@ def test_costs_never_grow(rng):
 
 
 def test_a_view_takes_them_as_they_are(opened):
-    """Everybody fits into a budget of the finest level's cost, nobody into less than the last's."""
+    """Fit all into a budget of the finest level's cost, and none into less than the last's."""
     errors = np.array([level.pose for level in opened.card.levels])
     costs = np.array(cost_model.seconds_per_pose(opened))
     camera = Camera(np.zeros(3), 1.0, 1080.0)

@@ -126,7 +126,7 @@ def _of(thread):
 
 
 def _name(process):
-    """How a process was started, by multiprocessing."""
+    """Return `trial` for a spawned process, else its command."""
     line = Path(f"/proc/{process}/cmdline").read_bytes().decode()
     return "trial" if "spawn_main" in line else line
 

@@ -132,8 +132,8 @@ def test_without_the_levels_before_it_does():
 
 
 def budgeted(rng, holds):
-    """How often any of 1,000 characters changes level while the camera wavers by 20 cm and a budget
-    allows for half of what everybody at the finest level costs."""
+    """Count the level changes of 1,000 characters while the camera wavers by 20 cm and a budget
+    allows for half the cost of all at the finest level."""
     centres = np.column_stack([rng.uniform(-30, 30, 1000), np.ones(1000), rng.uniform(0, 60, 1000)])
     before, changes = None, 0
     for i in range(40):

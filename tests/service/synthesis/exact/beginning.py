@@ -24,7 +24,7 @@ class Begun:
         return self.opened.card.skeleton.names.index(name)
 
     def place(self, name, frame, by=(0.0, 0.0, 0.0)) -> PositionConstraint:
-        """Aim that moves a joint at a frame by so much, m."""
+        """Return a constraint that moves a joint by `by` at a frame, m."""
         joint = self.joint(name)
         at, _ = self.held.scene.position_and_gradient(self.held.numbers, joint, frame)
         moment = Measure("height", (joint,), "landmark")

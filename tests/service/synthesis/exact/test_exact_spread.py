@@ -14,7 +14,7 @@ from posefield_train.graph import onnx_export
 
 
 def strays(trained) -> np.ndarray:
-    """What training's leave-one-out misses of each clip's coefficients (n, r3), standardised."""
+    """Return training's standardised leave-one-out errors of each clip's coefficients (n, r3)."""
     pose, laid, model = trained.pose, trained.samples, trained.model
     left_out = leave_one_out.leave_out(pose.hyper, laid.points, laid.groups)
     sigmas = np.sqrt(model.bank.sill * pose.variances * len(laid.points))
@@ -22,7 +22,7 @@ def strays(trained) -> np.ndarray:
 
 
 def gap(found, trained) -> float:
-    """How far a spread's covariance lies from training's, as a share of its size."""
+    """Return the distance of a spread's covariance from training's, as a share of the latter."""
     # Training has degrees of freedom before frames.
     core = trained.model.decoder.reduced.core.swapaxes(0, 1)
     rows = strays(trained) @ core.reshape(-1, found[1]).T

@@ -28,7 +28,7 @@ def measured(path, measures) -> Synthesizer:
 
 @pytest.fixture(scope="module")
 def reach(labelled_path) -> Synthesizer:
-    """A model of a reach whose hand can be held to its height."""
+    """Return a reach model whose hand height can be constrained."""
     names = session.load(labelled_path).card.skeleton.names
     return measured(
         labelled_path, {"target_height": Measure("height", (names.index("RightHand"),), "end")}
