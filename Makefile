@@ -78,7 +78,7 @@ lint: $(ENV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
-	$(BIN)/python .ci/prose
+	$(BIN)/python docs/check_prose.py
 
 .PHONY: types
 types: $(ENV)

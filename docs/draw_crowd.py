@@ -22,7 +22,7 @@ def levels(path: str) -> None:
     characters = stage.GetPrimAtPath("/Crowd/Characters").GetChildren()
     motions = [one.GetRelationship("skel:animationSource").GetTargets()[0] for one in characters]
     attributes = [stage.GetPrimAtPath(motion).GetAttribute("posefield:level") for motion in motions]
-    print(json.dumps([int(attribute.Get(FRAME)) for attribute in attributes]))  # noqa: T201
+    print(json.dumps([int(attribute.Get(FRAME)) for attribute in attributes]))
 
 
 def draw(crowd: str, shown: str, picture: str) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-CHECK = Path(__file__).parents[1] / ".ci/prose"
+CHECK = Path(__file__).parents[1] / "docs/check_prose.py"
 
 
 def check(*files):
@@ -43,4 +43,4 @@ def test_a_sentence_is_judged(line, fault, tmp_path):
 def test_the_lint_step_runs_it():
     makefile = (CHECK.parents[1] / "Makefile").read_text()
     lint = makefile.partition("\nlint:")[2].partition("\n\n")[0]
-    assert ".ci/prose" in lint
+    assert "docs/check_prose.py" in lint

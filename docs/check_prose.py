@@ -1,8 +1,7 @@
-#!/usr/bin/env python3
 """Refuse sentences that need a second reading, in what ships and in the contract.
 
-.ci/prose [FILE...]: prints a line for each fault, and exits 1 if there is one. It reads docstrings,
-comments and texts of Python files, and the sentences of api/openapi.yaml.
+python docs/check_prose.py [FILE...]: prints a line for each fault, and exits 1 if there is one. It
+reads docstrings, comments and texts of Python files, and the sentences of api/openapi.yaml.
 """
 
 import ast
