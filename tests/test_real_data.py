@@ -27,7 +27,7 @@ from posefield_train.source import data_folder, ingest, recipe
 
 pytestmark = pytest.mark.system
 
-RECIPES = Path(recipe.__file__).parent / "recipes"
+RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 CLIPS = {"hdm05_grab_high": 29, "hdm05_deposit_floor": 32, "cmu_walk": 78}
 # How many times fewer numbers than the aligned tensor's the motion is stored in at 1 cm, at least.
 STORED = {"hdm05_grab_high": 15.5, "hdm05_deposit_floor": 9.0, "cmu_walk": 45.0}
