@@ -14,10 +14,10 @@ from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_walk
-from posefield_train.source import ingest, recipe
+from posefield_train.source import ingest, recipe, shipped_recipes
 from posefield_train.source.recipe import Recipe
 
-WALK = Path(recipe.__file__).parent / "recipes" / "cmu_walk.toml"
+WALK = shipped_recipes.FOLDER / "cmu_walk.toml"
 BESIDE = Path(__file__).parents[2] / "shared" / "data"
 
 
