@@ -248,7 +248,7 @@ test("whether anything like it was captured has a mark beside sigma, and who mov
 test("a body that stays in place has the same marks", () =>
   on(`${WALK}&~root=in_place`, async (page) => {
     await page.locator("[data-mark=support]", { hasText: "Captured near here" }).waitFor();
-    await page.locator("[data-mark=performer]", { hasText: "never captured" }).waitFor();
+    await page.locator("[data-mark=performer]", { hasText: "unseen performer" }).waitFor();
   }));
 
 test("a control with few sampled values snaps to them", () =>

@@ -118,7 +118,7 @@ function sliding(card: ModelCard, clip: Motion): string {
     return card.feet.map((joint) => [...at.positions.slice(3 * joint, 3 * joint + 3)]);
   });
   const code =
-    "import json, sys, numpy; from posefield.motion.foot_skate import skate; " +
-    "print(f'{100 * skate(numpy.array(json.load(sys.stdin)), 60):.1f} cm/s', end='')";
+    "import json, sys, numpy; from posefield.motion.foot_skate import mean_skate_speed; " +
+    "print(f'{100 * mean_skate_speed(numpy.array(json.load(sys.stdin)), 60):.1f} cm/s', end='')";
   return execFileSync(PYTHON, ["-c", code], { cwd: ROOT, input: JSON.stringify(feet) }).toString();
 }
