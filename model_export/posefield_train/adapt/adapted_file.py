@@ -59,7 +59,7 @@ def export_adapted(reopened: ReconstructedModel, newcomer: NewPerformer) -> Expo
     """Return the exported model with the new performer; equal inputs give equal bytes.
 
     Raises InvalidField for an invalid or known name, TrainingError for clips of another action, and
-    ExportRefused as `export.finished` does.
+    ExportRefused as `onnx_export.check_and_export` does.
     """
     check_name(reopened.card, newcomer.performer)
     with single_thread.single_threaded():

@@ -1,4 +1,4 @@
-"""ONNX graph of the bank of coefficient models; `field_bank` is its NumPy counterpart."""
+"""ONNX graph of the bank of coefficient models; `kriging_bank` is its NumPy counterpart."""
 
 import numpy as np
 

@@ -42,7 +42,7 @@ class Cancellation:
         return self._event.is_set()
 
     def check(self) -> None:
-        """Raise Cancelled if the work should stop; otherwise sleep PAUSE s once in TURN s.
+        """Raise Cancelled if the work should stop; otherwise sleep YIELD_SLEEP s once in YIELD_INTERVAL s.
 
         Without the sleep, threads that wait for Python's lock get it after 5 ms and in no fixed
         order: an event loop beside several busy threads would wait for most of them.

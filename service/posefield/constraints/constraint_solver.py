@@ -60,7 +60,7 @@ class ConstraintSolver:
         return any(c.measure for c in self._session.card.controls)
 
     def constraints(self, question: ValidatedQuestion, asked: MotionQuestion) -> ConstraintSet:
-        """Return the constraints of a question; raises as `goals.of` does."""
+        """Return the constraints of a question; raises as `goals.from_question` does."""
         if not asked.has_constraints and not self.measures:
             return NO_CONSTRAINTS
         return goals.from_question(self._session.card, question, asked)

@@ -1,6 +1,6 @@
 """Tables of formats: encoders of clips, poses, crowds and grids by extension.
 
-The table of archives is `packs.PACKS`.
+The table of archives is `archives.ARCHIVE_WRITERS`.
 """
 
 import math
@@ -184,7 +184,7 @@ class CrowdWriter(Format):
     def stream(self, crowd: CrowdClip, instancing: str) -> Iterator[bytes]:
         """Return an iterator over the bytes of a crowd.
 
-        Raises InvalidField as `crowd.writer.stream` does.
+        Raises InvalidField as `crowd_writer.stream` does.
         """
         from posefield.encode.usd_crowd import (
             crowd_writer,  # usd-core: 0.12 CPU seconds of the start

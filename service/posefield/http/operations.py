@@ -36,7 +36,7 @@ async def live(service: Service, request: Request) -> Response:
 async def ready(service: Service, request: Request) -> Response:
     """Return the readiness of the service, and the models that the client may read.
 
-    Each model was tested within the last second. Raises RequestFault 503 if not ready.
+    Each model was tested within the last second. Raises RequestError 503 if not ready.
     """
     return responses.json_document(service.readiness.document(request.scope["principal"].may_read))
 

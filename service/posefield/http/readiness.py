@@ -36,7 +36,7 @@ class Readiness:
     def document(self, may_read: Callable[[str], bool]) -> dict[str, Any]:
         """Return the status, the models in service and the facts of reloads.
 
-        may_read: filter on the names of models. Raises RequestFault 503 when not ready.
+        may_read: filter on the names of models. Raises RequestError 503 when not ready.
         """
         library = self.models.registry
         if self.draining:

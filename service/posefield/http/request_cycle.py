@@ -156,7 +156,7 @@ def find(site: ServerState, scope: Scope) -> PathRoutes:
 
 
 def other_method(exchange: Exchange, place: PathRoutes) -> Response:
-    """Return the response to OPTIONS; raises RequestFault 405 for other methods."""
+    """Return the response to OPTIONS; raises RequestError 405 for other methods."""
     method, allow = exchange.scope["method"], {"Allow": place.allow}
     if method != "OPTIONS":
         detail = f"{method}, expected one of {place.allow}"
@@ -168,14 +168,14 @@ def other_method(exchange: Exchange, place: PathRoutes) -> Response:
 
 
 def check_load(site: ServerState, operation: Operation) -> None:
-    """Raise RequestFault 503 if too many requests are open for an operation that may wait."""
+    """Raise RequestError 503 if too many requests are open for an operation that may wait."""
     if site.open > site.service.settings.concurrency and operation.sheddable:
         detail = f"{site.open - 1} requests are being answered"
         raise RequestError(OVERLOADED, detail, headers={"Retry-After": "1"})
 
 
 def authorise(exchange: Exchange, route: Route) -> None:
-    """Set the request's principal and the library that it may read; raises RequestFault."""
+    """Set the request's principal and the library that it may read; raises RequestError."""
     scope, service = exchange.scope, exchange.service
     scope["library"], scope["principal"] = service.registry, EVERYONE
     if service.access_policy.requires_credentials:
@@ -191,7 +191,7 @@ def authorise(exchange: Exchange, route: Route) -> None:
 def negotiate(exchange: Exchange, route: Route) -> None:
     """Set the response's format and content coding.
 
-    Raises RequestFault for an unknown query parameter and for formats that do not exist.
+    Raises RequestError for an unknown query parameter and for formats that do not exist.
     """
     scope = exchange.scope
     scope["format"] = route.format

@@ -95,7 +95,7 @@ def worker_application(
 def open_models(
     places: tuple[str, ...], settings: Settings, limits: TrialLimits = DEFAULT_LIMITS
 ) -> ReloadingRegistry:
-    """Open the models of files, folders and URLs; `Shelf.check` raises their errors."""
+    """Open the models of files, folders and URLs; `ReloadingRegistry.check` raises their errors."""
     return ReloadingRegistry(
         places, VersionLimits(settings.versions, settings.versions_memory), limits
     )

@@ -77,7 +77,7 @@ def from_url(
 ) -> Callable[[Context[Any], Request], Awaitable[QuestionStruct]]:
     """Return the step that decodes a question of this type from the query parameters.
 
-    It raises as `text_decoding.question`.
+    It raises as `text_decoding.decode_question`.
     """
 
     async def decode(context: Context[Any], request: Request) -> QuestionStruct:
@@ -91,7 +91,7 @@ def from_body(
 ) -> Callable[[Context[Any], Request], Awaitable[QuestionStruct]]:
     """Return the step that decodes a question of this type from a JSON body.
 
-    It raises as `request_body.read` and `json_decoding.question`.
+    It raises as `request_body.read` and `json_decoding.decode_question`.
     """
 
     async def decode(context: Context[Any], request: Request) -> QuestionStruct:

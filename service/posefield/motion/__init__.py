@@ -1,1 +1,1 @@
-"""Code shared by the service and the training job; NumPy and msgspec are its only dependencies."""
+"""Motion in NumPy: rotations, skeletons, clips and BVH, shared by the service and the training job."""

@@ -1,4 +1,4 @@
-"""Intake of model files from their sources: opens new files once they have settled."""
+"""Loading of model files from their sources: opens new files once they have settled."""
 
 import logging
 import re

@@ -66,7 +66,7 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     """Return the poses of a crowd, placed where its characters stand.
 
     With a view, distances are measured to the characters' placements. Raises InvalidField and
-    OutsideSamples as `poses.pose` does for one character, with the index of the first character at
+    OutsideSamples as `poses.synthesize_poses` does for one character, with the index of the first character at
     fault.
     """
     card = model.session.card

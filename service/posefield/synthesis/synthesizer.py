@@ -34,7 +34,7 @@ class Synthesizer(NamedModel):
 
     @cached_property
     def exact_levels(self) -> dict[int, bool]:
-        """Cache of `poses.exact` by level."""
+        """Cache of `poses.is_batch_exact` by level."""
         return {}
 
     @cached_property

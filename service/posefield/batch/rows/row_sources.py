@@ -1,10 +1,10 @@
 """Sources of queries: a file, a grid or a sampling.
 
 A file is a table (CSV, Parquet) or objects (JSON Lines), by its ending. It has a column for each
-control of the model, and optionally those of `columns.OPTIONS`; the defaults of missing values come
+control of the model, and optionally those of `columns.OPTION_KINDS`; the defaults of missing values come
 from the command line. `rows` yields a Query or a Fault for each row, in the source's order.
 
-    source = queries.source(Asked(path), Defaults("usdc"), model)
+    source = open_source(SourceOptions(path), Defaults("usdc"), model)
     found = source.survey()
     for row in source.rows(): ...
 """

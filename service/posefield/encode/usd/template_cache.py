@@ -25,7 +25,7 @@ class Template(Protocol):
 
 
 class TemplateFormat(Protocol):
-    """Form of layers, binary or text: the module `crate` or `text`."""
+    """Form of layers, binary or text: the module `crate_template` or `text_template`."""
 
     def pattern(self, author: LayerBuilder, content: LayerContent) -> LayerPattern:
         """Return the pattern that selects the template."""

@@ -26,7 +26,7 @@ def authorize(
 ) -> Principal:
     """Return the principal of a request.
 
-    scope: the scope that the operation requires; None where it requires none. Raises RequestFault
+    scope: the scope that the operation requires; None where it requires none. Raises RequestError
     401 for missing or invalid credentials, and 403 for credentials without the scope.
     """
     if not policy.requires_credentials:

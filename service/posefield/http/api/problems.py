@@ -128,7 +128,7 @@ class RequestError(Exception):
 
 
 def request_error_response(request: Request, fault: RequestError) -> Response:
-    """Return the response to a RequestFault."""
+    """Return the response to a RequestError."""
     detail = _shortened(fault.detail)
     errors = [{**fault.place, "detail": detail}] if fault.place else []
     return _problem_response(request, fault.kind, detail, errors, fault.headers)

@@ -27,7 +27,7 @@ def decode_order(
 ) -> ArchiveOrder:
     """Return the validated order of a JSON body, which later steps do not refuse.
 
-    Raises FormError for a malformed body, RequestFault for an invalid clip and InvalidField for a
+    Raises FormError for a malformed body, RequestError for an invalid clip and InvalidField for a
     request beyond the limits.
     """
     body = bodies.decode_question(ClipsQuestion, content)

@@ -67,7 +67,7 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
     """Return the question of a JSON body.
 
     most: maximum number of characters. Raises FormError for a malformed body, InvalidField for
-    invalid values and RequestFault 413 for too many values.
+    invalid values and RequestError 413 for too many values.
     """
     _check_values(content, most)
     body = bodies.decode_question(CrowdBody, content)
@@ -87,7 +87,7 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
 
 
 def _check_values(content: bytes, most: float) -> None:
-    """Raise RequestFault for more values than a valid body has: decoded, each takes 32 bytes."""
+    """Raise RequestError for more values than a valid body has: decoded, each takes 32 bytes."""
     found, limit = content.count(b","), VALUES * max(most, FEWEST)
     if found > limit:
         raise RequestError(BODY_TOO_LARGE, f"{found} values, expected at most {limit:.0f}")

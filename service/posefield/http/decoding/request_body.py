@@ -24,7 +24,7 @@ class BodyMemory:
     used: int = 0
 
     def take(self, size: int) -> None:
-        """Add `size` bytes; raises RequestFault 503 beyond the limit."""
+        """Add `size` bytes; raises RequestError 503 beyond the limit."""
         if self.used + size > self.limit:
             detail = f"bodies of other requests take {self.used} of {self.limit} bytes"
             raise RequestError(OVERLOADED, detail, headers=_CLOSE | {"Retry-After": "1"})
@@ -39,7 +39,7 @@ async def read_body(request: Request, limit: int, memory: BodyMemory) -> bytes:
     """Return the body of a JSON request, with a Content-Length or chunked.
 
     limit: bytes. `request.scope["body_memory"]` is set to the bytes taken from `memory`, also when
-    this raises. Raises RequestFault for another media type (415), a body beyond the limit (413), an
+    this raises. Raises RequestError for another media type (415), a body beyond the limit (413), an
     incomplete body (400) and exhausted memory (503).
     """
     _check_media_type(request.headers.get("content-type", ""))

@@ -52,7 +52,7 @@ class _MediaRange:
 
 
 def negotiated_format(request: Request, offers: Offers) -> str:
-    """Return the format that a request prefers; raises RequestFault 406 if it accepts none."""
+    """Return the format that a request prefers; raises RequestError 406 if it accepts none."""
     lines = [value.decode("latin-1") for name, value in request["headers"] if name == b"accept"]
     if not lines:
         return offers[0][0]

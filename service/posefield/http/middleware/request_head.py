@@ -32,7 +32,7 @@ class HeadLimits:
     _known: set[bytes] = field(default_factory=set)
 
     def check(self, scope: Scope) -> None:
-        """Raise RequestFault for a long URL (414), large headers (431) or an unknown host (421)."""
+        """Raise RequestError for a long URL (414), large headers (431) or an unknown host (421)."""
         # raw_path is optional in ASGI.
         path = scope.get("raw_path") or scope["path"].encode()
         if len(path) + len(scope["query_string"]) > self.url:
