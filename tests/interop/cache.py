@@ -62,17 +62,7 @@ class Site:
 
 def faults() -> list[str]:
     """Return the wrong and the missing actions of the cache, a line each."""
-    if reason := proxy.missing():
-        print(f"no cache before the service: {reason}")
-        return []
-    ours = spoiled = proxy.CONF.read_text()
-    for line, (other, _) in SPOILED.items():
-        spoiled = spoiled.replace(line, other)
-    found, noticed = _faults(ours), _faults(spoiled)
-    for line, (_, fault) in SPOILED.items():
-        if line not in ours or not any(each.startswith(fault) for each in noticed):
-            found.append(f"nothing is noticed without {line!r}")
-    return [f"cache: {fault}" for fault in found]
+    return proxy.configuration_faults("cache", proxy.CONF.read_text(), SPOILED, _faults)
 
 
 def _faults(text: str) -> list[str]:

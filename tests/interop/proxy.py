@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import debian
@@ -46,3 +47,26 @@ def replaced(text: str, part: str, other: str) -> str:
     """Return the text with another part in place of one that occurs exactly once."""
     assert text.count(part) == 1, part
     return text.replace(part, other)
+
+
+def configuration_faults(
+    subject: str,
+    text: str,
+    needed: Mapping[str, tuple[str, str]],
+    faults: Callable[[str], list[str]],
+) -> list[str]:
+    """Return the faults of a configuration, and each needed line that can be spoiled unnoticed.
+
+    needed: by line of the configuration, what spoils it and how the fault that it causes begins.
+    """
+    if reason := missing():
+        print(f"no proxy before the service: {reason}")
+        return []
+    spoiled = text
+    for line, (other, _) in needed.items():
+        spoiled = spoiled.replace(line, other)
+    found, noticed = faults(text), faults(spoiled)
+    for line, (_, fault) in needed.items():
+        if line not in text or not any(each.startswith(fault) for each in noticed):
+            found.append(f"nothing is noticed without {line!r}")
+    return [f"{subject}: {fault}" for fault in found]

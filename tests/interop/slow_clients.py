@@ -51,20 +51,10 @@ class Upstream:
 def faults() -> list[str]:
     """Return a line for each slow client that keeps its connection, or is not noticed in a test
     without the directive."""
-    if reason := proxy.missing():
-        print(f"no proxy before the service: {reason}")
-        return []
     ours = proxy.CONF.read_text()
     for usual, short in SHORT.items():
         ours = proxy.replaced(ours, usual, short)
-    spoiled = ours
-    for line, (other, _) in NEEDED.items():
-        spoiled = spoiled.replace(line, other)
-    found, noticed = _faults(ours), _faults(spoiled)
-    for line, (_, fault) in NEEDED.items():
-        if line not in ours or not any(each.startswith(fault) for each in noticed):
-            found.append(f"nothing is noticed without {line!r}")
-    return [f"slow clients: {fault}" for fault in found]
+    return proxy.configuration_faults("slow clients", ours, NEEDED, _faults)
 
 
 def _faults(text: str) -> list[str]:

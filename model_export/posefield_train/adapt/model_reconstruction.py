@@ -2,7 +2,8 @@
 
 The graph holds dual weights, not sample values. These are recovered from the dual weights and the
 kriging system, which depends on controls, performers and the parameters of each model. The card
-holds the pose's parameters, the graph the scales and labels of all, and `TrainingParameters` the rest.
+holds the pose's parameters, the graph the scales and labels of all, and `TrainingParameters` the
+rest.
 """
 
 from collections.abc import Mapping

@@ -25,7 +25,7 @@ def poses(point: ControlPoint, phases: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def target(point: ControlPoint) -> Floats:
-    """Return the final position (3,), m, of the middle of the right hand, `sample_arms.palm_position`."""
+    """Return the final `sample_arms.palm_position` (3,), m, of the right hand."""
     return reaching.target(sample_controls.parse_controls(point))
 
 

@@ -42,10 +42,11 @@ class Cancellation:
         return self._event.is_set()
 
     def check(self) -> None:
-        """Raise Cancelled if the work should stop; otherwise sleep YIELD_SLEEP s once in YIELD_INTERVAL s.
+        """Raise Cancelled if the work should stop; otherwise sleep briefly.
 
-        Without the sleep, threads that wait for Python's lock get it after 5 ms and in no fixed
-        order: an event loop beside several busy threads would wait for most of them.
+        It sleeps YIELD_SLEEP s once in YIELD_INTERVAL s. Without the sleep, threads that wait for
+        Python's lock get it after 5 ms and in no fixed order: an event loop beside several busy
+        threads would wait for most of them.
         """
         if self.requested:
             raise Cancelled

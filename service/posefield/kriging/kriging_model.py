@@ -19,9 +19,9 @@ from posefield.kriging.covariance import COVARIANCE_MODELS
 class Hyper:
     """Parameters of a kriged field.
 
-    covariance: name in `COVARIANCE_MODELS`. drifts: polynomial degrees, 0 or 1, whose predictions are
-    averaged. scales (d,): distance per unit of each control, one over the range. nugget: share of
-    the sill. label: distance between two different performers; performers never enter the drift.
+    covariance: name in `COVARIANCE_MODELS`. drifts: polynomial degrees, 0 or 1, whose predictions
+    are averaged. scales (d,): distance per unit of each control, one over the range. nugget: share
+    of the sill. label: distance between two different performers; performers never enter the drift.
     """
 
     covariance: str

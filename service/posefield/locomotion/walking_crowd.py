@@ -61,7 +61,8 @@ def plan_routes(
 ) -> LocomotionPlan:
     """Return a plan of characters that follow routes; performers and phases depend on the seed.
 
-    Raises InvalidField as `plan_random` and `given.paths_through` do, and for a route that is too short.
+    Raises InvalidField as `plan_random` and `given.paths_through` do, and for a route that is too
+    short.
     """
     frames = _frames(len(routes), seconds, rate, seed)
     characters = random_paths.draw_characters(gait, len(routes), seed)

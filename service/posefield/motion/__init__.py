@@ -1,1 +1,1 @@
-"""Motion in NumPy: rotations, skeletons, clips and BVH, shared by the service and the training job."""
+"""Motion in NumPy: rotations, skeletons, clips and BVH; shared by service and training."""

@@ -38,8 +38,8 @@ def synthesize_clip(
     """Return the clip of a question; frame i is the pose at start + i / fps.
 
     most: largest number of frames. The N steps of a loop share the duration evenly, but are played
-    at fps. Raises as `poses.synthesize_poses` does, and InvalidField for a loop of a model that is not cyclic,
-    for joint names without roles and for more than `most` frames.
+    at fps. Raises as `poses.synthesize_poses` does, and InvalidField for a loop of a model that is
+    not cyclic, for joint names without roles and for more than `most` frames.
     """
     question = model.question(asked)
     joints = _named_skeleton(model, asked)

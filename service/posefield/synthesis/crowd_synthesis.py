@@ -66,8 +66,8 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     """Return the poses of a crowd, placed where its characters stand.
 
     With a view, distances are measured to the characters' placements. Raises InvalidField and
-    OutsideSamples as `poses.synthesize_poses` does for one character, with the index of the first character at
-    fault.
+    OutsideSamples as `poses.synthesize_poses` does for one character, with the index of the first
+    character at fault.
     """
     card = model.session.card
     controls, supported, said = crowd_validation.check_controls(

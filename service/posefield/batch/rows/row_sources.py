@@ -1,8 +1,8 @@
 """Sources of queries: a file, a grid or a sampling.
 
 A file is a table (CSV, Parquet) or objects (JSON Lines), by its ending. It has a column for each
-control of the model, and optionally those of `columns.OPTION_KINDS`; the defaults of missing values come
-from the command line. `rows` yields a Query or a Fault for each row, in the source's order.
+control of the model, and optionally those of `columns.OPTION_KINDS`; the defaults of missing values
+come from the command line. `rows` yields a query or a fault for each row, in the source's order.
 
     source = open_source(SourceOptions(path), Defaults("usdc"), model)
     found = source.survey()
