@@ -57,12 +57,23 @@ $(MODEL): $(SAMPLE)/recipe.toml | $(ENV)
 	$(BIN)/posefield train $(SAMPLE)/recipe.toml --output $(MODEL)
 
 .PHONY: demo
-demo: $(MODEL) ## sample, train, serve, ask over HTTP: clips in build/demo
+demo: $(MODEL) ## walks of the shipped model, and a reach sampled, trained and served: clips in build/demo
 	$(BIN)/python clients/demo.py $(MODEL) build/demo
+	$(BIN)/posefield demo --once --output build/demo
 
+# The walk goes first, so that the page opens with it; one of the same name in build/models takes its place.
+SHIPPED := service/posefield/shipped
+WALK = $(if $(wildcard build/models/cmu_walk.onnx),,$(SHIPPED)/cmu_walk.onnx)
 .PHONY: run
-run: $(MODEL) $(PAGE) $(DOCS) ## the same, but the service stays up on port 8000
-	$(BIN)/posefield serve build/models
+run: $(MODEL) $(PAGE) $(DOCS) ## serve the shipped walk and the models of build/models on port 8000
+	$(BIN)/posefield serve $(WALK) build/models
+
+# The motion data of CMU, as `posefield fetch cmu` leaves it; nothing of it is kept in the project.
+POSEFIELD_DATA ?= ../shared/data
+.PHONY: shipped-models
+shipped-models: $(MODEL) ## train the models that ship, from the motion data in POSEFIELD_DATA
+	$(BIN)/posefield train cmu_walk --data $(POSEFIELD_DATA) --output $(SHIPPED)/cmu_walk.onnx
+	cp $(MODEL) $(SHIPPED)/reaching.onnx
 
 .PHONY: addon
 addon: $(ENV) ## the Blender add-on as an archive to install, in build

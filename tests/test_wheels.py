@@ -16,6 +16,7 @@ import serving
 ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
 NAMES = ("posefield", "posefield-train")
+SHIPPED = [f"posefield/shipped/{name}" for name in ("cmu_walk.onnx", "reaching.onnx", "NOTICE")]
 
 pytestmark = pytest.mark.system
 
@@ -97,8 +98,10 @@ def test_wheels_train_and_serve_in_a_fresh_environment(version, dist, tmp_path):
         assert f"ModuleNotFoundError: No module named '{name}'" in told
 
 
-def test_the_service_alone_tells_how_to_get_the_training_commands(dist, tmp_path):
+def test_the_service_alone_shows_a_walk_and_tells_how_to_get_the_training_commands(dist, tmp_path):
     bin_ = installed(dist, tmp_path, sys.executable, "posefield")
+    run(bin_ / "posefield", "demo", "--once", "--output", "demo", cwd=tmp_path)
+    assert (tmp_path / "demo/walk_1.2.usdc").read_bytes().startswith(b"PXR-USDC")
     helped = run(bin_ / "posefield", "--help", cwd=tmp_path).stdout
     assert all(command in helped for command in ("serve", "train", "evaluate"))
     for words in (["train", "a.toml", "--output", "b.onnx"], ["sample", "--help"]):
@@ -118,9 +121,11 @@ def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):
             opened.read("posefield/http/api/openapi.yaml")
             == (ROOT / "api/openapi.yaml").read_bytes()
         )
+        shipped = {file: opened.read(file) for file in SHIPPED}
+    assert all(shipped[file] == (ROOT / "service" / file).read_bytes() for file in SHIPPED)
     pages = {f"posefield/http/pages/{page}/index.html" for page in ("docs", "viewer")}
     assert pages <= whole
     assert any(name.endswith("licenses/LICENSE") for name in whole)
     with tarfile.open(source) as opened:
         names = {member.name.partition("/")[2] for member in opened if member.isfile()}
-    assert pages | {"posefield/http/api/openapi.yaml", "LICENSE"} <= names
+    assert pages | {"posefield/http/api/openapi.yaml", "LICENSE", *SHIPPED} <= names

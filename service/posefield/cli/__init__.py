@@ -17,8 +17,10 @@ from posefield.cli import (
     command_check,
     command_clip,
     command_crowd,
+    command_demo,
     command_export,
     command_inspect,
+    command_models,
     command_page,
     command_serve,
     command_why,
@@ -41,6 +43,7 @@ EXTRAS = {
     "parquet": ("pyarrow",),
 }
 TRAINING = {
+    "fetch": "Convert downloaded motion data for a shipped recipe.",
     "sample": "Write procedural motions and their recipe.",
     "train": "Train a recipe's model.",
     "adapt": "Add a performer to a trained model.",
@@ -108,6 +111,8 @@ def _version(
         raise typer.Exit
 
 
+app.command()(command_demo.demo)
+app.command()(command_models.models)
 app.command()(command_inspect.inspect)
 app.command()(command_clip.pose)
 app.command()(command_clip.clip)

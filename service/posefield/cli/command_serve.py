@@ -6,13 +6,18 @@ import typer
 
 from posefield.console.arguments import Json
 from posefield.console.output import as_json
+from posefield.registry import shipped_models
 
 
 def serve(
     places: Annotated[
-        list[str],
-        typer.Argument(help="model files, folders with model files, or URLs of object stores"),
-    ],
+        list[str] | None,
+        typer.Argument(
+            help="model files, folders with model files, or URLs of object stores; "
+            "default: the models that ship with posefield",
+            show_default=False,
+        ),
+    ] = None,
     host: Annotated[
         str | None, typer.Option(help="IP address; default: POSEFIELD_HOST, else 127.0.0.1")
     ] = None,
@@ -20,11 +25,17 @@ def serve(
         int | None, typer.Option(help="TCP port; default: POSEFIELD_PORT, else 8000")
     ] = None,
 ) -> None:
-    """Serve the given models over HTTP until interrupted."""
+    """Serve models over HTTP until interrupted.
+
+    Without PLACES it serves the models that ship with posefield: a walk, which the page at / shows
+    first, and a reach.
+    """
     from posefield.http import server
     from posefield.http.api import settings
 
-    server.serve(places, settings.read_settings(host=host, port=port))
+    server.serve(
+        shipped_models.or_shipped(places or ()), settings.read_settings(host=host, port=port)
+    )
 
 
 def key(

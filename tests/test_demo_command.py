@@ -1,0 +1,89 @@
+"""Tests of `posefield demo`: its files, the service that it starts, and how both end."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import httpx
+import pytest
+from pxr import Usd, UsdSkel
+
+from posefield.cli import command_demo
+from posefield_train.source import bvh
+
+pytestmark = pytest.mark.system
+
+DEMO = [sys.executable, "-m", "posefield", "demo"]
+# The walk's speed is measured of the clip, and the question holds the answer to it.
+EXACT = 0.01
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The folder of a demo that has ended, and what it printed."""
+    folder = tmp_path_factory.mktemp("demo")
+    done = subprocess.run(
+        [*DEMO, "--once", "--output", folder],
+        # Settings of another service in the environment do not reach the demo's.
+        env={**os.environ, "POSEFIELD_PORT": "1", "POSEFIELD_KEYS_FILE": "/none"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout
+
+
+def test_every_file_is_written_and_named(made):
+    folder, said = made
+    assert {path.name for path in folder.iterdir()} == set(command_demo.FILES)
+    for name, question in command_demo.FILES.items():
+        (line,) = (line for line in said.splitlines() if f"{folder / name} " in line)
+        assert f"{(folder / name).stat().st_size:,} bytes" in line and line.endswith(question)
+    assert said.splitlines()[-1].startswith(f"{len(command_demo.FILES)} files in {folder}")
+
+
+@pytest.mark.parametrize("speed", command_demo.SPEEDS)
+def test_walks_have_the_speed_of_their_names(made, speed):
+    folder, _ = made
+    read = bvh.read(folder / f"walk_{speed}.bvh")
+    clip = bvh.to_clip(read, metres_per_unit=0.01, up="y", root_offset="replace")
+    first, last = clip.root_path[[0, -1]]
+    walked = float(((last - first)[[0, 2]] ** 2).sum() ** 0.5) / clip.duration
+    assert walked == pytest.approx(speed, abs=EXACT * 5)
+    assert min(abs(other - speed) for other in command_demo.SPEEDS if other != speed) > 0.3
+    assert (folder / f"walk_{speed}.glb").read_bytes().startswith(b"glTF")
+
+
+def test_usd_files_have_characters(made):
+    folder, _ = made
+    counts = {}
+    for path in folder.glob("*.usdc"):
+        stage = Usd.Stage.Open(str(path))
+        counts[path.name] = sum(prim.IsA(UsdSkel.Root) for prim in stage.TraverseAll())
+    assert counts.pop("crowd.usdc") >= 50
+    assert set(counts.values()) == {1}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_it_stays_up_until_a_signal_and_takes_the_service_with_it(tmp_path, number):
+    words = [*DEMO, "--no-browser", "--output", tmp_path]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+        lines = iter(child.stdout.readline, "")
+        address = next(line.split()[2] for line in lines if line.startswith("the page: "))
+        listed = httpx.get(f"{address}v1/models").json()["models"]
+        assert listed[0]["name"] == "cmu_walk", "the page opens with the first model"
+        child.send_signal(number)
+        assert child.wait(timeout=30) == 0
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(f"{address}livez")
+
+
+def test_a_taken_port_is_told_and_ends_it(tmp_path, made):
+    words = [*DEMO, "--once", "--port", "70000", "--output", tmp_path / "none"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 5
+    assert "70000, expected 0 to 65535" in done.stderr
+    assert "the service of the demo did not start: exit code 2" in done.stderr
+    assert not (tmp_path / "none").exists()

@@ -1,0 +1,147 @@
+"""Tests of the shipped models: their card, notice and listing, and that the recipes make them."""
+
+import json
+import re
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pytest
+import serving
+
+from posefield.inference import session
+from posefield.model_file import checked_file
+from posefield.question.motion_question import ClipQuestion
+from posefield.registry import shipped_models
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+
+NAMES = ("cmu_walk", "reaching")
+# Share-alike and non-commercial licences bind whoever takes the wheel: nothing of theirs ships.
+BINDING = re.compile(r"\b(SA|NC|ND)\b|share-?alike|non-?commercial|HDM05|Bandai", re.IGNORECASE)
+SAME = 1e-5
+"""Bound, m, of the difference between answers of a shipped model and of one trained again."""
+
+
+def file(name):
+    return shipped_models.FOLDER / f"{name}.onnx"
+
+
+@pytest.fixture(scope="module")
+def cards():
+    return {name: checked_file.load_card(file(name).read_bytes(), name) for name in NAMES}
+
+
+def test_the_walk_ships_first_and_is_small():
+    found = sorted(path.name for path in shipped_models.FOLDER.glob("*.onnx"))
+    assert found == [f"{name}.onnx" for name in NAMES]
+    assert all(file(name).stat().st_size < 150_000 for name in NAMES)
+
+
+def test_the_notice_quotes_the_licence_of_every_model(cards):
+    notice = " ".join(shipped_models.NOTICE.read_text().split())
+    assert cards["cmu_walk"].provenance["licence"].startswith("Free for all uses, not to be resold")
+    for name in NAMES:
+        assert f"{name}.onnx" in notice
+        assert not BINDING.search(cards[name].provenance["licence"])
+    assert "The data used in this project was obtained from mocap.cs.cmu.edu" in notice
+    assert "NSF EIA-0196217" in notice and "NSF EIA-0196217" in str(cards["cmu_walk"].provenance)
+    assert cards["reaching"].provenance["licence"] in notice
+    assert BINDING.search("CC BY-SA 3.0"), "negative control"
+
+
+def test_models_lists_the_shipped_models(posefield, cards):
+    code, out, err = posefield("models")
+    heading, *lines, last = out.splitlines()
+    assert (code, err) == (0, "")
+    assert heading.split() == "name controls clips performers size file licence".split()
+    assert [line.split()[0] for line in lines] == list(NAMES)
+    assert re.search(r"speed, turn, stride_length +78 +15 +110 kB .*mocap\.cs\.cmu\.edu", lines[0])
+    assert last.endswith(str(shipped_models.NOTICE))
+
+
+def test_models_lists_local_models_as_json(posefield, model_path):
+    code, out, err = posefield("models", model_path, "--json")
+    *shipped, own = json.loads(out)
+    assert (code, err) == (0, "")
+    assert [one["name"] for one in shipped] == list(NAMES)
+    assert (own["file"], own["bytes"]) == (str(model_path), model_path.stat().st_size)
+    assert own["identity"] == f"reaching@{checked_file.digest(model_path.read_bytes())}"
+    speed = shipped[0]["controls"][0]
+    assert (speed["name"], speed["unit"]) == ("speed", "m/s")
+    assert speed["minimum"] < 0.5 and speed["maximum"] > 1.7
+    assert len(shipped[0]["performers"]) == 15
+
+
+def test_models_names_a_file_that_is_none_and_lists_the_others(posefield, tmp_path):
+    (tmp_path / "broken.onnx").write_bytes(b"no model")
+    code, out, err = posefield("models", tmp_path, tmp_path / "none")
+    assert code == 3
+    assert [line.split()[0] for line in out.splitlines()[1:-1]] == list(NAMES)
+    assert [line.split(": ")[1] for line in err.splitlines()] == [
+        str(tmp_path / "broken.onnx"),
+        str(tmp_path / "none"),
+    ]
+
+
+def answers(model):
+    """Joint positions (points, times, J, 3), m, at corners of the controls' ranges and amid."""
+    card = model.session.card
+    found = []
+    for share in (0.1, 0.5, 0.9):
+        controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
+        asked = ClipQuestion(controls=controls, fps=30.0, extrapolate="ok")
+        found.append(clips.synthesize_clip(model, asked).clip.positions()[[0, 9, 18]])
+    return np.stack(found)
+
+
+def open_model(name, content):
+    return Synthesizer(name, session.load_bytes(content, f"{name}.onnx"))
+
+
+def assert_trained_again(name, content):
+    """Assert that a file just trained gives the answers of the shipped one.
+
+    Bytes are compared by their origins only: another BLAS rounds otherwise, and the card names the
+    versions of the libraries.
+    """
+    shipped = open_model(name, file(name).read_bytes())
+    again = open_model(name, content)
+    for key in ("data_sha256", "recipe_sha256", "clips", "licence"):
+        assert shipped.session.card.provenance[key] == again.session.card.provenance[key]
+    apart = np.abs(answers(shipped) - answers(again))
+    assert apart.max() < SAME
+    shifted = np.abs(answers(shipped) - np.roll(answers(again), 1, axis=0))
+    assert shifted.max() > 1000 * SAME, "negative control: other controls, other motion"
+
+
+def test_the_walk_is_what_its_recipe_makes(real_data, posefield, tmp_path):
+    made = tmp_path / "cmu_walk.onnx"
+    code, _, err = posefield("train", "cmu_walk", "--data", real_data, "-o", made)
+    assert code == 0, err
+    assert_trained_again("cmu_walk", made.read_bytes())
+
+
+@pytest.mark.system
+def test_the_reach_is_what_its_recipe_makes(posefield, tmp_path):
+    assert posefield("sample", "reaching", "-o", tmp_path)[0] == 0
+    made = tmp_path / "reaching.onnx"
+    assert posefield("train", tmp_path / "recipe.toml", "-o", made)[0] == 0
+    assert_trained_again("reaching", made.read_bytes())
+
+
+@pytest.mark.system
+def test_serve_without_places_serves_the_shipped_models():
+    with serving.process() as child:
+        url = serving.address(child)
+        listed = httpx.get(f"{url}/v1/models").json()["models"]
+        assert [model["name"] for model in listed] == list(NAMES)
+        crowd = httpx.get(f"{url}/v1/models/cmu_walk/crowd.usdc?count=2&seconds=1")
+        assert crowd.content.startswith(b"PXR-USDC")
+
+
+def test_the_makefile_names_the_files_that_it_makes():
+    text = (Path(__file__).parents[1] / "Makefile").read_text()
+    recipe = text.partition("shipped-models: ")[2].partition("\n\n")[0]
+    assert "SHIPPED := service/posefield/shipped" in text
+    assert all(f"$(SHIPPED)/{name}.onnx" in recipe for name in NAMES)
