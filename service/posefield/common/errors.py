@@ -3,6 +3,7 @@
 MotionError
 ├── FileError            a file that cannot be used, with its path and, where known, its line
 │   ├── BvhError         a motion file that breaks the BVH grammar or contradicts itself
+│   ├── AcclaimError     a skeleton (ASF) or motion (AMC) file that breaks its grammar
 │   ├── RecipeError      a recipe or its table of clips
 │   ├── ModelError       an .onnx file that is corrupt, foreign or of an unknown format
 │   └── UsdError         a USD file that does not open
@@ -46,6 +47,10 @@ class FileError(MotionError):
 
 class BvhError(FileError):
     """A motion file that breaks the BVH grammar or contradicts itself."""
+
+
+class AcclaimError(FileError):
+    """A skeleton (ASF) or motion (AMC) file that breaks its grammar or contradicts itself."""
 
 
 class RecipeError(FileError):
