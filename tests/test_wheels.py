@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
 NAMES = ("posefield", "posefield-train")
 SHIPPED = [f"posefield/shipped/{name}" for name in ("cmu_walk.onnx", "reaching.onnx", "NOTICE")]
+TABLES = ("cmu_walk/strides.csv", "hdm05_reach/clips.csv", "hdm05_reach/sha256.csv")
 
 pytestmark = pytest.mark.system
 
@@ -126,6 +127,10 @@ def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):
     pages = {f"posefield/http/pages/{page}/index.html" for page in ("docs", "viewer")}
     assert pages <= whole
     assert any(name.endswith("licenses/LICENSE") for name in whole)
+    (training,) = dist.glob("posefield_train-*.whl")
+    with zipfile.ZipFile(training) as opened:
+        tables = {f"posefield_train/recipes/{name}" for name in TABLES}
+        assert tables <= set(opened.namelist())
     with tarfile.open(source) as opened:
         names = {member.name.partition("/")[2] for member in opened if member.isfile()}
     assert pages | {"posefield/http/api/openapi.yaml", "LICENSE", *SHIPPED} <= names

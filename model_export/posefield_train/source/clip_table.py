@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common.errors import RecipeError
 from posefield.common.units import Floats
-from posefield_train.source import data_folder
+from posefield_train.source import data_folder, shipped_recipes
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.recipe import Clips, Condition, Recipe
 
@@ -56,10 +56,11 @@ class ClipRow:
 def read(recipe: Recipe, folder: Path) -> list[ClipRow]:
     """Return the rows of the recipe's table that meet its conditions.
 
-    Raises RecipeError, naming line and column, for the first invalid cell, and for a missing
-    column, no matching row, and two rows of the same frames.
+    If the folder lacks the table, the shipped one of its name is read, if there is one. Raises
+    RecipeError, naming line and column, for the first invalid cell, and for a missing column, no
+    matching row, and two rows of the same frames.
     """
-    place = data_folder.find(folder, recipe.clips.table)
+    place = shipped_recipes.find_table(folder, recipe.clips.table)
     cells = open_table(place)
     cells.require(_columns(recipe))
     rows = [

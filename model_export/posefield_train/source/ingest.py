@@ -12,7 +12,7 @@ from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import bvh, clip_table, half_turns, measured_controls
+from posefield_train.source import bvh, clip_table, half_turns, measured_controls, shipped_recipes
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
@@ -54,7 +54,7 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     rows = clip_table.read(recipe, folder)
     files = read_files(rows)
     unnoted = set(files) if recipe.source.root_offset is None else set()
-    notes: list[str] = []
+    notes = shipped_recipes.table_notes(rows[0].table)
     examples = []
     for row in rows:
         key = str(row.place)

@@ -1,8 +1,10 @@
-"""Recipes of the package, by name: their motion data is published by its owners."""
+"""Recipes and tables of clips of the package, by name; their owners publish the motion data."""
 
 from pathlib import Path
 
-from posefield.common.errors import InvalidField
+from posefield.common.errors import InvalidField, RecipeError
+from posefield_train.source import data_folder
+from posefield_train.source.data_folder import FileLocation
 
 FOLDER = Path(__file__).parents[1] / "recipes"
 
@@ -26,3 +28,25 @@ def file_of(given: Path, data: Path | None) -> Path:
     if data is None:
         raise InvalidField("data", f"missing, expected the folder of the data of {given.name}")
     return FOLDER / f"{given.name}.toml"
+
+
+def find_table(folder: Path, name: str) -> FileLocation:
+    """Return the table of clips in a data folder, else the shipped table of that name.
+
+    Raises RecipeError, as `data_folder.find`, if neither exists.
+    """
+    try:
+        return data_folder.find(folder, name)
+    except RecipeError:
+        shipped = {path.relative_to(FOLDER).as_posix(): path for path in FOLDER.glob("*/*.csv")}
+        if name not in shipped:
+            raise
+        return shipped[name]
+
+
+def table_notes(place: str) -> list[str]:
+    """Return a note on the use of a shipped table; none for a table of the data folder."""
+    if not Path(place).is_relative_to(FOLDER):
+        return []
+    name = Path(place).relative_to(FOLDER).as_posix()
+    return [f"{name}: the data folder has no such table, the one that ships was used"]

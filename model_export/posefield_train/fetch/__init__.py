@@ -1,0 +1,1 @@
+"""Conversion of motion data as their owners publish it to what the shipped recipes read."""

@@ -1,0 +1,297 @@
+"""Tests of `posefield fetch` with files of HDM05, and with Acclaim files made of CMU's walks."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from acclaim_files import ARM_AMC, ARM_ASF, files_of
+
+from posefield.motion import bvh_writer, quat
+from posefield.motion import clip as clips
+from posefield.motion.skeleton import Skeleton
+from posefield_train.fetch import cmu_trials, data_sets
+from posefield_train.source import bvh, data_folder, ingest, recipe, shipped_recipes
+
+UNIT = cmu_trials.METRES_PER_UNIT
+# Given files are written to four decimals of the unit: 5.3e-6 m was measured.
+WRITTEN = 1e-5
+WALK, TURN = "bvh/p07_walking_4_tr.bvh", "bvh/puA_walking_22_tr.bvh"
+
+
+@pytest.fixture(scope="module")
+def downloaded(real_data, tmp_path_factory):
+    """A folder with two performers' skeletons and three clips of HDM05, as unpacked."""
+    folder = tmp_path_factory.mktemp("HDM05_cut_amc")
+    for name in ("HDM_bd.asf", "HDM_bd_grabHighR_001_120.amc", "HDM_bd_grabHighR_002_120.amc"):
+        copy_reach(real_data, name, folder / "grabHighR")
+    for name in ("HDM_tr.asf", "HDM_tr_depositFloorR_029_120.amc"):
+        copy_reach(real_data, name, folder / "depositFloorR")
+    return folder
+
+
+def copy_reach(real_data, name, folder):
+    folder.mkdir(exist_ok=True)
+    with data_folder.find(real_data, f"hdm05_reach/asf_amc/{name}").open("rb") as file:
+        (folder / name).write_bytes(file.read())
+
+
+def clip_of(place):
+    return bvh.to_clip(bvh.read(place), metres_per_unit=UNIT, up="y", root_offset="replace")
+
+
+@pytest.fixture
+def fetch(posefield, tmp_path):
+    """Function that fetches into tmp_path/data; gives code, output, errors."""
+    return lambda name, source, *words: posefield(
+        *("fetch", name, source, "-o", tmp_path / "data", *words)
+    )
+
+
+def assert_same_motion(ours, theirs):
+    a, b = clip_of(ours), clip_of(theirs)
+    assert a.skeleton.same_tree(b.skeleton)
+    assert (len(a), a.rate) == (len(b), b.rate)
+    assert np.abs(a.positions() - b.positions()).max() < WRITTEN
+    assert np.abs(a.positions()[1:] - b.positions()[:-1]).max() > 10 * WRITTEN, "negative control"
+
+
+def test_reaches_are_converted_with_their_rows_and_hashes(fetch, downloaded, real_data, tmp_path):
+    code, out, err = fetch("hdm05", downloaded, "--json")
+    facts = json.loads(out)
+    assert code == 0, err
+    assert [line.partition(": ")[0] for line in err.splitlines()] == ["missing"] * 58
+    place = tmp_path / "data/hdm05_reach"
+    assert json.loads((place / "fetched.json").read_text()) == facts
+    assert len(facts["missing"]) == 58 and len(facts["files"]) == facts["rows"] == 3
+    known = data_sets.HDM05.hashes()
+    for one in facts["files"]:
+        assert one["remark"] == ""
+        assert one["sha256"] == known[one["file"]]
+        assert one["sha256"] == data_sets.sha256((place / one["file"]).read_bytes())
+        assert all(own["sha256"] == known[own["file"]] for own in one["sources"])
+        given = data_folder.find(real_data, f"hdm05_reach/{one['file']}")
+        assert_same_motion(place / one["file"], given)
+    own = recipe.read(shipped_recipes.FOLDER / "hdm05_grab_high.toml")
+    made, notes = ingest.ingest(own, tmp_path / "data")
+    given, _ = ingest.ingest(own, real_data)
+    by_file = {example.row.place.name: example for example in given}
+    assert len(made) == 2 and not any("the one that ships" in note for note in notes)
+    for example in made:
+        expected = by_file[example.row.place.name].controls
+        assert np.abs(example.controls - expected).max() < WRITTEN
+
+
+def test_line_ends_make_no_other_motion_and_numbers_do(fetch, downloaded, tmp_path):
+    source = tmp_path / "own"
+    source.mkdir()
+    for path in downloaded.rglob("HDM_bd*"):
+        (source / path.name).write_bytes(path.read_bytes().replace(b"\r\n", b"\n"))
+    code, _, err = fetch("hdm05", source)
+    assert code == 0 and "warning" not in err
+    path = source / "HDM_bd_grabHighR_001_120.amc"
+    assert path.read_bytes() != (downloaded / "grabHighR" / path.name).read_bytes()
+    path.write_bytes(re.sub(rb"(?m)^ltibia .*", b"ltibia 45", path.read_bytes(), count=1))
+    code, _, err = fetch("hdm05", source)
+    assert code == 0
+    (line,) = (line for line in err.splitlines() if line.startswith("warning"))
+    assert line.endswith("not the content of which the table was measured")
+    assert "HDM_bd_grabHighR_001_120.amc" in line
+
+
+def test_another_cut_and_two_files_of_one_name_are_refused(fetch, downloaded, tmp_path):
+    source = tmp_path / "own"
+    for path in downloaded.rglob("HDM_bd*"):
+        source.mkdir(exist_ok=True)
+        (source / path.name).write_bytes(path.read_bytes())
+    path = source / "HDM_bd_grabHighR_001_120.amc"
+    whole = path.read_bytes()
+    path.write_bytes(whole[: whole.rindex(b"\n253")] + b"\n")
+    code, out, err = fetch("hdm05", source)
+    assert (code, out) == (3, "")
+    assert re.search(r"001_120\.amc: found 252 frames, expected 253 as in the table", err)
+    path.write_bytes(whole)
+    (source / "again").mkdir()
+    (source / "again/HDM_bd.asf").write_text(ARM_ASF)
+    code, _, err = fetch("hdm05", source)
+    assert code == 3 and re.search(r"HDM_bd\.asf: differs from .*HDM_bd\.asf, expected one", err)
+    assert not (tmp_path / "data").exists()
+
+
+@pytest.fixture(scope="module")
+def walks(real_data):
+    """Function from the table's name of a walk to its place in the given data."""
+    return lambda file: data_folder.find(real_data, f"cmu_walk/{file}")
+
+
+@pytest.fixture(scope="module")
+def acclaim_texts(walks):
+    """ASF and AMC texts of two walks, with the names of bones that CMU's files have."""
+    names = {own: theirs for theirs, own in cmu_trials.JOINTS.items()}
+
+    def made(file):
+        clip = clip_of(walks(file))
+        bones = replace(clip.skeleton, names=tuple(names[one] for one in clip.skeleton.names))
+        return files_of(replace(clip, skeleton=bones), UNIT)
+
+    return {file: made(file) for file in (WALK, TURN)}
+
+
+def write_trial(folder, texts, subject, number):
+    """A skeleton and a motion as CMU lays them out."""
+    own = folder / f"subjects/{subject:02}"
+    own.mkdir(parents=True, exist_ok=True)
+    (own / f"{subject:02}.asf").write_text(texts[0])
+    (own / f"{subject:02}_{number:02}.amc").write_text(texts[1])
+
+
+def test_walks_are_recognized_by_their_motion(fetch, acclaim_texts, walks, tmp_path):
+    # The trial's number is not the one that the table supposes, and one subject is unknown.
+    write_trial(tmp_path / "cmu", acclaim_texts[WALK], 7, 12)
+    write_trial(tmp_path / "cmu", acclaim_texts[TURN], 91, 3)
+    code, out, err = fetch("cmu", tmp_path / "cmu", "--json")
+    facts = json.loads(out)
+    assert code == 0, err
+    assert {one["file"]: one["sources"][-1]["file"] for one in facts["files"]} == {
+        WALK: "07_12.amc",
+        TURN: "91_03.amc",
+    }
+    place = tmp_path / "data/cmu_walk"
+    for file in (WALK, TURN):
+        assert_same_motion(place / file, walks(file))
+    listed = (place / "strides.csv").read_text().splitlines()
+    assert len(listed) == 1 + facts["rows"]
+    assert {line.partition(",")[0] for line in listed[1:]} == {WALK, TURN}
+    assert facts["missing"]["bvh/p07_walking_5_tr.bvh"] == (
+        "found no match, expected a trial of subject 07 of 329 frames"
+    )
+    own = recipe.read(shipped_recipes.FOLDER / "cmu_walk.toml")
+    made, _ = ingest.ingest(own, tmp_path / "data")
+    assert {example.row.place.name for example in made} == {Path(WALK).name, Path(TURN).name}
+
+
+def test_a_t_pose_before_the_first_frame_is_left_out(fetch, walks, tmp_path):
+    clip = clip_of(walks(WALK))
+    first = np.zeros_like(clip.rotations[:1])
+    first[..., 0] = 1.0
+    posed = replace(
+        clip,
+        rotations=np.concatenate([first, clip.rotations]),
+        translations=np.concatenate([clip.translations[:1], clip.translations]),
+    )
+    (tmp_path / "cgspeed").mkdir()
+    (tmp_path / "cgspeed/07_01.bvh").write_bytes(bvh_writer.dumps(posed, metres_per_unit=UNIT))
+    assert fetch("cmu", tmp_path / "cgspeed")[0] == 0
+    assert_same_motion(tmp_path / "data/cmu_walk" / WALK, walks(WALK))
+
+
+def test_the_files_of_the_table_are_copied_as_they_are(fetch, walks, tmp_path):
+    with walks(WALK).open("rb") as file:
+        content = file.read()
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own" / Path(WALK).name).write_bytes(content)
+    assert fetch("cmu", tmp_path / "own")[0] == 0
+    assert (tmp_path / "data/cmu_walk" / WALK).read_bytes() == content
+
+
+def test_another_subject_another_motion_and_two_trials_are_no_match(fetch, acclaim_texts, tmp_path):
+    write_trial(tmp_path / "other", acclaim_texts[WALK], 8, 1)
+    code, _, err = fetch("cmu", tmp_path / "other")
+    assert code == 3 and "found none of 60 clips; see http://mocap.cs.cmu.edu" in err
+    skeleton, motion = acclaim_texts[WALK]
+    slow = re.sub(r"(?m)^(root \S+ \S+) (\S+)", lambda m: f"{m[1]} {0.9 * float(m[2])}", motion)
+    write_trial(tmp_path / "slow", (skeleton, slow), 7, 1)
+    assert fetch("cmu", tmp_path / "slow")[0] == 3
+    for number in (1, 2):
+        write_trial(tmp_path / "two", acclaim_texts[WALK], 7, number)
+    code, _, err = fetch("cmu", tmp_path / "two")
+    assert code == 3
+    assert "found 07_01.amc, 07_02.amc with these strides, expected one trial" in err
+
+
+def steady_walk(frames, speed):
+    """A clip of the recipe's joints in a row, which walks ahead, speed in metres a frame."""
+    names = tuple(cmu_trials.JOINTS)
+    count = len(names)
+    parents = (-1, *range(count - 1))
+    offsets = np.zeros((count, 3))
+    offsets[2:, 0] = 0.1
+    joints = Skeleton(names, parents, offsets, (count - 1,), np.array([[0.1, 0.0, 0.0]]))
+    angles = 0.3 * np.sin(np.linspace(0.0, 9.0, frames))[:, None] * np.ones((1, count))
+    turned = quat.from_euler(np.stack([angles, 0.5 * angles, -angles], axis=-1), "ZYX")
+    path = speed * np.arange(frames)[:, None] * np.array([0.6, 0.0, 0.8])
+    return clips.assemble(joints, turned, path, offsets, cmu_trials.RATE)
+
+
+@pytest.mark.parametrize(("share", "code"), [(1.0, 0), (1.002, 3)])
+def test_the_length_of_the_strides_tells_trials_apart(fetch, tmp_path, share, code):
+    """Without captured motion: a walk that only has the frames and the stride of a row."""
+    (row,) = (one for one in data_sets.CMU.rows("strides.csv") if one["performer"] == "cmu_02")
+    apart = int(row["end_frame"]) - int(row["start_frame"])
+    clip = steady_walk(343, share * float(row["stride_m"]) / apart)
+    write_trial(tmp_path / "cmu", files_of(clip, UNIT), 2, 1)
+    assert fetch("cmu", tmp_path / "cmu")[0] == code
+    made = tmp_path / "data/cmu_walk" / row["file"]
+    assert made.exists() == (code == 0)
+    if made.exists():
+        assert clip_of(made).skeleton.names == tuple(cmu_trials.JOINTS.values())
+        assert np.abs(clip_of(made).positions() - clip.positions()).max() < 1e-6
+
+
+def test_a_reach_of_other_content_is_converted_with_a_warning(fetch, tmp_path):
+    """Without captured motion: an arm under the name of a clip of HDM05."""
+    (tmp_path / "own").mkdir()
+    (tmp_path / "own/HDM_bd.asf").write_text(ARM_ASF)
+    head, frame = ARM_AMC.split("\n1\n")[0], "root 1 2 3 0 0 0\nupper 90 0"
+    frames = "\n".join(f"{number}\n{frame}" for number in range(1, 254))
+    (tmp_path / "own/HDM_bd_grabHighR_001_120.amc").write_text(f"{head}\n{frames}\n")
+    code, out, err = fetch("hdm05", tmp_path / "own")
+    assert code == 0 and "CC BY-SA 3.0" in out and "1 of 61 motions, 1 rows of clips.csv" in out
+    assert "HDM_bd.asf and HDM_bd_grabHighR_001_120.amc: not the content of which" in err
+    made = clip_of(tmp_path / "data/hdm05_reach/bvh/HDM_bd_grabHighR_001_120.bvh")
+    assert np.allclose(made.root_path / UNIT, [1.0, 2.0, 3.0], atol=1e-6)
+
+
+def test_a_folder_without_files_or_without_a_skeleton_is_refused(posefield, tmp_path):
+    words = ("-o", tmp_path / "data")
+    code, _, err = posefield("fetch", "cmu", tmp_path, *words)
+    assert code == 3 and "found no .asf, .amc, .bvh file in this folder" in err
+    (tmp_path / "07_01.amc").write_text(ARM_AMC)
+    code, _, err = posefield("fetch", "cmu", tmp_path, *words)
+    assert code == 3 and "07_01.amc: found no skeleton 07.asf for it, expected one" in err
+    (tmp_path / "07.asf").write_text(ARM_ASF)
+    code, _, err = posefield("fetch", "cmu", tmp_path, *words)
+    assert code == 3 and "found none of 60 clips" in err
+
+
+def test_the_package_has_tables_and_no_motion():
+    kinds = {path.suffix for path in shipped_recipes.FOLDER.rglob("*") if path.is_file()}
+    assert kinds == {".toml", ".json", ".csv"}
+    for own in (data_sets.CMU, data_sets.HDM05):
+        table = own.rows(own.table)
+        assert {row["file"] for row in table} <= own.hashes().keys()
+        assert all(re.fullmatch("[0-9a-f]{64}", text) for text in own.hashes().values())
+
+
+def test_a_data_folder_without_a_table_takes_the_shipped_one_and_says_so(walks, tmp_path):
+    own = recipe.read(shipped_recipes.FOLDER / "cmu_walk.toml")
+    performer = {"performer": recipe.Condition(among=["cmu_07"])}
+    own = own.model_copy(update={"clips": own.clips.model_copy(update={"where": performer})})
+    for row in data_sets.CMU.rows("strides.csv"):
+        if row["performer"] == "cmu_07":
+            path = tmp_path / "cmu_walk" / row["file"]
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with walks(row["file"]).open("rb") as file:
+                path.write_bytes(file.read())
+    said = "cmu_walk/strides.csv: the data folder has no such table, the one that ships was used"
+    shipped, notes = ingest.ingest(own, tmp_path)
+    assert said in notes
+    table = (shipped_recipes.FOLDER / "cmu_walk/strides.csv").read_bytes()
+    (tmp_path / "cmu_walk/strides.csv").write_bytes(table)
+    own_table, notes = ingest.ingest(own, tmp_path)
+    assert said not in notes
+    assert len(shipped) == len(own_table) == 2
+    for one, other in zip(shipped, own_table, strict=True):
+        assert np.array_equal(one.clip.rotations, other.clip.rotations)
