@@ -7,6 +7,7 @@ import sys
 
 import httpx
 import pytest
+import serving
 from pxr import Usd, UsdSkel
 
 from posefield.cli import command_demo
@@ -78,6 +79,23 @@ def test_it_stays_up_until_a_signal_and_takes_the_service_with_it(tmp_path, numb
         assert child.wait(timeout=30) == 0
     with pytest.raises(httpx.ConnectError):
         httpx.get(f"{address}livez")
+
+
+@pytest.mark.parametrize("words", [[], ["--no-browser"], ["--once"]])
+def test_the_browser_is_shown_the_page_unless_told_otherwise(tmp_path, words):
+    browser, seen = tmp_path / "browser", tmp_path / "seen"
+    browser.write_text(f'#!/bin/sh\necho "$1" > {seen}.new && mv {seen}.new {seen}\n')
+    browser.chmod(0o755)
+    given = {**os.environ, "BROWSER": str(browser)}
+    command = [*DEMO, *words, "--output", tmp_path / "demo"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=given) as child:
+        lines = iter(child.stdout.readline, "")
+        page = next((line.split()[2] for line in lines if line.startswith("the page: ")), None)
+        shown = serving.within(30 if not words else 1, seen.exists)
+        child.send_signal(signal.SIGINT)
+        assert child.wait(timeout=30) == 0
+    assert shown == (words == [])
+    assert not shown or seen.read_text().strip() == page
 
 
 def test_a_taken_port_is_told_and_ends_it(tmp_path, made):

@@ -127,6 +127,7 @@ def test_the_archives_hold_the_pages_the_contract_and_the_licence(dist):
     pages = {f"posefield/http/pages/{page}/index.html" for page in ("docs", "viewer")}
     assert pages <= whole
     assert any(name.endswith("licenses/LICENSE") for name in whole)
+    assert any(name.endswith("licenses/posefield/shipped/NOTICE") for name in whole)
     (training,) = dist.glob("posefield_train-*.whl")
     with zipfile.ZipFile(training) as opened:
         tables = {f"posefield_train/recipes/{name}" for name in TABLES}

@@ -275,6 +275,16 @@ def test_the_package_has_tables_and_no_motion():
         assert all(re.fullmatch("[0-9a-f]{64}", text) for text in own.hashes().values())
 
 
+def test_the_help_names_the_subjects_of_the_table(posefield):
+    code, out, _ = posefield("fetch", "--help")
+    assert code == 0
+    (listed,) = re.findall(r"subjects ((?:\d+,\s+)*\d+);", re.sub(r"[│\s]+", " ", out))
+    rows = {row["performer"].removeprefix("cmu_") for row in data_sets.CMU.rows("strides.csv")}
+    assert {int(text) for text in listed.split(", ")} == {int(n) for n in rows if n.isdecimal()}
+    files = {row["file"] for row in data_sets.CMU.rows("strides.csv") if "_u" in row["performer"]}
+    assert len(files) == 5
+
+
 def test_a_data_folder_without_a_table_takes_the_shipped_one_and_says_so(walks, tmp_path):
     own = recipe.read(shipped_recipes.FOLDER / "cmu_walk.toml")
     performer = {"performer": recipe.Condition(among=["cmu_07"])}

@@ -27,10 +27,11 @@ def fetch(
 ) -> None:
     """Convert downloaded motion data to what a shipped recipe reads.
 
-    It downloads nothing: the owners' pages are http://mocap.cs.cmu.edu (all of subject 07 and so
-    on, for the recipe cmu_walk) and https://resources.mpi-inf.mpg.de/HDM05 (the cut clips, for
-    hdm05_grab_high and hdm05_deposit_floor). The data folder then has BVH files, the table with
-    the rows whose files were found, and fetched.json with the SHA-256 of all files.
+    It downloads nothing: the owners' pages are http://mocap.cs.cmu.edu (for the recipe cmu_walk:
+    subjects 2, 5, 6, 7, 8, 10, 12, 16, 35, 38, 39, 43, 45, 46, 47, 49, 55; five of the walks are of
+    unknown subjects) and https://resources.mpi-inf.mpg.de/HDM05 (for hdm05_grab_high and
+    hdm05_deposit_floor: the cut clips). The data folder then has BVH files, the table with the
+    rows whose files were found, and fetched.json with the SHA-256 of all files.
     """
     from posefield_train.fetch import cmu_trials, data_sets, hdm05_cuts
 

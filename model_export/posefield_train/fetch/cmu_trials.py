@@ -129,7 +129,7 @@ def _recognized(
     """Return the walk of a row of clips.csv, or why there is none."""
     subject = row["performer"].removeprefix("cmu_")
     own = [one for one in trials if not subject.isdecimal() or one.subject == int(subject)]
-    matches = {}
+    matches: dict[tuple[int, int], tuple[Trial, Clip]] = {}
     for trial in own:
         clip = _clip(trial, int(row["frames"]))
         if clip is not None and _fits(clip, strides[row["file"]]):

@@ -76,9 +76,9 @@ def models(
 
     A file that is no model is named on standard error, and the exit code is then 3.
     """
-    found, faults = [], []
-    for one in _listed([str(shipped_models.FOLDER), *(places or ())]):
-        (faults if isinstance(one, ModelError) else found).append(one)
+    listed = list(_listed([str(shipped_models.FOLDER), *(places or ())]))
+    found = [one for one in listed if isinstance(one, LocalModel)]
+    faults = [one for one in listed if isinstance(one, ModelError)]
     if json:
         typer.echo(as_json([model.facts() for model in found]))
     else:

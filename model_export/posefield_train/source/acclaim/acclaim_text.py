@@ -8,8 +8,8 @@ from typing import IO, Literal, Protocol
 from posefield.common.errors import AcclaimError
 from posefield_train.source.bvh.bvh_content import MAX_NUMBER, NUMBER, quote
 
-MAX_BYTES = 500_000_000
-"""Limit of a file's size: 45 minutes of 31 joints at 120 frames a second."""
+MAX_LINE = 10_000
+"""Limit of a line's length, bytes: hundreds of times that of a bone with six numbers."""
 
 
 class FileLike(Protocol):
@@ -45,21 +45,23 @@ class Line:
         return values
 
 
-def read_lines(place: FileLike) -> Iterator[Line]:
+def read_lines(place: FileLike, most: int) -> Iterator[Line]:
     """Yield the lines of a file that have words, without comments.
 
-    Any byte is text (Latin-1), since paths in comments have letters of their authors' code pages.
-    Raises AcclaimError if the file cannot be read, or is too large.
+    most: limit of the file's size, bytes. Any byte is text (Latin-1), since comments have paths in
+    the code pages of their authors. Raises AcclaimError if the file cannot be read, is larger, or
+    has a line longer than MAX_LINE; lines are read one at a time.
     """
-    source = str(place)
+    source, read, number = str(place), 0, 0
     try:
         with place.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
+            while content := file.readline(MAX_LINE + 1):
+                read, number = read + len(content), number + 1
+                if len(content) > MAX_LINE or read > most:
+                    expected = f"expected at most {MAX_LINE} bytes a line and {most} in all"
+                    raise AcclaimError(source, f"found more bytes than allowed, {expected}", number)
+                words = tuple(content.decode("latin-1").partition("#")[0].split())
+                if words:
+                    yield Line(source, number, words)
     except OSError as fault:
         raise AcclaimError(source, f"cannot be read: {fault.strerror}") from fault
-    if len(content) > MAX_BYTES:
-        raise AcclaimError(source, f"found more than {MAX_BYTES} bytes, expected at most as many")
-    for number, text in enumerate(content.decode("latin-1").split("\n"), 1):
-        words = tuple(text.partition("#")[0].split())
-        if words:
-            yield Line(source, number, words)

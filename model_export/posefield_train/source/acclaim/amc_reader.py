@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
 
 import numpy as np
 
@@ -14,6 +13,9 @@ from posefield_train.source.acclaim.asf_reader import ROOT, AsfFile
 from posefield_train.source.bvh.bvh_reader import MAX_POSES
 
 FRAME = re.compile(r"\d{1,9}", re.ASCII)
+MAX_BYTES = 500_000_000
+"""Limit of a file's size: 45 minutes of 31 joints at 120 frames a second."""
+
 HEADER = {":fully-specified", ":degrees"}
 
 
@@ -40,44 +42,49 @@ def read_amc(place: FileLike, skeleton: AsfFile) -> AmcFile:
     another skeleton, or whose frames are not numbered one after another.
     """
     widths = {ROOT: 6, **{bone.name: len(bone.dof) for bone in skeleton.bones if bone.dof}}
+    groups = _groups(read_lines(place, MAX_BYTES), most=max(len(HEADER), 1 + len(widths)))
+    _check_header(next(groups), str(place))
     most = MAX_POSES // (len(skeleton.bones) + 1)
-    frames: list[tuple[float, ...]] = []
-    for frame in _frames(read_lines(place)):
+    frames: list[Floats] = []
+    before = None
+    for frame in groups:
+        number = int(frame[0].words[0])
+        if before is not None and number != before + 1:
+            raise frame[0].unexpected(f"frame {before + 1}")
         if len(frames) == most:
             raise frame[0].error(f"found more than {most} frames, expected at most as many")
-        frames.append(_values(frame, widths))
+        frames.append(np.array(_values(frame, widths)))
+        before = number
     if not frames:
         raise AcclaimError(str(place), "found no frame, expected at least one")
     ends = np.cumsum([*widths.values()])[:-1]
-    columns = dict(zip(widths, np.split(np.array(frames), ends, axis=1), strict=True))
+    columns = dict(zip(widths, np.split(np.stack(frames), ends, axis=1), strict=True))
     return AmcFile(str(place), columns.pop(ROOT), columns)
 
 
-def _frames(lines: Iterator[Line]) -> Iterator[list[Line]]:
-    """Yield the lines of each frame, its number first."""
-    header: set[str] = set()
-    count = 0
+def _groups(lines: Iterator[Line], most: int) -> Iterator[list[Line]]:
+    """Yield the header's lines, then those of each frame, its number first.
 
-    def frame_of(line: Line) -> int:
-        nonlocal count
-        count += len(line.words) == 1 and bool(FRAME.fullmatch(line.words[0]))
-        return count
+    Raises AcclaimError for more than `most` lines in one of them.
+    """
+    own: list[Line] = []
+    for line in lines:
+        if len(line.words) == 1 and FRAME.fullmatch(line.words[0]):
+            yield own
+            own = []
+        elif len(own) == most:
+            raise line.unexpected("the number of the next frame")
+        own.append(line)
+    yield own
 
-    before = None
-    for number, group in groupby(lines, frame_of):
-        own = list(group)
-        if not number:
-            header = {line.words[0].lower() for line in own}
-            if unknown := [line for line in own if line.words[0].lower() not in HEADER]:
-                raise unknown[0].unexpected(f"{' and '.join(sorted(HEADER))}, then frames")
-            continue
-        if header != HEADER:
-            raise own[0].error(f"found the header {sorted(header)}, expected {sorted(HEADER)}")
-        index = int(own[0].words[0])
-        if before is not None and index != before + 1:
-            raise own[0].unexpected(f"frame {before + 1}")
-        before = index
-        yield own
+
+def _check_header(lines: list[Line], source: str) -> None:
+    for line in lines:
+        if line.words[0].lower() not in HEADER or len(line.words) > 1:
+            raise line.unexpected(f"{' and '.join(sorted(HEADER))}, then frames")
+    found = {line.words[0].lower() for line in lines}
+    if found != HEADER:
+        raise AcclaimError(source, f"found the header {sorted(found)}, expected {sorted(HEADER)}")
 
 
 def _values(frame: list[Line], widths: dict[str, int]) -> tuple[float, ...]:

@@ -15,6 +15,9 @@ ROOT = "root"
 MAX_BONES = 1000
 """Limit of bones, several times those of any character."""
 
+MAX_BYTES = 4_000_000
+"""Limit of a file's size: several times that of MAX_BONES bones."""
+
 Vector = tuple[float, float, float]
 IGNORED = {"version", "name", "documentation", "skin"}
 """Sections that do not change the motion."""
@@ -60,7 +63,7 @@ def read_asf(place: FileLike) -> AsfFile:
     reader does not know: angles in radians, bones that move or stretch, a root that is not at the
     origin, and axes in another order than XYZ.
     """
-    source, sections = str(place), _sections(read_lines(place))
+    source, sections = str(place), _sections(read_lines(place, MAX_BYTES))
     for name in ("units", "root", "bonedata", "hierarchy"):
         if not sections.get(name):
             raise AcclaimError(source, f"found no entry of section :{name}, expected some")
