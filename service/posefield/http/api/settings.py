@@ -13,37 +13,47 @@ PREFIX = "POSEFIELD_"
 class Settings:
     """Settings of the service; each is read from POSEFIELD_ and its name in capitals.
 
-    Limits are maxima; times are in seconds, sizes in bytes.
+    Limits are maxima; times are in seconds, sizes in bytes. The documentation's page of settings is
+    made of the paragraphs below.
 
-    host, port: address to listen on; port 0 takes a free one. workers: processes that share the
-    port; 0 for the number of processors. log: "on" for one line per request on standard error.
-    concurrency: open requests of a process. deadline: time until a response begins. drain: time
-    after SIGTERM in which the service still listens and reports not ready. grace: time for open
-    requests to finish after that. unresponsive: time without an iteration of the event loop until a
-    process logs its stacks and ends, to be replaced; 0 for never.
+    host: IP address to listen on. port: TCP port; 0 takes a free one. workers: processes that share
+    the port; 0 for the number of processors. log: "on" for one line per request on standard error,
+    or "off". concurrency: open requests of a process; 503 above it. deadline: time until a response
+    begins; 503 after it. drain: time after SIGTERM in which the service still listens and reports
+    not ready. grace: time for open requests to finish after the drain. unresponsive: time without
+    an iteration of the event loop until a process logs its stacks and ends, to be replaced; 0 for
+    never.
 
-    body_limit: size of a request body. crowd_body_limit: of a crowd request. clips_body_limit: of a
-    request for many clips. bodies_memory: memory of the bodies of all open requests. url_limit,
-    head_limit: size of a URL and of all headers. idle_time: time until an idle connection is
-    closed. output_limit: size of a clip, of a crowd's poses and of a walking crowd.
+    body_limit: size of a request body. crowd_body_limit: size of the body of a crowd request.
+    clips_body_limit: size of the body of a request for many clips. bodies_memory: memory of the
+    bodies of all open requests, beyond 64 KiB of each; 503 above it. url_limit: size of a URL.
+    head_limit: size of all header lines, at most 100 of them. idle_time: time until an idle
+    connection is closed. output_limit: size of a clip, of a crowd's poses and of a walking crowd,
+    estimated before it is made.
 
     crowd_limit: characters of a crowd. crowd_poses: poses of all motions of a walking crowd.
-    crowd_frames: frames of each of these motions. clips_limit: clips of a request. clips_poses:
-    frames of all its clips. clips_targets: cost of all its targets. grid_limit: points of a grid
-    of sigma.
+    crowd_frames: frames of each motion of a walking crowd. clips_limit: clips of an archive.
+    clips_poses: frames of all clips of an archive. clips_targets: targets of all clips of an
+    archive; one of a clip with open controls counts as four, pinned feet count as four more.
+    grid_limit: points of a grid of sigma.
 
     reload: time between two checks for new models; 0 for never. versions: older versions of a model
-    that stay available by hash. versions_memory: memory of all of these. alias_seconds: time for
-    which caches may use a response for a model's plain name without revalidation.
+    that stay available by hash. versions_memory: memory of all older versions, roughly.
+    alias_seconds: time for which caches may use a response for a model's plain name without
+    revalidation.
 
-    hosts: accepted host names, comma-separated; IP addresses are always accepted. origins: origins
-    that CORS allows, comma-separated.
+    hosts: accepted host names, comma-separated, such as poses.example.com,*.example.org, or *;
+    without any, localhost. IP addresses are always accepted. origins: origins that CORS allows,
+    comma-separated, or *.
 
-    keys, keys_file: API keys as lines of name, hash and scopes. open: allow a service
-    without credentials on addresses other than loopback. metrics_open: /metrics needs no
-    credentials. jwt_keys: file or URL of the token issuer's public keys. jwt_refresh: time between
-    two reads of it. jwt_issuer, jwt_audience, jwt_algorithm: required of tokens. jwt_leeway:
-    tolerance for clock differences. jwt_scopes: name of the claim with the scopes.
+    keys: API keys as lines of name, hash and scopes, or some between semicolons. keys_file: file of
+    such lines, as posefield key writes them. open: 1 allows a service without credentials on
+    addresses other than loopback. metrics_open: 1 allows /metrics without credentials. jwt_keys:
+    file or https URL of the token issuer's public keys (JWKS). jwt_refresh: time between two reads
+    of these keys. jwt_issuer: value that tokens must have as iss. jwt_audience: value that tokens
+    must have as aud. jwt_algorithm: the one accepted algorithm; RS, PS or ES with 256, 384 or 512,
+    or EdDSA. jwt_leeway: tolerance for clock differences. jwt_scopes: name of the claim with the
+    scopes.
     """
 
     host: str = "127.0.0.1"

@@ -1,0 +1,48 @@
+"""Write the pages of the documentation that repeat what the code, the contract or a JSON file says.
+
+python docs/generate.py writes them; with --check it prints the pages that differ, and exits 1.
+"""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import code_pages
+import data_pages
+
+DOCS = Path(__file__).parent
+PAGES: dict[str, Callable[[], str]] = {
+    "operate/settings.md": code_pages.settings,
+    "reference/cli.md": code_pages.commands,
+    "reference/problems.md": code_pages.problems,
+    "reference/table-columns.md": code_pages.columns,
+    "reference/recipe-keys.md": data_pages.recipe_keys,
+    "reference/api.md": data_pages.api,
+    "reference/python.md": lambda: data_pages.client("python"),
+    "reference/typescript.md": lambda: data_pages.client("typescript"),
+    "results/quality.md": lambda: data_pages.results("quality"),
+    "results/targets.md": lambda: data_pages.results("targets"),
+    "results/support.md": lambda: data_pages.results("support"),
+    "results/speed.md": lambda: data_pages.results("speed"),
+}
+
+
+def main() -> None:
+    """Write all pages, or check that they are up to date."""
+    texts = {name: text() for name, text in PAGES.items()}
+    stale = [name for name, text in texts.items() if content(DOCS / name) != text]
+    if "--check" in sys.argv[1:]:
+        print("\n".join(f"docs/{name} differs: run docs/generate.py" for name in stale))
+        sys.exit(bool(stale))
+    for name in stale:
+        (DOCS / name).write_text(texts[name], encoding="utf-8")
+        print(f"docs/{name} written")
+
+
+def content(file: Path) -> str | None:
+    """Return the text of a file, None if it does not exist."""
+    return file.read_text(encoding="utf-8") if file.exists() else None
+
+
+if __name__ == "__main__":
+    main()
