@@ -90,6 +90,13 @@ lint: $(ENV)
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
 	$(BIN)/python docs/check_prose.py
+	$(MAKE) --no-print-directory docs
+
+# Fails on every warning, and where a generated page differs from its source.
+.PHONY: docs
+docs: $(ENV) ## build the documentation in build/site
+	$(BIN)/python docs/generate.py --check
+	$(BIN)/zensical build --config-file mkdocs.yml --strict --clean
 
 .PHONY: types
 types: $(ENV)

@@ -24,6 +24,8 @@ SETTINGS_INTRO = """\
 The service reads its settings once, from environment variables. Options of `posefield serve` take
 precedence. A value that cannot be used ends the start with exit code 2 and a sentence. Limits are
 maxima; times are in seconds, sizes in bytes."""
+SETTINGS_SECTIONS = ("Process", "Sizes", "Work of a request", "Models", "Host names", "Access")
+"""Headings of the paragraphs of the docstring of Settings that describe settings."""
 COMMANDS_INTRO = """\
 `posefield COMMAND --help` prints the same. `train`, `sample`, `adapt` and `evaluate` need `pip
 install "posefield[train]"`."""
@@ -65,7 +67,8 @@ def settings() -> str:
     ranges = dict(_setting_ranges())
     defaults = {each.name: each.default for each in fields(Settings)}
     parts = [SETTINGS_INTRO]
-    for paragraph in inspect.cleandoc(Settings.__doc__ or "").split("\n\n")[2:]:
+    paragraphs = inspect.cleandoc(Settings.__doc__ or "").split("\n\n")[2:]
+    for heading, paragraph in zip(SETTINGS_SECTIONS, paragraphs, strict=True):
         rows = []
         for names, text in _setting_texts(paragraph):
             for name in names:
@@ -73,7 +76,7 @@ def settings() -> str:
                 shown = int(default) if isinstance(default, bool) else default
                 variable = code(PREFIX + name.upper())
                 rows.append((variable, code(shown), ranges.get(name, ""), text))
-        parts.append(table(("variable", "default", "range", "meaning"), rows))
+        parts += [f"## {heading}", table(("variable", "default", "range", "meaning"), rows)]
     if defaults:
         raise SystemExit(f"settings that the docstring of Settings does not describe: {defaults}")
     return page("Settings", "service/posefield/http/api/settings.py", parts)

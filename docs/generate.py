@@ -4,11 +4,12 @@ python docs/generate.py writes them; with --check it prints the pages that diffe
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import code_pages
 import data_pages
+import module_tables
 
 DOCS = Path(__file__).parent
 PAGES: dict[str, Callable[[], str]] = {
@@ -29,7 +30,7 @@ PAGES: dict[str, Callable[[], str]] = {
 
 def main() -> None:
     """Write all pages, or check that they are up to date."""
-    texts = {name: text() for name, text in PAGES.items()}
+    texts = {name: text() for name, text in PAGES.items()} | dict(architecture())
     stale = [name for name, text in texts.items() if content(DOCS / name) != text]
     if "--check" in sys.argv[1:]:
         print("\n".join(f"docs/{name} differs: run docs/generate.py" for name in stale))
@@ -37,6 +38,13 @@ def main() -> None:
     for name in stale:
         (DOCS / name).write_text(texts[name], encoding="utf-8")
         print(f"docs/{name} written")
+
+
+def architecture() -> Iterator[tuple[str, str]]:
+    """Yield name and text of each architecture page, its tables of modules made anew."""
+    for file in sorted((DOCS / "architecture").glob("*.md")):
+        text = module_tables.updated(file.read_text(encoding="utf-8"))
+        yield f"architecture/{file.name}", text
 
 
 def content(file: Path) -> str | None:
