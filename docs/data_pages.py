@@ -11,7 +11,11 @@ from page_parts import code, page, table
 
 ROOT = Path(__file__).resolve().parents[1]
 SCHEMA = ROOT / "model_export/posefield_train/recipes/recipe.schema.json"
-CLIENTS = {"python": "Python client", "typescript": "TypeScript client"}
+CLIENTS = {
+    "python": ("Python client", "## How it is made"),
+    "typescript": ("TypeScript client", "## Development"),
+}
+"""Title of each client's page, and the heading of its README that is for its developers."""
 METHODS = ("get", "post")
 API_INTRO = """\
 The contract is `api/openapi.yaml` (OpenAPI 3.1), version {version}. A running service shows it:
@@ -151,11 +155,12 @@ def _default(name: str, value: dict[str, Any], required: list[str]) -> str:
 
 
 def client(name: str) -> str:
-    """Return the page of a client: its README, with links of this site."""
+    """Return the page of a client: its README for users, with links of this site."""
+    title, last = CLIENTS[name]
     readme = (ROOT / f"clients/{name}/README.md").read_text(encoding="utf-8")
-    _, _, body = readme.partition("\n")
-    body = body.strip().replace("](../../README.md)", "](../index.md)")
-    return page(CLIENTS[name], f"clients/{name}/README.md", [body])
+    body = readme.partition("\n")[2].partition(last)[0].strip()
+    body = body.replace("](../../README.md)", "](../index.md)")
+    return page(title, f"clients/{name}/README.md", [body])
 
 
 def results(name: str) -> str:

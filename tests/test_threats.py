@@ -1,4 +1,4 @@
-"""Tests of the threat table in ARCHITECTURE.md: each guard has a test or a check of `interop`."""
+"""Tests of the threat table in SECURITY.md: each guard has a test or a check of `interop`."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def test_every_threat_has_a_test_that_exists():
-    page = (ROOT / "ARCHITECTURE.md").read_text().partition("## Threats")[2].partition("\n## ")[0]
+    page = (ROOT / "SECURITY.md").read_text().partition("## Threats")[2].partition("\n## ")[0]
     rows = [line.split("|") for line in page.splitlines() if line.startswith("| ")][1:]
     tests = {path.stem for path in (ROOT / "tests").rglob("test_*.py")}
     run = (ROOT / "tests/interop/run.py").read_text()

@@ -1,8 +1,5 @@
 """Tests of settings from the environment: valid values, and errors."""
 
-from dataclasses import fields
-from pathlib import Path
-
 import pytest
 
 from posefield.common.errors import InvalidField
@@ -42,14 +39,6 @@ def test_each_setting_has_a_variable():
     others = {**crowds, **clips, **ends, **follows, **access}
     expected = Settings("::1", 9000, body_limit=10, **others)
     assert settings.read_settings(environ=given) == expected
-
-
-def test_the_readme_lists_every_setting_and_its_default():
-    readme = (Path(__file__).parents[3] / "README.md").read_text()
-    for setting in fields(Settings):
-        name = f"POSEFIELD_{setting.name.upper()}"
-        default = int(setting.default) if setting.type is bool else setting.default
-        assert f"| `{name}` | `{default}` |".replace(" `` ", " ") in readme
 
 
 @pytest.mark.parametrize(
