@@ -197,7 +197,7 @@ def _write(costs: list[Cost]) -> None:
     head = (
         f"# {said}\n\nWritten by `benchmarks/worst_requests.py`; all {len(costs)} candidates are in"
     )
-    text = f"{head}\n[worst-requests.json](worst-requests.json).\n\n{table(worst(costs))}\n"
+    text = f"{head}\n`docs/results/worst-requests.json`.\n\n{table(worst(costs))}\n"
     RESULTS.with_suffix(".md").write_text(text)
     listed = json.dumps([asdict(cost) for cost in costs], indent=1)
     RESULTS.with_suffix(".json").write_text(listed + "\n")

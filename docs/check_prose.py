@@ -1,7 +1,7 @@
-"""Refuse sentences that need a second reading, in what ships and in the contract.
+"""Refuse sentences that need a second reading, in what ships, in the contract and the documents.
 
 python docs/check_prose.py [FILE...]: prints a line for each fault, and exits 1 if there is one. It
-reads docstrings, comments and texts of Python files, and the sentences of api/openapi.yaml.
+reads docstrings, comments and texts of Python files, and the sentences of other files.
 """
 
 import ast
@@ -14,6 +14,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACES = ("service", "model_export", "clients/python", "clients/blender", "api/openapi.yaml")
+DOCUMENTS = ("*.md", "docs/**/*.md", "clients/*/README.md")
+# Records keep the words of their time.
+RECORDS = {"CHANGELOG.md", "decisions"}
 GENERATED = "generated.py"
 # Words that stand for a noun which the sentence does not name.
 CRUTCHES = re.compile(
@@ -43,6 +46,9 @@ def shipped() -> Iterator[Path]:
         yield from (
             file for file in files if file.name != GENERATED and "node_modules" not in file.parts
         )
+    for pattern in DOCUMENTS:
+        found = ROOT.glob(pattern)
+        yield from (file for file in found if RECORDS.isdisjoint(file.relative_to(ROOT).parts))
 
 
 def faults(file: Path) -> Iterator[str]:

@@ -40,6 +40,12 @@ def test_a_sentence_is_judged(line, fault, tmp_path):
     assert (done.returncode, fault in done.stdout) == (int(bool(fault)), True), done.stdout
 
 
+def test_a_sentence_of_a_document_is_judged(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("# A page\n\nWhoever asks is held to a target.\n")
+    assert len(check(page).stdout.splitlines()) == 2
+
+
 def test_the_lint_step_runs_it():
     makefile = (CHECK.parents[1] / "Makefile").read_text()
     lint = makefile.partition("\nlint:")[2].partition("\n\n")[0]
