@@ -22,8 +22,9 @@ def make_targets():
 
 def targets(step):
     """Return the targets of `make` that a step runs."""
-    words = re.findall(r"^make (.*)$", step.get("run", ""), re.MULTILINE)
-    return {word for line in words for word in line.split() if "=" not in word}
+    lines = re.findall(r"^make (.*)$", step.get("run", ""), re.MULTILINE)
+    # Without variables, which may be expressions such as ${{ matrix.python }}.
+    return {word for line in lines for word in re.sub(r"\w+=.*$", "", line).split()}
 
 
 def test_workflows_run_targets_of_the_makefile():
