@@ -16,6 +16,7 @@ import tempfile
 from pathlib import Path
 
 import addon
+import blender_bvh
 import cache
 import cases
 import container
@@ -85,7 +86,7 @@ def main() -> int:
         rows += khronos(node, folder)
     print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     wrong = _report(rows)
-    others = lint.faults(node) + container.faults() + cache.faults()
+    others = blender_bvh.faults(python) + lint.faults(node) + container.faults() + cache.faults()
     others += slow_clients.faults()
     others += engines.faults(*environment.node()) + page.faults(node) + addon.faults()
     print("\n".join(others) or "no fault in what runs elsewhere")

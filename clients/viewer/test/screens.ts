@@ -1,4 +1,4 @@
-/** Writes the README's pictures of the page: `node test/screens.ts ../../docs` beside a service. */
+/** Writes the pictures of docs/guide/page.md: `node test/screens.ts ../../docs` beside a service. */
 
 import { join } from "node:path";
 
