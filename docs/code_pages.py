@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args, get_origin
 
 import typer
 from data_pages import contract, schema_text
-from page_parts import code, page, table
+from page_parts import choices, code, page, table
 
 from posefield import cli
 from posefield.batch.rows.columns import OPTION_KINDS
@@ -121,7 +121,7 @@ def _command_parts(name: str, command: Any) -> Iterator[str]:
     usage = " ".join(["posefield", name, *map(_placeholder, arguments), "[OPTIONS]"])
     yield f"`{usage}`"
     yield inspect.cleandoc(command.help or "")
-    rows = [(_words(each), code(_kind(each)), _default(each), _sentence(each.help)) for each in own]
+    rows = [(_words(each), choices(_kind(each)), _default(each), _sentence(each.help)) for each in own]
     if rows:
         yield table(("argument or option", "value", "default", "meaning"), rows)
 

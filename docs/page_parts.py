@@ -24,3 +24,8 @@ def cell(value: object) -> str:
 def code(value: object) -> str:
     """Return a value as code, nothing for an empty one."""
     return f"`{value}`" if str(value) else ""
+
+
+def choices(text: str) -> str:
+    """Return alternatives that vertical bars separate, each as code."""
+    return ", ".join(code(word) for word in text.split("|"))
