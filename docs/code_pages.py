@@ -121,7 +121,7 @@ def _command_parts(name: str, command: Any) -> Iterator[str]:
     usage = " ".join(["posefield", name, *map(_placeholder, arguments), "[OPTIONS]"])
     yield f"`{usage}`"
     yield inspect.cleandoc(command.help or "")
-    rows = [(_words(each), choices(_kind(each)), _default(each), _sentence(each.help)) for each in own]
+    rows = [(_words(each), choices(_kind(each)), _default(each), each.help or "") for each in own]
     if rows:
         yield table(("argument or option", "value", "default", "meaning"), rows)
 
@@ -160,10 +160,6 @@ def _default(parameter: Any) -> str:
     default = parameter.default
     shown = default is not None and default is not False and default not in ((), [])
     return code(default) if shown and not callable(default) else ""
-
-
-def _sentence(text: str | None) -> str:
-    return (text or "").strip()
 
 
 def problems() -> str:
