@@ -15,8 +15,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 PLACES = ("service", "model_export", "clients/python", "clients/blender", "api/openapi.yaml")
 DOCUMENTS = ("*.md", "docs/**/*.md", "clients/*/README.md")
-# Records keep the words of their time.
-RECORDS = {"CHANGELOG.md", "decisions"}
+# A change log keeps the words of its time.
+RECORDS = {"CHANGELOG.md"}
 GENERATED = "generated.py"
 # Words that stand for a noun which the sentence does not name.
 CRUTCHES = re.compile(

@@ -1,4 +1,4 @@
-"""Queries at random points: `--sample N --method latin|hull --seed S`.
+"""Queries at random points: `--sample N --method latin --seed S`, or `--method hull`.
 
 Equal seeds give equal points on every machine: only sums, products, sorts and NumPy's guaranteed
 random streams are used.
