@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from evaluation_tables import TABLES
 from page_parts import code, page, table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -170,7 +171,8 @@ def results(name: str) -> str:
     for each in found["tables"]:
         parts.append(f"## {each['title']}")
         parts += [each["about"]] if each["about"] else []
-        parts.append(table(each["columns"], each["rows"]))
+        columns, rows = TABLES[each["from"]]() if "from" in each else (each["columns"], ())
+        parts.append(table(columns, [*rows, *each["rows"]]))
         if each["remarks"]:
             parts.append("\n".join(f"- {remark}" for remark in each["remarks"]))
     return page(found["title"], f"docs/results/{name}.json", parts)
