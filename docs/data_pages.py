@@ -1,6 +1,7 @@
 """Pages generated from data: the contract, the recipe schema, client READMEs and results."""
 
 import json
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -35,20 +36,12 @@ RECIPE_INTRO = """\
 All keys of a recipe, from its JSON schema, `recipe.schema.json` in the folder of the shipped
 recipes (`model_export/posefield_train/recipes`). [Recipes](../guide/recipes.md) explains them.
 Unknown keys are errors."""
-SECTIONS = {
-    "Source": "[source]",
-    "Clips": "[clips]",
-    "Condition": "[clips.where] NAME",
+SPECIAL_SECTIONS = {
     "ControlColumn": "[[controls]] from a column",
     "ControlMeasured": "[[controls]] measured",
     "Auto": "auto of a control",
-    "Motion": "[motion]",
-    "Alignment": "[alignment]",
-    "Kriging": "[kriging]",
-    "Event": "[event]",
-    "Size": "[size]",
-    "Detail": "[[size.levels]]",
 }
+"""Headings of sections that their place in a recipe does not tell."""
 KEY_HELP = {
     "name": "name in questions: lower case letters, digits and underscores",
     "column": "column of the table that holds the value",
@@ -105,32 +98,41 @@ def schema_text(found: dict[str, Any], schema: dict[str, Any]) -> str:
 def recipe_keys() -> str:
     """Return the page of all keys of a recipe."""
     schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
-    unknown = schema["$defs"].keys() ^ SECTIONS.keys()
-    if unknown:
-        raise SystemExit(f"sections of recipes without a heading, or the reverse: {unknown}")
-    parts = [RECIPE_INTRO, "## Top level", _keys(schema)]
-    for name, heading in SECTIONS.items():
-        parts += [f"## {heading}", schema["$defs"][name]["description"].strip()]
-        parts.append(_keys(schema["$defs"][name]))
+    headings = dict(_headings(schema, schema, "")) | SPECIAL_SECTIONS
+    parts = [RECIPE_INTRO, "## Top level", _keys(schema, headings)]
+    for name in headings:
+        section = schema["$defs"][name]
+        parts += [f"## {headings[name]}", section["description"].strip(), _keys(section, headings)]
     return page("Recipe keys", "recipe.schema.json", parts)
 
 
-def _keys(schema: dict[str, Any]) -> str:
+def _headings(schema: dict[str, Any], part: dict[str, Any], path: str) -> Iterator[tuple[str, str]]:
+    """Yield name and TOML heading of each section below a part of the schema, `[clips.where]`."""
+    for key, value in part["properties"].items():
+        text, inner = json.dumps(value), f"{path}.{key}".strip(".")
+        if value.get("type") == "object":
+            inner += ".NAME"
+        is_list = value.get("type") == "array" or '"type": "array"' in text
+        for name in re.findall(r'"#/\$defs/(\w+)"', text):
+            yield name, f"[[{inner}]]" if is_list else f"[{inner}]"
+            yield from _headings(schema, schema["$defs"][name], inner)
+
+
+def _keys(schema: dict[str, Any], headings: dict[str, str]) -> str:
     required = schema.get("required", [])
     rows = []
     for name, value in schema["properties"].items():
-        text = value.get("description") or KEY_HELP.get(name) or _section(value)
+        text = value.get("description") or KEY_HELP.get(name) or _section(value, headings)
         if not text:
             raise SystemExit(f"the recipe key {name} of {schema['title']} has no description")
         rows.append((code(name), _value(value), _default(name, value, required), text))
     return table(("key", "value", "default", "meaning"), rows)
 
 
-def _section(value: dict[str, Any]) -> str:
+def _section(value: dict[str, Any], headings: dict[str, str]) -> str:
     """Return the heading of the section that a key holds; empty for plain values."""
-    text = json.dumps(value)
-    names = [name for name in SECTIONS if f'"#/$defs/{name}"' in text]
-    return ", ".join(f"section {code(SECTIONS[name])}" for name in names)
+    names = re.findall(r'"#/\$defs/(\w+)"', json.dumps(value))
+    return ", ".join(f"section {code(headings[name])}" for name in names)
 
 
 def _value(value: dict[str, Any]) -> str:

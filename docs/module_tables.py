@@ -1,7 +1,7 @@
 """Tables of modules in the architecture pages, made of the first line of each module's docstring.
 
 A page holds `<!-- modules: FOLDER... -->` and `<!-- end of modules -->`; the lines between are
-written again. A folder is a path such as posefield/motion; its subfolders are named separately.
+written again. A folder is a path such as posefield/motion; its subfolders follow it.
 """
 
 import ast
@@ -28,15 +28,9 @@ def updated(text: str) -> str:
     return BLOCK.sub(block, text)
 
 
-def folders(text: str) -> list[str]:
-    """Return the folders that the blocks of a page name."""
-    return [folder for block in BLOCK.finditer(text) for folder in block[2].split()]
-
-
 def _tables(names: list[str]) -> Iterator[str]:
-    for name in names:
-        folder = _path(name)
-        yield f"**`{name}`**: {_purpose(folder / '__init__.py')}"
+    for folder in (each for name in names for each in _packages(name)):
+        yield f"**`{_name(folder)}`**: {_purpose(folder / '__init__.py')}"
         modules = sorted(each for each in folder.glob("*.py") if each.name != "__init__.py")
         if modules:
             yield table(
@@ -44,9 +38,17 @@ def _tables(names: list[str]) -> Iterator[str]:
             )
 
 
-def _path(name: str) -> Path:
+def _packages(name: str) -> list[Path]:
+    """Return a package and all packages in it, outer ones first."""
     distribution, _, rest = name.partition("/")
-    return DISTRIBUTIONS[distribution] / rest
+    inner = (DISTRIBUTIONS[distribution] / rest).rglob("__init__.py")
+    return sorted(file.parent for file in inner)
+
+
+def _name(folder: Path) -> str:
+    """Return the path of a package from its distribution on, posefield/motion."""
+    (root,) = (root for root in DISTRIBUTIONS.values() if folder.is_relative_to(root))
+    return str(folder.relative_to(root.parent))
 
 
 def _purpose(file: Path) -> str:
