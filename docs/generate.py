@@ -33,7 +33,8 @@ def main() -> None:
     texts = {name: text() for name, text in PAGES.items()} | dict(architecture())
     stale = [name for name, text in texts.items() if content(DOCS / name) != text]
     if "--check" in sys.argv[1:]:
-        print("\n".join(f"docs/{name} differs: run docs/generate.py" for name in stale))
+        for name in stale:
+            print(f"docs/{name} differs: run docs/generate.py")
         sys.exit(bool(stale))
     for name in stale:
         (DOCS / name).write_text(texts[name], encoding="utf-8")
