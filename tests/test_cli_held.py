@@ -32,6 +32,14 @@ def test_clip_says_what_it_misses(posefield, model_path, tmp_path):
     [
         (["--target", "RightHand"], "target: 'RightHand', expected JOINT@MOMENT:X,Y,Z, m"),
         (["--target", "Tail@end=0,1,0"], "targets/0/joint: 'Tail', expected one of Hips"),
+        (
+            ["--target", "RightHnd@end=0,1,0"],
+            "targets/0/joint: 'RightHnd' (did you mean 'RightHand'?), expected one of Hips",
+        ),
+        (
+            ["-c", "statur=1.7"],
+            "controls/statur: no such control (did you mean 'stature'?); this model has stature",
+        ),
         (["--target", NEAR, "--target", NEAR], "targets/1: RightHand at end has a target already"),
         (["--exact", "turn"], "exact: 'turn' is not measured on a motion"),
         (["--exact", ""], "exact: '', expected auto, none or names of controls"),

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
 
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield_train.sample import sample_body
 
 STATURES = {"short": 1.62, "middle": 1.75, "tall": 1.88}
@@ -73,7 +74,8 @@ def parse_controls(controls: Mapping[str, float] | Sequence[float]) -> SampleCon
     values = controls if isinstance(controls, Mapping) else _by_name(controls)
     for name in values:
         if name not in RANGES:
-            raise InvalidField(name, f"unknown control, expected one of {', '.join(RANGES)}")
+            hint = did_you_mean(name, RANGES)
+            raise InvalidField(name, f"unknown control{hint}, expected one of {', '.join(RANGES)}")
     for name in RANGES:
         if name not in values:
             raise InvalidField(name, "missing control")

@@ -14,6 +14,7 @@ from posefield.batch.job import ExportJob, WorkerInput, open_model_of
 from posefield.batch.rows.row_query import ClipQuery
 from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CLIP_ENCODERS
@@ -170,5 +171,6 @@ LAYOUTS = {
 def find_layout(name: str) -> Layout:
     """Return the layout of a name; InvalidField if there is none."""
     if name not in LAYOUTS:
-        raise InvalidField("layout", f"{name!r}, expected one of {', '.join(LAYOUTS)}")
+        hint = did_you_mean(name, LAYOUTS)
+        raise InvalidField("layout", f"{name!r}{hint}, expected one of {', '.join(LAYOUTS)}")
     return LAYOUTS[name]

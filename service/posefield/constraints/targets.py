@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import value_validation
@@ -104,8 +105,10 @@ def _exact_controls(
     for name in asked.exact:
         control = card.control(name)
         if control is None:
-            known = ", ".join(c.name for c in card.controls)
-            raise InvalidField("exact", f"{name!r}, expected controls of this model: {known}")
+            own = [c.name for c in card.controls]
+            hint = did_you_mean(name, own)
+            expected = f"expected controls of this model: {', '.join(own)}"
+            raise InvalidField("exact", f"{name!r}{hint}, {expected}")
         if not _is_measured(control):
             movable = ", ".join(c.name for c in card.controls if _is_measured(c))
             raise InvalidField(
@@ -127,7 +130,8 @@ def _joint_target(card: ModelCard, index: int, target: Target) -> JointTarget:
         raise InvalidField("targets", f"more than {MAX_TARGETS}")
     if target.joint not in card.skeleton.names:
         known = ", ".join(card.skeleton.names)
-        raise InvalidField(f"{field}/joint", f"{target.joint!r}, expected one of {known}")
+        hint = did_you_mean(target.joint, card.skeleton.names)
+        raise InvalidField(f"{field}/joint", f"{target.joint!r}{hint}, expected one of {known}")
     joint = card.skeleton.names.index(target.joint)
     if len(target.position) != 3:
         raise InvalidField(f"{field}/position", f"{len(target.position)} numbers, expected three")

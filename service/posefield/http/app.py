@@ -7,6 +7,7 @@ from functools import partial
 from starlette.types import Receive, Scope, Send
 
 from posefield.common.errors import UnknownFormat
+from posefield.common.name_suggestion import did_you_mean
 from posefield.http import pages, request_cycle
 from posefield.http.access import access_policy
 from posefield.http.api import contract, problems
@@ -127,5 +128,6 @@ def _missing(places: RouteTree, path: str) -> Exception:
     """Return the error of a path that is not in the contract."""
     if found := places.other_formats(path):
         asked, known = found
-        return UnknownFormat("format", f"no format {asked!r}; there are {', '.join(known)}")
+        hint = did_you_mean(asked, known)
+        return UnknownFormat("format", f"no format {asked!r}{hint}; there are {', '.join(known)}")
     return RequestError(problems.NO_SUCH_PATH, f"{path!r}; /openapi.yaml names what there is")

@@ -20,6 +20,7 @@ from starlette.responses import Response
 from starlette.types import Message, Receive, Scope, Send
 
 from posefield.common.errors import QueryError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.http.access import access_control
 from posefield.http.access.audit import AuditedRequest
 from posefield.http.access.principal import EVERYONE
@@ -206,7 +207,9 @@ def negotiate(exchange: Exchange, route: Route) -> None:
 def _check_parameters(request: Request, operation: Operation) -> None:
     if unknown := request.query_params.keys() - operation.query:
         name = min(unknown)
-        detail = f"{name}: no such query parameter; there are {sorted(operation.query) or 'none'}"
+        known = sorted(operation.query)
+        hint = did_you_mean(name, known)
+        detail = f"{name}: no such query parameter{hint}; there are {known or 'none'}"
         raise RequestError(problems.BAD_PARAMETER, detail, {"parameter": name})
 
 

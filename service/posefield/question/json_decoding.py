@@ -3,12 +3,15 @@
 import itertools
 import json
 import sys
+from collections.abc import Sequence
 from functools import cache
-from typing import Any, TypeVar, cast
+from types import UnionType
+from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import msgspec
 
 from posefield.common.errors import FormError
+from posefield.common.name_suggestion import did_you_mean
 
 Question = TypeVar("Question")
 _PATH = " - at `$"
@@ -46,29 +49,66 @@ def _decode_plain(form: type[Question], content: bytes, fault: msgspec.Validatio
     Raises FormError if it is still invalid.
     """
     if len(content) > MAX_PLAIN_BYTES:
-        raise _form_error(str(fault), None) from None
+        raise _form_error(form, str(fault), None) from None
     try:
         plain, said = json.loads(content.decode()), str(fault)
     except (RecursionError, ValueError):
         # msgspec reports a wrong type before it parses the rest, which may be invalid JSON.
-        raise _form_error(str(fault), None) from None
+        raise _form_error(form, str(fault), None) from None
     if "out of range" not in said:
         try:
             return msgspec.convert(_with_whole_numbers(plain), form)
         except msgspec.ValidationError as refused:
             said = str(refused)
-    raise _form_error(said, plain) from None
+    raise _form_error(form, said, plain) from None
 
 
-def _form_error(said: str, plain: Any) -> FormError:
-    """Return the error of msgspec's message about a body; plain: its value, if known."""
+def _form_error(form: Any, said: str, plain: Any) -> FormError:
+    """Return the error of msgspec's message about a body of a type; plain: its value, if known."""
     path, found = list(itertools.takewhile(_ANY_KEY.__ne__, error_path(said))), dict[str, Any]()
     if plain is not None:
         path, found = _resolve_path(error_path(said), plain)
     message = said.rpartition(_PATH)[0] or said
     typed = said.startswith("Expected") and not isinstance(found, dict | list)
-    shown = f" {found!r}" if typed else ""
+    shown = f" {found!r}" if typed else _accepted_names(form, path, found)
     return FormError(json_pointer(*path).removeprefix("/"), message + shown)
+
+
+def _accepted_names(form: Any, path: Sequence[str], found: Any) -> str:
+    """Return the names that a type accepts at the path of an error, to follow its message.
+
+    They are the keys of the object whose unknown key ends the path, or the choices of a text. Empty
+    if the path leads to neither.
+    """
+    keys = getattr(_type_at(form, path[:-1]), "__struct_encode_fields__", ())
+    if path and keys and path[-1] not in keys:
+        return f"{did_you_mean(path[-1], keys)}, expected some of {', '.join(keys)}"
+    choices = get_args(_type_at(form, path))
+    if isinstance(found, str) and choices and all(isinstance(each, str) for each in choices):
+        return f"{did_you_mean(found, choices)}, expected one of {', '.join(choices)}"
+    return ""
+
+
+def _type_at(form: Any, path: Sequence[str]) -> Any:
+    """Return the type at a path in a value of a type; None if it is not known."""
+    kind = _without_absence(form)
+    for step in path:
+        if hasattr(kind, "__struct_fields__"):
+            kind = get_type_hints(kind).get(step)
+        elif get_origin(kind) in (list, tuple):
+            kind = get_args(kind)[0]
+        else:
+            kind = None
+        kind = _without_absence(kind)
+    return kind
+
+
+def _without_absence(kind: Any) -> Any:
+    """Return the only member of a union besides None and UNSET; other types unchanged."""
+    if get_origin(kind) not in (Union, UnionType):
+        return kind
+    rest = [each for each in get_args(kind) if each not in (type(None), msgspec.UnsetType)]
+    return rest[0] if len(rest) == 1 else None
 
 
 def _with_whole_numbers(node: Any) -> Any:

@@ -25,6 +25,7 @@ from typing import (
 from msgspec import NODEFAULT, Meta, Struct, structs
 
 from posefield.common.errors import FormError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.question.motion_question import ExactControls, Moment, Target
 
 Question = TypeVar("Question", bound=Struct)
@@ -145,7 +146,8 @@ def choice_parser(choices: tuple[str, ...]) -> Callable[[str], str]:
 
     def read(text: str) -> str:
         if text not in choices:
-            raise ValueError(f"{text!r}, expected one of {', '.join(choices)}")
+            found = f"{text!r}{did_you_mean(text, choices)}"
+            raise ValueError(f"{found}, expected one of {', '.join(choices)}")
         return text
 
     return read

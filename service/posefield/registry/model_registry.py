@@ -7,6 +7,7 @@ from itertools import accumulate, chain, takewhile
 from pathlib import Path
 
 from posefield.common.errors import UnknownModel
+from posefield.common.name_suggestion import did_you_mean
 from posefield.registry.model_loading import ModelLoader
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -32,7 +33,8 @@ class ModelRegistry:
             name = key.partition("@")[0]
             near = self.versions(name) or tuple(self._by_key[key] for key in self.models)
             known = ", ".join(m.identity for m in near)
-            raise UnknownModel("model", f"no model {key!r}; there are {known}")
+            hint = "" if name in self.models else did_you_mean(name, self.models)
+            raise UnknownModel("model", f"no model {key!r}{hint}; there are {known}")
         return model
 
     def versions(self, name: str) -> tuple[Synthesizer, ...]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Booleans, Floats, Singles
 from posefield.model_file.model_card import ModelCard
 from posefield.question.model_question import SigmaQuestion
@@ -56,8 +57,11 @@ def _sigmas(model: Synthesizer, points: Floats, labels: Floats) -> Singles:
 def _axis(card: ModelCard, field: str, name: str, count: int, asked: SigmaQuestion) -> GridAxis:
     control = card.control(name)
     if control is None:
-        known = ", ".join(c.name for c in card.controls)
-        raise InvalidField(field, f"{name!r}, expected one of this model's controls, {known}")
+        own = [c.name for c in card.controls]
+        found = f"{name!r}{did_you_mean(name, own)}"
+        raise InvalidField(
+            field, f"{found}, expected one of this model's controls, {', '.join(own)}"
+        )
     if name in asked.controls:
         raise InvalidField(f"controls/{name}", f"given, and {field} the grid too; expected one")
     room = asked.margin * (control.maximum - control.minimum)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Booleans, Floats, Indices, Singles
 from posefield.inference.level_selection import MAX_COORDINATE, LevelCriteria
 from posefield.motion.crowd_clip import Placement
@@ -96,8 +97,9 @@ def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:
     for index, name in enumerate(question.performers):
         if name is not None and name not in known:
             first = int(np.argmax(question.performer == index))
+            hint = did_you_mean(name, known)
             raise InvalidField(
-                "performer", f"{name!r}, expected {input_limits.accepted_names(known)}", first
+                "performer", f"{name!r}{hint}, expected {input_limits.accepted_names(known)}", first
             )
     rows = [[name == other for other in known] for name in question.performers]
     return np.array(rows, dtype=np.float32)[question.performer]

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.model_file.model_card import Control, ModelCard
 
 # A clip this many times longer or shorter than any captured one is no plausible motion.
@@ -13,9 +14,10 @@ def check_names(card: ModelCard, names: Iterable[str]) -> None:
     """Raise InvalidField for the first name that is not a control of the model."""
     for name in names:
         if card.control(name) is None:
-            accepted_names = ", ".join(c.name for c in card.controls)
+            own = [c.name for c in card.controls]
+            hint = did_you_mean(name, own)
             raise InvalidField(
-                f"controls/{name}", f"no such control; this model has {accepted_names}"
+                f"controls/{name}", f"no such control{hint}; this model has {', '.join(own)}"
             )
 
 

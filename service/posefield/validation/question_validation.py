@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from posefield.common.errors import InvalidField, OutsideSamples
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.kriging import support
 from posefield.model_file.model_card import Control, ModelCard
@@ -127,9 +128,8 @@ def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
     Raises InvalidField for a name that is not among the performers.
     """
     if asked is not None and asked not in performers:
-        raise InvalidField(
-            "performer", f"{asked!r}, expected {input_limits.accepted_names(performers)}"
-        )
+        known = f"expected {input_limits.accepted_names(performers)}"
+        raise InvalidField("performer", f"{asked!r}{did_you_mean(asked, performers)}, {known}")
     return np.array([[float(name == asked) for name in performers]])
 
 

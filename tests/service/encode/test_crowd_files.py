@@ -310,8 +310,9 @@ def test_one_joint_in_one_frame_by_one_character_will_do(instancing, tmp_path):
 
 
 def test_what_cannot_be_written_is_refused_before_any_motion_is_made(clip, tmp_path):
+    hint = "(did you mean 'usd'?)"
     for ending, instancing, said in (
-        ("usdx", "references", "format: 'usdx', expected one of usd, usda, usdc, usdz"),
+        ("usdx", "references", f"format: 'usdx' {hint}, expected one of usd, usda, usdc, usdz"),
         ("usdc", "copies", "instancing: 'copies', expected one of references, scenegraph, flatten"),
     ):
         with pytest.raises(InvalidField) as refusal:

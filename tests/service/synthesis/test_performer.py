@@ -95,8 +95,14 @@ def test_a_clip_is_the_poses_of_its_performer(model):
     assert np.abs(clip.clip.rotations[15] - other.rotations[0]).max() > 10 * FLOAT32
 
 
-@pytest.mark.parametrize("name", ["Tall", "", " tall", "nobody", "tall, short"])
-def test_an_unknown_performer_is_refused_with_those_there_are(model, name):
+HINT = " (did you mean 'tall'?)"
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("Tall", HINT), ("", ""), (" tall", HINT), ("nobody", ""), ("tall, short", "")],
+)
+def test_an_unknown_performer_is_refused_with_those_there_are(model, name, hint):
     for ask in (
         lambda: poses.synthesize_poses(
             model, PoseQuestion(controls=POINT, times=[0.0], performer=name)
@@ -108,7 +114,7 @@ def test_an_unknown_performer_is_refused_with_those_there_are(model, name):
         with pytest.raises(InvalidField) as caught:
             ask()
         assert caught.value.field == "performer"
-        assert caught.value.message == f"{name!r}, expected one of middle, short, tall"
+        assert caught.value.message == f"{name!r}{hint}, expected one of middle, short, tall"
 
 
 def test_a_model_that_knows_nobody_refuses_every_name(plain):

@@ -9,7 +9,6 @@ option.
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import partial
 from typing import Any, Literal, get_args, get_origin
 
@@ -23,6 +22,7 @@ from posefield.batch.rows.cells import (
     NumberCell,
     TargetsCell,
 )
+from posefield.common.name_suggestion import similar_name
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.model_file.model_card import ModelCard
 from posefield.question import text_decoding
@@ -161,11 +161,9 @@ class Columns:
         return column
 
     def _closest_title(self, title: str) -> str:
-        plain = {name.lower(): name for name in self.titles if not name.startswith(CONTROL_PREFIX)}
-        near = get_close_matches(title.lower(), plain, n=1)
-        if near:
-            return f"did you mean {plain[near[0]]!r}?"
-        return f"expected one of {', '.join(plain.values())}"
+        known = [name for name in self.titles if not name.startswith(CONTROL_PREFIX)]
+        near = similar_name(title, known)
+        return f"did you mean {near!r}?" if near else f"expected one of {', '.join(known)}"
 
 
 def columns_of(card: ModelCard) -> Columns:

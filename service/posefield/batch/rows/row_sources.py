@@ -33,6 +33,7 @@ from posefield.batch.rows.row_query import RowFault, RowSource
 from posefield.batch.rows.row_validation import Defaults, RowReader
 from posefield.batch.rows.source_files import SourceFile
 from posefield.common.errors import InvalidField, UnknownFormat
+from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
@@ -114,9 +115,8 @@ def _check_single_source(asked: SourceOptions) -> None:
 def _check_defaults(usual: Defaults, model: Synthesizer) -> None:
     """Validate the defaults alone; rows are validated only in the values that they have."""
     if usual.format not in CLIP_ENCODERS:
-        raise UnknownFormat(
-            "format", f"{usual.format!r}, expected one of {', '.join(CLIP_ENCODERS)}"
-        )
+        found = f"{usual.format!r}{did_you_mean(usual.format, CLIP_ENCODERS)}"
+        raise UnknownFormat("format", f"{found}, expected one of {', '.join(CLIP_ENCODERS)}")
     middle = {control.name: control.default for control in model.session.card.controls}
     clips.check(model, structs.replace(usual.question, controls=middle))
 

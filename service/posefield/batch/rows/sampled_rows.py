@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from posefield.batch.rows.columns import Column
 from posefield.batch.rows.row_blocks import BLOCK_SIZE, RowBlock
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Control, ModelCard
 
@@ -57,7 +58,8 @@ class SampledPoints:
 def check_sampling(method: str, count: int, seed: int) -> None:
     """Raise InvalidField for an unknown method, a count out of range or a negative seed."""
     if method not in METHODS:
-        raise InvalidField("method", f"{method!r}, expected one of {', '.join(METHODS)}")
+        hint = did_you_mean(method, METHODS)
+        raise InvalidField("method", f"{method!r}{hint}, expected one of {', '.join(METHODS)}")
     if not 1 <= count <= MAX_POINTS:
         raise InvalidField("sample", f"{count}, expected 1 to {MAX_POINTS}")
     if seed < 0:

@@ -8,6 +8,7 @@ from typing import Any
 
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.files import zip_archive
 from posefield.encode.usd import layer_metadata
 from posefield.encode.usd_crowd import (
@@ -77,7 +78,8 @@ def _validate(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancin
 
 def _check_choice(field: str, found: str, expected: tuple[str, ...]) -> None:
     if found not in expected:
-        raise InvalidField(field, f"{found!r}, expected one of {', '.join(expected)}")
+        hint = did_you_mean(found, expected)
+        raise InvalidField(field, f"{found!r}{hint}, expected one of {', '.join(expected)}")
 
 
 def _form(ending: str) -> str:

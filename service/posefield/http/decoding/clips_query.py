@@ -7,6 +7,7 @@ from posefield.batch.rows import clip_names
 from posefield.batch.rows.row_query import ClipQuery
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.constraints import targets
 from posefield.encode.formats import ClipEncoder, max_poses
 from posefield.http.api import problems
@@ -32,7 +33,8 @@ def decode_order(
     """
     body = bodies.decode_question(ClipsQuestion, content)
     if body.format not in encoders:
-        detail = f"{body.format!r}, expected one of {', '.join(encoders)}"
+        hint = did_you_mean(body.format, encoders)
+        detail = f"{body.format!r}{hint}, expected one of {', '.join(encoders)}"
         raise FormError("format", detail)
     if not 1 <= len(body.clips) <= settings.clips_limit:
         expected = f"expected 1 to {settings.clips_limit}"
