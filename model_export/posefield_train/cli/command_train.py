@@ -66,9 +66,9 @@ def _train(
     from posefield_train.source import ingest, recipe
 
     output_files.expect_onnx(output)
+    own = recipe.read(recipe_file)
     progress = ProgressPrinter()
     progress(f"reading {recipe_file}")
-    own = recipe.read(recipe_file)
     examples, notes = ingest.ingest(own, data or recipe_file.parent)
     trained = train.train(own, examples, progress)
     progress("writing the graph and comparing it with the reference")

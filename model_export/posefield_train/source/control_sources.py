@@ -42,6 +42,14 @@ ALLOWED_KEYS = {
 REQUIRED_KEYS = {quantity: keys for quantity, keys in ALLOWED_KEYS.items() if keys != PAIR}
 
 
+class KeyFault(ValueError):
+    """A mistake that a validator of a recipe finds. keys: its path below the validated part."""
+
+    def __init__(self, message: str, *keys: str | int) -> None:
+        super().__init__(message)
+        self.keys = keys
+
+
 class RecipePart(BaseModel):
     """Base of the parts of a recipe; unknown keys are refused."""
 
@@ -94,7 +102,7 @@ class Auto(RecipePart):
                 f"found {found} besides quantity {self.quantity!r}, expected {expected}{optional}"
             )
         if (self.quantity, self.at) == (ROOT_HEIGHT, "farthest"):
-            raise ValueError("at: found 'farthest', but the root is never away from itself")
+            raise KeyFault("found 'farthest', but the root is never away from itself", "at")
         return self
 
 
@@ -131,9 +139,10 @@ class ControlMeasured(_NamedControl):
     @model_validator(mode="after")
     def _check_unit(self) -> "ControlMeasured":
         if self.unit != self.auto.unit:
-            raise ValueError(
-                f"unit: found {self.unit!r}, expected {self.auto.unit!r}, in which "
-                f"{self.auto.quantity} is measured, or no unit"
+            raise KeyFault(
+                f"found {self.unit!r}, expected {self.auto.unit!r}, in which "
+                f"{self.auto.quantity} is measured, or no unit",
+                "unit",
             )
         return self
 

@@ -7,24 +7,24 @@ keys, missing units, duplicate names.
 import json
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator, model_validator
 
 from posefield.common.errors import RecipeError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.motion import measures
 from posefield.motion.joint_roles import Role
-from posefield_train.source import data_folder
+from posefield_train.source import data_folder, recipe_errors
 from posefield_train.source.control_sources import (
-    COLUMN_TAG,
-    MEASURED,
     TIME_NAMES,
     Auto,
     Control,
     ControlColumn,
     ControlMeasured,
+    KeyFault,
     RecipePart,
     Text,
 )
@@ -304,7 +304,9 @@ class Recipe(RecipePart):
     @model_validator(mode="after")
     def _check_label(self) -> "Recipe":
         if self.kriging.label and not self.clips.performer:
-            raise ValueError("kriging.label is 'performer', but clips.performer names no column")
+            raise KeyFault(
+                "found 'performer', but clips.performer names no column", "kriging", "label"
+            )
         return self
 
     @field_validator("controls")
@@ -318,33 +320,38 @@ class Recipe(RecipePart):
 
     @model_validator(mode="after")
     def _check_measured_controls(self) -> "Recipe":
-        for control in self.measured:
-            fault = self._measurement_fault(control.auto)
-            if fault:
-                raise ValueError(f"controls.{control.name}.auto: {fault}")
+        for index, control in enumerate(self.controls):
+            if isinstance(control, ControlMeasured):
+                for key, fault in self._measurement_faults(control.auto):
+                    raise KeyFault(f"{fault} (control {control.name})", "controls", index, *key)
         return self
 
-    def _measurement_fault(self, auto: Auto) -> str | None:
-        """Return the reason for which a quantity cannot be measured; None if it can."""
+    def _measurement_faults(self, auto: Auto) -> Iterator[tuple[tuple[str, ...], str]]:
+        """Yield the reasons for which a quantity cannot be measured, each with its key."""
         quantity, landmarks = auto.quantity, self.clips.landmarks
         if quantity in CYCLE_QUANTITIES and not self.motion.cyclic:
-            return (
+            yield (
+                ("auto", "quantity"),
                 f"found {quantity!r} and motion.cyclic = false, expected a cycle: of a motion that "
-                "ends elsewhere it depends on the cut"
+                "ends elsewhere it depends on the cut",
             )
         if quantity in ("speed", "stride_length") and self.motion.root == "in_place":
-            return f"found {quantity!r} and motion.root = 'in_place', expected one that travels"
+            found = f"found {quantity!r} and motion.root = 'in_place', expected one that travels"
+            yield ("auto", "quantity"), found
         if auto.at is not None and auto.at not in (*TIME_NAMES, *landmarks):
-            known = ", ".join(map(repr, TIME_NAMES))
-            return f"at: found {auto.at!r}, expected {known} or a column of {landmarks}"
+            known = (*TIME_NAMES, *landmarks)
+            moments = ", ".join(map(repr, TIME_NAMES))
+            expected = f"expected {moments} or a column of clips.landmarks {landmarks}"
+            yield ("auto", "at"), f"found {auto.at!r}{did_you_mean(auto.at, known)}, {expected}"
         if quantity == "step_length" and len(self.leg_ends(auto)) != 2:
-            return f"joints: found none and motion.feet {self.motion.feet}, expected two feet"
+            found = f"found none and motion.feet {self.motion.feet}, expected two feet"
+            yield ("auto", "joints"), found
         if quantity == "leg_length" and len(self.leg_ends(auto)) != 2:
-            return (
-                "joints: found none, and not both roles leftUpperLeg and leftFoot; expected the "
-                "upper end of a leg and its lower"
+            yield (
+                ("auto", "joints"),
+                "found none, and not both roles leftUpperLeg and leftFoot; expected the upper end "
+                "of a leg and its lower",
             )
-        return None
 
     @field_validator("roles")
     @classmethod
@@ -359,14 +366,17 @@ class Recipe(RecipePart):
     def _check_event(self) -> "Recipe":
         if self.event is None:
             if self.size.effector_budget_cm is not None:
-                raise ValueError(
-                    f"size.effector_budget_cm: found {self.size.effector_budget_cm:g} and no "
-                    "[event], expected event.joint and event.at to say where it counts"
+                raise KeyFault(
+                    f"found {self.size.effector_budget_cm:g} and no [event], expected event.joint "
+                    "and event.at to say where it counts",
+                    *("size", "effector_budget_cm"),
                 )
         elif self.event.at != "end" and self.event.at not in self.clips.landmarks:
-            raise ValueError(
-                f"event.at: found {self.event.at!r}, expected 'end' or a column of "
-                f"clips.landmarks {self.clips.landmarks}"
+            known = ("end", *self.clips.landmarks)
+            raise KeyFault(
+                f"found {self.event.at!r}{did_you_mean(self.event.at, known)}, expected 'end' or a "
+                f"column of clips.landmarks {self.clips.landmarks}",
+                *("event", "at"),
             )
         return self
 
@@ -376,9 +386,6 @@ MAX_BYTES = 128_000
 
 MAX_DOTS = 1_000
 """Dots in one key: far more than MOST_LEVELS, and few enough to parse quickly."""
-
-SHOWN = 200
-"""Characters of a value in a message."""
 
 MAX_DEPTH = 16
 """Nesting depth of tables and arrays; a recipe needs five."""
@@ -400,13 +407,13 @@ def read(path: Path) -> Recipe:
         raise RecipeError(path, TOO_DEEP) from fault
     except ValueError as fault:
         # ValueError covers TOMLDecodeError and int's error for a number of thousands of digits.
-        raise RecipeError(path, f"not TOML: {fault}", _line_of(str(fault))) from fault
+        raise _syntax_error(path, str(fault)) from fault
     if _nesting_depth(found) > MAX_DEPTH:
         raise RecipeError(path, TOO_DEEP)
     try:
         return Recipe.model_validate(found)
     except ValidationError as fault:
-        raise RecipeError(path, _explain(fault)) from fault
+        raise recipe_errors.recipe_error(path, text, Recipe, fault) from fault
 
 
 TOO_DEEP = f"tables or arrays nested deeper than {MAX_DEPTH} levels, expected at most that many"
@@ -423,27 +430,15 @@ def _nesting_depth(found: dict[str, Any]) -> int:
     return MAX_DEPTH + 1
 
 
-def _line_of(message: str) -> int | None:
-    found = re.search(r"line (\d+)", message)
-    return int(found.group(1)) if found else None
+PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
+"""End of a message of tomllib."""
 
 
-def _explain(fault: ValidationError) -> str:
-    lines = []
-    # The default unit follows from the measured quantity; an error there is reported already.
-    errors = fault.errors(include_url=False)
-    for error in (one for one in errors if one["type"] != "default_factory_not_called"):
-        parts = [str(part) for part in error["loc"] if part not in (COLUMN_TAG, MEASURED)]
-        key = ".".join(parts) or "recipe"
-        found = "" if error["type"] in ("missing", "value_error") else _quote_input(error["input"])
-        lines.append(f"{key}: {error['msg']}{found}")
-    return "; ".join(lines)
-
-
-def _quote_input(given: Any) -> str:
-    """Return the given value for a message, cut to SHOWN characters."""
-    shown = repr(given)
-    return f", found {shown if len(shown) <= SHOWN else f'{shown[:SHOWN]}...'}"
+def _syntax_error(path: Path, message: str) -> RecipeError:
+    """Return the error of a message of tomllib; an error at the end of the text has no place."""
+    place = PLACE.search(message)
+    where = map(int, place.groups()) if place else ()
+    return RecipeError(path, f"not TOML: {PLACE.sub('', message)}", *where)
 
 
 def json_schema() -> str:

@@ -31,18 +31,25 @@ class MotionError(Exception):
 
 
 class FileError(MotionError):
-    """A file that cannot be used; `path` and `line` locate the error."""
+    """A file that cannot be used; `path`, `line` and `column` (from 1) locate the error."""
 
-    def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
-        where = f"{path}:{line}" if line is not None else f"{path}"
-        super().__init__(f"{where}: {message}")
+    def __init__(
+        self,
+        path: str | Path,
+        message: str,
+        line: int | None = None,
+        column: int | None = None,
+    ) -> None:
+        place = [str(part) for part in (path, line, column) if part is not None]
+        super().__init__(f"{':'.join(place)}: {message}")
         self.path = str(path)
         self.line = line
+        self.column = column
         self.message = message
 
-    def __reduce__(self) -> tuple[type["FileError"], tuple[str, str, int | None]]:
+    def __reduce__(self) -> tuple[type["FileError"], tuple[str, str, int | None, int | None]]:
         # Errors of worker processes are pickled with their fields.
-        return type(self), (self.path, self.message, self.line)
+        return type(self), (self.path, self.message, self.line, self.column)
 
 
 class BvhError(FileError):

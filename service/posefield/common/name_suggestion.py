@@ -19,7 +19,8 @@ SIMILARITY = 0.7
 def similar_name(name: str, known: Iterable[str]) -> str | None:
     """Return the known name that is most similar to `name`, or None if none is similar enough.
 
-    None also if two are equally similar. Case and the separators "_", "-", ":" and " " do not count.
+    None also if two are equally similar. Case and the separators "_", "-", ":" and " " do not
+    count.
     """
     if len(name) > MAX_NAME_LENGTH:
         return None

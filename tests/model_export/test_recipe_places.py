@@ -1,0 +1,135 @@
+"""Tests of the lines and columns in errors of recipes."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from minimal import TOML
+
+from posefield.common.errors import RecipeError
+from posefield_train.source import recipe
+from posefield_train.source.toml_positions import key_positions, nearest_position
+
+TRICKY = '''
+# [not.a.table] = 1
+title = "a = [1] # no comment" # a comment = 1
+'quoted key' = 'x'
+a . b . "c d" = 1.5e3
+when = 1979-05-27 07:32:00
+[fruit]
+list = [
+  "one", # first ]
+  { name = "two", size = { w = 1 } },
+  [3, [4]],
+]
+text = """
+[inside.text]
+key = 1
+"""
+[[fruit.kinds]]
+name = "red"
+[fruit.kinds.taste]
+sweet = true
+[[fruit.kinds]]
+name = "green"
+[[fruit.kinds.seeds]]
+count = 2
+'''
+
+
+def paths(value, before=()):
+    """Return the paths of all values inside a value."""
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    found = set()
+    for key, inner in items:
+        found |= {(*before, key)}
+        if isinstance(inner, dict | list):
+            found |= paths(inner, (*before, key))
+    return found
+
+
+RECIPES = sorted((Path(recipe.__file__).parents[1] / "recipes").glob("*.toml"))
+
+
+@pytest.mark.parametrize("text", [TRICKY, TOML, *(path.read_text() for path in RECIPES)])
+def test_every_value_that_tomllib_reads_has_a_position(text):
+    """Oracle: tomllib. Only the list of an array of tables has no place of its own."""
+    known, wanted = set(key_positions(text)), paths(tomllib.loads(text))
+    assert known <= wanted
+    assert {path for path in wanted - known if (*path, 0) not in known} == set()
+
+
+@pytest.mark.parametrize(
+    ("path", "word"),
+    [
+        (("title",), "title"),
+        (("quoted key",), "'quoted key'"),
+        (("a", "b", "c d"), "a . b"),
+        (("when",), "when"),
+        (("fruit", "list", 1, "size", "w"), "w = 1"),
+        (("fruit", "list", 2, 1, 0), "4"),
+        (("fruit", "kinds", 0, "taste", "sweet"), "sweet"),
+        (("fruit", "kinds", 1, "name"), 'name = "green"'),
+        (("fruit", "kinds", 1, "seeds", 0, "count"), "count"),
+    ],
+)
+def test_a_position_is_where_the_key_begins(path, word):
+    line, column = key_positions(TRICKY)[path]
+    assert TRICKY.splitlines()[line - 1][column - 1 :].startswith(word)
+
+
+def test_a_missing_key_has_the_position_of_its_table():
+    positions = key_positions("a = 1\n\n[b]\nc = 2\n")
+    assert nearest_position(positions, ("b", "x", "y")) == (3, 2)
+    assert nearest_position(positions, ("d",)) is None
+
+
+@pytest.fixture
+def refused(tmp_path):
+    """Function that returns the lines of a recipe's error, without the path."""
+    path = tmp_path / "recipe.toml"
+
+    def of(text):
+        path.write_text(text)
+        with pytest.raises(RecipeError) as caught:
+            recipe.read(path)
+        return [line.removeprefix(f"{path}:") for line in str(caught.value).split("\n")]
+
+    return of
+
+
+def place(text, word):
+    """Return LINE:COLUMN of a word in a text."""
+    before = text[: text.index(word)]
+    return f"{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
+
+
+def test_every_mistake_has_its_line_and_column(refused):
+    text = TOML.replace('up = "y"', 'up = "x"').replace("frames = 20", "framez = 20")
+    first, second, third = refused(text)
+    assert first.startswith(f"{place(text, 'up =')}: source.up: Input should be 'y' or 'z'")
+    # The missing key at its table, the unknown one at itself.
+    assert second.startswith(f"{place(text, 'motion]')}: motion.frames: Field required")
+    hint = "(did you mean 'frames'?), found 20; expected some of frames, cyclic, root"
+    assert third.startswith(f"{place(text, 'framez')}: motion.framez: Extra inputs")
+    assert hint in third
+
+
+def test_a_mistake_of_our_own_checks_has_its_key_and_no_words_of_pydantic(refused):
+    text = TOML.replace("[size]", '[event]\njoint = "hand"\nat = "highest"\n[size]')
+    (line,) = refused(text)
+    at = place(text, "at = ")
+    expected = "found 'highest', expected 'end' or a column of clips.landmarks []"
+    assert line == f"{at}: event.at: {expected}"
+
+
+def test_an_unknown_key_of_a_control_is_answered_with_those_of_its_kind(refused):
+    text = TOML.replace("[[controls]]\n", "[[controls]]\ncolum = 3\n")
+    (line,) = refused(text)
+    assert line.startswith(f"{place(text, 'colum =')}: controls.0.colum: ")
+    assert line.endswith("expected some of name, column, unit, description")
+
+
+def test_the_number_of_listed_mistakes_is_bounded(refused):
+    lines = refused("".join(f"key{number} = 1\n" for number in range(100)) + TOML)
+    assert len(lines) == 21 and lines[-1] == " 80 further mistakes"
