@@ -73,7 +73,8 @@ def test_help_is_shown_as_it_is_written():
     commands(cli.app)
     found = typer.main.get_command(cli.app).commands
     assert {"crowd", "train"} <= found.keys()
-    texts = [each.help or "" for command in found.values() for each in (command, *command.params)]
+    parts = [each for command in found.values() for each in (command, *command.params)]
+    texts = [text for each in parts for text in (each.help, getattr(each, "epilog", "")) if text]
     assert [text for text in texts if Text.from_markup(text).plain != text] == []
 
 
@@ -278,8 +279,17 @@ def test_samples_that_make_no_model_are_refused_with_code_4(
 def test_a_recipe_that_is_wrong_is_refused_with_code_3(posefield, quick, tmp_path):
     wrong = tmp_path / "wrong.toml"
     wrong.write_text(quick.read_text().replace("cyclic = false", "cyclic = 0"))
-    said = refused_after_progress(posefield, 3, "train", wrong, "-o", tmp_path / "x.onnx")
-    assert said.startswith(f"{wrong}: motion.cyclic: ")
+    # Nothing was begun, so that no progress is told.
+    code, out, err = posefield("train", wrong, "-o", tmp_path / "x.onnx")
+    assert (code, out, err.count("\n")) == (3, "", 1)
+    line = 1 + quick.read_text().split("cyclic = false")[0].count("\n")
+    assert err.startswith(f"posefield: {wrong}:{line}:1: motion.cyclic: ")
+
+
+def test_a_recipe_that_is_not_there_is_refused_before_any_progress(refused, tmp_path):
+    path = tmp_path / "nope.toml"
+    said = refused(3, "train", path, "-o", tmp_path / "x.onnx")
+    assert said == f"{path}: cannot be read: No such file or directory"
 
 
 def test_a_model_is_an_onnx_file(refused, train_words, tmp_path):

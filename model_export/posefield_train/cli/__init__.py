@@ -2,6 +2,7 @@
 
 import typer
 
+from posefield.console.registration import MAKE, register
 from posefield_train.cli import (
     command_adapt,
     command_evaluate,
@@ -10,11 +11,35 @@ from posefield_train.cli import (
     command_train,
 )
 
+COMMANDS = {
+    "fetch": (
+        command_fetch.fetch,
+        ["fetch cmu downloads -o motion", "fetch hdm05 downloads -o motion"],
+    ),
+    "sample": (
+        command_sample.sample,
+        ["sample reaching -o reaching", "sample reaching --truth -c turn=20 -o truth.bvh"],
+    ),
+    "train": (
+        command_train.train_command,
+        [
+            "train kick/recipe.toml -o kick.onnx --report kick.html",
+            "train cmu_walk --data motion -o walk.onnx",
+        ],
+    ),
+    "adapt": (
+        command_adapt.adapt,
+        [
+            "adapt walk.onnx kim.bvh -o walk_kim.onnx --performer kim "
+            "--unit 0.01 --up y --licence CC0-1.0"
+        ],
+    ),
+}
+"""Functions of the commands and their examples."""
+
 
 def commands(app: typer.Typer) -> None:
     """Add the training commands to an application."""
-    app.command("fetch")(command_fetch.fetch)
-    app.command("sample")(command_sample.sample)
-    app.command("train")(command_train.train_command)
-    app.command("adapt")(command_adapt.adapt)
-    app.command("evaluate")(command_evaluate.evaluate)
+    for name, (function, examples) in COMMANDS.items():
+        register(app, function, MAKE, examples, name)
+    command_evaluate.add(app)

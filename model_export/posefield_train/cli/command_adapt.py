@@ -29,7 +29,7 @@ class ClipArguments:
         list[Path] | None,
         typer.Argument(
             help="BVH files of one new performer: one or more, typically up to five",
-            metavar="CLIP...",
+            metavar="CLIP",
         ),
     ] = None
     table: Annotated[
@@ -56,7 +56,10 @@ def adapt(
     ],
     json: Json = False,
 ) -> None:
-    """Add a performer to a model from a few clips, without the model's training data."""
+    """Add a performer to a model from a few clips.
+
+    The model's training data is not needed.
+    """
     from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
     from posefield_train.adapt.adapted_file import NewPerformer
     from posefield_train.source.recipe import Source

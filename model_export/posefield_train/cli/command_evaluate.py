@@ -1,7 +1,9 @@
 """Command `posefield evaluate`: errors of a recipe's models on held-out motions."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,8 +11,10 @@ import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
+from posefield.console.arguments import Json
 from posefield.console.output import as_json
 from posefield.console.question_options import with_option_groups
+from posefield.console.registration import MAKE, PlainCommand, register
 from posefield_train.cli import executors, output_files
 from posefield_train.cli.executors import Scheduler
 from posefield_train.source import shipped_recipes
@@ -39,12 +43,15 @@ class EvaluateOptions:
         list[Protocol] | None,
         typer.Option(
             help="hold out clips or performers, or compare with the noise-free truth; may be "
-            "repeated; default: all"
+            "repeated; default: all",
+            metavar="|".join(Protocol),
         ),
     ] = None
     report: Annotated[Path | None, typer.Option(help="output .html report")] = None
+    json: Json = False
     json_file: Annotated[
-        Path | None, typer.Option("--json", help="output .json file", metavar="FILE")
+        Path | None,
+        typer.Option("--json-file", help="output .json file; --json FILE is the same"),
     ] = None
     joined: Annotated[
         Path | None,
@@ -57,8 +64,9 @@ class EvaluateOptions:
     learning: Annotated[
         bool,
         typer.Option(
+            "--learning",
             help="compare the errors after suggested and after random captures, for the "
-            "procedural family"
+            "procedural family",
         ),
     ] = False
     scheduler: Scheduler = None
@@ -67,6 +75,10 @@ class EvaluateOptions:
     def protocols(self) -> list[str]:
         """Names of the wanted protocols; empty for all that the recipe allows."""
         return [one.value for one in self.protocol or []]
+
+    def print(self, text: str) -> None:
+        """Print a result for people: on standard error if standard output has the JSON."""
+        typer.echo(text, err=self.json)
 
 
 @with_option_groups
@@ -81,13 +93,49 @@ def evaluate(
         typer.Option(help="folder of the motion data; default: the recipe's folder"),
     ] = None,
 ) -> None:
-    """Measure the error of a recipe's models on held-out motions, and compare other methods.
+    """Measure the errors of a recipe's models on held-out motions.
 
-    Each fold fits the whole model again without the held-out clips.
+    Other methods are measured on the same motions. Each fold fits the whole model again without the
+    held-out clips.
     """
     output_files.expect_html(wanted.report)
     recipe_file = shipped_recipes.file_of(recipe, data)
     _evaluate(recipe_file, data or recipe_file.parent, wanted)
+
+
+class EvaluateCommand(PlainCommand):
+    """Command that also accepts `--json FILE`, the form before --json became a flag."""
+
+    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
+        """Parse the words of a command line."""
+        return super().parse_args(ctx, json_file_words(args))
+
+
+def json_file_words(words: Sequence[str]) -> list[str]:
+    """Return the words with --json-file for a --json that a file follows.
+
+    A word after --json is its file unless it is an option, or the recipe: a TOML file or the name
+    of a shipped recipe.
+    """
+    found = list(words)
+    for at, (word, after) in enumerate(zip_longest(words, words[1:], fillvalue="-")):
+        is_recipe = after.endswith(".toml") or after in shipped_recipes.names()
+        if word.startswith("--json=") or (
+            word == "--json" and not after.startswith("-") and not is_recipe
+        ):
+            found[at] = word.replace("--json", "--json-file", 1)
+    return found
+
+
+EXAMPLES = [
+    "evaluate kick/recipe.toml --report kick.html",
+    "evaluate cmu_walk --data motion --protocol performer --json",
+]
+
+
+def add(app: typer.Typer) -> None:
+    """Add the command to an application."""
+    register(app, evaluate, MAKE, EXAMPLES, "evaluate", EvaluateCommand)
 
 
 @dataclass(frozen=True)
@@ -105,12 +153,15 @@ def _evaluate(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> None:
     own = _family(recipe_file, data, wanted)
     other = _joined(own, data, wanted)
     results = _protocols(own, wanted)
-    typer.echo(evaluation_summary.legend(results))
+    wanted.print(evaluation_summary.legend(results))
     curve = _learning(wanted)
-    more = _extra_results(own, other, results, curve)
+    more = _extra_results(own, other, results, curve, wanted)
     first, *others = map(evaluation_summary.facts, results)
+    found = as_json({**first, **more, "others": others})
+    if wanted.json:
+        typer.echo(found)
     if wanted.json_file:
-        atomic_files.write(as_json({**first, **more, "others": others}).encode(), wanted.json_file)
+        atomic_files.write(found.encode(), wanted.json_file)
     if wanted.report:
         from posefield_train.evaluate.pages import evaluation_page
 
@@ -171,11 +222,11 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
                     protocol.run_protocol(own.recipe, own.examples, name, jobs, bar.update)
                 )
             trust = "\n".join(evaluation_summary.trust_text(results[-1]))
-            typer.echo(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
+            wanted.print(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
             if results[-1].corrections:
-                typer.echo(f"{corrections.table(results[-1])}\n")
+                wanted.print(f"{corrections.table(results[-1])}\n")
     for text in evaluation_summary.performer_text(results):
-        typer.echo(text)
+        wanted.print(text)
     return results
 
 
@@ -184,19 +235,20 @@ def _extra_results(
     other: _JoinedFamily | None,
     results: "list[EvaluationResult]",
     curve: "Learning | None",
+    wanted: EvaluateOptions,
 ) -> dict[str, Any]:
     """Print and return the results for a joined family, for performers and for suggested clips."""
     from posefield_train.evaluate import evaluation_summary, learning_curves
 
     more: dict[str, Any] = {}
     if other:
-        typer.echo(f"\n{own.recipe.name} and {other.name} joined, {other.flags.text()}")
+        wanted.print(f"\n{own.recipe.name} and {other.name} joined, {other.flags.text()}")
         more["joined"] = {"family": other.name, "support": other.flags.facts()}
     if named := evaluation_summary.performer_facts(results):
         more["performers"] = named
     if curve:
         more["learning"] = learning_curves.facts(curve)
-        typer.echo(f"\n{learning_curves.table(curve)}")
+        wanted.print(f"\n{learning_curves.table(curve)}")
     return more
 
 

@@ -9,23 +9,35 @@ from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, encoder_for
 from posefield.console.output import as_json, written_message
-from posefield.console.question_options import Controls, parse_controls
+from posefield.console.question_options import parse_controls
 from posefield.question.results import ClipAnswer, Trust
 
 
 def sample(
-    family: Annotated[str, typer.Argument(help="name of the family: reaching")],
+    family: Annotated[str, typer.Argument(help="name of the family: reaching", metavar="FAMILY")],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="output folder; with --truth, output file")
     ],
     truth: Annotated[
-        bool, typer.Option(help="write the noise-free motion at the controls of --control")
+        bool,
+        typer.Option("--truth", help="write the noise-free motion at the controls of --control"),
     ] = False,
-    control: Controls = None,
+    control: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--control",
+            "-c",
+            help="with --truth: value of a control; all are needed; may be repeated",
+            metavar="NAME=VALUE",
+        ),
+    ] = None,
     fps: Annotated[float, typer.Option(help="frame rate with --truth, frames a second")] = 120.0,
     json: Json = False,
 ) -> None:
-    """Write a procedural family of motions, or its noise-free motion at any control point."""
+    """Write a procedural family of motions, or its noise-free motion.
+
+    The noise-free motion exists at any control point.
+    """
     from posefield_train.sample import noise_free as truths
     from posefield_train.sample import sample_files
 

@@ -26,7 +26,7 @@ def train_command(
     recipes: Annotated[
         list[Path],
         typer.Argument(
-            help="recipes (TOML files or names of shipped recipes)", metavar="RECIPE..."
+            help="recipes (TOML files or names of shipped recipes), one or more", metavar="RECIPE"
         ),
     ],
     output: Annotated[
@@ -46,7 +46,7 @@ def train_command(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Train the model of each recipe and write it as one .onnx file."""
+    """Train the model of each recipe, one .onnx file each."""
     output_files.expect_html(report)
     recipe_files = [shipped_recipes.file_of(given, data) for given in recipes]
     if len(recipe_files) == 1 and executor == ExecutorOptions():

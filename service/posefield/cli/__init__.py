@@ -26,8 +26,21 @@ from posefield.cli import (
     command_why,
 )
 from posefield.common.errors import FileError, MotionError, TrainingError, WorkerDied
+from posefield.console.registration import (
+    ASK,
+    HELP_OPTIONS,
+    MAKE,
+    SERVE,
+    PlainGroup,
+    example_text,
+    register,
+)
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(
+    cls=PlainGroup,
+    context_settings={"help_option_names": HELP_OPTIONS},
+    pretty_exceptions_enable=False,
+)
 
 INTERRUPTED = 130
 """Exit code that shells expect after SIGINT."""
@@ -44,6 +57,8 @@ EXTRAS = {
 }
 TRAINING = {
     "fetch": "Convert downloaded motion data for a shipped recipe.",
+    "probe": "Propose unit, axes, feet and heading of motion files.",
+    "init": "Write a recipe and a table for a folder of motion files.",
     "sample": "Write procedural motions and their recipe.",
     "train": "Train a recipe's model.",
     "adapt": "Add a performer to a trained model.",
@@ -91,7 +106,7 @@ def _list_training() -> None:
     anything = {"ignore_unknown_options": True, "allow_extra_args": True, "help_option_names": []}
     for name, purpose in TRAINING.items():
         text = f'{purpose} Needs pip install "posefield[train]".'
-        app.command(name, help=text, context_settings=anything)(absent)
+        app.command(name, help=text, context_settings=anything, rich_help_panel=MAKE)(absent)
 
 
 def _exit_code(fault: MotionError) -> int:
@@ -102,25 +117,71 @@ def _exit_code(fault: MotionError) -> int:
     return 5 if isinstance(fault, WorkerDied) else 2
 
 
-@app.callback(invoke_without_command=True)
+HELP = (
+    "Example motions become one model file, which answers with any motion between them.\n\n"
+    "Exit codes: 0 success, 1 check found defects, 2 a question or an argument cannot be answered, "
+    "3 a file cannot be used, 4 no model can be made of the samples, 5 a process died."
+)
+COMMANDS = {
+    "demo": (command_demo.demo, SERVE, ["demo", "demo --once -o clips"]),
+    "models": (command_models.models, ASK, ["models", "models my_models --json"]),
+    "inspect": (
+        command_inspect.inspect,
+        ASK,
+        ["inspect walk.onnx", "inspect walk.onnx --json"],
+    ),
+    "pose": (command_clip.pose, ASK, ["pose walk.onnx -c speed=1.2 --time 0.5 --time 0.6"]),
+    "clip": (
+        command_clip.clip,
+        ASK,
+        [
+            "clip walk.onnx -c speed=1.2 -o walk.glb",
+            "clip walk.onnx -c speed=1.2 --fps 24 -o blender.usdc",
+            "clip reach.onnx --target RightHand@end=-0.2,1.1,0.5 -o reach.usda",
+        ],
+    ),
+    "crowd": (
+        command_crowd.crowd,
+        ASK,
+        [
+            "crowd walk.onnx --count 100 --seconds 5 -o crowd.usd",
+            "crowd walk.onnx --camera=-60,1.7,0 -o crowd.usdz",
+        ],
+    ),
+    "why": (command_why.why, ASK, ["why walk.onnx -c speed=1.2 --nearest 5"]),
+    "suggest": (command_why.suggest, ASK, ["suggest walk.onnx --count 5"]),
+    "export": (
+        command_export.export,
+        ASK,
+        [
+            "export walk.onnx queries.csv -o clips",
+            "export walk.onnx --grid speed=0.8:1.6:9 --format glb -o sweep",
+            "export walk.onnx --sample 10000 --layout tar -o s3://bucket/walks",
+        ],
+    ),
+    "check": (command_check.check, ASK, ["check walk.usda", "check walk.usda --json"]),
+    "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
+    "key": (command_serve.key, SERVE, ["key anna --model walk >> keys.txt"]),
+    "page": (command_page.page, SERVE, ["page walk.onnx -o site"]),
+}
+"""Functions of the commands, their groups and examples."""
+
+
+@app.callback(
+    invoke_without_command=True,
+    help=HELP,
+    epilog=example_text(["clip walk.onnx -c speed=1.2 -o walk.glb", "--install-completion"]),
+)
 def _version(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="print the version and exit")] = False,
 ) -> None:
     if version:
         typer.echo(f"posefield {__version__}")
         raise typer.Exit
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
-app.command()(command_demo.demo)
-app.command()(command_models.models)
-app.command()(command_inspect.inspect)
-app.command()(command_clip.pose)
-app.command()(command_clip.clip)
-app.command()(command_crowd.crowd)
-app.command()(command_why.why)
-app.command()(command_why.suggest)
-app.command()(command_export.export)
-app.command()(command_page.page)
-app.command()(command_serve.serve)
-app.command()(command_serve.key)
-app.command()(command_check.check)
+for _name, (_function, _group, _examples) in COMMANDS.items():
+    register(app, _function, _group, _examples, _name)

@@ -10,10 +10,13 @@ from posefield.console.output import as_json
 
 
 def check(
-    file: Annotated[Path, typer.Argument(help="USD file: usda, usdc, usd or usdz")],
+    file: Annotated[Path, typer.Argument(help="USD file: usda, usdc, usd or usdz", metavar="FILE")],
     json: Json = False,
 ) -> None:
-    """Find defects of a USD character that validators accept but some readers fail on."""
+    """Find defects of a USD character.
+
+    They are defects that validators accept but some readers fail on.
+    """
     from posefield.check import check as find
 
     findings = find(file)

@@ -15,8 +15,11 @@ from posefield.synthesis import clips, poses
 
 
 @with_question_options(PoseQuestion, usual={"times": [0.0]})
-def pose(model: ModelPath, question: PoseQuestion) -> None:
-    """Print the poses at one or more times as JSON."""
+def pose(model: ModelPath, question: PoseQuestion, json: Json = False) -> None:
+    """Print the poses at one or more times as JSON.
+
+    The output is JSON with and without --json.
+    """
     answer = poses.synthesize_poses(open_model(model), question)
     print_warnings(answer.trust)
     typer.echo(POSE_ENCODERS["json"].encode(answer).decode())
@@ -31,7 +34,12 @@ def clip(
     question: FileQuestion,
     json: Json = False,
 ) -> None:
-    """Write a clip as a usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack file."""
+    """Write a clip to a file: USD, glTF, BVH or numbers.
+
+    The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack. Blender plays
+    USD files at the scene's frame rate, 24 by default: write them with --fps 24, or set the scene's
+    rate.
+    """
     found = encoder_for(output)
     convention = found.convention(question.unit, question.up)
     answer = clips.synthesize_clip(open_model(model), question)

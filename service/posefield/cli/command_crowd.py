@@ -31,12 +31,16 @@ def crowd(
         Path | None,
         typer.Option(
             help="instead of random paths: JSON list of routes with waypoints (x, z pairs, m) and "
-            "speed (m/s)"
+            "speed (m/s)",
+            metavar="FILE",
         ),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Write a walking crowd, each character on its own path at its own varying speed."""
+    """Write a walking crowd to a file.
+
+    Each character walks on its own path at its own varying speed.
+    """
     from posefield.cli import crowd_files
     from posefield.locomotion import crowd_order
 

@@ -37,9 +37,7 @@ class RowArguments:
 
     table: Annotated[
         Path | None,
-        typer.Argument(
-            help="CSV, Parquet or JSON Lines file, one row per clip", metavar="[QUERIES]"
-        ),
+        typer.Argument(help="CSV, Parquet or JSON Lines file, one row per clip", metavar="QUERIES"),
     ] = None
     grid: Annotated[
         list[str] | None,
@@ -105,7 +103,7 @@ def export(
     execution: RunArguments,
     json: Json = False,
 ) -> None:
-    """Write a clip for each row of a table, or for each point of a grid or a sampling.
+    """Write many clips: one for each row of a table, or point of a grid.
 
     A column of the table takes precedence over the option of the same name. The same command
     resumes an interrupted export and gives the same files. It rewrites missing or damaged files.

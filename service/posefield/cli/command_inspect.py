@@ -12,7 +12,10 @@ from posefield.motion import measures
 
 
 def inspect(model: ModelPath, json: Json = False) -> None:
-    """Print a model's controls, skeleton, errors, provenance and time per pose on this machine."""
+    """Print a model's controls, levels of detail, errors and licence.
+
+    The time per pose is measured on this machine.
+    """
     opened = session.load(model)
     plain = {
         "identity": f"{model.stem}@{opened.digest}",

@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Annotated
 from urllib.parse import quote
 
-import orjson
 import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import FileError
+from posefield.console.arguments import Json, ModelPath
+from posefield.console.output import as_json
 from posefield.inference import session
 from posefield.model_file import checked_file
 
@@ -23,9 +24,9 @@ _HEAD, _PRESSED = b"<head>", ".gz"
 
 
 def page(
-    model: Annotated[Path, typer.Argument(help="model file", metavar="MODEL")],
+    model: ModelPath,
     output: Annotated[Path, typer.Option("--output", "-o", help="output folder")],
-    json: Annotated[bool, typer.Option("--json", help="print the result as JSON")] = False,
+    json: Json = False,
 ) -> None:
     """Write the viewer page with a model, for static web hosting."""
     content = checked_file.read(model)
@@ -34,7 +35,7 @@ def page(
     written = write_files(page_files(model.name, content, identity), output)
     if json:
         plain = {"folder": str(output), "model": identity, "files": written}
-        typer.echo(orjson.dumps(plain, option=orjson.OPT_INDENT_2).decode())
+        typer.echo(as_json(plain))
         return
     size = sum(written.values()) / 1e6
     typer.echo(

@@ -15,6 +15,7 @@ def serve(
         typer.Argument(
             help="model files, folders with model files, or URLs of object stores; "
             "default: the models that ship with posefield",
+            metavar="MODEL",
             show_default=False,
         ),
     ] = None,
@@ -39,7 +40,7 @@ def serve(
 
 
 def key(
-    name: Annotated[str, typer.Argument(help="name of the key's owner in the log")],
+    name: Annotated[str, typer.Argument(help="name of the key's owner in the log", metavar="NAME")],
     model: Annotated[
         list[str] | None,
         typer.Option(help="model that the key may read; may be repeated; default: all models"),

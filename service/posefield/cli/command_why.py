@@ -17,7 +17,10 @@ from posefield.synthesis.explanation import explain_result as find_reasons
 
 @with_question_options(WhyQuestion)
 def why(model: ModelPath, question: WhyQuestion, json: Json = False) -> None:
-    """Print the captured clips nearest to the controls, and their weights."""
+    """Print the captured clips nearest to the controls.
+
+    Each clip has its distance, and its weight in the answer.
+    """
     found = find_reasons(open_model(model), question)
     print_warnings(found)
     as_text = model_tables.explanation_text

@@ -1,0 +1,113 @@
+"""Tests of the help: groups, examples, placeholders, and completion."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from posefield import cli
+from posefield.console.registration import GROUPS
+from posefield_train.cli import command_evaluate, commands
+
+commands(cli.app)
+GROUP = typer.main.get_command(cli.app)
+NAMES = sorted(GROUP.commands)
+WIDTH = 80
+
+
+@pytest.fixture
+def helped(posefield, monkeypatch):
+    """Function that returns the help of a command on a terminal of 80 columns."""
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+
+    def of(*words):
+        code, out, err = posefield(*words)
+        assert (code, err) == (0, "")
+        return out
+
+    return of
+
+
+def test_without_arguments_it_helps_and_succeeds(helped):
+    assert helped() == helped("-h") == helped("--help")
+
+
+def test_commands_stand_in_groups_in_their_order(helped):
+    text = helped()
+    places = [text.index(group) for group in GROUPS]
+    assert places == sorted(places)
+    ungrouped = [
+        n for n, command in GROUP.commands.items() if command.rich_help_panel not in GROUPS
+    ]
+    assert ungrouped == []
+    assert text.index(" train ") < places[1] < text.index(" clip ") < places[2]
+
+
+def test_a_command_takes_one_line_of_the_list(helped):
+    for line in helped().splitlines():
+        assert not re.match("│ {8,}[a-z]+", line) or "completion" in line or "install" in line, line
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_help_has_examples_and_no_python_types(helped, name):
+    text = helped(name, "-h")
+    assert text == helped(name, "--help")
+    assert re.search(rf"Examples:\s+posefield {name} ", text)
+    assert not re.search(r"<(bool|int|float|str|path|list.*)>", text)
+    usage = next(line for line in text.splitlines() if "Usage:" in line)
+    assert re.search(r"\{[a-z]", usage) is None, usage
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_options_of_examples_exist(name):
+    """Each example parses: its options and the number of its arguments are the command's."""
+    command = GROUP.commands[name]
+    for line in re.findall(rf"posefield {name} (.*)", command.epilog):
+        words = re.sub(r" (>>|<) .*", "", line).split()
+        known = {opt for param in command.params for opt in param.opts}
+        assert {word.partition("=")[0] for word in words if re.match("-[a-z-]", word)} <= known
+        command.make_context(name, list(words), resilient_parsing=True)
+
+
+@pytest.mark.parametrize("name", sorted(set(NAMES) - {"serve"}))
+def test_json_is_a_flag_of_every_command_with_a_result(name):
+    """The service has no result; its log is JSON by a setting."""
+    (found,) = [param for param in GROUP.commands[name].params if "--json" in param.opts]
+    assert found.is_flag
+
+
+@pytest.mark.parametrize(
+    ("words", "parsed"),
+    [
+        (["a.toml", "--json", "b.json"], ["a.toml", "--json-file", "b.json"]),
+        (["a.toml", "--json=b"], ["a.toml", "--json-file=b"]),
+        (["--json", "out/b", "a.toml"], ["--json-file", "out/b", "a.toml"]),
+        (["--json", "a.toml"], ["--json", "a.toml"]),
+        (["--json", "cmu_walk"], ["--json", "cmu_walk"]),
+        (["a.toml", "--json"], ["a.toml", "--json"]),
+        (["a.toml", "--json", "--learning"], ["a.toml", "--json", "--learning"]),
+    ],
+)
+def test_evaluate_takes_json_as_a_flag_and_with_a_file_as_before(words, parsed):
+    assert command_evaluate.json_file_words(words) == parsed
+
+
+def test_an_unknown_command_suggests_one(posefield):
+    code, _, err = posefield("clp")
+    assert code == 2 and "Did you mean 'clip'?" in err
+
+
+@pytest.mark.system
+@pytest.mark.parametrize(
+    ("line", "word"), [("posefield cl", "clip"), ("posefield clip --pi", "--pin-feet")]
+)
+def test_shells_complete_commands_and_options(line, word):
+    asked = {"_POSEFIELD_COMPLETE": "complete_bash", "COMP_WORDS": line}
+    asked["COMP_CWORD"] = str(line.count(" "))
+    command = Path(sys.executable).parent / "posefield"
+    done = subprocess.run([command], capture_output=True, text=True, env=os.environ | asked)
+    assert word in done.stdout.split()
