@@ -51,7 +51,7 @@ def examples(trained, who, controls):
     return [
         ingest.Example(
             replace(row, place=row.place.with_name(f"{who}{value:g}.bvh"), performer=who),
-            ingest.canonicalize(newcomers.clip(who, value), row, False, False)[0],
+            ingest.canonicalize(newcomers.clip(who, value), False, False)[0],
             np.array([value]),
             (),
             (),

@@ -91,7 +91,7 @@ def head(path, who, level=0):
 def test_the_service_answers_for_the_newcomer_at_every_level(adapted):
     path, _ = adapted
     true = newcomers.clip("cy", 4.0)
-    expected = ingest.canonicalize(true, None, False, False)[0].positions()[:, 2].mean(axis=0)
+    expected = ingest.canonicalize(true, False, False)[0].positions()[:, 2].mean(axis=0)
     for number, level in enumerate(session.load(path).card.levels):
         own, other = (np.linalg.norm(head(path, who, number) - expected) for who in ("cy", "a"))
         assert own < 0.02 + 2.0 * level.rms

@@ -322,6 +322,19 @@ def test_bones_that_stretch_are_noted_and_their_mean_is_kept(read):
     assert examples[0].offsets[2, 1] == pytest.approx(0.31, abs=WRITTEN)
 
 
+def test_many_clips_that_stretch_take_one_note_with_the_worst(read, tmp_path):
+    source = small_clip()
+    stretched = []
+    for much in (0.02, 0.0, 0.05, 0.01):
+        translations = source.translations.copy()
+        translations[:, 2, 1] += np.linspace(0.0, much, len(source))
+        stretched.append(replace(source, translations=translations))
+    assert read(*stretched)[1] == [
+        f"3 of 4 clips: bones stretch by up to 0.0500 m, the most in {tmp_path / '2.bvh'}; their "
+        "mean is kept"
+    ]
+
+
 def test_a_rigid_skeleton_brings_no_note(read):
     assert read(small_clip(), small_clip(1.0))[1] == []
 

@@ -16,7 +16,14 @@ from posefield.motion import measures
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
-from posefield_train.source import bvh, clip_table, data_folder, ingest, measured_controls
+from posefield_train.source import (
+    bvh,
+    clip_notes,
+    clip_table,
+    data_folder,
+    ingest,
+    measured_controls,
+)
 from posefield_train.source.clip_table import ClipRow, ClipTable
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Source
@@ -98,27 +105,29 @@ def _examples(
     given: Sequence[Mapping[str, float]],
 ) -> tuple[list[Example], list[str]]:
     files = ingest.read_files(rows)
-    examples, notes = [], []
+    examples, notes, stretches = [], list[str](), []
     for row, values in zip(rows, given, strict=True):
-        example, said = _example(reopened, row, source, files[str(row.place)])
+        example, said, stretch = _example(reopened, row, source, files[str(row.place)])
         controls = _controls(reopened, example, values)
         examples.append(replace(example, controls=controls))
         notes += [note for note in said if note not in notes]
-    return examples, notes
+        stretches.append(stretch)
+    if source.root_offset is None:
+        notes += clip_notes.offset_notes(files)
+    return examples, notes + clip_notes.stretch_notes(rows, stretches)
 
 
 def _example(
     reopened: ReconstructedModel, row: ClipRow, source: Source, file: bvh.BvhFile
-) -> tuple[Example, list[str]]:
+) -> tuple[Example, list[str], float]:
+    """Return the example of a row, notes on it, and the stretch of its bones, m."""
     own = reopened.card
     cut, last = ingest.cut_frames(ingest.clip_of_file(file, source), row)
     clip, notes = _reduce_to_skeleton(cut, own.skeleton, row)
-    if source.root_offset is None:
-        notes += ingest.offset_notes(file, row)
-    clip, jumps, said = ingest.canonicalize(clip, row, own.cyclic, own.root == "in_place")
+    clip, jumps, stretch = ingest.canonicalize(clip, own.cyclic, own.root == "in_place")
     marks = ingest.landmarks(row, last)
     nothing = np.full(len(own.controls), np.nan)
-    return Example(row, clip, nothing, marks, jumps), notes + said
+    return Example(row, clip, nothing, marks, jumps), notes, stretch
 
 
 def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Clip, list[str]]:

@@ -45,6 +45,10 @@ class ClipArguments:
     ] = None
 
 
+STEPS = 4
+"""Steps of an adaptation."""
+
+
 @with_option_groups
 def adapt(
     model: ModelPath,
@@ -71,18 +75,20 @@ def adapt(
         raise InvalidField("unit", f"{files.unit}, expected a length in metres")
     if not licence.strip():
         raise InvalidField("licence", "blank, expected a text")
-    progress = ProgressPrinter()
-    progress(f"reading {model}")
-    known = model_reconstruction.load(model)
-    adapted_file.check_name(known.card, performer)
-    source = Source(metres_per_unit=files.unit, up=files.up, root_offset=files.root_offset)
-    progress("reading clips")
-    if files.table:
-        examples, notes = new_clips.examples_of_table(known, files.table, source, performer)
-    else:
-        examples, notes = new_clips.examples_of_files(known, files.clips or [], source, performer)
-    progress("adapting, and comparing the graph with the reference")
-    made = adapted_file.export_adapted(known, NewPerformer(performer, examples, licence, notes))
-    atomic_files.write(made.content, output)
-    progress("done")
+    with ProgressPrinter(STEPS) as progress:
+        progress(f"reading {model}")
+        known = model_reconstruction.load(model)
+        adapted_file.check_name(known.card, performer)
+        source = Source(metres_per_unit=files.unit, up=files.up, root_offset=files.root_offset)
+        progress("reading clips")
+        if files.table:
+            examples, notes = new_clips.examples_of_table(known, files.table, source, performer)
+        else:
+            examples, notes = new_clips.examples_of_files(
+                known, files.clips or [], source, performer
+            )
+        progress("adapting, and comparing the graph with the reference")
+        made = adapted_file.export_adapted(known, NewPerformer(performer, examples, licence, notes))
+        atomic_files.write(made.content, output)
+        progress("done")
     typer.echo(output_files.format_output(made, output, json))

@@ -21,6 +21,10 @@ if TYPE_CHECKING:
     from posefield_train.source.recipe import Recipe
 
 
+STEPS, REPORT_STEPS = 6, 8
+"""Steps of a training, without and with its report."""
+
+
 @with_option_groups
 def train_command(
     recipes: Annotated[
@@ -67,16 +71,16 @@ def _train(
 
     output_files.expect_onnx(output)
     own = recipe.read(recipe_file)
-    progress = ProgressPrinter()
-    progress(f"reading {recipe_file}")
-    examples, notes = ingest.ingest(own, data or recipe_file.parent)
-    trained = train.train(own, examples, progress)
-    progress("writing the graph and comparing it with the reference")
-    exported = onnx_export.export_model(own, trained, notes)
-    atomic_files.write(exported.content, output)
-    if report:
-        _write_report(own, trained, exported, progress, report)
-    progress("done")
+    with ProgressPrinter(REPORT_STEPS if report else STEPS) as progress:
+        progress(f"reading {recipe_file}")
+        examples, notes = ingest.ingest(own, data or recipe_file.parent)
+        trained = train.train(own, examples, progress)
+        progress("writing the graph and comparing it with the reference")
+        exported = onnx_export.export_model(own, trained, notes)
+        atomic_files.write(exported.content, output)
+        if report:
+            _write_report(own, trained, exported, progress, report)
+        progress("done")
     typer.echo(output_files.format_output(exported, output, json))
 
 
@@ -104,21 +108,29 @@ def _write_report(
 def _sweep(
     recipe_files: list[Path], data: Path | None, folder: Path, place: ExecutorOptions, json: bool
 ) -> None:
+    from posefield.console.progress import ProgressBar
     from posefield_train import sweep
 
     if folder.suffix == ".onnx":
         raise InvalidField("output", f"{folder.name!r}, expected a folder for several models")
     found, failed = [], []
-    with executors.jobs(place.scheduler, place.jobs) as jobs:
+    with (
+        executors.jobs(place.scheduler, place.jobs) as jobs,
+        ProgressBar("models", len(recipe_files)) as bar,
+    ):
         for made in sweep.train_models(recipe_files, data, jobs):
+            bar.advance(1)
             if isinstance(made.found, TrainingError):
                 failed.append(made.name)
-                typer.echo(f"{made.name}: {made.found}", err=True)
+                bar.print(f"{made.name}: {made.found}")
                 continue
             path = folder / f"{made.name}.onnx"
             atomic_files.write(made.found.content, path)
             found.append(output_files.facts(made.found, path))
-            typer.echo(output_files.summary(made.found, path), err=json)
+            if json:
+                bar.print(output_files.summary(made.found, path))
+            else:
+                typer.echo(output_files.summary(made.found, path))
     if json:
         typer.echo(as_json(sorted(found, key=lambda facts: str(facts["file"]))))
     if failed:

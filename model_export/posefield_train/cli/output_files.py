@@ -10,6 +10,10 @@ if TYPE_CHECKING:
     from posefield_train.graph.onnx_export import ExportedModel
 
 
+MAX_NOTES = 12
+"""Notes that a summary shows; the model file holds all of them."""
+
+
 def expect_onnx(output: Path) -> None:
     """Raise InvalidField for a model file without the suffix .onnx."""
     if output.suffix != ".onnx":
@@ -42,7 +46,10 @@ def facts(exported: "ExportedModel", output: Path) -> dict[str, Any]:
 def summary(exported: "ExportedModel", output: Path) -> str:
     """Return the summary of a written model as text."""
     found = facts(exported, output)
-    notes = [f"note: {note}" for note in found["notes"]]
+    notes = [f"note: {note}" for note in found["notes"][:MAX_NOTES]]
+    if len(found["notes"]) > MAX_NOTES:
+        others = len(found["notes"]) - MAX_NOTES
+        notes.append(f"note: {others} further notes: posefield inspect {output}")
     return "\n".join(
         [
             *notes,

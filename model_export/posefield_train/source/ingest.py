@@ -12,13 +12,18 @@ from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import bvh, clip_table, half_turns, measured_controls, shipped_recipes
+from posefield_train.source import (
+    bvh,
+    clip_notes,
+    clip_table,
+    half_turns,
+    measured_controls,
+    shipped_recipes,
+)
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
 
-# Bones that stretch by less than this are taken as rigid without a note, m.
-RIGID_TOLERANCE = 1e-4
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
 # second, which take 2.4 GB.
 MAX_POSES = 30_000_000
@@ -53,17 +58,13 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     """
     rows = clip_table.read(recipe, folder)
     files = read_files(rows)
-    unnoted = set(files) if recipe.source.root_offset is None else set()
-    notes = shipped_recipes.table_notes(rows[0].table)
-    examples = []
-    for row in rows:
-        key = str(row.place)
-        if key in unnoted:
-            unnoted.remove(key)
-            notes += offset_notes(files[key], row)
-        examples.append(_example(recipe, files[key], row, notes))
+    found = [_example(recipe, files[str(row.place)], row) for row in rows]
+    examples = [example for example, _ in found]
     _expect_same_skeleton(examples)
-    return examples, notes
+    notes = shipped_recipes.table_notes(rows[0].table)
+    if recipe.source.root_offset is None:
+        notes += clip_notes.offset_notes(files)
+    return examples, notes + clip_notes.stretch_notes(rows, [stretch for _, stretch in found])
 
 
 def read_files(rows: Sequence[ClipRow]) -> dict[str, bvh.BvhFile]:
@@ -86,26 +87,15 @@ def read_files(rows: Sequence[ClipRow]) -> dict[str, bvh.BvhFile]:
     return files
 
 
-def offset_notes(file: bvh.BvhFile, row: ClipRow) -> list[str]:
-    """Return a note on the interpretation of a root's OFFSET that is not zero."""
-    if not np.any(file.joints[0].offset):
-        return []
-    return [
-        f"{row.place}: the root's OFFSET is {file.joints[0].offset} and has position channels, "
-        "which were taken to replace it; say so as source.root_offset"
-    ]
-
-
-def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow, notes: list[str]) -> Example:
+def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> tuple[Example, float]:
+    """Return the example of a row, and the largest change of a bone's length in it, m."""
     own, last = cut_frames(clip_of_file(file, recipe.source), row)
     clip = _drop_joints(own, recipe, row)
     in_place = recipe.motion.root == "in_place"
-    clip, jumps, said = canonicalize(clip, row, recipe.motion.cyclic, in_place)
-    notes += said
+    clip, jumps, stretch = canonicalize(clip, recipe.motion.cyclic, in_place)
     marks = landmarks(row, last)
-    return Example(
-        row, clip, measured_controls.control_values(recipe, row, clip, marks), marks, jumps
-    )
+    values = measured_controls.control_values(recipe, row, clip, marks)
+    return Example(row, clip, values, marks, jumps), stretch
 
 
 def clip_of_file(file: bvh.BvhFile, source: Source) -> Clip:
@@ -137,20 +127,17 @@ def cut_frames(clip: Clip, row: ClipRow) -> tuple[Clip, int]:
 
 
 def canonicalize(
-    clip: Clip, row: ClipRow, cyclic: bool, in_place: bool
-) -> tuple[Clip, tuple[Finding, ...], list[str]]:
-    """Return the clip with heading and origin removed, the corrections, and notes.
+    clip: Clip, cyclic: bool, in_place: bool
+) -> tuple[Clip, tuple[Finding, ...], float]:
+    """Return the clip with heading and origin removed, the corrections, and the stretch of bones.
 
-    A cycle is closed.
+    A cycle is closed. The stretch is the largest change of a component of a bone's offset, m.
     """
-    notes = []
-    stretch = np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0)
-    if stretch > RIGID_TOLERANCE:
-        notes.append(f"{row.place}: bones stretch by up to {stretch:.4f} m; their mean is kept")
+    stretch = float(np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0))
     # Before the cycle is closed, because closing it would spread a jump over all frames.
     clip, jumps = half_turns.remove_jumps(clip, 0)
     clip = _close_cycle(straighten_gait(clip)) if cyclic else _start_at_origin(clip)
-    return remove_drift(clip) if in_place else clip, tuple(jumps), notes
+    return remove_drift(clip) if in_place else clip, tuple(jumps), stretch
 
 
 def _drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:

@@ -14,6 +14,7 @@ from rich.progress import (
     ProgressColumn,
     Task,
     TextColumn,
+    TimeElapsedColumn,
 )
 from rich.text import Text
 
@@ -26,17 +27,24 @@ class ProgressBar:
 
     done: units that were finished before. Where standard error is not a terminal, such as in the
     log of a CI job, it prints a line every `interval` seconds instead. Standard output is not used.
+    unequal: units take different times, so that the bar shows the elapsed time and no estimate.
     """
 
     def __init__(
-        self, label: str, total: int | None = None, done: int = 0, interval: float = INTERVAL
+        self,
+        label: str,
+        total: int | None = None,
+        done: int = 0,
+        interval: float = INTERVAL,
+        unequal: bool = False,
     ) -> None:
         # isatty() of the file itself: FORCE_COLOR makes rich treat every file as a terminal.
         terminal = sys.stderr.isatty()
         self._console = Console(stderr=True, highlight=False, force_terminal=terminal)
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), _Estimate())
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        last = TimeElapsedColumn() if unequal else _Estimate()
         self._progress = Progress(
-            *columns, console=self._console, transient=True, disable=not terminal
+            *columns, last, console=self._console, transient=True, disable=not terminal
         )
         self._task = self._progress.add_task(label, total=total, completed=done)
         self._interval, self._written = interval, time.monotonic()
@@ -60,6 +68,10 @@ class ProgressBar:
             (task,) = self._progress.tasks
             self.print(f"{task.description}: {done} of {task.total:.0f}{_estimate(task)}")
             self._written = time.monotonic()
+
+    def describe(self, label: str) -> None:
+        """Show another label."""
+        self._progress.update(self._task, description=label)
 
     def advance(self, count: int) -> None:
         """Show that more units are finished."""

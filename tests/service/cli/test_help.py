@@ -111,3 +111,15 @@ def test_shells_complete_commands_and_options(line, word):
     command = Path(sys.executable).parent / "posefield"
     done = subprocess.run([command], capture_output=True, text=True, env=os.environ | asked)
     assert word in done.stdout.split()
+
+
+def test_commands_start_without_the_packages_that_few_need():
+    """Negative control: NumPy, which all need, is there."""
+    code = (
+        "import sys; from posefield import cli; from posefield_train.cli import commands; "
+        "commands(cli.app); print(*sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    assert "numpy" in loaded
+    assert loaded.isdisjoint({"rich.progress", "scipy", "onnx", "pydantic", "starlette", "pxr"})
