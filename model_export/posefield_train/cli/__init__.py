@@ -1,4 +1,4 @@
-"""Training commands: `fetch`, `sample`, `train`, `adapt` and `evaluate`."""
+"""Training commands: `probe`, `init`, `fetch`, `sample`, `train`, `adapt`, `evaluate`."""
 
 import typer
 
@@ -7,11 +7,14 @@ from posefield_train.cli import (
     command_adapt,
     command_evaluate,
     command_fetch,
+    command_probe,
     command_sample,
     command_train,
 )
 
 COMMANDS = {
+    "probe": (command_probe.probe, command_probe.PROBE_EXAMPLES),
+    "init": (command_probe.init, command_probe.INIT_EXAMPLES),
     "fetch": (
         command_fetch.fetch,
         ["fetch cmu downloads -o motion", "fetch hdm05 downloads -o motion"],

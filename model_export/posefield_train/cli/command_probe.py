@@ -1,0 +1,101 @@
+"""Commands `posefield probe` and `posefield init`: proposals for a recipe from motion files."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import FileError, InvalidField
+from posefield.console.arguments import Json
+from posefield.console.output import as_json
+
+if TYPE_CHECKING:
+    from posefield_train.probe.probe_report import ProbeReport
+
+PROBE_EXAMPLES = ["probe motion/*.bvh", "probe kick.bvh --json"]
+INIT_EXAMPLES = ["init motion", "init motion --table clips.csv"]
+
+
+def probe(
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="BVH files, one or more", metavar="FILE", show_default=False),
+    ],
+    json: Json = False,
+) -> None:
+    """Propose unit, up axis, rate, feet and heading of motion files.
+
+    Each proposal has its evidence and its confidence. The files are read as of one family.
+    """
+    from posefield_train.probe import probe_report
+
+    report = _probe(files)
+    typer.echo(as_json(report.facts()) if json else probe_report.text(report))
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(help="folder with BVH files", metavar="FOLDER")],
+    table: Annotated[
+        str | None,
+        typer.Option(
+            help="name of a table that the folder has already, in place of a new clips.csv",
+            metavar="FILE",
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Write a recipe and a table for a folder of motion files.
+
+    Complete recipe.toml where it says TODO, then train it. No file is overwritten.
+    """
+    from posefield_train.probe import recipe_draft
+
+    if not folder.is_dir():
+        raise FileError(folder, "not a folder, expected one with BVH files")
+    recipe = folder / recipe_draft.RECIPE
+    _refuse_existing(recipe)
+    known = None if table is None else recipe_draft.read_table(folder / table)
+    if known is None:
+        _refuse_existing(folder / recipe_draft.TABLE)
+        files = sorted(folder.rglob("*.bvh"))
+    else:
+        files = recipe_draft.files_of(known, folder)
+    if not files:
+        raise InvalidField("FOLDER", f"{folder} has no BVH files, expected one or more")
+    report = _probe(files)
+    written = [recipe]
+    if known is None:
+        written.insert(0, folder / recipe_draft.TABLE)
+        atomic_files.write(recipe_draft.table_text(report, folder).encode(), written[0])
+    draft = recipe_draft.recipe_text(report, folder.resolve().name, known)
+    atomic_files.write(draft.encode(), recipe)
+    _tell(report, written, json)
+
+
+def _probe(files: list[Path]) -> "ProbeReport":
+    from posefield.console.progress import ProgressBar
+    from posefield_train.probe import probe_report
+
+    with ProgressBar("files", len(files)) as bar:
+        return probe_report.probe(files, bar.update)
+
+
+def _refuse_existing(path: Path) -> None:
+    if path.exists():
+        hint = ": name it with --table" if path.suffix == ".csv" else ""
+        raise FileError(path, f"exists already, and is not overwritten{hint}")
+
+
+def _tell(report: "ProbeReport", written: list[Path], json: bool) -> None:
+    """Print the files that were written, and what has to be completed."""
+    from posefield_train.probe import probe_report
+
+    if json:
+        typer.echo(as_json({"files": [str(path) for path in written], **report.facts()}))
+        return
+    typer.echo("\n".join(probe_report.summary(report)))
+    typer.echo(
+        f"wrote {' and '.join(map(str, written))}: complete the licence and the controls (TODO), "
+        f"then: posefield train {written[-1]} -o model.onnx"
+    )

@@ -1,0 +1,1 @@
+"""Proposals for a recipe from motion files: unit, axes, feet and heading, with evidence."""

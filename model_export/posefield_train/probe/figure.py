@@ -1,0 +1,86 @@
+"""Measurements of the figure in a motion file, in the file's own unit and axes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import skeleton
+from posefield_train.probe import joint_names
+from posefield_train.source import bvh
+from posefield_train.source.bvh import bvh_conversion
+
+MAX_FRAMES = 200
+"""Frames of a file that are measured, spread evenly."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A file's figure.
+
+    roles: joints by role. positions: of the joints (F, J, 3), in some of the frames. bones: length
+    (J,) of the bone that leads to each joint. turns: rotations (F, 4) of the root. moves: whether
+    position channels of each joint (J,) change.
+    """
+
+    file: bvh.BvhFile
+    roles: dict[str, str]
+    positions: Floats
+    bones: Floats
+    turns: Floats
+    moves: tuple[bool, ...]
+
+    @property
+    def names(self) -> list[str]:
+        """Return the names of the joints."""
+        return [joint.name for joint in self.file.joints]
+
+    def role(self, role: str) -> Floats | None:
+        """Return the positions (F, 3) of the joint with a role, or None."""
+        name = self.roles.get(role)
+        return None if name is None else self.positions[:, self.names.index(name)]
+
+    def pair(self, role: str) -> tuple[Floats, Floats] | None:
+        """Return the positions (F, 3) of the left and the right joint of a role, or None."""
+        left, right = self.role("left" + role), self.role("right" + role)
+        return None if left is None or right is None else (left, right)
+
+    def leg_length(self) -> float | None:
+        """Return the length of the bones from the hip to the foot, in the file's unit, or None."""
+        lengths = [self._chain(f"{side}UpperLeg", f"{side}Foot") for side in ("left", "right")]
+        known = [length for length in lengths if length]
+        return float(np.mean(known)) if known else None
+
+    def _chain(self, upper: str, lower: str) -> float | None:
+        if not {upper, lower} <= self.roles.keys():
+            return None
+        parents = [joint.parent for joint in self.file.joints]
+        top, joint = (self.names.index(self.roles[role]) for role in (upper, lower))
+        length = 0.0
+        while joint > top:
+            length += float(self.bones[joint])
+            joint = parents[joint]
+        return length if joint == top else None
+
+    @property
+    def size(self) -> float:
+        """Return the largest extent of the joints along an axis, in the file's unit."""
+        return float(np.median(np.ptp(self.positions, axis=1).max(axis=-1)))
+
+
+def measure(file: bvh.BvhFile) -> Figure:
+    """Return the measurements of a file."""
+    rotations, translations = bvh_conversion.local_motion(file)
+    picked = np.linspace(0, len(file.values) - 1, min(len(file.values), MAX_FRAMES)).round()
+    frames = np.unique(picked.astype(int))
+    parents = tuple(joint.parent for joint in file.joints)
+    names = [joint.name for joint in file.joints]
+    moves = np.ptp(translations, axis=0).max(axis=-1) > 0.0
+    return Figure(
+        file,
+        joint_names.roles_of(names, parents),
+        skeleton.positions(parents, rotations[frames], translations[frames]),
+        np.linalg.norm(np.median(translations, axis=0), axis=-1),
+        rotations[frames, 0],
+        tuple(moves.tolist()),
+    )

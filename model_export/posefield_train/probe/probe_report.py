@@ -1,0 +1,163 @@
+"""Report on motion files: what is known, what is proposed, and what stays unknown."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from posefield_train.probe import figure, proposals
+from posefield_train.probe.figure import Figure
+from posefield_train.probe.proposals import Proposal
+from posefield_train.source import bvh
+
+LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))
+SHOWN_JOINTS = 40
+
+
+@dataclass(frozen=True)
+class FileFacts:
+    """Frames and rate of a motion file."""
+
+    path: str
+    frames: int
+    fps: float
+
+    @property
+    def seconds(self) -> float:
+        """Return the duration of the motion, s."""
+        return (self.frames - 1) / self.fps
+
+
+@dataclass(frozen=True)
+class ProbeReport:
+    """Findings about motion files. joints: those of most files. proposed: by name."""
+
+    files: tuple[FileFacts, ...]
+    joints: tuple[str, ...]
+    roles: dict[str, str]
+    proposed: dict[str, Proposal]
+    warnings: tuple[str, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """Return the report as JSON values."""
+        return {
+            "files": [
+                {"file": one.path, "frames": one.frames, "fps": one.fps, "seconds": one.seconds}
+                for one in self.files
+            ],
+            "joints": list(self.joints),
+            "roles": self.roles,
+            "proposed": {name: found.facts() for name, found in self.proposed.items()},
+            "warnings": list(self.warnings),
+        }
+
+
+def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None) -> ProbeReport:
+    """Return the report on motion files.
+
+    report: called with the number of files that are read. Raises BvhError for a file that cannot be
+    read.
+    """
+    figures = []
+    for count, path in enumerate(paths, 1):
+        figures.append(figure.measure(bvh.read(path)))
+        report(count)
+    common, _ = Counter(tuple(each.names) for each in figures).most_common(1)[0]
+    usual = [each for each in figures if tuple(each.names) == common]
+    up = proposals.propose_up(usual)
+    files = tuple(
+        FileFacts(str(path), len(each.file.values), each.file.rate)
+        for path, each in zip(paths, figures, strict=True)
+    )
+    proposed = {
+        "metres_per_unit": proposals.propose_unit(usual),
+        "up": up,
+        "fps": _propose_rate(figures),
+        "feet": proposals.propose_feet(usual, up.value),
+        "facing": proposals.propose_facing(usual, up.value),
+        "licence": LICENCE,
+    }
+    return ProbeReport(files, common, usual[0].roles, proposed, tuple(_warnings(figures, usual)))
+
+
+def _propose_rate(figures: Sequence[Figure]) -> Proposal:
+    rates = Counter(each.file.rate for each in figures)
+    times = sorted({each.file.frame_time for each in figures})
+    evidence = f"frame time {', '.join(f'{time:g}' for time in times[:5])} s in the files"
+    ((rate, _),) = rates.most_common(1)
+    if len(rates) > 1:
+        said = ", ".join(f"{count} files at {each:g}" for each, count in rates.most_common(5))
+        return Proposal(rate, "medium", (evidence, said))
+    return Proposal(rate, "certain", (evidence,))
+
+
+def _warnings(figures: Sequence[Figure], usual: Sequence[Figure]) -> list[str]:
+    """Return what keeps the files from being trained together, and joints that hint at damage."""
+    found = []
+    if len(usual) < len(figures):
+        odd = next(each for each in figures if each.names != usual[0].names)
+        differ = sorted(set(odd.names) ^ set(usual[0].names))[:6]
+        found.append(
+            f"{len(figures) - len(usual)} of {len(figures)} files have other joints, such as "
+            f"{odd.file.source} ({', '.join(differ) or 'another order'}): one model needs one "
+            "skeleton"
+        )
+    still = [each for each in usual if not each.moves[0] and any(each.moves)]
+    if still:
+        mover = still[0].names[still[0].moves.index(True)]
+        found.append(
+            f"the root {still[0].names[0]!r} stays in place while {mover!r} moves: make {mover!r} "
+            "the root, or its motion is lost"
+        )
+    stretching = [each for each in usual if any(each.moves[1:])]
+    if stretching and not still:
+        found.append(
+            f"{len(stretching)} of {len(usual)} files have bones whose length changes; training "
+            "keeps their mean"
+        )
+    return found
+
+
+UNITS = {"metres_per_unit": " m", "fps": " frames a second", "facing": " degrees"}
+
+
+def text(report: ProbeReport) -> str:
+    """Return the report for people."""
+    frames = sorted(one.frames for one in report.files)
+    seconds = sorted(one.seconds for one in report.files)
+    joints = ", ".join(report.joints[:SHOWN_JOINTS])
+    more = f" and {len(report.joints) - SHOWN_JOINTS} more"
+    lines = [
+        f"{len(report.files)} {'file' if len(report.files) == 1 else 'files'}, "
+        f"{_span(frames, 'd')} frames, {_span(seconds, '.2f')} s",
+        f"joints ({len(report.joints)}): {joints}"
+        f"{more if len(report.joints) > SHOWN_JOINTS else ''}",
+        f"roles by name: {_roles(report) or 'none recognised'}",
+    ]
+    return "\n".join([*lines, *summary(report, with_evidence=True)])
+
+
+def summary(report: ProbeReport, with_evidence: bool = False) -> list[str]:
+    """Return lines with the proposals and the warnings."""
+    lines = []
+    for name, found in report.proposed.items():
+        lines.append(f"{name:<15} {_value(name, found)} (confidence: {found.confidence})")
+        lines += [f"{'':<18}{said}" for said in found.evidence if with_evidence]
+    return [*lines, *(f"warning: {said}" for said in report.warnings)]
+
+
+def _roles(report: ProbeReport) -> str:
+    return ", ".join(f"{role} = {joint}" for role, joint in report.roles.items())
+
+
+def _value(name: str, found: Proposal) -> str:
+    if found.value is None or found.value == []:
+        return "unknown"
+    shown = ", ".join(found.value) if isinstance(found.value, list) else str(found.value)
+    return f"{shown}{UNITS.get(name, '')}"
+
+
+def _span(values: Sequence[float], form: str) -> str:
+    low, high = f"{values[0]:{form}}", f"{values[-1]:{form}}"
+    return low if low == high else f"{low} to {high}"

@@ -1,0 +1,206 @@
+"""Proposals for the settings of a recipe that motion files do not state, with their evidence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import quat
+from posefield_train.probe.figure import Figure
+from posefield_train.source.bone_lengths import UNITS
+
+Confidence = Literal["certain", "high", "medium", "low", "none"]
+
+ADULT_LEG, LEG_FACTORS = 0.86, (1.2, 1.35)
+"""Usual length of an adult's leg from hip to ankle, m, and the largest factors between it and the
+proposed length for a high and a medium confidence."""
+ADULT_SIZE = 1.7
+"""Usual largest extent of an adult, m."""
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A proposed value, None if there is none, with its confidence and its evidence."""
+
+    value: Any
+    confidence: Confidence
+    evidence: tuple[str, ...]
+
+    def facts(self) -> dict[str, Any]:
+        """Return the proposal as JSON values."""
+        return {
+            "value": self.value,
+            "confidence": self.confidence,
+            "evidence": list(self.evidence),
+        }
+
+
+def propose_unit(figures: Sequence[Figure]) -> Proposal:
+    """Return the length of the files' unit in metres, from the length of the legs."""
+    legs = [leg for figure in figures if (leg := figure.leg_length())]
+    length = float(np.median(legs or [figure.size for figure in figures]))
+    usual, what = (ADULT_LEG, "leg, hip to foot") if legs else (ADULT_SIZE, "largest extent")
+    if length <= 0.0:
+        return Proposal(None, "none", (f"{what}: no length",))
+    apart = {name: abs(np.log(length * metres / usual)) for name, metres in UNITS.items()}
+    first, second, third = sorted(apart, key=lambda name: apart[name])[:3]
+    factor = float(np.exp(apart[first]))
+    high, medium = LEG_FACTORS
+    confidence: Confidence = "high" if factor < high else "medium" if factor < medium else "low"
+    evidence = [
+        f"{what}: {length:.4g} units, which is {length * UNITS[first]:.2f} m in {first}; of an "
+        f"adult about {usual} m",
+        f"the next units: {length * UNITS[second]:.3g} m in {second}, "
+        f"{length * UNITS[third]:.3g} m in {third}",
+    ]
+    if not legs:
+        evidence.append("no legs were recognised by their names")
+        confidence = "low"
+    return Proposal(UNITS[first], confidence, tuple(evidence))
+
+
+def propose_up(figures: Sequence[Figure]) -> Proposal:
+    """Return the up axis, from the bodies in motion, the floor under their feet, and at rest."""
+    votes = [_body_axis(figures), _floor_axis(figures), _rest_axis(figures)]
+    found = [(axis, said) for axis, said in votes if axis is not None]
+    evidence = tuple(said for _, said in found)
+    if not found:
+        return Proposal(None, "none", ("neither a head nor feet were recognised",))
+    first = found[0][0]
+    agreeing = sum(axis == first for axis, _ in found)
+    if first not in ("+y", "+z"):
+        said = f"the up axis seems to be {first}; only +y and +z can be read"
+        return Proposal(None, "none", (*evidence, said))
+    confidence: Confidence = "high" if agreeing == len(found) > 1 else "medium"
+    return Proposal(first[1], "low" if agreeing * 2 < len(found) else confidence, evidence)
+
+
+Vote = tuple[str | None, str]
+
+
+def _body_axis(figures: Sequence[Figure]) -> Vote:
+    """Return the axis of the mean direction from the feet to the head."""
+    found = [_upward(figure, figure.positions) for figure in figures]
+    return _main_axis([each for each in found if each is not None], "from the feet to the head")
+
+
+def _rest_axis(figures: Sequence[Figure]) -> Vote:
+    """Return the axis from the feet to the head of the figure at rest."""
+    found = []
+    for figure in figures:
+        rest = np.zeros((1, len(figure.names), 3))
+        for index, joint in enumerate(figure.file.joints):
+            before = rest[0, joint.parent] if joint.parent >= 0 else 0.0
+            rest[0, index] = before + np.array(joint.offset)
+        found.append(_upward(figure, rest))
+    known = [each for each in found if each is not None]
+    return _main_axis(known, "from the feet to the head at rest")
+
+
+def _upward(figure: Figure, positions: Floats) -> Floats | None:
+    """Return the mean direction (3,) from the feet to the head at positions (F, J, 3), or None."""
+    if not {"head", "leftFoot", "rightFoot"} <= figure.roles.keys():
+        return None
+    head, left, right = (
+        positions[:, figure.names.index(figure.roles[role])]
+        for role in ("head", "leftFoot", "rightFoot")
+    )
+    return np.asarray(np.mean(head - 0.5 * (left + right), axis=0))
+
+
+def _main_axis(directions: Sequence[Floats], what: str) -> Vote:
+    if not directions:
+        return None, ""
+    mean = np.mean([one / max(np.linalg.norm(one), 1e-12) for one in directions], axis=0)
+    axis = int(np.argmax(np.abs(mean)))
+    name = ("+" if mean[axis] > 0 else "-") + AXES[axis]
+    return name, f"{what}: {name}, {abs(mean[axis]):.0%} of the direction"
+
+
+def _floor_axis(figures: Sequence[Figure]) -> Vote:
+    """Return the axis along which the lowest joint stays most nearly at one height."""
+    spreads = []
+    for figure in figures:
+        # A root that stays at the origin is no foot on the floor.
+        moving = np.ptp(figure.positions, axis=0).any(axis=-1)
+        body = figure.positions[:, moving] if moving.any() else figure.positions
+        low, high = body.min(axis=1), body.max(axis=1)
+        both = np.concatenate([low, high], axis=1)
+        spreads.append(both.std(axis=0) / max(figure.size, 1e-12))
+    spread = np.mean(spreads, axis=0)
+    best = int(np.argmin(spread))
+    name = ("+" if best < 3 else "-") + AXES[best % 3]
+    others = np.delete(spread, best).min()
+    said = (
+        f"lowest joint along {name}: moves by {spread[best]:.1%} of the figure's size, along any "
+    )
+    return name, f"{said}other axis by {others:.1%} or more"
+
+
+def propose_feet(figures: Sequence[Figure], up: str | None) -> Proposal:
+    """Return the joints of the feet: the lowest of the joints that are named as feet or toes."""
+    first = figures[0]
+    roles = [role for role in ("Toes", "Foot") if first.pair(role)]
+    if not roles:
+        return Proposal([], "none", ("no joints are named as feet or toes",))
+    feet = [first.roles[side + roles[0]] for side in ("left", "right")]
+    evidence = [f"named as {'toes' if roles[0] == 'Toes' else 'feet'}: {', '.join(feet)}"]
+    if up is None:
+        return Proposal(feet, "medium", tuple(evidence))
+    axis = AXES.index(up)
+    heights = np.mean(
+        [figure.positions[..., axis].min(axis=0) for figure in figures if _alike(figure, first)],
+        axis=0,
+    )
+    lowest = [first.names[joint] for joint in np.argsort(heights, kind="stable")[:4]]
+    agree = set(feet) <= set(lowest)
+    evidence.append(f"joints that come lowest: {', '.join(lowest)}")
+    return Proposal(feet, "high" if agree else "medium", tuple(evidence))
+
+
+def _alike(figure: Figure, other: Figure) -> bool:
+    return figure.names == other.names
+
+
+def propose_facing(figures: Sequence[Figure], up: str | None) -> Proposal:
+    """Return the angle from the root's forward axis to the body's, degrees to the left.
+
+    Training takes +z of the root (after conversion to y up) as forward.
+    """
+    if up is None:
+        return Proposal(None, "none", ("the up axis is not known",))
+    angles = [angle for figure in figures if (angle := _facing(figure, up)) is not None]
+    if not angles:
+        return Proposal(None, "none", ("no pair of hips or shoulders was recognised",))
+    mean = float(np.degrees(np.angle(np.mean(np.exp(1j * np.array(angles))))))
+    agree = float(np.abs(np.mean(np.exp(1j * np.array(angles)))))
+    value = round(mean, 1) + 0.0
+    said = [f"the line between the hips faces {value:g} degrees to the left of the root's +z"]
+    if abs(mean) > 45.0:
+        said.append(
+            "training takes +z of the root as forward: turn the root by this angle, or the "
+            "controls left and forward are not the body's"
+        )
+    return Proposal(value, "high" if agree > 0.9 and abs(mean) < 45.0 else "low", tuple(said))
+
+
+def _facing(figure: Figure, up: str) -> float | None:
+    """Return the mean angle of the body's forward direction to the root's +z, rad, or None."""
+    pair = figure.pair("UpperLeg") or figure.pair("UpperArm")
+    if pair is None:
+        return None
+    left, right = (_y_up(points, up) for points in pair)
+    across = left - right
+    # Forward is left turned by a quarter: x to z, and z to -x.
+    body = np.arctan2(-across[:, 2], across[:, 0])
+    turns = figure.turns.copy()
+    turns[:, 1:] = _y_up(turns[:, 1:], up)
+    heading = quat.twist(turns, np.array([0.0, 1.0, 0.0]))
+    return float(np.angle(np.mean(np.exp(1j * (body - heading)))))
+
+
+def _y_up(vectors: Floats, up: str) -> Floats:
+    return vectors if up == "y" else vectors[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])

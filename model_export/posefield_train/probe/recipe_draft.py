@@ -1,0 +1,223 @@
+"""Draft of a recipe and its table, with what is proposed and places for what is not known."""
+
+import csv
+import io
+import json
+import re
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+
+from posefield.common.errors import RecipeError
+from posefield_train.probe.probe_report import ProbeReport
+from posefield_train.source import clip_table
+from posefield_train.source.clip_table import ClipTable
+
+TABLE, RECIPE = "clips.csv", "recipe.toml"
+FRAME_NAME = re.compile(r"frame(?!s\b)|_frame$|^frame_")
+"""Names of columns that tell a frame rather than a number of frames."""
+OWN_COLUMNS = ("file", "first_frame", "last_frame")
+FILE_COLUMNS = ("file", "path", "bvh", "filename")
+PERFORMER_COLUMNS = ("performer", "subject", "actor", "who")
+
+
+def table_text(report: ProbeReport, folder: Path) -> str:
+    """Return a table with one row for each whole file."""
+    lines = io.StringIO()
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(OWN_COLUMNS)
+    for one in report.files:
+        name = Path(one.path).relative_to(folder).as_posix()
+        writer.writerow([name, 0, one.frames - 1])
+    return lines.getvalue()
+
+
+def recipe_text(report: ProbeReport, name: str, table: ClipTable | None) -> str:
+    """Return a recipe to be completed.
+
+    name: of the folder. table: a table that exists already; None for that of `table_text`.
+    """
+    return "\n".join(
+        [
+            *_head(name),
+            *_source(report),
+            *_clips(table),
+            *_controls(report, table),
+            *_motion(report),
+            *_event(report, table),
+            *_roles(report),
+            "[size]",
+            "rms_budget_cm = 1.0",
+            "",
+        ]
+    )
+
+
+def recipe_name(name: str) -> str:
+    """Return a folder's name as the name of a recipe and its model."""
+    plain = re.sub(r"[^a-z0-9_-]+", "_", name.lower()).strip("_-")[:64]
+    return plain or "motion"
+
+
+def read_table(path: Path) -> ClipTable:
+    """Return a table that exists; RecipeError if it names no motion files."""
+    found = clip_table.open_table(path)
+    if not found.records:
+        raise RecipeError(path, "no rows below the heading")
+    if not _first_of(found, FILE_COLUMNS):
+        known = ", ".join(FILE_COLUMNS)
+        raise RecipeError(path, f"no column of the motion files, expected one of {known}", 1)
+    return found
+
+
+def files_of(table: ClipTable, folder: Path) -> list[Path]:
+    """Return the motion files of a table's rows, each once, in the table's order."""
+    column = _first_of(table, FILE_COLUMNS)
+    return [folder / name for name in dict.fromkeys(record[column] for _, record in table.records)]
+
+
+def _first_of(table: ClipTable, names: Sequence[str]) -> str:
+    there = table.records[0][1]
+    return next((name for name in names if name in there), "")
+
+
+def _quote(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _list(words: Sequence[str]) -> str:
+    return f"[{', '.join(map(_quote, words))}]"
+
+
+def _head(name: str) -> list[str]:
+    return [
+        "# Draft by posefield init: complete what is marked TODO, then train it.",
+        "schema = 1",
+        f"name = {_quote(recipe_name(name))}",
+        f"description = {_quote(f'Motions of {name}')}",
+        "# TODO licence of the motions with its attribution; motion files state none.",
+        'licence = ""',
+        "",
+    ]
+
+
+def _source(report: ProbeReport) -> list[str]:
+    unit, up = report.proposed["metres_per_unit"], report.proposed["up"]
+    lines = ["[source]"]
+    for key, found in (("metres_per_unit", unit), ("up", up)):
+        lines += [f"# {said}" for said in found.evidence]
+        lines.append(f"# confidence: {found.confidence}")
+        known = found.value is not None
+        lines.append(f"{key} = {json.dumps(found.value)}" if known else f"# TODO {key} = ")
+    return [*lines, ""]
+
+
+def _clips(table: ClipTable | None) -> list[str]:
+    if table is None:
+        return [
+            "[clips]",
+            f"table = {_quote(TABLE)}",
+            'file = "file"',
+            'first_frame = "first_frame"  # from 0',
+            'last_frame = "last_frame"    # inclusive',
+            "# A column with the performer's name, so that they can be told apart:",
+            '# performer = "performer"',
+            "# Columns with the frame of an event, counted from 0 as in the file, in their order:",
+            '# landmarks = ["contact_frame"]',
+            "",
+        ]
+    performer = _first_of(table, PERFORMER_COLUMNS)
+    lines = ["[clips]", f"table = {_quote(Path(table.name).name)}"]
+    lines.append(f"file = {_quote(_first_of(table, FILE_COLUMNS))}")
+    if performer:
+        lines.append(f"performer = {_quote(performer)}")
+    marks = frame_columns(table)
+    lines.append("# Columns that may hold the frame of an event; those that do become landmarks:")
+    lines.append(f"# landmarks = {_list(marks or ['contact_frame'])}")
+    return [*lines, ""]
+
+
+def frame_columns(table: ClipTable) -> list[str]:
+    """Return the columns of whole numbers whose names speak of a frame."""
+    return [
+        name
+        for name in number_columns(table)
+        if FRAME_NAME.search(name)
+        and all(float(record[name]).is_integer() for _, record in table.records)
+    ]
+
+
+def number_columns(table: ClipTable) -> list[str]:
+    """Return the columns whose cells are numbers, and not all the same."""
+    found = []
+    for name in table.records[0][1]:
+        cells = [record[name] for _, record in table.records]
+        if all(re.fullmatch(r"[+-]?[0-9.]+([eE][+-]?[0-9]+)?", cell) for cell in cells):
+            found += [name] if len(set(cells)) > 1 else []
+    return found
+
+
+def _controls(report: ProbeReport, table: ClipTable | None) -> list[str]:
+    hand = report.roles.get("rightHand") or report.roles.get("leftFoot") or report.joints[-1]
+    lines = [
+        "# TODO at least one control: what a clip is an example of. Either measured of the motion:",
+        "# [[controls]]",
+        f"# name = {_quote(_control_name(hand) + '_height')}",
+        f'# auto = {{ quantity = "height", joint = {_quote(hand)}, at = "end" }}',
+        f"# description = {_quote(f'Height of {hand} at the end')}",
+        "# or a column of the table, in its unit:",
+    ]
+    marks = [] if table is None else frame_columns(table)
+    columns = [] if table is None else [n for n in number_columns(table) if n not in marks]
+    if columns:
+        text = f"Columns of numbers: {', '.join(columns)}."
+        lines += textwrap.wrap(text, 96, initial_indent="# ", subsequent_indent="# ")
+    lines += [
+        "# [[controls]]",
+        '# name = "speed"',
+        '# column = "COLUMN"',
+        '# unit = "m/s"',
+        '# description = "Mean speed"',
+        "",
+    ]
+    return lines
+
+
+def _control_name(text: str) -> str:
+    plain = re.sub(r"[^a-z0-9_]+", "_", text.lower()).strip("_")[:30]
+    return plain if re.match("[a-z]", plain) else f"at_{plain}"
+
+
+def _motion(report: ProbeReport) -> list[str]:
+    feet, facing = report.proposed["feet"], report.proposed["facing"]
+    return [
+        "[motion]",
+        "frames = 60",
+        "# true if the last pose leads into the first, as in one whole stride:",
+        "cyclic = false",
+        'root = "travelling"  # or "in_place"',
+        *[f"# {said} (confidence: {feet.confidence})" for said in feet.evidence],
+        f"feet = {_list(feet.value)}",
+        *[f"# facing: {said} (confidence: {facing.confidence})" for said in facing.evidence],
+        "",
+    ]
+
+
+def _event(report: ProbeReport, table: ClipTable | None) -> list[str]:
+    marks = [] if table is None else frame_columns(table)
+    at = marks[0] if marks else "end"
+    joint = report.roles.get("rightHand", report.joints[-1])
+    return [
+        '# The joint that the motion is for, and the moment: "end", or a column of clips.landmarks',
+        "# [event]",
+        f"# joint = {_quote(joint)}",
+        f"# at = {_quote(at)}",
+        "",
+    ]
+
+
+def _roles(report: ProbeReport) -> list[str]:
+    if not report.roles:
+        return ["# No joints were recognised by their names: [roles] tells other tools who is who."]
+    lines = [f"{role} = {_quote(joint)}" for role, joint in report.roles.items()]
+    return ["# By the joints' names; check them, or delete the table.", "[roles]", *lines, ""]
