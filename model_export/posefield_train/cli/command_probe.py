@@ -92,7 +92,7 @@ def _tell(report: "ProbeReport", written: list[Path], json: bool) -> None:
     from posefield_train.probe import probe_report
 
     if json:
-        typer.echo(as_json({"files": [str(path) for path in written], **report.facts()}))
+        typer.echo(as_json({"written": [str(path) for path in written], **report.facts()}))
         return
     typer.echo("\n".join(probe_report.summary(report)))
     typer.echo(

@@ -67,8 +67,8 @@ class Clips(RecipePart):
     last_frame: Text | None = Field(default=None, description="column: last frame, inclusive")
     landmarks: list[Text] = Field(
         default=[],
-        description="columns: frames of events, in order, that alignment moves to the same time in "
-        "all clips",
+        description="columns: frames of events, in order, counted from 0 as in the motion file, "
+        "that alignment moves to the same time in all clips; such as ['contact_frame']",
     )
     where: dict[str, Condition] = Field(default={}, description="conditions on rows, by column")
 
@@ -165,7 +165,8 @@ class Event(RecipePart):
 
     joint: Text = Field(description="joint of the event: a hand that reaches, a foot that lands")
     at: Text = Field(
-        description="moment of the event: 'end' for the last frame, or a column of clips.landmarks"
+        description="moment of the event: 'end' for the last frame, or a column of clips.landmarks "
+        "such as 'contact_frame'"
     )
 
 
