@@ -23,12 +23,37 @@ const LOOKED_AT = [
   "Trust",
 ];
 
+/** Questions whose keys are checked before they are sent. */
+const QUESTIONS = [
+  "PoseQuestion",
+  "ClipQuestion",
+  "NamedClipQuestion",
+  "CrowdQuestion",
+  "SigmaQuestion",
+  "WhyQuestion",
+  "Target",
+];
+
+/** Questions whose keys are the query parameters of an operation, by its path. */
+const QUERIES = {
+  WalkQuestion: "/v1/models/{model}/crowd.{format}",
+  SuggestQuestion: "/v1/models/{model}/suggestions",
+};
+
 interface Contract {
   readonly info: { readonly version: string };
+  readonly paths: Record<string, { readonly get: { readonly parameters: readonly Parameter[] } }>;
   readonly components: {
     readonly schemas: Record<string, Schema>;
-    readonly parameters: Record<string, { readonly "x-media-types"?: object }>;
+    readonly parameters: Record<string, Parameter>;
   };
+}
+
+interface Parameter {
+  readonly $ref?: string;
+  readonly name?: string;
+  readonly in?: string;
+  readonly "x-media-types"?: object;
 }
 
 interface Schema {
@@ -55,12 +80,32 @@ export const REQUIRED = ${text(Object.fromEntries(required))} as const;
 /** Which of them are lists. */
 export const LISTS = ${text(Object.fromEntries(lists))} as const;
 
+/** Keys that each question may have. */
+export const KEYS = ${text(keys(contract))} as const;
+
 /** What files of each format are sent as. */
 export const MEDIA_TYPES = ${text(mediaTypes(contract))} as const;
 
 /** Everything that may be wrong. */
 export const PROBLEM_TYPES = ${text(components.schemas["Problem"]?.properties?.["type"]?.enum)} as const;
 `;
+}
+
+function keys(contract: Contract): object {
+  const { schemas } = contract.components;
+  const bodies = QUESTIONS.map((name) => [name, Object.keys(schemas[name]?.properties ?? {})]);
+  const queries = Object.entries(QUERIES).map(([name, path]) => [name, queryOf(contract, path)]);
+  return Object.fromEntries([...bodies, ...queries]) as object;
+}
+
+/** Names of the query parameters of a path's GET. */
+function queryOf({ paths, components }: Contract, path: string): readonly unknown[] {
+  const listed = paths[path]?.get.parameters ?? [];
+  const given = listed.map((each) => {
+    const name = each.$ref?.split("/").at(-1);
+    return name === undefined ? each : components.parameters[name];
+  });
+  return given.filter((each) => each?.in === "query").map((each) => each?.name);
 }
 
 function listsOf({ required = [], properties = {} }: Schema): readonly string[] {

@@ -11,7 +11,7 @@ import pytest
 from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer, quat
 from posefield.motion.clip import Clip
-from posefield_train.probe import joint_names, probe_report, recipe_draft
+from posefield_train.probe import joint_recognition, probe_report, recipe_draft
 from posefield_train.sample import noise_free
 from posefield_train.source import bvh, clip_table, recipe
 
@@ -175,7 +175,7 @@ WANTED = ("hips", "spine", "neck", "leftUpperLeg", "leftLowerLeg", "leftFoot", "
 def test_joints_are_recognised_by_the_names_of_a_tool(tool):
     names = SKELETONS[tool]
     parents = [-1, 0, 1, 0, *range(3, len(names) - 1)]
-    found = joint_names.roles_of(names, parents)
+    found = joint_recognition.roles_of(names, parents)
     expected = dict(zip(WANTED, names, strict=False))
     if tool == "Unreal":
         del expected["neck"], expected["spine"]
@@ -183,7 +183,7 @@ def test_joints_are_recognised_by_the_names_of_a_tool(tool):
 
 
 def test_names_without_a_meaning_have_no_role():
-    assert joint_names.roles_of(["a", "lever", "rail"], [-1, 0, 0]) == {}
+    assert joint_recognition.roles_of(["a", "lever", "rail"], [-1, 0, 0]) == {}
 
 
 # --- the commands ---------------------------------------------------------------------------------

@@ -83,6 +83,9 @@ class AsyncClient:
         self._http = httpx.AsyncClient(timeout=timeout)
         self._sleep = sleep
 
+    def __repr__(self) -> str:
+        return f"AsyncClient({self._place.address!r})"
+
     models = _ask(questions.models)
     live = _ask(questions.live)
     ready = _ask(questions.ready)
@@ -147,6 +150,9 @@ class AsyncSaving:
     def __init__(self, client: AsyncClient, files: Files) -> None:
         self._client = client
         self._files = files
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._files.about})"
 
     async def save(self, path: str | PathLike[str], progress: Watch | None = None) -> Saved:
         """Write the result to a file atomically; the path's suffix selects the format."""

@@ -4,6 +4,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from decimal import Decimal
+from difflib import get_close_matches
 from typing import Any
 from urllib.parse import quote_plus
 
@@ -13,13 +14,30 @@ import numpy.typing as npt
 from msgspec import UNSET, Struct
 
 from posefield_client.errors import WrongQuestion
-from posefield_client.generated import OPERATIONS, Operation, Target
+from posefield_client.generated import (
+    OPERATIONS,
+    ClipQuestion,
+    CrowdQuestion,
+    Operation,
+    PoseQuestion,
+    Target,
+)
 from posefield_client.wire import Request
 
 MODEL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}(@[0-9a-f]{16})?", re.ASCII)
 LONGEST = 4000
 """Longest path and query of a GET request; services accept 8,192 characters by default."""
 _SAID_OTHERWISE = {"times": "time"}
+LONGEST_NAME = 40
+"""Longest name that is compared with known ones."""
+OPTIONS = sorted(
+    {
+        name
+        for form in (PoseQuestion, ClipQuestion, CrowdQuestion)
+        for name in form.__struct_fields__
+    }
+)
+"""Options of questions: an argument of another name is taken for a control."""
 
 
 def plain(
@@ -109,7 +127,8 @@ def number(name: str, value: Any) -> float:
     """Return a finite number as a Python int or float; NumPy scalars are accepted."""
     found = value.item() if isinstance(value, np.generic) else value
     if type(found) not in (int, float) or not _is_finite(found):
-        raise WrongQuestion(f"{name} is {value!r}, expected a finite number")
+        hint = "" if isinstance(found, int | float) else did_you_mean(name, OPTIONS)
+        raise WrongQuestion(f"{name}{hint} is {value!r}, expected a finite number")
     plain: float = found
     return plain
 
@@ -157,6 +176,25 @@ def _finite(name: str, found: npt.NDArray[Any]) -> list[Any]:
         raise WrongQuestion(f"{name} holds what is no finite number")
     listed: list[Any] = found.tolist()
     return listed
+
+
+def about(model: str, question: Struct) -> str:
+    """Return a model and a question as the arguments of a call, for people; long lists are cut."""
+    said = {key: getattr(question, key) for key in question.__struct_fields__}
+    said = {**said.pop("controls", {}), **said}
+    words = (f"{key}={_short(value)}" for key, value in said.items() if value is not UNSET)
+    return ", ".join([repr(model), *words])
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"<{len(value)} items>"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the text " (did you mean 'NAME'?)" to follow an unknown name, or "" for no name."""
+    near = get_close_matches(name[:LONGEST_NAME].lower(), known, n=1, cutoff=0.7)
+    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def controls(given: Mapping[str, Any] | None, named: Mapping[str, Any]) -> dict[str, float]:

@@ -4,13 +4,23 @@ import time
 from collections.abc import Callable
 from contextlib import closing
 from functools import cached_property, partial, wraps
+from html import escape
 from os import PathLike
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import httpx
 
-from posefield_client import asking, files, numbers, questions, saving, tables, transport
+from posefield_client import (
+    asking,
+    files,
+    notebook,
+    numbers,
+    questions,
+    saving,
+    tables,
+    transport,
+)
 from posefield_client.cache import Cache
 from posefield_client.errors import PosefieldError
 from posefield_client.exchange import Core
@@ -84,6 +94,9 @@ class Client:
         self._http = httpx.Client(timeout=timeout)
         self._sleep = sleep
 
+    def __repr__(self) -> str:
+        return f"Client({self._place.address!r})"
+
     models = _ask(questions.models)
     live = _ask(questions.live)
     ready = _ask(questions.ready)
@@ -146,6 +159,9 @@ class Saving:
         self._client = client
         self._files = files
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._files.about})"
+
     def save(self, path: str | PathLike[str], progress: Watch | None = None) -> Saved:
         """Write the result to a file atomically; the path's suffix selects the format."""
         return self._client.run(saving.save(self._client.core, self._files, Path(path), progress))
@@ -165,6 +181,13 @@ class Clip(Saving):
     def numbers(self) -> ClipNumbers:
         """Return the frames as arrays, requested once."""
         return self._numbers(numbers.clip)
+
+    def _repr_html_(self) -> str:
+        """Return the moving figure for a notebook, or the reason for which there is none."""
+        try:
+            return notebook.picture(self.numbers)
+        except PosefieldError as fault:
+            return f"<pre>{escape(repr(self))}: {escape(str(fault))}</pre>"
 
 
 class Crowd(Saving):

@@ -38,16 +38,22 @@ CLIP, CLIPS, CROWD, WALK = (
 
 @dataclass(frozen=True)
 class Files:
-    """Request with a file as result. count: number of clips of an archive, else None."""
+    """Request with a file as result.
+
+    count: number of clips of an archive, else None. about: model and question, for people.
+    """
 
     formats: tuple[str, ...]
     ask: Callable[[str], Request]
     count: int | None = None
+    about: str = ""
 
     def request(self, ending: str) -> Request:
         """Return the request for a format; WrongQuestion for an unknown one."""
         if ending not in self.formats:
-            raise WrongQuestion(f"format {ending!r}, expected one of {', '.join(self.formats)}")
+            hint = asking.did_you_mean(ending, self.formats)
+            known = ", ".join(self.formats)
+            raise WrongQuestion(f"format {ending!r}{hint}, expected one of {known}")
         return self.ask(ending)
 
     def ending(self, path: Path) -> str:
@@ -88,7 +94,8 @@ def clip(
         **asking.said(joint_sigma=joint_sigma, pin_feet=pin_feet),
         **holding.said(exact, targets),
     )
-    return Files(CLIP, lambda ending: asking.either("ClipInFormat", model, question, ending))
+    ask = partial(asking.either, "ClipInFormat", model, question)
+    return Files(CLIP, ask, about=asking.about(model, question))
 
 
 def clips(
@@ -102,11 +109,12 @@ def clips(
 ) -> Files:
     """Return an archive of many clips of one format, with a manifest."""
     if format not in CLIP:
-        raise WrongQuestion(f"format {format!r}, expected one of {', '.join(CLIP)}")
+        hint = asking.did_you_mean(format, CLIP)
+        raise WrongQuestion(f"format {format!r}{hint}, expected one of {', '.join(CLIP)}")
     listed = tuple(_named(place, each) for place, each in enumerate(clips))
     question = ClipsQuestion(format=format, clips=listed, **asking.said(unit=unit, up=up))
     ask = partial(asking.body, "queryClipsInFormat", model, question)
-    return Files(CLIPS, ask, len(listed))
+    return Files(CLIPS, ask, len(listed), f"{model!r}, {len(listed)} clips as {format}")
 
 
 def _named(place: int, given: NamedClipQuestion | Mapping[str, Any]) -> NamedClipQuestion:
@@ -154,7 +162,8 @@ def crowd(
         **asking.said(performer=performer, camera=camera, pixels=pixels, budget_ms=budget_ms),
         **asking.said(root=root, extrapolate=extrapolate),
     )
-    return Files(CROWD, partial(asking.body, "queryCrowdInFormat", model, question))
+    ask = partial(asking.body, "queryCrowdInFormat", model, question)
+    return Files(CROWD, ask, about=asking.about(model, question))
 
 
 def walk(
@@ -182,4 +191,7 @@ def walk(
         **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),
         **asking.said(instancing=instancing),
     }
-    return Files(WALK, partial(asking.plain, "getCrowdInFormat", model, words))
+    said = "".join(f", {name}={value!r}" for name, value in words.items())
+    return Files(
+        WALK, partial(asking.plain, "getCrowdInFormat", model, words), about=f"{model!r}{said}"
+    )

@@ -38,7 +38,16 @@ def _target(place: int, given: Target | Mapping[str, Any]) -> Target:
     try:
         found = msgspec.convert(asking.sayable(name, given), Target)
     except msgspec.ValidationError as fault:
-        raise WrongQuestion(f"{name}: {fault}") from None
+        raise WrongQuestion(f"{name}: {fault}{_known_keys(given)}") from None
     if (found.time is UNSET) == (found.at is UNSET):
         raise WrongQuestion(f"{name}: expected one of time and at")
     return found
+
+
+def _known_keys(given: Target | Mapping[str, Any]) -> str:
+    """Return the keys of a target after a message, if an unknown one was given."""
+    known = Target.__struct_fields__
+    unknown = [] if isinstance(given, Target) else [key for key in given if key not in known]
+    if not unknown:
+        return ""
+    return f"{asking.did_you_mean(str(unknown[0]), known)}, expected some of {', '.join(known)}"

@@ -15,7 +15,24 @@ Array = npt.NDArray[Any]
 KINDS = "fiub"
 
 
-class Pose(Struct, frozen=True, eq=False):
+class Arrays(Struct, frozen=True, eq=False):
+    """Answer with arrays, of which people are shown the shapes."""
+
+    def __repr__(self) -> str:
+        said = (f"{name}={_shape(getattr(self, name))}" for name in self.__struct_fields__)
+        return f"{type(self).__name__}({', '.join(said)})"
+
+
+def _shape(value: Any) -> str:
+    """Return an array as its type and shape, a list of names as its length, and Trust in short."""
+    if isinstance(value, np.ndarray):
+        return f"<{value.dtype} {value.shape}>"
+    if isinstance(value, Trust):
+        return f"<{value.model}, sigma {value.sigma:.3g} m>"
+    return f"<{len(value)} items>" if isinstance(value, tuple) and len(value) > 3 else repr(value)
+
+
+class Pose(Arrays, frozen=True, eq=False):
     """Poses at S times of the J joints that the model's card names.
 
     times: (S,), s. rotations: (S, J, 4), unit quaternions w x y z, local to the parent.
@@ -29,7 +46,7 @@ class Pose(Struct, frozen=True, eq=False):
     bone_offsets: Array
 
 
-class ClipNumbers(Struct, frozen=True, eq=False):
+class ClipNumbers(Arrays, frozen=True, eq=False):
     """A clip of F frames of J joints, with arrays as in Pose.
 
     rate: frames per second. names, parents: of the joints; the root's parent is -1. units: of the
@@ -47,7 +64,7 @@ class ClipNumbers(Struct, frozen=True, eq=False):
     bone_offsets: Array
 
 
-class SigmaGrid(Struct, frozen=True, eq=False):
+class SigmaGrid(Arrays, frozen=True, eq=False):
     """Sigma over two controls.
 
     across_values: (columns,). along_values: (rows,). controls: values of the other controls. sigma:
@@ -68,7 +85,7 @@ class SigmaGrid(Struct, frozen=True, eq=False):
     supported: Array | None = None
 
 
-class CrowdPoses(Struct, frozen=True, eq=False):
+class CrowdPoses(Arrays, frozen=True, eq=False):
     """One pose each of N characters of J joints, in the order of the request.
 
     rotations: (N, J, 4), the root's in world space. root_position: (N, 3) in world space, m.

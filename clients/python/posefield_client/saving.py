@@ -2,8 +2,8 @@
 
 import io
 import secrets
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from errno import EISDIR
 from pathlib import Path
@@ -71,6 +71,7 @@ class Part:
     """Temporary file beside the target; `keep` renames it, otherwise it is deleted at the end."""
 
     def __init__(self, path: Path) -> None:
+        self._asked = path
         # Write the target of a symbolic link, and keep the link.
         self.path = path.resolve()
         self._beside = self.path.with_name(f".{secrets.token_hex(6)}.part")
@@ -79,7 +80,8 @@ class Part:
     def __enter__(self) -> "Part":
         if self.path.is_dir():
             raise IsADirectoryError(EISDIR, "a folder, expected a file", str(self.path))
-        self.file = self._beside.open("xb+")
+        with self._named_faults():
+            self.file = self._beside.open("xb+")
         return self
 
     def __exit__(
@@ -98,7 +100,16 @@ class Part:
         # Keep the permissions of an existing file.
         with suppress(FileNotFoundError):
             self._beside.chmod(S_IMODE(self.path.stat().st_mode))
-        self._beside.replace(self.path)
+        with self._named_faults():
+            self._beside.replace(self.path)
+
+    @contextmanager
+    def _named_faults(self) -> Iterator[None]:
+        """Raise errors of the file system with the wanted path, not with the temporary one."""
+        try:
+            yield
+        except OSError as fault:
+            raise type(fault)(fault.errno, fault.strerror, str(self._asked)) from None
 
 
 class Into:

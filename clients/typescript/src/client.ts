@@ -6,6 +6,7 @@ import { Unexpected, WrongQuestion } from "./errors.ts";
 import type { Whole } from "./memory.ts";
 import { named } from "./named.ts";
 import { crowd, motion, poses } from "./numbers.ts";
+import { checkNames, checkQuestion, type QuestionKind } from "./option-names.ts";
 import { asFile, get, link, post, type Request, request, under } from "./questions.ts";
 import { streamed } from "./streams.ts";
 import type {
@@ -59,6 +60,25 @@ export interface ArchiveOptions extends TransferOptions {
 
 type Content = Uint8Array<ArrayBuffer>;
 
+/** Names of ClientOptions, TransferOptions and ArchiveOptions, which have no values at run time. */
+const CLIENT_NAMES = {
+  key: true,
+  timeout: true,
+  retries: true,
+  pause: true,
+  cacheBytes: true,
+  longestLink: true,
+  fetch: true,
+} as const satisfies Record<keyof ClientOptions, true>;
+const TRANSFER_NAMES = { signal: true, onProgress: true } as const satisfies Record<
+  keyof TransferOptions,
+  true
+>;
+const ARCHIVE_NAMES = { ...TRANSFER_NAMES, as: true } as const satisfies Record<
+  keyof ArchiveOptions,
+  true
+>;
+
 export class Client {
   readonly base: string;
   readonly #longest: number;
@@ -69,6 +89,7 @@ export class Client {
    * where that is no address, or the key none that a header can hold.
    */
   constructor(base = "", options: ClientOptions = {}) {
+    checkNames("ClientOptions", Object.keys(CLIENT_NAMES), options);
     this.base = addressOf(base).replace(/\/+$/, "");
     this.#longest = options.longestLink ?? 2000;
     this.#wire = new Wire({
@@ -92,28 +113,31 @@ export class Client {
   }
 
   async pose(model: string, question: PoseQuestion, signal?: AbortSignal): Promise<Poses> {
-    return this.#read(this.#request(model, "/pose.msgpack", question), poses, signal);
+    const asked = this.#request(model, "/pose.msgpack", "PoseQuestion", question);
+    return this.#read(asked, poses, signal);
   }
 
   /** A clip as numbers. */
   async clip(model: string, question: ClipQuestion, signal?: AbortSignal): Promise<Motion> {
-    return this.#read(this.#request(model, "/clip.msgpack", question), motion, signal);
+    const asked = this.#request(model, "/clip.msgpack", "ClipQuestion", question);
+    return this.#read(asked, motion, signal);
   }
 
   /** One pose of each of many characters. */
   async crowd(model: string, question: CrowdQuestion, signal?: AbortSignal): Promise<CrowdPoses> {
+    checkQuestion("CrowdQuestion", question);
     return this.#read(post(under(model, "/crowd.msgpack"), question), crowd, signal);
   }
 
   /** Sigma over two controls. */
   async sigma(model: string, question: SigmaQuestion, signal?: AbortSignal): Promise<SigmaGrid> {
-    const asked = this.#request(model, "/sigma.json", question);
+    const asked = this.#request(model, "/sigma.json", "SigmaQuestion", question);
     return this.#read(asked, (found) => read("SigmaGrid", found), signal);
   }
 
   /** Which captured clips an answer is made of. */
   async why(model: string, question: WhyQuestion, signal?: AbortSignal): Promise<Reasons> {
-    const asked = this.#request(model, "/why", question);
+    const asked = this.#request(model, "/why", "WhyQuestion", question);
     return this.#read(asked, (found) => read("Reasons", found), signal);
   }
 
@@ -123,7 +147,7 @@ export class Client {
     asked: { readonly count?: number; readonly performer?: string } = {},
     signal?: AbortSignal,
   ): Promise<Suggestions> {
-    const wanted = this.#request(model, "/suggestions", asked);
+    const wanted = this.#request(model, "/suggestions", "SuggestQuestion", asked);
     return this.#read(wanted, (found) => read("Suggestions", found), signal);
   }
 
@@ -134,7 +158,7 @@ export class Client {
     question: ClipQuestion,
     signal?: AbortSignal,
   ): Promise<Download> {
-    const asked = this.#request(model, `/clip.${format}`, question);
+    const asked = this.#request(model, `/clip.${format}`, "ClipQuestion", question);
     return this.#file(asFile(asked, format), `${model}.${format}`, { signal });
   }
 
@@ -145,6 +169,8 @@ export class Client {
     question: WalkQuestion,
     options: TransferOptions = {},
   ): Promise<Download> {
+    checkQuestion("WalkQuestion", question);
+    checkNames("TransferOptions", Object.keys(TRANSFER_NAMES), options);
     const asked = asFile(get(link(under(model, `/crowd.${format}`), question)), format);
     return this.#file(asked, `${model}.${format}`, options);
   }
@@ -156,6 +182,7 @@ export class Client {
     clips: readonly NamedClipQuestion[],
     { as = "zip", ...options }: ArchiveOptions = {},
   ): Promise<Archive> {
+    checkArchive(clips, options);
     const asked = asFile(post(under(model, `/clips.${as}`), { format, clips }), as);
     const download = await this.#file(asked, `${model}.${as}`, options);
     return this.#explained(async () => opened(download, as, clips.length));
@@ -166,8 +193,10 @@ export class Client {
     model: string,
     format: ClipFormat,
     clips: readonly NamedClipQuestion[],
-    { as = "zip", signal, onProgress }: ArchiveOptions = {},
+    { as = "zip", ...options }: ArchiveOptions = {},
   ): Promise<Transfer> {
+    checkArchive(clips, options);
+    const { signal, onProgress } = options;
     const asked = asFile(post(under(model, `/clips.${as}`), { format, clips }), as);
     return this.#explained(async () => {
       const begun = await this.#wire.begin(asked, signal);
@@ -186,6 +215,7 @@ export class Client {
 
   /** The link to a clip's file, to be sent on. */
   url(model: string, format: ClipFormat, question: ClipQuestion): string {
+    checkQuestion("ClipQuestion", question);
     const path = link(under(model, `/clip.${format}`), question);
     return (this.base || (globalThis.location?.origin ?? "")) + path;
   }
@@ -209,7 +239,8 @@ export class Client {
     throw new Unexpected("the service does not say which version of the contract it speaks");
   }
 
-  #request(model: string, rest: string, question: object): Request {
+  #request(model: string, rest: string, kind: QuestionKind, question: object): Request {
+    checkQuestion(kind, question);
     return request(under(model, rest), question, this.#longest);
   }
 
@@ -237,6 +268,11 @@ export class Client {
       throw new Unexpected(fault.message, { cause: fault.cause, service });
     }
   }
+}
+
+function checkArchive(clips: readonly NamedClipQuestion[], options: TransferOptions): void {
+  for (const clip of clips) checkQuestion("NamedClipQuestion", clip);
+  checkNames("ArchiveOptions", Object.keys(ARCHIVE_NAMES), options);
 }
 
 function addressOf(base: string): string {

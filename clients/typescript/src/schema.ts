@@ -3596,6 +3596,110 @@ export const LISTS = {
   ]
 } as const;
 
+/** Keys that each question may have. */
+export const KEYS = {
+  "PoseQuestion": [
+    "controls",
+    "times",
+    "extrapolate",
+    "performer",
+    "level",
+    "joint_sigma",
+    "exact",
+    "targets",
+    "pin_feet"
+  ],
+  "ClipQuestion": [
+    "controls",
+    "fps",
+    "start",
+    "end",
+    "extrapolate",
+    "performer",
+    "level",
+    "joint_sigma",
+    "names",
+    "root",
+    "loop",
+    "exact",
+    "targets",
+    "pin_feet",
+    "unit",
+    "up"
+  ],
+  "NamedClipQuestion": [
+    "name",
+    "controls",
+    "fps",
+    "start",
+    "end",
+    "extrapolate",
+    "performer",
+    "level",
+    "joint_sigma",
+    "names",
+    "root",
+    "loop",
+    "exact",
+    "targets",
+    "pin_feet"
+  ],
+  "CrowdQuestion": [
+    "controls",
+    "time",
+    "position",
+    "heading",
+    "performer",
+    "level",
+    "previous_level",
+    "from_level",
+    "blend",
+    "camera",
+    "pixels",
+    "budget_ms",
+    "root",
+    "extrapolate"
+  ],
+  "SigmaQuestion": [
+    "across",
+    "along",
+    "columns",
+    "rows",
+    "margin",
+    "controls",
+    "performer"
+  ],
+  "WhyQuestion": [
+    "controls",
+    "nearest",
+    "extrapolate",
+    "performer"
+  ],
+  "Target": [
+    "joint",
+    "position",
+    "time",
+    "at"
+  ],
+  "WalkQuestion": [
+    "count",
+    "motions",
+    "seconds",
+    "fps",
+    "seed",
+    "level",
+    "camera",
+    "fov",
+    "height",
+    "pixels",
+    "instancing"
+  ],
+  "SuggestQuestion": [
+    "count",
+    "performer"
+  ]
+} as const;
+
 /** What files of each format are sent as. */
 export const MEDIA_TYPES = {
   "usda": "model/vnd.usda",

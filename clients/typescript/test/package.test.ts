@@ -2,7 +2,15 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { mkdirSync, mkdtempSync, rmSync, symlinkSync, writeFileSync } from "node:fs";
+import {
+  mkdirSync,
+  mkdtempSync,
+  readdirSync,
+  readFileSync,
+  rmSync,
+  symlinkSync,
+  writeFileSync,
+} from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { after, before, test } from "node:test";
@@ -61,6 +69,20 @@ after(() => rmSync(folder, { recursive: true }));
 function run(cwd: string, ...words: string[]): string {
   return execFileSync(process.execPath, words, { cwd, encoding: "utf8" });
 }
+
+test("npm has nothing to build, and no source to trip over", () => {
+  const own = `${folder}/node_modules/@posefield/client`;
+  const { scripts, exports } = JSON.parse(readFileSync(`${own}/package.json`, "utf8"));
+  assert.equal(scripts, undefined);
+  const files = readdirSync(own);
+  assert.deepEqual(
+    files.filter((name) => name.endsWith(".ts") && !name.endsWith(".d.ts")),
+    [],
+  );
+  for (const { types, default: code } of Object.values<Record<string, string>>(exports)) {
+    for (const name of [types, code]) assert.ok(files.includes(String(name).slice(2)), name);
+  }
+});
 
 test("it runs where nobody knows TypeScript", () => {
   writeFileSync(`${folder}/use.mjs`, SCRIPT);

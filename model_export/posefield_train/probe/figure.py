@@ -6,7 +6,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import skeleton
-from posefield_train.probe import joint_names
+from posefield_train.probe import joint_recognition
 from posefield_train.source import bvh
 from posefield_train.source.bvh import bvh_conversion
 
@@ -78,7 +78,7 @@ def measure(file: bvh.BvhFile) -> Figure:
     moves = np.ptp(translations, axis=0).max(axis=-1) > 0.0
     return Figure(
         file,
-        joint_names.roles_of(names, parents),
+        joint_recognition.roles_of(names, parents),
         skeleton.positions(parents, rotations[frames], translations[frames]),
         np.linalg.norm(np.median(translations, axis=0), axis=-1),
         rotations[frames, 0],

@@ -19,7 +19,7 @@ PLACEHOLDERS = {bool: "", int: "N", float: "NUMBER", Path: "PATH"}
 class PlainArgument(TyperArgument):
     """Argument whose help has no column with the Python type."""
 
-    def display_type_rich(self, ctx: typer.Context) -> None:
+    def display_type_rich(self, ctx: Any) -> None:
         """Return None, no type: the name and the text say it."""
 
 
