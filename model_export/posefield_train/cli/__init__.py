@@ -1,5 +1,7 @@
 """Training commands: `probe`, `init`, `fetch`, `sample`, `train`, `adapt`, `evaluate`."""
 
+from collections.abc import Callable
+
 import typer
 
 from posefield.console.registration import MAKE, register
@@ -12,7 +14,7 @@ from posefield_train.cli import (
     command_train,
 )
 
-COMMANDS = {
+COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "probe": (command_probe.probe, command_probe.PROBE_EXAMPLES),
     "init": (command_probe.init, command_probe.INIT_EXAMPLES),
     "fetch": (

@@ -114,7 +114,8 @@ def _upward(figure: Figure, positions: Floats) -> Floats | None:
 def _main_axis(directions: Sequence[Floats], what: str) -> Vote:
     if not directions:
         return None, ""
-    mean = np.mean([one / max(np.linalg.norm(one), 1e-12) for one in directions], axis=0)
+    lengths = np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
+    mean = np.mean(np.asarray(directions) / lengths, axis=0)
     axis = int(np.argmax(np.abs(mean)))
     name = ("+" if mean[axis] > 0 else "-") + AXES[axis]
     return name, f"{what}: {name}, {abs(mean[axis]):.0%} of the direction"

@@ -6,6 +6,7 @@ that died; 128 and a signal's number where that ended an export.
 """
 
 import sys
+from collections.abc import Callable
 from importlib.metadata import entry_points
 from importlib.util import find_spec
 from typing import Annotated
@@ -122,7 +123,7 @@ HELP = (
     "Exit codes: 0 success, 1 check found defects, 2 a question or an argument cannot be answered, "
     "3 a file cannot be used, 4 no model can be made of the samples, 5 a process died."
 )
-COMMANDS = {
+COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
     "demo": (command_demo.demo, SERVE, ["demo", "demo --once -o clips"]),
     "models": (command_models.models, ASK, ["models", "models my_models --json"]),
     "inspect": (

@@ -3,8 +3,10 @@
 from collections.abc import Iterable
 
 from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
+from posefield.common.name_suggestion import did_you_mean, similar_name
 from posefield.model_file.model_card import Control, ModelCard
+from posefield.question.motion_question import FileQuestion, PoseQuestion
+from posefield.question.text_decoding import parameters
 
 # A clip this many times longer or shorter than any captured one is no plausible motion.
 DURATION_FACTOR = 10.0
@@ -15,10 +17,20 @@ def check_names(card: ModelCard, names: Iterable[str]) -> None:
     for name in names:
         if card.control(name) is None:
             own = [c.name for c in card.controls]
-            hint = did_you_mean(name, own)
+            hint = did_you_mean(name, own) or _option_hint(name)
             raise InvalidField(
                 f"controls/{name}", f"no such control{hint}; this model has {', '.join(own)}"
             )
+
+
+def _option_hint(name: str) -> str:
+    """Return the text about an option that is similar to a name, or "".
+
+    In a query string each name that is no option is taken for a control.
+    """
+    forms = (PoseQuestion, FileQuestion)
+    found = similar_name(name, [word for form in forms for word in parameters(form)])
+    return "" if found is None else f" (did you mean the option {found!r}?)"
 
 
 def accepted_range(control: Control) -> tuple[float, float]:
