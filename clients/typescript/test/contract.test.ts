@@ -184,7 +184,9 @@ function questionOf(example: Example): unknown {
     else if (name === "time") found["times"] = searchParams.getAll("time").map(Number);
     else controls[name] = Number(value);
   }
-  return { ...found, controls };
+  // Walking crowds and suggestions have no controls.
+  const without = /\/(crowd|suggestions)\b/.test(example.path);
+  return without ? found : { ...found, controls };
 }
 
 /** That an answer has what an excerpt of it has. */

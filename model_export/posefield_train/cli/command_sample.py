@@ -1,16 +1,21 @@
 """Command `posefield sample`: procedural motions."""
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.console.arguments import Json, encoder_for
 from posefield.console.output import as_json, written_message
 from posefield.console.question_options import parse_controls
 from posefield.question.results import ClipAnswer, Trust
+
+if TYPE_CHECKING:
+    from posefield_train.sample.sample_family import SampleTrial
 
 
 def sample(
@@ -39,12 +44,13 @@ def sample(
     The noise-free motion exists at any control point.
     """
     from posefield_train.sample import noise_free as truths
-    from posefield_train.sample import sample_files
 
     if family != "reaching":
-        raise InvalidField("family", f"{family!r}, expected reaching")
+        raise InvalidField(
+            "family", f"{family!r}{did_you_mean(family, ['reaching'])}, expected reaching"
+        )
     if not truth:
-        path = sample_files.write_family(output)
+        path = _write_family(output)
         typer.echo(
             as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )
@@ -55,3 +61,18 @@ def sample(
     answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))
     atomic_files.write(encode(answer), output)
     typer.echo(written_message(output, answer, json))
+
+
+def _write_family(output: Path) -> Path:
+    """Write the procedural family with a progress bar, and return the path of its recipe."""
+    from posefield.console.progress import ProgressBar
+    from posefield_train.sample import sample_family, sample_files
+
+    with ProgressBar("motions", len(list(sample_family.design()))) as bar:
+
+        def watched() -> "Iterator[SampleTrial]":
+            for each in sample_family.samples():
+                bar.advance(1)
+                yield each
+
+        return sample_files.write_family(output, watched())
