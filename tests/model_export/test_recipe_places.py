@@ -115,6 +115,10 @@ def test_every_mistake_has_its_line_and_column(refused):
     assert hint in third
 
 
+def test_a_missing_key_of_no_table_is_at_the_top(refused):
+    assert refused(TOML.replace("schema = 1\n", "")) == ["1:1: schema: Field required"]
+
+
 def test_a_mistake_of_our_own_checks_has_its_key_and_no_words_of_pydantic(refused):
     text = TOML.replace("[size]", '[event]\njoint = "hand"\nat = "highest"\n[size]')
     (line,) = refused(text)

@@ -14,6 +14,8 @@ from posefield_train.source.toml_positions import Key, key_positions, nearest_po
 
 SHOWN = 200
 """Characters of a value in a message."""
+TOP = (1, 1)
+"""Position of a missing key that belongs into no table."""
 MAX_LISTED = 20
 """Mistakes that are listed; a recipe with more was not meant as one."""
 
@@ -28,7 +30,7 @@ def recipe_error(
     positions = key_positions(text)
     listed = [_mistake(form, error) for error in fault.errors(include_url=False) if _own(error)]
     errors = [
-        RecipeError(path, message, *(nearest_position(positions, key) or ()))
+        RecipeError(path, message, *(nearest_position(positions, key) or TOP))
         for key, message in listed[:MAX_LISTED]
     ]
     first, *others = errors
