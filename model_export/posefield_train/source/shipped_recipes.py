@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from posefield.common.errors import InvalidField, RecipeError
+from posefield.common.name_suggestion import did_you_mean
 from posefield_train.source import data_folder
 from posefield_train.source.data_folder import FileLocation
 
@@ -24,7 +25,8 @@ def file_of(given: Path, data: Path | None) -> Path:
         return given
     if given.name not in (known := names()):
         shipped = ", ".join(known)
-        raise InvalidField("RECIPE", f"{given.name!r}, expected a TOML file or one of {shipped}")
+        found = f"{given.name!r}{did_you_mean(given.name, known)}"
+        raise InvalidField("RECIPE", f"{found}, expected a TOML file or one of {shipped}")
     if data is None:
         raise InvalidField("data", f"missing, expected the folder of the data of {given.name}")
     return FOLDER / f"{given.name}.toml"

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from posefield.common.errors import ModelError, UnknownFormat
+from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder
 from posefield.registry import model_registry
 from posefield.synthesis.synthesizer import Synthesizer
@@ -25,5 +26,7 @@ def encoder_for(path: Path) -> ClipEncoder:
     """Return the encoder for a path's ending; UnknownFormat if there is none."""
     ending = path.suffix.removeprefix(".")
     if ending not in CLIP_ENCODERS:
-        raise UnknownFormat("output", f"{path.name!r} ends in none of {', '.join(CLIP_ENCODERS)}")
+        hint = did_you_mean(ending, CLIP_ENCODERS)
+        known = ", ".join(CLIP_ENCODERS)
+        raise UnknownFormat("output", f"{path.name!r} ends in none of {known}{hint}")
     return CLIP_ENCODERS[ending]

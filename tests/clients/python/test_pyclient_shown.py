@@ -5,6 +5,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 import scripted
+from msgspec import structs
 from posefield_client import NEVER, AsyncClient, Client, errors, notebook
 from posefield_client.generated import Trust
 from posefield_client.numbers import ClipNumbers, Pose
@@ -138,3 +139,27 @@ def test_a_misspelt_name_is_answered_with_a_known_one(ask, said):
     with pytest.raises(errors.WrongQuestion) as caught:
         ask(Client(ADDRESS).model("walk"))
     assert str(caught.value).startswith(said)
+
+
+@pytest.mark.parametrize("up", ["Y", "Z"])
+def test_the_figure_stands_upright(numbers, up):
+    """One bone upwards and one to each side: the first joint is the highest of the picture."""
+    turns = np.zeros((FRAMES, JOINTS, 4))
+    turns[..., 0] = 1.0
+    along = np.array([[0, 0, 0], [0, 1, 0], [0.3, 0, 0], [-0.3, 0, 0]], float)
+    if up == "Z":
+        # Y up, +Z ahead becomes Z up, -Y ahead.
+        along = along[:, [0, 2, 1]] * np.array([1.0, -1.0, 1.0])
+    parents = (-1, 0, 0, 0)
+    still = structs.replace(
+        numbers,
+        units={"up": up},
+        parents=parents,
+        rotations=turns,
+        root_position=np.zeros((FRAMES, 3)),
+        bone_offsets=along,
+    )
+    figure = ET.fromstring(notebook.picture(still).replace("<br>", "<br/>"))
+    for path in figure.find(".//animate").get("values").split(";"):
+        points = np.array([p.split() for p in path.replace("L", "M").split("M")[1:]], float)
+        assert points[1, 1] == points[:, 1].min() < points[0, 1] - 50
