@@ -10,7 +10,7 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
-from posefield.constraints import constrained_motion, constraint
+from posefield.constraints import constrained_motion, constraint, overshoot
 from posefield.constraints import targets as goals
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.constraint import Constraint, PositionConstraint
@@ -184,6 +184,9 @@ class ConstraintSolver:
             held = found
             if settled:
                 break
+        bounds = self._session.bounds
+        if not bounds.is_inside(question.point):
+            held = overshoot.bring_back(bench, held, asked.constraints, question.controls, bounds)
         self._check_times(asked.constraints.targets, held)
         _check_duplicates(self._target_constraints(question, asked.constraints.targets, held), last)
         return held

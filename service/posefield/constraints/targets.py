@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
+from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import value_validation
@@ -89,7 +90,8 @@ def from_question(
             if named:
                 raise InvalidField("exact", f"{control.name!r}, for whose joint there is a target")
             continue
-        controls.append((control.name, own, question.controls[control.name]))
+        goal = answer_bounds.limit_control(control, question.controls[control.name])
+        controls.append((control.name, own, goal))
     return ConstraintSet(tuple(controls), targets, tuple(card.feet) if asked.pin_feet else ())
 
 

@@ -16,7 +16,8 @@ from posefield.inference.onnx_runtime import LazySessions
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights
-from posefield.model_file import checked_file, subgraph
+from posefield.model_file import answer_bounds, checked_file, subgraph
+from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import ModelCard
 
 # Estimate of memory: a model of 114 kB with four levels in use takes 3.1 MB, for twelve sessions
@@ -29,7 +30,8 @@ class PredictionState:
     """Intermediate values of the graph from which the poses of one question are computed.
 
     coefficients: sample coefficients (r3,). frames: canonical frames (S,) of the question's times.
-    travel: travel (3,) of a cycle. bones: bone offsets (J, 3), m. duration: s. sigma: m.
+    travel: travel (3,) of a cycle. bones: bone offsets (J, 3), m. duration: s. sigma: m, at the
+    controls that were limited; asked_sigma: m, at the controls as asked.
     """
 
     coefficients: Floats
@@ -38,6 +40,7 @@ class PredictionState:
     bones: Floats
     duration: float
     sigma: float
+    asked_sigma: float
 
 
 @dataclass(frozen=True)
@@ -70,32 +73,94 @@ class Session:
     ) -> list[Any]:
         """Return the graph's outputs, in their order, for controls (B, d) and times (B, S).
 
-        labels (B or 1, p): performers; an unseen performer if None. level: level of detail.
+        labels (B or 1, p): performers; an unseen performer if None. level: level of detail. Outside
+        the sampled ranges, answers are bounded (`answer_bounds`), but sigma is that of the controls
+        as asked.
         """
-        feed = self._feed(controls, labels)
-        feed["time"] = time.astype(np.float32, copy=False)
-        answers: list[Any] = self.runtimes[level].run(list(outputs), feed)
+        if self.bounds.is_inside(controls):
+            return self._run(controls, time, outputs, labels, level)
+        raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
+        # The graph places a time by the duration that it computes itself.
+        stretched = time * (raw / bounded)[:, None]
+        answers = self._run(self.bounds.limit(controls), stretched, outputs, labels, level)
+        replaced = {"duration": (raw != bounded, bounded)}
+        if "sigma" in outputs:
+            sigma = self._run(controls, time, ("sigma",), labels, level)[0]
+            replaced["sigma"] = (self.bounds.outside(controls), sigma)
+        for at in set(outputs) & set(replaced):
+            rows, values = replaced[at]
+            place = outputs.index(at)
+            answers[place] = np.where(rows, values, answers[place])
         return answers
 
     def durations(
         self, controls: Floats | Singles, labels: Floats | Singles | None = None, level: int = 0
     ) -> Singles:
         """Return the durations (B,), s, of `run`, in a quarter of its time."""
+        if self.bounds.is_inside(controls):
+            return self._durations(controls, labels, level)
+        return self._raw_and_bounded_durations(controls, labels, level)[1]
+
+    def state(
+        self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
+    ) -> PredictionState:
+        """Return the intermediate values for one question: controls (1, d), times (S,).
+
+        Bounded as the answers of `run` are.
+        """
+        if self.bounds.is_inside(controls):
+            return self._state(controls, time, labels, level)
+        raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
+        asked = float(self._run(controls, np.zeros((1, 1)), ("sigma",), labels, level)[0][0])
+        stretch = float(raw[0]) / float(bounded[0])
+        found = self._state(self.bounds.limit(controls), time * stretch, labels, level)
+        return replace(found, duration=found.duration / stretch, asked_sigma=asked)
+
+    @cached_property
+    def bounds(self) -> AnswerBounds:
+        """Bounds of the answers outside the sampled ranges."""
+        return answer_bounds.of_card(self.card)
+
+    def _run(
+        self,
+        controls: Floats | Singles,
+        time: Floats | Singles,
+        outputs: tuple[str, ...],
+        labels: Floats | Singles | None,
+        level: int,
+    ) -> list[Any]:
+        """Return the graph's outputs at any controls, without bounds."""
+        feed = self._feed(controls, labels)
+        feed["time"] = time.astype(np.float32, copy=False)
+        answers: list[Any] = self.runtimes[level].run(list(outputs), feed)
+        return answers
+
+    def _durations(
+        self, controls: Floats | Singles, labels: Floats | Singles | None, level: int
+    ) -> Singles:
         answers: list[Singles] = self.duration_sessions[level].run(
             ["duration"], self._feed(controls, labels)
         )
         return answers[0]
 
-    def state(
-        self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
+    def _raw_and_bounded_durations(
+        self, controls: Floats | Singles, labels: Floats | Singles | None, level: int
+    ) -> tuple[Singles, Singles]:
+        """Return the durations (B,) of the graph at limited controls, and the bounded ones."""
+        raw = self._durations(self.bounds.limit(controls), labels, level)
+        nearest = self._durations(self.bounds.nearest_sampled(controls), labels, level)
+        return raw, self.bounds.limit_durations(raw, nearest)
+
+    def _state(
+        self, controls: Floats | Singles, time: Floats, labels: Floats | None, level: int
     ) -> PredictionState:
-        """Return the intermediate values for one question: controls (1, d), times (S,)."""
         feed = self._feed(controls, labels)
         feed["time"] = time[None].astype(np.float32, copy=False)
         found = self.state_sessions[level].run(list(self._state_outputs), feed)
         coefficients, frames, bones, durations, sigmas, *ways = (a.astype(float) for a in found)
         way = ways[0][0] if ways else np.zeros(3)
-        numbers = float(durations[0]), float(sigmas[0])
+        sigma = float(sigmas[0])
+        numbers = float(durations[0]), sigma, sigma
         return PredictionState(coefficients[0], frames[0, :, 0], way, bones[0], *numbers)
 
     @property

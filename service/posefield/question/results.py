@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,41 @@ class ConstraintResult:
 
 
 @dataclass(frozen=True)
+class Deviation:
+    """A requested control whose value the motion does not have.
+
+    asked: requested value. given: value of the motion if the control is measured, else the value at
+    which the control acts. captured: smallest and largest sampled value. side: of the given value,
+    seen from the requested one.
+    """
+
+    control: str
+    asked: float
+    given: float
+    unit: str
+    captured: tuple[float, float]
+
+    @property
+    def side(self) -> Literal["above", "below"]:
+        """Return on which side of the requested value the given one lies."""
+        return "above" if self.given > self.asked else "below"
+
+    @property
+    def sentence(self) -> str:
+        """Return the deviation in words, for warnings."""
+        low, high = self.captured
+        unit = f" {self.unit}" if self.unit else ""
+        return (
+            f"{self.control}: asked {self.asked:.4g}{unit}, given {self.given:.4g}{unit}, "
+            f"captured {low:.4g} to {high:.4g}{unit}; {self.side} what was asked"
+        )
+
+    def facts(self) -> dict[str, Any]:
+        """Return the deviation as plain values."""
+        return {**asdict(self), "captured": list(self.captured), "side": self.side}
+
+
+@dataclass(frozen=True)
 class Trust:
     """Provenance and uncertainty of a result.
 
@@ -37,13 +72,15 @@ class Trust:
     length of the whole clip at these controls, s. sigma: expected distance between this clip and a
     captured clip at these controls, root mean square over joints and frames, m. warnings: one
     sentence for each control outside its sampled range, or one for controls in a gap between the
-    samples, and one for each target that is not reached. performer: requested name; None for an
+    samples, one for each deviation, and one for each target that is not reached. performer:
+    requested name; None for an
     unseen performer. level: of detail. supported: whether clips with similar controls were
     captured. performer_seen: whether the requested performer was captured; None where the model
     does not distinguish performers. inferred: names of the controls that were not given and were
     set to the most typical values for the given ones. measured: values in this result of the
     controls for which the recipe has a measure. targets: residuals of the constraints. joint_sigma
-    (J,), m: sigma of each joint; empty unless requested.
+    (J,), m: sigma of each joint; empty unless requested. deviations: requested controls whose value
+    the motion does not have.
     """
 
     model: str
@@ -59,6 +96,7 @@ class Trust:
     measured: Mapping[str, float] = field(default_factory=dict)
     targets: tuple[ConstraintResult, ...] = ()
     joint_sigma: tuple[float, ...] = ()
+    deviations: tuple[Deviation, ...] = ()
 
     def facts(self) -> dict[str, Any]:
         """Return the fields that are not empty as plain values, for the metadata of files."""
@@ -81,6 +119,7 @@ class Trust:
             "measured": dict(self.measured),
             "targets": [asdict(met) for met in self.targets],
             "joint_sigma": list(self.joint_sigma),
+            "deviations": [deviation.facts() for deviation in self.deviations],
         }
         return seen | {name: fact for name, fact in more.items() if fact}
 

@@ -16,7 +16,7 @@ from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer
 from posefield.synthesis import frame_times
 from posefield.synthesis.poses import POSE_OUTPUTS
-from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.synthesizer import Synthesizer, deviation_warnings
 from posefield.validation.question_validation import ValidatedQuestion
 
 
@@ -24,7 +24,8 @@ from posefield.validation.question_validation import ValidatedQuestion
 class ClipPreview:
     """Properties of a clip that are known before its synthesis.
 
-    frames: number of frames. warnings: as in the answer. missed: true if the clip misses a target.
+    frames: number of frames. warnings: of the controls, as in the answer; deviations of controls
+    that the correction constrains are told with the values at which they act. missed: true if the clip misses a target.
     """
 
     frames: int
@@ -73,7 +74,8 @@ def preview_clip(
     duration, misses = _duration_and_misses(model, question, asked)
     times = frame_times.sample_times(asked, duration, most)
     # A loop ends with its first frame again.
-    return ClipPreview(len(times) + asked.loop, question.warnings, misses)
+    said = () if asked.extrapolate == "ok" else deviation_warnings(question.deviations)
+    return ClipPreview(len(times) + asked.loop, (*question.warnings, *said), misses)
 
 
 def _named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:

@@ -4,6 +4,8 @@ The poses of the finest level are a weighted sum of the captured clips in the co
 motion tensor; the weights depend on the controls and the performer, not on the time.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from posefield.common.units import Floats
@@ -11,7 +13,7 @@ from posefield.kriging import kriging_model, support
 from posefield.model_file.model_card import ModelCard
 from posefield.question.model_question import WhyQuestion
 from posefield.question.results import CapturedClip, Explanation, SupportReport
-from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.synthesizer import Synthesizer, deviation_warnings
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
 NEAREST, MOST = 10, 10_000
@@ -24,14 +26,15 @@ def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
     """
     card = model.session.card
     question = model.validator.question(asked.controls, asked.extrapolate, asked.performer, level=0)
-    point = _point(card, question)
-    distances = model.session.kriging_weights.distances(point)[0]
-    weights = model.session.kriging_weights.weights(point)[0]
+    distances = model.session.kriging_weights.distances(_point(card, question))[0]
+    acting = replace(question, point=model.session.bounds.limit(question.point))
+    weights = model.session.kriging_weights.weights(_point(card, acting))[0]
     order = np.argsort(distances, kind="stable")
     near, others = order[: asked.nearest], order[asked.nearest :]
     found = tuple(_captured_clip(card, i, distances[i], weights[i]) for i in near.tolist())
     rest = float(weights[others].sum())
-    controls, who, said = question.controls, question.performer, question.warnings
+    apart = deviation_warnings(question.deviations) if asked.extrapolate == "warn" else ()
+    controls, who, said = question.controls, question.performer, (*question.warnings, *apart)
     inferred, backing = question.inferred, _support_report(model.validator, question)
     rests = len(others), rest
     return Explanation(model.identity, controls, who, said, backing, found, *rests, inferred)

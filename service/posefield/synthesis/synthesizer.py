@@ -1,6 +1,6 @@
 """A named model: validation of its questions, and the trust of its answers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,8 +10,8 @@ from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
 from posefield.inference.named_model import NamedModel
 from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion
-from posefield.question.results import ConstraintResult, Trust
-from posefield.validation import input_limits
+from posefield.question.results import ConstraintResult, Deviation, Trust
+from posefield.validation import input_limits, question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
 MICROMETRES = 6
@@ -81,7 +81,8 @@ class Synthesizer(NamedModel):
         self, asked: MotionQuestion, question: ValidatedQuestion, duration: float, sigma: float
     ) -> Trust:
         """Return the trust of an answer with this duration, s, and sigma, m."""
-        who = question.performer
+        who, apart = question.performer, question.deviations
+        said = () if asked.extrapolate == "ok" else deviation_warnings(apart)
         seen = who is not None if self.session.card.performers else None
         shares = self.session.card.joint_sigma if asked.joint_sigma else ()
         return Trust(
@@ -89,24 +90,56 @@ class Synthesizer(NamedModel):
             question.controls,
             duration,
             sigma,
-            question.warnings,
+            (*question.warnings, *said),
             who,
             question.level,
             question.supported,
             seen,
             inferred=question.inferred,
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
+            deviations=apart,
         )
 
     def constrained_trust(
         self, asked: MotionQuestion, question: ValidatedQuestion, held: ConstrainedMotion
     ) -> Trust:
         """Return the trust of a constrained answer, with the errors of its targets."""
-        own = self.trust(asked, question, held.duration, held.state.sigma)
         measured = self.solver.measured(question, held)
-        said = () if asked.extrapolate == "ok" else miss_warnings(held.results)
+        # Results of controls precede those of targets.
+        first = len(held.results) - len(asked.targets)
+        controls, targets = held.results[:first], held.results[first:]
+        apart = self._deviations(question, measured, controls)
+        question = replace(question, deviations=apart)
+        own = self.trust(asked, question, held.duration, held.state.asked_sigma)
+        said = () if asked.extrapolate == "ok" else miss_warnings(targets)
         warnings = (*own.warnings, *said)
         return replace(own, warnings=warnings, measured=measured, targets=held.results)
+
+    def _deviations(
+        self,
+        question: ValidatedQuestion,
+        measured: Mapping[str, float],
+        results: Sequence[ConstraintResult],
+    ) -> tuple[Deviation, ...]:
+        """Return the deviations of a constrained motion, in the order of the card.
+
+        measured: values of its measured controls. results: those of constrained controls, whose
+        deviations are measured.
+        """
+        reached = {met.what: met.reached for met in results}
+        found = {each.control: each for each in question.deviations if each.control not in reached}
+        for control in self.session.card.controls:
+            name = control.name
+            if not reached.get(name, True):
+                found[name] = question_validation.deviation(
+                    control, question.controls[name], measured[name]
+                )
+        return tuple(found[name] for name in question.controls if name in found)
+
+
+def deviation_warnings(apart: Sequence[Deviation]) -> tuple[str, ...]:
+    """Return a sentence for each control whose value the motion does not have."""
+    return tuple(each.sentence for each in apart)
 
 
 def miss_warnings(met: Sequence[ConstraintResult]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ import numpy as np
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import Booleans, Floats, Indices, Singles
 from posefield.kriging.support import Support
+from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.validation import input_limits, question_validation
 from posefield.validation.crowd_question import CrowdQuestion
@@ -62,10 +63,18 @@ def _range_warning(question: CrowdQuestion, control: Control, values: Floats) ->
         f"{control.name} of {np.count_nonzero(beyond)} characters lies outside what was sampled, "
         f"{control.minimum:g} to {control.maximum:g} {control.unit}; "
         f"the first is character {first}, {values[first]:g} {control.unit}"
+        f"{_limited_part(control, values)}"
     )
     if question.extrapolate == "refuse":
         raise OutsideSamples(f"controls/{control.name}", said, first)
     return said
+
+
+def _limited_part(control: Control, values: Floats) -> str:
+    """Return the part of a warning that tells at which value the farthest values act."""
+    ends = [answer_bounds.limit_control(control, float(v)) for v in (values.min(), values.max())]
+    limited = [f"{a:.4g}" for a, v in zip(ends, (values.min(), values.max())) if a != v]
+    return f"; values further out act as {' or '.join(limited)} {control.unit}" if limited else ""
 
 
 def _gap_warning(

@@ -10,9 +10,11 @@ from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.kriging import support
+from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.question import value_validation
 from posefield.question.motion_question import ExtrapolationPolicy
+from posefield.question.results import Deviation
 from posefield.validation import input_limits
 from posefield.validation.imputation import ControlImputer
 
@@ -24,7 +26,8 @@ class ValidatedQuestion:
     controls: all controls in the card's order. performer: name, None for an unseen performer.
     point: the controls as the graph's input, (1, d). labels: the performer as the graph's input,
     (1, p). warnings: of extrapolation. supported: true if similar clips were captured. inferred:
-    names of the controls that were not given and are conditional means.
+    names of the controls that were not given and were chosen. deviations: controls that act at
+    another value than the requested one, which is too far outside the samples.
     """
 
     controls: dict[str, float]
@@ -35,6 +38,7 @@ class ValidatedQuestion:
     warnings: tuple[str, ...]
     supported: bool
     inferred: tuple[str, ...] = ()
+    deviations: tuple[Deviation, ...] = ()
 
 
 class QuestionValidator:
@@ -82,7 +86,10 @@ class QuestionValidator:
         )
         inferred = tuple(name for name in given if name not in controls)
         array = np.array([point])
-        return ValidatedQuestion(given, performer, level, array, own, warnings, supported, inferred)
+        limited = () if plain else limited_controls(self._card.controls, point)
+        return ValidatedQuestion(
+            given, performer, level, array, own, warnings, supported, inferred, limited
+        )
 
     def _is_within_ranges(self, controls: Mapping[str, float]) -> bool:
         """Return whether all controls are floats within the sampled ranges: the fast path."""
@@ -148,6 +155,25 @@ def range_warnings(controls: Sequence[Control], point: Sequence[float]) -> tuple
     """
     found = (_range_warning(control, value) for control, value in zip(controls, point, strict=True))
     return tuple(filter(None, found))
+
+
+def limited_controls(controls: Sequence[Control], point: Sequence[float]) -> tuple[Deviation, ...]:
+    """Return a deviation for each control that acts at another value than the given one.
+
+    point: values (d,) in the order of the controls.
+    """
+    found = []
+    for control, value in zip(controls, point, strict=True):
+        acting = answer_bounds.limit_control(control, value)
+        if acting != value:
+            found.append(deviation(control, value, acting))
+    return tuple(found)
+
+
+def deviation(control: Control, asked: float, given: float) -> Deviation:
+    """Return the deviation of a control's given value from the requested one."""
+    captured = control.minimum, control.maximum
+    return Deviation(control.name, asked, given, control.unit, captured)
 
 
 def gap_warning(who: str, variance: float, limit: float) -> str:

@@ -1,0 +1,98 @@
+"""Bounds of answers outside the sampled ranges.
+
+Trends of the model are not followed without end: a control acts as if it were at most a quarter of
+its range outside the sampled one, and a clip is at most a quarter shorter or longer than the
+captured ones. Within the sampled ranges nothing is bounded.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from posefield.common.units import Booleans, Floats, Singles
+from posefield.model_file.model_card import Control, ModelCard
+
+MARGIN = 0.25
+"""Margin of controls, as a share of the sampled range, and of durations, as a share of the captured
+ones. Answers with support last up to 1.25 times as long as the longest captured clip (three
+families of captured motion and the procedural one, up to 0.15 of the range outside the samples), and
+paths of walking crowds need controls up to 0.2 of a range outside.
+"""
+SLACK = 1e-6
+"""Share of the range that a control inside it may lie outside by rounding."""
+
+
+@dataclass(frozen=True)
+class AnswerBounds:
+    """Bounds of a model's answers.
+
+    low, high (d,): sampled range of each control. durations: shortest and longest captured clip, s.
+    """
+
+    low: Floats
+    high: Floats
+    durations: tuple[float, float]
+
+    @cached_property
+    def _inside(self) -> tuple[Floats, Floats]:
+        slack = SLACK * (self.high - self.low)
+        return self.low - slack, self.high + slack
+
+    @cached_property
+    def limits(self) -> tuple[Floats, Floats]:
+        """Smallest and largest value (d,) at which each control acts."""
+        room = MARGIN * (self.high - self.low)
+        return self.low - room, self.high + room
+
+    @property
+    def duration_limits(self) -> tuple[float, float]:
+        """Smallest and largest duration, s, of an answer outside the sampled ranges.
+
+        The duration at the nearest controls inside the ranges is never outside the limits.
+        """
+        return self.durations[0] * (1.0 - MARGIN), self.durations[1] * (1.0 + MARGIN)
+
+    def is_inside(self, controls: Floats | Singles) -> bool:
+        """Return whether all controls (B, d) lie within the sampled ranges."""
+        low, high = self._inside
+        return bool(((controls >= low) & (controls <= high)).all())
+
+    def outside(self, controls: Floats | Singles) -> Booleans:
+        """Return whether a control of each row (B, d) lies outside its sampled range, (B,)."""
+        low, high = self._inside
+        return np.asarray(((controls < low) | (controls > high)).any(axis=1))
+
+    def limit(self, controls: Floats | Singles) -> Floats | Singles:
+        """Return the controls (B, d) at which the answer is computed; inside the limits the same.
+
+        Keeps the type of the numbers.
+        """
+        low, high = (ends.astype(controls.dtype) for ends in self.limits)
+        return np.asarray(np.clip(controls, low, high))
+
+    def nearest_sampled(self, controls: Floats | Singles) -> Floats:
+        """Return the nearest controls (B, d) inside the sampled ranges."""
+        return np.clip(controls.astype(np.float64), self.low, self.high)
+
+    def limit_durations(self, found: Singles, nearest: Singles) -> Singles:
+        """Return durations (B,), s, limited to the margin about the captured ones.
+
+        nearest (B,): durations at the nearest controls inside the sampled ranges, which may lie
+        further out where a combination of controls was never captured.
+        """
+        shortest, longest = np.array(self.duration_limits, found.dtype)
+        least, most = np.minimum(shortest, nearest), np.maximum(longest, nearest)
+        return np.clip(found, least, most)
+
+
+def of_card(card: ModelCard) -> AnswerBounds:
+    """Return the bounds of a model's answers."""
+    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    return AnswerBounds(low, high, card.durations)
+
+
+def limit_control(control: Control, value: float) -> float:
+    """Return the value at which a control acts: at most the margin outside its sampled range."""
+    room = MARGIN * (control.maximum - control.minimum)
+    return min(max(value, control.minimum - room), control.maximum + room)
