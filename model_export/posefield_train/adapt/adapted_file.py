@@ -177,17 +177,18 @@ def _card(
 
 def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
     """Return the controls with ranges, defaults and values from samples (N, d)."""
+    typical = onnx_export.typical_controls(values)
     return tuple(
         replace(
             control,
             minimum=float(own.min()),
             maximum=float(own.max()),
-            default=float(np.sort(own)[len(own) // 2]),
+            default=float(default),
             values=tuple(np.unique(own).tolist())
             if len(np.unique(own)) <= MAX_LISTED_VALUES
             else (),
         )
-        for control, own in zip(old, values.T, strict=True)
+        for control, own, default in zip(old, values.T, typical, strict=True)
     )
 
 

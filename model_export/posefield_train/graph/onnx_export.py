@@ -18,7 +18,8 @@ from posefield.common.units import Floats
 from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.session import Session
-from posefield.kriging.kriging_model import Hyper
+from posefield.kriging import typical_clip
+from posefield.kriging.kriging_model import Hyper, half_ranges
 from posefield.model_file import model_card
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import Control, ModelCard, TrainingParameters
@@ -246,7 +247,8 @@ def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
     values = np.stack([example.controls for example in trained.examples])
     landmarks = np.array([example.landmarks for example in trained.examples])
     controls = []
-    for asked, own in zip(recipe.controls, values.T, strict=True):
+    typical = typical_controls(values)
+    for asked, own, default in zip(recipe.controls, values.T, typical, strict=True):
         distinct = np.unique(own)
         controls.append(
             Control(
@@ -255,12 +257,18 @@ def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
                 asked.description,
                 float(distinct[0]),
                 float(distinct[-1]),
-                float(np.sort(own)[len(own) // 2]),
+                float(default),
                 tuple(map(float, distinct)) if len(distinct) <= MAX_LISTED_VALUES else (),
                 measured_controls.card_measure(recipe, asked, trained.skeleton, landmarks),
             )
         )
     return tuple(controls)
+
+
+def typical_controls(values: Floats) -> Floats:
+    """Return the controls (d,) of the medoid of captured clips with controls (N, d)."""
+    places = half_ranges(values, values.min(axis=0), values.max(axis=0))
+    return values[typical_clip.medoid(places)]
 
 
 def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict[str, Any]:

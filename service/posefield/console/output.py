@@ -6,7 +6,7 @@ from typing import Any
 import orjson
 import typer
 
-from posefield.question.results import ClipAnswer, Explanation, Trust
+from posefield.question.results import ClipAnswer, Explanation, Trust, band
 
 
 def as_json(value: Any) -> str:
@@ -19,11 +19,11 @@ def written_message(path: Path, answer: ClipAnswer, json: bool) -> str:
     frames = len(answer.clip)
     if json:
         return as_json(
-            {"file": str(path), "frames": frames, "rate": answer.clip.rate, **answer.trust.facts()}
+            {"file": str(path), "frames": frames, "rate": answer.clip.rate, **answer.trust.document()}
         )
     return (
         f"{path}: {frames} frames at {answer.clip.rate:g} a second, {answer.trust.duration:.2f} s, "
-        f"give or take {100 * answer.trust.sigma:.1f} cm"
+        f"give or take {100 * answer.trust.sigma:.1f} cm ({band(answer.trust.sigma)})"
     )
 
 

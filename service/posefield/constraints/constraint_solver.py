@@ -70,7 +70,8 @@ class ConstraintSolver:
     ) -> dict[str, float] | None:
         """Return all controls of a question with open controls and targets, else None.
 
-        The open controls are the conditional mean, given the other controls and the targets.
+        The open controls are near those of a captured clip that is typical for the other controls
+        and the targets.
         """
         if not (question.inferred and asked.targets):
             return None
@@ -92,23 +93,26 @@ class ConstraintSolver:
     ) -> dict[str, float]:
         """Return the controls with which the model's prediction comes nearest to the targets.
 
-        The conditional mean is linear in the targets, but motions are not, so the remaining error
-        is added to the requested positions in each round. It stops when the distance of the targets
-        is within the spread of captured motions; a closer fit would attribute chance to the
-        controls.
+        The first are those of a typical captured clip. The conditional mean about it is linear in
+        the targets, but motions are not, so the remaining error is added to the requested positions
+        in each round. It stops when the distance of the targets is within the spread of captured
+        motions; a closer fit would attribute chance to the controls.
         """
         seen = np.hstack([self._positions_cached(goal.moment, goal.time) for goal in targets])
         wanted = asked = target_values(targets)
         tried: list[tuple[float, dict[str, float]]] = []
+        local = chooser.near_measures(given, question.labels, seen, wanted)
+        found = local.captured()
         for _ in range(MAX_ROUNDS):
-            found = chooser.impute_with_measures(given, question.labels, seen, asked)
             own = replace(question, controls=found, point=np.array([list(found.values())]))
             begun = self.solve(own, NO_CONSTRAINTS)
             aims = self._target_constraints(own, targets, begun)
             tried.append((self._corrector(question.level).distance(begun, aims), found))
             if tried[-1][0] <= math.sqrt(len(wanted)):
                 break
-            asked = asked + wanted - constraint.evaluate(aims, begun.scene, begun.numbers)[0]
+            if len(tried) > 1:
+                asked = asked + wanted - constraint.evaluate(aims, begun.scene, begun.numbers)[0]
+            found = local(asked)
         return min(tried, key=lambda pair: pair[0])[1]
 
     def solve(self, question: ValidatedQuestion, found: ConstraintSet) -> ConstrainedMotion:

@@ -31,13 +31,26 @@ def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
     weights = model.session.kriging_weights.weights(_point(card, acting))[0]
     order = np.argsort(distances, kind="stable")
     near, others = order[: asked.nearest], order[asked.nearest :]
-    found = tuple(_captured_clip(card, i, distances[i], weights[i]) for i in near.tolist())
-    rest = float(weights[others].sum())
+    shares = positive_shares(weights)
+    found = tuple(
+        _captured_clip(card, i, distances[i], weights[i], shares[i]) for i in near.tolist()
+    )
+    rest = float(weights[others].sum()), float(shares[others].sum())
     apart = deviation_warnings(question.deviations) if asked.extrapolate == "warn" else ()
     controls, who, said = question.controls, question.performer, (*question.warnings, *apart)
     inferred, backing = question.inferred, _support_report(model.validator, question)
-    rests = len(others), rest
-    return Explanation(model.identity, controls, who, said, backing, found, *rests, inferred)
+    return Explanation(
+        model.identity, controls, who, said, backing, found, len(others), *rest, inferred
+    )
+
+
+def positive_shares(weights: Floats) -> Floats:
+    """Return the parts (n,) of the positive weights (n,) in their sum; 0 for a negative weight.
+
+    Kriging weights sum to one, so at least one is positive.
+    """
+    positive = np.maximum(weights, 0.0)
+    return positive / positive.sum()
 
 
 def _support_report(door: QuestionValidator, question: ValidatedQuestion) -> SupportReport:
@@ -53,8 +66,11 @@ def _point(card: ModelCard, question: ValidatedQuestion) -> Floats:
     return np.hstack([kriging_model.half_ranges(question.point, low, high), question.labels])
 
 
-def _captured_clip(card: ModelCard, index: int, distance: float, weight: float) -> CapturedClip:
+def _captured_clip(
+    card: ModelCard, index: int, distance: float, weight: float, share: float
+) -> CapturedClip:
     names = (control.name for control in card.controls)
     controls = dict(zip(names, card.examples[index], strict=True))
     who = card.performers[card.moved_by[index]] if card.moved_by else None
-    return CapturedClip(card.sources[index], controls, who, float(distance), float(weight))
+    numbers = float(distance), float(weight), float(share)
+    return CapturedClip(card.sources[index], controls, who, *numbers)

@@ -1,4 +1,4 @@
-"""Tests of the conditional mean of controls that a question omits."""
+"""Tests of the choice of controls that a question omits."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ from msgspec import structs
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
+from posefield.kriging import typical_clip
 from posefield.question.model_question import WhyQuestion
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
@@ -82,32 +83,55 @@ def test_units_do_not_matter(drawn):
     assert np.abs(found / scale - fit_gaussian(drawn)({0: 3.0, 2: 30.1})).max() < ROUNDING * 1e3
 
 
-def test_a_control_of_few_values_takes_one_of_them_and_others_follow_it(card):
-    few = [i for i, control in enumerate(card.controls) if control.values]
-    assert few, "the family has statures"
+def test_weights_count_as_repeated_samples(drawn):
+    twice = np.vstack([drawn, drawn[:50]])
+    weights = np.where(np.arange(len(drawn)) < 50, 2.0, 1.0)
+    weighted, repeated = fit_gaussian(drawn, weights=weights), fit_gaussian(twice)
+    assert np.abs(weighted({0: 3.0}) - repeated({0: 3.0})).max() < ROUNDING
+    assert np.abs(weighted({0: 3.0}) - fit_gaussian(drawn)({0: 3.0})).max() > 1e3 * ROUNDING
+
+
+def test_without_given_controls_all_are_those_of_the_medoid_clip(card):
     found = ControlImputer(card).impute({}, NOBODY)
-    for i in few:
-        control = card.controls[i]
-        mean = np.mean([point[i] for point in card.examples])
-        assert found[control.name] in control.values
-        assert found[control.name] == min(control.values, key=lambda value: abs(value - mean))
-    given = {card.controls[i].name: found[card.controls[i].name] for i in few}
-    assert ControlImputer(card).impute(given, NOBODY) == found
+    places = np.array(card.examples)
+    places = (places - places.min(axis=0)) / np.ptp(places, axis=0)
+    totals = [sum(np.linalg.norm(own - other) for other in places) for own in places]
+    assert tuple(found.values()) == card.examples[int(np.argmin(totals))]
+    assert np.ptp(totals) > 1.0, "negative control: clips differ"
 
 
-def test_what_is_chosen_is_short_and_within_what_was_sampled(card):
-    rare = {"target_height": card.control("target_height").maximum * 50}
-    for given in ({}, {"turn": 21.0}, rare):
-        found = ControlImputer(card).impute(given, NOBODY)
-        assert list(found) == [control.name for control in card.controls]
-        for control in card.controls:
-            if control.name in given:
-                assert found[control.name] == given[control.name]
-                continue
-            assert control.minimum <= found[control.name] <= control.maximum
-            short = float(f"{found[control.name]:.6g}")
-            ends = (control.minimum, control.maximum, *control.values)
-            assert found[control.name] in (short, *ends)
+def test_open_controls_are_those_of_one_captured_clip_near_the_given_ones(card):
+    chooser = ControlImputer(card)
+    captured = {tuple(point[i] for i in (0, 1, 3)): point[2] for point in card.examples}
+    own = card.control("turn")
+    for turn in np.linspace(own.minimum, own.maximum, 40).tolist():
+        found = chooser.impute({"turn": turn}, NOBODY)
+        assert found["turn"] == turn
+        rest = tuple(value for name, value in found.items() if name != "turn")
+        away = abs(captured[rest] - turn)
+        nearest = min(abs(point[2] - turn) for point in card.examples)
+        assert away <= nearest + typical_clip.NEAR * (own.maximum - own.minimum)
+
+
+def test_a_choice_never_lies_between_two_clusters(card):
+    """Who sits or stands is one of the two, though the mean of all hips lies between them."""
+    hips = np.unique([point[1] for point in card.examples])
+    below, above = max(zip(hips, hips[1:], strict=False), key=lambda pair: pair[1] - pair[0])
+    chooser = ControlImputer(card)
+    for given in ({}, {"turn": 20.0}, {"turn": -3.0}, {"target_height": 1.0}, {"stature": 1.7}):
+        hip = chooser.impute(given, NOBODY)["hip_height"]
+        assert hip <= below or hip >= above
+    # Negative control: a mean of all clips does.
+    assert below < fit_gaussian(np.array(card.examples))({2: 20.0})[1] < above
+
+
+def test_far_outside_the_samples_the_choice_stays(card):
+    """A control acts within its limits, so it is near the same clips however far out it is."""
+    high = card.control("target_height").maximum
+    chooser = ControlImputer(card)
+    far, farther = (chooser.impute({"target_height": times * high}, NOBODY) for times in (2, 50))
+    assert {**far, "target_height": 0.0} == {**farther, "target_height": 0.0}
+    assert far != {**chooser.impute({"target_height": 0.5}, NOBODY), "target_height": 2 * high}
 
 
 def test_a_performer_who_is_named_is_typical_of_himself(card):

@@ -41,7 +41,7 @@ def clip_json(answer: ClipAnswer, convention: Convention) -> bytes:
         "frames": len(clip),
         "times": np.round(frame_times(clip), DECIMALS),
         **{name: _rounded(values) for name, values in motion_arrays(clip).items()},
-        "trust": answer.trust.facts(),
+        "trust": answer.trust.document(),
     }
     return tables.json_object(content)
 
@@ -56,7 +56,7 @@ def table(answer: ClipAnswer, convention: Convention) -> Table:
         "parents": list(clip.skeleton.parents),
         "rate": clip.rate,
         "units": unit_names(convention),
-        "trust": answer.trust.facts(),
+        "trust": answer.trust.document(),
     }
     return Table({"times": frame_times(clip), **numbers}, facts, fixed)
 
@@ -95,6 +95,6 @@ def pose_table(answer: PoseAnswer[Any]) -> Table:
             "rotations": tables.as_float32(answer.rotations),
             "root_position": tables.as_float32(answer.root_position),
         },
-        {"trust": answer.trust.facts()},
+        {"trust": answer.trust.document()},
         {"bone_offsets": tables.as_float32(answer.bone_offsets)},
     )

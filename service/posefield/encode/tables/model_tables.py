@@ -66,14 +66,18 @@ def explanation(found: Explanation) -> dict[str, Any]:
         "warnings": list(found.warnings),
         "support": _support_facts(found.backing),
         "nearest": [_clip_facts(clip) for clip in found.nearest],
-        "others": {"count": found.others, "weight": round(found.others_weight, DECIMALS)},
+        "others": {
+            "count": found.others,
+            "weight": round(found.others_weight, DECIMALS),
+            "share": round(found.others_share, DECIMALS),
+        },
         **({"inferred": list(found.inferred)} if found.inferred else {}),
     }
 
 
 def _clip_facts(clip: CapturedClip) -> dict[str, Any]:
-    rounded = {name: round(getattr(clip, name), DECIMALS) for name in ("distance", "weight")}
-    return {**vars(clip), **rounded}
+    rounded = ("distance", "weight", "share")
+    return {**vars(clip), **{name: round(getattr(clip, name), DECIMALS) for name in rounded}}
 
 
 def _support_facts(found: SupportReport) -> dict[str, Any]:
@@ -89,16 +93,22 @@ def _support_facts(found: SupportReport) -> dict[str, Any]:
 def explanation_text(found: Explanation) -> str:
     """Return one line for each clip, the nearest first, one for all others, and the support."""
     wide = max(len("clip"), *(len(clip.source) for clip in found.nearest))
-    lines = [f"{'clip':{wide}}  distance   weight  "]
+    lines = [f"{'clip':{wide}}  distance    share     weight  "]
     lines += [
-        f"{clip.source:{wide}}  {clip.distance:8.3f}  {100 * clip.weight:6.1f} %  "
+        f"{clip.source:{wide}}  {clip.distance:8.3f}  {_percent(clip.share)}   "
+        f"{_percent(clip.weight)}  "
         f"{_clip_line(clip)}"
         for clip in found.nearest
     ]
     others = f"{found.others} others"
-    lines.append(f"{others:{wide}}  {'':8}  {100 * found.others_weight:6.1f} %")
+    shares = f"{_percent(found.others_share)}   {_percent(found.others_weight)}"
+    lines.append(f"{others:{wide}}  {'':8}  {shares}")
     lines.append(_support_line(found.backing))
     return "\n".join(line.rstrip() for line in lines)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:5.1f} %"
 
 
 def _support_line(found: SupportReport) -> str:
