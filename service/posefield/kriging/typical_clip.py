@@ -1,0 +1,88 @@
+"""Typical captured clips: the medoid of all, or of those near given values.
+
+A mean of several clusters of clips lies between them, where nothing was captured: half a squat is
+the mean of sitting and standing. A medoid is a captured clip.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats, Indices
+
+NEAR = 0.25
+"""Standard deviation of the weights of clips near given values, in half-ranges."""
+CANDIDATE_COST = 1.0
+"""A clip is a candidate if its squared distance from the given values, in `NEAR`, exceeds the least
+one by no more.
+"""
+NEIGHBOUR_QUANTILE = 0.95
+"""Share of the captured clips whose nearest neighbour is within the radius of a neighbourhood."""
+BISECTIONS = 30
+
+
+def medoid(places: Floats) -> int:
+    """Return the row of places (n, k) with the least sum of distances to all rows."""
+    return typical_row(places, np.zeros(len(places)))
+
+
+def typical_row(places: Floats, costs: Floats) -> int:
+    """Return the medoid of the rows near given values.
+
+    places (n, k): rows in the space of the open values. costs (n,): squared distances from the
+    given values, in `NEAR`. Rows weigh exp(-cost / 2), and only the nearest ones are candidates.
+    """
+    beyond = costs - costs.min()
+    apart = np.linalg.norm(places[:, None] - places, axis=-1)
+    # Products of one matrix and a vector would round differently between processors.
+    total = np.sum(np.exp(-0.5 * beyond)[:, None] * apart, axis=0)
+    total[beyond > CANDIDATE_COST] = np.inf
+    return int(np.argmin(total))
+
+
+@dataclass(frozen=True)
+class Neighbourhood:
+    """Surroundings of captured clips in the space of open values.
+
+    places (n, k): of the clips. sets: columns in which a point has to be near a clip, each with the
+    radius of that.
+    """
+
+    places: Floats
+    sets: tuple[tuple[Indices, float], ...]
+
+    def contains(self, point: Floats) -> bool:
+        """Return whether a point (k,) is near a captured clip, jointly and in each value."""
+        apart = self.places - point
+        return all(
+            np.linalg.norm(apart[:, columns], axis=1).min() <= radius
+            for columns, radius in self.sets
+        )
+
+    def pull_in(self, start: Floats, end: Floats) -> Floats:
+        """Return the point farthest from a clip `start` (k,) on the way to `end` (k,) inside."""
+        if self.contains(end):
+            return end
+        low, high = 0.0, 1.0
+        for _ in range(BISECTIONS):
+            middle = 0.5 * (low + high)
+            inside = self.contains(start + middle * (end - start))
+            low, high = (middle, high) if inside else (low, middle)
+        return start + low * (end - start)
+
+
+def neighbourhood(places: Floats) -> Neighbourhood:
+    """Return the surroundings of captured clips at places (n, k)."""
+    width = places.shape[1]
+    columns = [np.arange(width), *(np.array([i]) for i in range(width if width > 1 else 0))]
+    return Neighbourhood(places, tuple((own, _radius(places[:, own])) for own in columns))
+
+
+def _radius(places: Floats) -> float:
+    """Return the distance within which most rows (n, k) have another row."""
+    distinct = np.unique(places, axis=0)
+    if len(distinct) < 2:
+        return 0.0
+    apart = np.linalg.norm(distinct[:, None] - distinct, axis=-1)
+    np.fill_diagonal(apart, np.inf)
+    return float(np.quantile(apart.min(axis=1), NEIGHBOUR_QUANTILE))
