@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "3.0.0"
+CONTRACT = "3.1.0"
 """Version of the contract that this client was made for."""
 
 
@@ -285,6 +285,17 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     event: ModelCardEvent | None = None
 
 
+class Deviation(Struct, frozen=True, kw_only=True):
+    """A requested control whose value the motion does not have."""
+
+    control: str
+    asked: float
+    given: float
+    unit: str
+    captured: tuple[float, float]
+    side: str
+
+
 class Met(Struct, frozen=True, kw_only=True):
     """Residual of one constraint."""
 
@@ -303,10 +314,12 @@ class Trust(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    band: str | None = None
     supported: bool | None = None
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()
     warnings: tuple[str, ...]
+    deviations: tuple[Deviation, ...] = ()
     inferred: tuple[str, ...] = ()
     measured: dict[str, float] = {}
     targets: tuple[Met, ...] = ()
@@ -330,6 +343,7 @@ class CapturedClip(Struct, frozen=True, kw_only=True):
     performer: str | None
     distance: float
     weight: float
+    share: float | None = None
 
 
 class ReasonsOthers(Struct, frozen=True, kw_only=True):
@@ -337,13 +351,14 @@ class ReasonsOthers(Struct, frozen=True, kw_only=True):
 
     count: int
     weight: float
+    share: float | None = None
 
 
 class Reasons(Struct, frozen=True, kw_only=True):
     """At any time, the poses are a weighted sum of the captured clips, in the coordinates of
     the model's motion tensor. The weights in `nearest` and `others` sum to one. A weight may
     be negative: of a clip that other clips screen, or of a clip from which the prediction
-    extrapolates.
+    extrapolates. The shares in `nearest` and `others` are never negative and sum to one.
     """
 
     model: str

@@ -779,7 +779,7 @@ export interface components {
          * @description At any time, the poses are a weighted sum of the captured clips, in the coordinates of the
          *     model's motion tensor. The weights in `nearest` and `others` sum to one. A weight may be
          *     negative: of a clip that other clips screen, or of a clip from which the prediction
-         *     extrapolates.
+         *     extrapolates. The shares in `nearest` and `others` are never negative and sum to one.
          */
         Reasons: {
             model: components["schemas"]["Identity"];
@@ -796,6 +796,8 @@ export interface components {
             others: {
                 count: number;
                 weight: number;
+                /** @description Total share of these clips. Since 3.1.0. */
+                share?: number;
             };
         };
         /** @description Whether clips with similar controls were captured, and the quantities that decide it. */
@@ -844,6 +846,8 @@ export interface components {
             distance: number;
             /** @description Weight of the clip. */
             weight: number;
+            /** @description Part of the clip in the sum of all positive weights; 0 for a negative weight. Since 3.1.0. */
+            share?: number;
         };
         /**
          * @description Name of a control of the model.
@@ -989,11 +993,14 @@ export interface components {
             duration: number;
             /** @description Expected distance of a captured clip at these controls from this clip, root mean square over joints and frames, in metres. */
             sigma: number;
+            band?: components["schemas"]["Band"];
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
-            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, and one for each element of `targets` that is not reached. */
+            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, one for each element of `deviations`, and one for each target that is not reached. */
             warnings: string[];
+            /** @description Requested controls whose value the motion does not have. Absent if there is none. Since 3.1.0. */
+            deviations?: components["schemas"]["Deviation"][];
             inferred?: components["schemas"]["Inferred"];
             /** @description Values of the measurable controls on this motion, in their units. Present for clips, and for poses with constraints. */
             measured?: {
@@ -1003,8 +1010,31 @@ export interface components {
             targets?: components["schemas"]["Met"][];
         };
         /**
-         * @description Names of the omitted controls, which are set to their conditional mean given the other
-         *     controls and the targets. Absent if no control was omitted. Since 2.2.0.
+         * @description Range of `sigma`, on one scale for all models: `close` up to 3 cm, `near` up to 7.5 cm,
+         *     `rough` up to 15 cm, and `guess` beyond. Other words may follow. Since 3.1.0.
+         * @example near
+         */
+        Band: string;
+        /** @description A requested control whose value the motion does not have. */
+        Deviation: {
+            control: components["schemas"]["ControlName"];
+            /** @description Requested value. */
+            asked: number;
+            /** @description Value measured on the motion; for a control that is not measured, the value as which it acts. */
+            given: number;
+            /** @description Unit of the values. */
+            unit: string;
+            /** @description Smallest and largest sampled value. */
+            captured: number[];
+            /**
+             * @description Side of the given value, seen from the requested one: above or below.
+             * @example below
+             */
+            side: string;
+        };
+        /**
+         * @description Names of the omitted controls, which are set to those of a typical captured clip near the
+         *     other controls and the targets (their conditional mean before 3.1.0). Absent if no control was omitted. Since 2.2.0.
          */
         Inferred: string[];
         /** @description True if clips with similar controls were captured: no control lies more than a tenth of its range outside that range, and captured clips are as near as 19 of 20 captured clips are to the others. Always present since 2.2.0. */
@@ -1071,7 +1101,7 @@ export interface components {
             description: string;
             minimum: number;
             maximum: number;
-            /** @description Median of the sampled values. */
+            /** @description Value in the medoid clip, so that the defaults of all controls are those of one captured clip (since 3.1.0; before, the median of the sampled values). */
             default: number;
             /** @description Distinct sampled values if there are few, else empty. */
             values: number[];
@@ -1865,10 +1895,12 @@ export interface components {
          * @description One query parameter for each control of the model, with the control's name:
          *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
          *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
-         *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
-         *     mean of the captured clips, given the other controls, the performer if one is named, and the
-         *     targets. An omitted control with few sampled values takes the nearest of them. The trust
-         *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+         *     range widths outside is an error. A value acts as if it were at most a quarter of the range
+         *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
+         *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
+         *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
+         *     near the other controls, the performer if one is named, and the targets; with targets, also
+         *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
          *     `exact` set to the measured controls given before (`none` if there are none), gets the same
          *     response. The names of the other parameters are reserved.
          * @example {
@@ -2146,10 +2178,12 @@ export interface operations {
                  * @description One query parameter for each control of the model, with the control's name:
                  *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
                  *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
-                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
-                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
-                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
-                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     range widths outside is an error. A value acts as if it were at most a quarter of the range
+                 *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
+                 *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
+                 *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
+                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
                  * @example {
@@ -2271,10 +2305,12 @@ export interface operations {
                  * @description One query parameter for each control of the model, with the control's name:
                  *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
                  *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
-                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
-                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
-                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
-                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     range widths outside is an error. A value acts as if it were at most a quarter of the range
+                 *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
+                 *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
+                 *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
+                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
                  * @example {
@@ -2404,10 +2440,12 @@ export interface operations {
                  * @description One query parameter for each control of the model, with the control's name:
                  *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
                  *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
-                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
-                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
-                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
-                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     range widths outside is an error. A value acts as if it were at most a quarter of the range
+                 *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
+                 *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
+                 *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
+                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
                  * @example {
@@ -2533,10 +2571,12 @@ export interface operations {
                  * @description One query parameter for each control of the model, with the control's name:
                  *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
                  *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
-                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
-                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
-                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
-                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     range widths outside is an error. A value acts as if it were at most a quarter of the range
+                 *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
+                 *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
+                 *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
+                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
                  * @example {
@@ -2930,10 +2970,12 @@ export interface operations {
                  * @description One query parameter for each control of the model, with the control's name:
                  *     `?stature=1.72&turn=20`. The model's card gives names, units and sampled ranges. A value
                  *     outside the sampled range gives a warning (see `extrapolate`); a value more than a hundred
-                 *     range widths outside is an error. Omitted controls (since 2.2.0) are set to the conditional
-                 *     mean of the captured clips, given the other controls, the performer if one is named, and the
-                 *     targets. An omitted control with few sampled values takes the nearest of them. The trust
-                 *     lists the omitted controls as `inferred`. A request with the inferred values, and with
+                 *     range widths outside is an error. A value acts as if it were at most a quarter of the range
+                 *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
+                 *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
+                 *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
+                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
                  * @example {
@@ -3458,7 +3500,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "3.0.0";
+export const CONTRACT = "3.1.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {

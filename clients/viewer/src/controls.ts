@@ -2,9 +2,10 @@
 
 import { button, el, id } from "./dom.ts";
 import type { Mount } from "./page.ts";
+import type { Session } from "./session.ts";
 import { Slider } from "./slider.ts";
 
-export const mount: Mount = (host, { card, signal, store }) => {
+export function mount(host: HTMLElement, { card, player, signal, store }: Session): void {
   const sliders = card.controls.map((control, column) => {
     const examples = card.examples.map((row) => row[column]!);
     const set = (value: number) =>
@@ -27,7 +28,12 @@ export const mount: Mount = (host, { card, signal, store }) => {
     if (changed.has("controls")) show();
   });
   signal.addEventListener("abort", leave);
-};
+  player.onTrust(({ deviations = [] }) => {
+    for (const [name, slider] of sliders) {
+      slider.tell(deviations.find(({ control }) => control === name) ?? null);
+    }
+  });
+}
 
 const NOBODY = "Somebody never seen";
 

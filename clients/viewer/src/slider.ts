@@ -1,10 +1,11 @@
 /** One control: a slider over what was sampled and a quarter beyond, examples as ticks, a number. */
 
-import type { ModelCard } from "@posefield/client";
+import type { ModelCard, Trust } from "@posefield/client";
 
 import { button, el, icon, id, svg } from "./dom.ts";
 import * as written from "./written.ts";
 
+type Deviation = NonNullable<Trust["deviations"]>[number];
 export type Control = ModelCard["controls"][number];
 
 /** Share of the sampled range by which a slider goes beyond it on either side. */
@@ -18,6 +19,7 @@ export class Slider {
   readonly #number = el("input", { type: "text", inputmode: "decimal", autocomplete: "off" });
   readonly #mark = el("span", { class: "mark" });
   readonly #fault = el("p", { class: "fault", role: "alert" });
+  readonly #given = el("p", { class: "given", "data-given": "" });
   readonly #reset: HTMLButtonElement;
   readonly #set: (value: number) => void;
   #value: number;
@@ -50,6 +52,7 @@ export class Slider {
       head,
       el("div", { class: "track" }, ticks(control, examples), this.#range),
       this.#fault,
+      this.#given,
       el("p", { class: "about", id: about }, about_(control)),
     );
     this.show(control.default);
@@ -69,6 +72,13 @@ export class Slider {
     this.#mark.textContent = outside ? "outside" : "";
     this.#reset.disabled = value === this.#control.default;
     this.#refuse("");
+  }
+
+  /** What the motion has of it, where that is not what was asked; null where it is. */
+  tell(found: Deviation | null): void {
+    const { minimum, maximum, unit } = this.#control;
+    const value = found && written.short(found.given, maximum - minimum);
+    this.#given.textContent = found ? `Given ${value} ${unit}: ${found.side} what was asked.` : "";
   }
 
   /** Where the slider stands; at a sampled value, where those are few. */

@@ -3,6 +3,7 @@
 
 import type { ModelCard, Reasons, Trust } from "@posefield/client";
 
+import { SCALE, worded } from "./bands.ts";
 import { el } from "./dom.ts";
 import { Latest } from "./latest.ts";
 import { items, marks } from "./marks.ts";
@@ -21,6 +22,7 @@ type Captured = Reasons["nearest"][number];
 export function mount(host: HTMLElement, session: Session): void {
   const { card, player, signal, source, store } = session;
   const sigma = el("strong", { "data-sigma": "" }, "…");
+  const band = el("span", { "data-band": "", title: "One scale for all models" });
   const known = el("ul", { class: "marks", "aria-label": "What was captured" });
   const sentence = el("p", { class: "sentence" });
   const warnings = el("ul", { class: "warnings" });
@@ -33,7 +35,7 @@ export function mount(host: HTMLElement, session: Session): void {
       "div",
       { class: "title" },
       el("h2", {}, "Trust"),
-      el("span", { class: "sigma" }, "σ ", sigma),
+      el("span", { class: "sigma" }, "σ ", sigma, " ", band),
     ),
     meter,
     known,
@@ -53,35 +55,27 @@ export function mount(host: HTMLElement, session: Session): void {
   let timer: ReturnType<typeof setTimeout> | undefined;
   signal.addEventListener("abort", () => clearTimeout(timer));
   player.onTrust((trust) => {
-    const usual = worst(card);
     sigma.textContent = written.centimetres(trust.sigma);
-    meter.value = Math.min(1, trust.sigma / (3 * usual));
+    band.textContent = worded(trust.sigma).split(":")[0]!;
+    meter.value = Math.min(1, trust.sigma / SCALE);
     known.replaceChildren(...items(trust));
-    sentence.textContent = says(trust, usual);
+    sentence.textContent = says(trust);
     warnings.replaceChildren(...trust.warnings.map((text) => el("li", {}, text)));
     host.toggleAttribute("data-outside", trust.warnings.length > 0);
     clearTimeout(timer);
     timer = setTimeout(() => {
       if (served(source)) why.ask(null);
       const told = marks(trust).map(({ words }) => `${words}.`);
-      aloud.textContent = [says(trust, usual), ...told, ...trust.warnings].join(" ");
+      aloud.textContent = [says(trust), ...told, ...trust.warnings].join(" ");
     }, CALM);
   });
 }
 
-function says(trust: Trust, usual: number): string {
+function says(trust: Trust): string {
   const found = `A captured clip here would lie about ${written.centimetres(trust.sigma)} away, joint by joint.`;
   // Services older than 2.2.0 warn of what lies outside, and say no more.
   if (!(trust.supported ?? !trust.warnings.length)) return `${found} That is a guess.`;
-  if (trust.sigma > 1.5 * usual)
-    return `${found} That is far more than usual: the examples are sparse here.`;
-  return found;
-}
-
-/** What a clip left out typically lies away, m; what that is not known of: the finest level's error. */
-function worst(card: ModelCard): number {
-  const found = (card.diagnostics as Record<string, unknown>)["leave_one_out_rms_m"];
-  return typeof found === "number" ? found : card.levels[0]!.rms;
+  return `${found} That is ${worded(trust.sigma)}.`;
 }
 
 function item(clip: Captured, card: ModelCard, { store }: Session): HTMLElement {
@@ -93,8 +87,8 @@ function item(clip: Captured, card: ModelCard, { store }: Session): HTMLElement 
     "button",
     { type: "button", title: `Go there: ${values.join(", ")}` },
     el("span", { class: "source" }, clip.source),
-    el("span", { class: "weight" }, `${percent(clip.weight)}`),
-    el("meter", { min: 0, max: 1, value: Math.max(0, clip.weight), "aria-hidden": "true" }),
+    el("span", { class: "weight" }, percent(share(clip))),
+    el("meter", { min: 0, max: 1, value: share(clip), "aria-hidden": "true" }),
     el("span", { class: "about" }, `distance ${clip.distance.toFixed(2)}${who(clip)}`),
   );
   go.addEventListener("click", () =>
@@ -107,8 +101,13 @@ function who({ performer }: Captured): string {
   return performer ? ` · ${performer}` : "";
 }
 
+/** Part of the clip in the positive weights; services older than 3.1.0 say the weight alone. */
+function share(clip: { readonly share?: number; readonly weight: number }): number {
+  return clip.share ?? Math.max(0, clip.weight);
+}
+
 function rest({ others }: Reasons): string {
-  return others.count ? `${others.count} others together ${percent(others.weight)}` : "";
+  return others.count ? `${others.count} others together ${percent(share(others))}` : "";
 }
 
 function percent(share: number): string {

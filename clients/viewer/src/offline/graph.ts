@@ -3,6 +3,7 @@
 import type { ModelCard } from "@posefield/client";
 import type * as Runtime from "onnxruntime-web/wasm";
 
+import { Bounds } from "./bounds.ts";
 import { atLevel } from "./protobuf.ts";
 
 export type Ort = typeof Runtime;
@@ -28,15 +29,44 @@ export class Graph {
   readonly #ort: Ort;
   readonly #model: Uint8Array;
   readonly #card: ModelCard;
+  readonly #bounds: Bounds;
   readonly #sessions: (Promise<Runtime.InferenceSession> | undefined)[] = [];
 
   constructor(ort: Ort, model: Uint8Array, card: ModelCard) {
     this.#ort = ort;
     this.#model = model;
     this.#card = card;
+    this.#bounds = new Bounds(card);
   }
 
+  /** Answers, bounded outside the sampled ranges as service/posefield/inference/session.py bounds
+   * them; sigma is that of the controls as asked. */
   async run(rows: Rows, level: number): Promise<Answers> {
+    const outside = this.#bounds.outside(rows.controls);
+    if (!outside.includes(true)) return this.unbounded(rows, level);
+    const begin = { ...rows, times: new Float32Array(rows.count) };
+    const limited = this.#bounds.limit(rows.controls);
+    const { duration: raw } = await this.unbounded({ ...begin, controls: limited }, level);
+    const inside = { ...begin, controls: this.#bounds.nearest(rows.controls) };
+    const { duration: nearest } = await this.unbounded(inside, level);
+    const bounded = raw.map((found, row) => this.#bounds.duration(found, nearest[row]!));
+    const steps = rows.times.length / rows.count;
+    // The graph places a time by the duration that it computes itself.
+    const times = rows.times.map((time, i) => {
+      const row = Math.floor(i / steps);
+      return (time * raw[row]!) / bounded[row]!;
+    });
+    const found = await this.unbounded({ ...rows, controls: limited, times }, level);
+    const { sigma } = await this.unbounded({ ...begin, controls: rows.controls }, level);
+    return {
+      ...found,
+      duration: found.duration.map((own, row) => (raw[row] === bounded[row] ? own : bounded[row]!)),
+      sigma: found.sigma.map((own, row) => (outside[row] ? sigma[row]! : own)),
+    };
+  }
+
+  /** What the graph answers at any controls. */
+  async unbounded(rows: Rows, level: number): Promise<Answers> {
     const steps = rows.times.length / rows.count;
     const joints = this.#card.skeleton.parents.length;
     const shared = { rotations: steps * joints, root_position: steps, bone_offsets: joints };

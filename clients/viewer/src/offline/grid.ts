@@ -27,7 +27,7 @@ export async function sigma(
   const who = new Int32Array(points.length).fill(door.performer(card, asked.performer));
   const times = new Float32Array(points.length);
   const controls = Float32Array.from(points.flat());
-  const found = await graph.run({ count: points.length, controls, times, who }, 0);
+  const found = await graph.unbounded({ count: points.length, controls, times, who }, 0);
   const split = <Item>(all: readonly Item[]) =>
     up.map((_, row) => all.slice(row * right.length, (row + 1) * right.length));
   const within = (values: readonly number[]) =>

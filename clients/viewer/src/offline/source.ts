@@ -15,6 +15,7 @@ import type {
 } from "@posefield/client";
 
 import type { Source } from "../page.ts";
+import { type Deviation, deviations, sentence, told } from "./bounds.ts";
 import { card as read } from "./card.ts";
 import { type Course, closed, inPlace, times, type Way } from "./course.ts";
 import { crowd } from "./crowd.ts";
@@ -36,6 +37,7 @@ interface Asked {
   readonly level: number;
   readonly warnings: string[];
   readonly supported: boolean;
+  readonly deviations: readonly Deviation[];
 }
 
 export class Offline implements Source {
@@ -125,14 +127,16 @@ export class Offline implements Source {
     const supported = support.of(this.#card).holds(values);
     const said = found.length || supported ? found : [door.GAP];
     if (policy === "refuse" && said.length) throw new door.Refused(said.join("; "));
+    const apart = deviations(this.#card, values);
     return {
       controls: question.controls,
       point: Float32Array.from(values),
       who: Int32Array.of(door.performer(this.#card, question.performer)),
       performer: question.performer ?? null,
       level: door.level(this.#card, question.level ?? 0),
-      warnings: policy === "warn" ? said : [],
+      warnings: policy === "warn" ? [...said, ...apart.map(sentence)] : [],
       supported,
+      deviations: apart,
     };
   }
 
@@ -147,7 +151,7 @@ export class Offline implements Source {
     const model = this.#card.identity;
     const seen = this.#card.performers.length ? { performer_seen: performer !== null } : {};
     const own = { model, controls, performer, level, duration, sigma, supported, warnings };
-    return { ...own, ...seen } as Trust;
+    return { ...own, ...seen, ...told(asked.deviations, sigma) } as Trust;
   }
 }
 
