@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
 
-import { Client, type ModelCard, type SigmaGrid } from "@posefield/client";
+import { Client, type ModelCard, type SigmaGrid, type Trust } from "@posefield/client";
 import type { Browser, Page } from "playwright-core";
 
 import { place, placed } from "../src/skeleton.ts";
@@ -86,6 +86,25 @@ for (const model of ["reaching", "cmu_walk"]) {
       const moved = await ask<Numbers>("pose", { controls: other, times });
       assert.ok(gap(card, coarser, theirs) > NEAR);
       assert.ok(gap(card, moved, theirs) > NEAR);
+    });
+
+    it("bounds answers far outside what was sampled as the service does", async () => {
+      const first = Object.fromEntries(card.controls.map((own) => [own.name, own.default]));
+      for (const { name, minimum, maximum } of card.controls) {
+        for (const share of [-8, -0.2, 1.1, 1.6, 9]) {
+          const controls = { ...first, [name]: minimum + share * (maximum - minimum) };
+          const question = { controls, times: [0, 0.3 * card.durations[0]!] };
+          const own = await ask<Numbers & { trust: Trust }>("pose", question);
+          const theirs = await service.pose(model, { ...question, exact: "none" });
+          assert.ok(gap(card, own, theirs) < NEAR, `${name} ${share}`);
+          assert.ok(Math.abs(own.trust.duration - theirs.trust.duration) < NEAR);
+          assert.equal(own.trust.band, theirs.trust.band);
+          assert.deepEqual(
+            own.trust.deviations?.map((each) => [each.control, each.side]),
+            theirs.trust.deviations?.map((each) => [each.control, each.side]),
+          );
+        }
+      }
     });
 
     it("makes clips that travel, stay in place and close", async () => {

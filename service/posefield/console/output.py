@@ -18,9 +18,8 @@ def written_message(path: Path, answer: ClipAnswer, json: bool) -> str:
     """Return the message about a written clip, as JSON or as text."""
     frames = len(answer.clip)
     if json:
-        return as_json(
-            {"file": str(path), "frames": frames, "rate": answer.clip.rate, **answer.trust.document()}
-        )
+        facts = answer.trust.document()
+        return as_json({"file": str(path), "frames": frames, "rate": answer.clip.rate, **facts})
     return (
         f"{path}: {frames} frames at {answer.clip.rate:g} a second, {answer.trust.duration:.2f} s, "
         f"give or take {100 * answer.trust.sigma:.1f} cm ({band(answer.trust.sigma)})"

@@ -15,9 +15,9 @@ from posefield.model_file.model_card import Control, ModelCard
 
 MARGIN = 0.25
 """Margin of controls, as a share of the sampled range, and of durations, as a share of the captured
-ones. Answers with support last up to 1.25 times as long as the longest captured clip (three
-families of captured motion and the procedural one, up to 0.15 of the range outside the samples), and
-paths of walking crowds need controls up to 0.2 of a range outside.
+ones. Measured on three families of captured motion and the procedural one: up to 0.15 of the range
+outside the samples, supported answers last 0.93 times the shortest to 1.25 times the longest
+captured clip; paths of walking crowds need controls up to 0.2 of a range outside.
 """
 SLACK = 1e-6
 """Share of the range that a control inside it may lie outside by rounding."""

@@ -42,9 +42,10 @@ UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 class Control:
     """One control parameter, its unit and its sampled range.
 
-    default: its value in the medoid clip, so that all defaults are those of one clip. values: the distinct sampled values where there are
-    at most ten (a handful of performers, sitting or standing), else empty. measure: how it is
-    measured of a motion; None for a control whose values come from the table of clips.
+    default: its value in the medoid clip, so that all defaults are those of one clip. values: the
+    distinct sampled values where there are at most ten (a handful of performers, sitting or
+    standing), else empty. measure: how it is measured of a motion; None for a control whose values
+    come from the table of clips.
     """
 
     name: Key

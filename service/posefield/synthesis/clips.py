@@ -25,7 +25,8 @@ class ClipPreview:
     """Properties of a clip that are known before its synthesis.
 
     frames: number of frames. warnings: of the controls, as in the answer; deviations of controls
-    that the correction constrains are told with the values at which they act. missed: true if the clip misses a target.
+    that the correction constrains are told with the values at which they act. missed: true if the
+    clip misses a target.
     """
 
     frames: int

@@ -72,8 +72,9 @@ def _range_warning(question: CrowdQuestion, control: Control, values: Floats) ->
 
 def _limited_part(control: Control, values: Floats) -> str:
     """Return the part of a warning that tells at which value the farthest values act."""
-    ends = [answer_bounds.limit_control(control, float(v)) for v in (values.min(), values.max())]
-    limited = [f"{a:.4g}" for a, v in zip(ends, (values.min(), values.max())) if a != v]
+    ends = float(values.min()), float(values.max())
+    acting = [answer_bounds.limit_control(control, value) for value in ends]
+    limited = [f"{own:.4g}" for own, value in zip(acting, ends, strict=True) if own != value]
     return f"; values further out act as {' or '.join(limited)} {control.unit}" if limited else ""
 
 

@@ -1,5 +1,6 @@
 """Tests of the choice of controls that a question omits."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -116,7 +117,7 @@ def test_open_controls_are_those_of_one_captured_clip_near_the_given_ones(card):
 def test_a_choice_never_lies_between_two_clusters(card):
     """Who sits or stands is one of the two, though the mean of all hips lies between them."""
     hips = np.unique([point[1] for point in card.examples])
-    below, above = max(zip(hips, hips[1:], strict=False), key=lambda pair: pair[1] - pair[0])
+    below, above = max(itertools.pairwise(hips), key=lambda pair: pair[1] - pair[0])
     chooser = ControlImputer(card)
     for given in ({}, {"turn": 20.0}, {"turn": -3.0}, {"target_height": 1.0}, {"stature": 1.7}):
         hip = chooser.impute(given, NOBODY)["hip_height"]

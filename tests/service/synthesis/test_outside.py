@@ -1,0 +1,247 @@
+"""Tests of answers outside the sampled ranges: bounded, never beyond what was asked, and told."""
+
+import numpy as np
+import pytest
+
+from posefield.inference import session
+from posefield.model_file import answer_bounds
+from posefield.question.model_question import WhyQuestion
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.question.results import band
+from posefield.synthesis import clips, poses
+from posefield.synthesis.explanation import explain_result
+from posefield.synthesis.synthesizer import Synthesizer
+
+SHARES = (-40.0, -8.0, -1.0, -0.3, -0.2, -0.05, 0.0, 0.5, 1.0, 1.05, 1.2, 1.3, 2.0, 9.0, 40.0)
+"""Places of asked values, from 0 at the smallest sampled one to 1 at the largest."""
+NEAR = 1e-6
+# Share of a control's range: the tolerance of the correction in each.
+ROUNDING = 1e-3
+
+
+@pytest.fixture(scope="module", params=["labelled_path", "walk_path", "measured_walk_path"])
+def model(request) -> Synthesizer:
+    path = request.getfixturevalue(request.param)
+    return Synthesizer(path.stem, session.load(path))
+
+
+@pytest.fixture(scope="module")
+def walk(measured_walk_path) -> Synthesizer:
+    return Synthesizer("walk", session.load(measured_walk_path))
+
+
+def trust(model, controls, **rest):
+    return clips.synthesize_clip(model, ClipQuestion(controls=controls, **rest)).trust
+
+
+def at(control, share):
+    return control.minimum + share * (control.maximum - control.minimum)
+
+
+def swept(model, performer):
+    """The trust of every asked value of every control, alone and in order."""
+    for control in model.session.card.controls:
+        values = [at(control, share) for share in SHARES]
+        yield (
+            control,
+            values,
+            [trust(model, {control.name: v}, performer=performer) for v in values],
+        )
+
+
+def test_durations_stay_within_the_margin_of_the_captured_ones(model):
+    low, high = model.session.card.durations
+    margin = answer_bounds.MARGIN
+    for performer in (None, *model.session.card.performers):
+        for control, values, answers in swept(model, performer):
+            for value, answer in zip(values, answers, strict=True):
+                if not control.minimum <= value <= control.maximum:
+                    assert (
+                        low * (1 - margin) - NEAR <= answer.duration <= high * (1 + margin) + NEAR
+                    )
+
+
+def test_the_graph_alone_would_run_away(walk):
+    """Negative control of the bounds: what the file answers without them."""
+    speed = walk.session.card.control("speed")
+    typical = {c.name: c.default for c in walk.session.card.controls}
+    point = np.array([list({**typical, "speed": at(speed, 9.0)}.values())], np.float32)
+    feed = {"controls": point, "time": np.zeros((1, 1), np.float32)}
+    raw = walk.session.runtimes[0].run(["duration"], feed)[0][0]
+    least = walk.session.bounds.duration_limits[0]
+    assert raw < 0.5 * least <= walk.session.durations(point)[0] * (1 + NEAR)
+
+
+def test_a_measured_control_is_given_monotonically_and_never_passed(model):
+    for performer in (None, *model.session.card.performers):
+        for control, values, answers in swept(model, performer):
+            if control.measure is None or control.measure.is_body_measure:
+                continue
+            given = np.array([answer.measured[control.name] for answer in answers])
+            room = ROUNDING * (control.maximum - control.minimum)
+            assert np.all(np.diff(given) >= -room), control.name
+            for value, found in zip(values, given, strict=True):
+                if value > control.maximum:
+                    assert found <= value + room
+                if value < control.minimum:
+                    assert found >= value - room
+
+
+def test_travel_stays_near_the_captured_one(walk):
+    examples = np.array(walk.session.card.examples)
+    ends = np.full((len(examples), 1), 1e9)
+    captured = np.linalg.norm(walk.session.run(examples, ends, "travel")[0][:, 0, :2], axis=1)
+    room = answer_bounds.MARGIN
+    for control in walk.session.card.controls:
+        for share in SHARES:
+            answer = trust(walk, {control.name: at(control, share)})
+            length = answer.measured["speed"] * answer.duration
+            assert captured.min() * (1 - room) <= length <= captured.max() * (1 + room)
+
+
+def test_what_was_asked_and_given_is_told_with_its_side(walk):
+    speed = walk.session.card.control("speed")
+    for share, side in ((9.0, "below"), (-9.0, "above")):
+        value = at(speed, share)
+        found = trust(walk, {"speed": value})
+        [told] = found.deviations
+        assert (told.control, told.asked, told.side) == ("speed", value, side)
+        assert told.given == found.measured["speed"]
+        assert told.captured == (speed.minimum, speed.maximum)
+        assert told.sentence in found.warnings and f"; {side} what was asked" in told.sentence
+        assert trust(walk, {"speed": value}, extrapolate="ok").warnings == ()
+        assert trust(walk, {"speed": value}, extrapolate="ok").deviations == (told,)
+        facts = found.facts()["deviations"][0]
+        assert facts["side"] == side and facts["captured"] == [speed.minimum, speed.maximum]
+    assert trust(walk, {"speed": at(speed, 0.5)}).deviations == ()
+    assert "deviations" not in trust(walk, {"speed": at(speed, 0.5)}).facts()
+
+
+def test_a_control_that_is_not_measured_acts_as_at_the_limit(labelled_path):
+    model = Synthesizer("labelled", session.load(labelled_path))
+    turn = model.session.card.control("turn")
+    typical = {c.name: c.default for c in model.session.card.controls}
+    limit = answer_bounds.limit_control(turn, 1e9)
+    far, end = ({**typical, "turn": value} for value in (at(turn, 7.0), limit))
+    one, other = (clips.synthesize_clip(model, ClipQuestion(controls=c)) for c in (far, end))
+    assert one.clip.rotations.tobytes() == other.clip.rotations.tobytes()
+    assert [each.given for each in one.trust.deviations] == [limit]
+    assert other.trust.deviations == ()
+    # Sigma is that of the asked values, and a little inside the limit it is another clip.
+    assert one.trust.sigma > other.trust.sigma
+    inside = {**typical, "turn": at(turn, 1.2)}
+    assert trust(model, inside).duration != one.trust.duration
+
+
+def test_within_the_ranges_the_answer_is_the_graph_s(model, rng):
+    card = model.session.card
+    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    points = rng.uniform(low, high, (50, len(low)))
+    time = np.full((50, 1), 0.4 * card.durations[0])
+    outputs = ("rotations", "root_position", "duration", "sigma", "travel")
+    feed = {"controls": points.astype(np.float32), "time": time.astype(np.float32)}
+    if card.performers:
+        feed["performer"] = np.zeros((50, len(card.performers)), np.float32)
+    raw = model.session.runtimes[0].run(list(outputs), feed)
+    labels = feed.get("performer")
+    for own, expected in zip(
+        model.session.run(points, time, *outputs, labels=labels), raw, strict=True
+    ):
+        assert own.tobytes() == expected.tobytes()
+    # Among rows outside, those inside keep their bytes, too.
+    mixed = np.vstack([points, points + 2.0 * (high - low)])
+    both = model.session.run(
+        mixed,
+        np.tile(time, (2, 1)),
+        *outputs,
+        labels=None if labels is None else np.tile(labels, (2, 1)),
+    )
+    for own, expected in zip(both, raw, strict=True):
+        np.testing.assert_allclose(own[:50], expected, atol=1e-6)
+    assert np.abs(both[0][50:] - raw[0]).max() > 1e-2
+
+
+def test_poses_clips_and_states_agree_outside(model):
+    card = model.session.card
+    for control in card.controls:
+        for share in (-0.4, 3.0):
+            asked = {c.name: c.default for c in card.controls} | {control.name: at(control, share)}
+            clip = trust(model, asked, exact="none")
+            pose = poses.synthesize_poses(
+                model, PoseQuestion(controls=asked, times=[0.3 * clip.duration], exact="none")
+            )
+            point = np.array([list(asked.values())])
+            state = model.session.state(point, np.array([0.3 * clip.duration]))
+            assert pose.trust.duration == pytest.approx(clip.duration, rel=1e-6)
+            assert state.duration == pytest.approx(clip.duration, rel=1e-6)
+            assert state.asked_sigma == pytest.approx(clip.sigma, rel=1e-5)
+            last = model.session.state(point, np.array([clip.duration])).frames[0]
+            assert last == pytest.approx(card.frames - 1.0, abs=1e-3)
+
+
+def test_bounds_are_continuous_at_the_ends_of_the_ranges(model):
+    """A step over the end of a range changes a duration as little as one before it."""
+    card = model.session.card
+    labels = np.zeros((1, len(card.performers)))
+    ends = [(c.minimum, c.maximum) for c in card.controls]
+    for corner in np.stack(np.meshgrid(*ends), axis=-1).reshape(-1, len(ends)):
+        for column, (low, high) in enumerate(ends):
+            step = np.zeros(len(ends))
+            step[column] = 2e-6 * (high - low) * (1 if corner[column] == high else -1)
+            inside, outside = (
+                model.session.durations((corner + s)[None], labels) for s in (0, step)
+            )
+            assert outside[0] == pytest.approx(inside[0], rel=1e-4)
+
+
+def test_weights_are_those_of_the_answer_and_shares_positive(model):
+    card = model.session.card
+    for share in (-3.0, 0.3, 0.8, 4.0):
+        asked = {c.name: at(c, share) for c in card.controls}
+        for performer in (None, *card.performers):
+            found = explain_result(
+                model, WhyQuestion(controls=asked, performer=performer, nearest=4)
+            )
+            shares = [clip.share for clip in found.nearest]
+            assert min(shares) >= 0.0 and found.others_share >= 0.0
+            assert sum(shares) + found.others_share == pytest.approx(1.0, abs=1e-12)
+            assert all(clip.share == 0.0 for clip in found.nearest if clip.weight <= 0.0)
+    limits = {c.name: answer_bounds.limit_control(c, at(c, 4.0)) for c in card.controls}
+    one, other = (
+        explain_result(model, WhyQuestion(controls=c, nearest=10_000)) for c in (asked, limits)
+    )
+    assert {c.source: c.weight for c in one.nearest} == {c.source: c.weight for c in other.nearest}
+
+
+def test_a_weight_may_be_negative_where_a_share_is_not(model):
+    """Negative control of the shares."""
+    card = model.session.card
+    asked = {c.name: at(c, 1.2) for c in card.controls}
+    found = explain_result(model, WhyQuestion(controls=asked, nearest=10_000))
+    assert min(clip.weight for clip in found.nearest) < 0.0
+    assert sum(max(clip.weight, 0.0) for clip in found.nearest) > 1.0
+
+
+def test_bands_are_one_scale_for_all_models(model):
+    names = [band(sigma) for sigma in (0.0, 0.03, 0.0301, 0.075, 0.0751, 0.15, 0.1501, 9.0)]
+    assert names == ["close", "close", "near", "near", "rough", "rough", "guess", "guess"]
+    answer = trust(model, {})
+    assert answer.document() == {**answer.facts(), "band": band(answer.sigma)}
+
+
+def test_the_defaults_are_the_controls_of_one_captured_clip(model):
+    card = model.session.card
+    defaults = tuple(control.default for control in card.controls)
+    places = np.array(card.examples)
+    places = (places - places.min(axis=0)) / np.ptp(places, axis=0)
+    totals = [float(np.linalg.norm(places - own, axis=1).sum()) for own in places]
+    assert totals[card.examples.index(defaults)] == pytest.approx(min(totals), abs=1e-9)
+    assert max(totals) > min(totals) + 0.1
+    assert tuple(trust(model, {}).controls.values()) == defaults
+
+
+def test_medians_of_each_control_are_no_captured_clip(labelled_path):
+    """Negative control of the defaults."""
+    card = session.load(labelled_path).card
+    medians = tuple(np.sort(column)[len(column) // 2] for column in np.transpose(card.examples))
+    assert medians not in card.examples
