@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { describe, it } from "node:test";
 
 import { band, worded } from "../src/bands.ts";
-import { Bounds, deviations, limited, sentence, told } from "../src/offline/bounds.ts";
+import { Bounds, deviations, limited, merged, sentence, told } from "../src/offline/bounds.ts";
 import { CARD } from "./card.ts";
 
 const bounds = new Bounds(CARD);
@@ -36,6 +36,8 @@ describe("bounds of answers", () => {
       sentence(found[0]!),
       "speed: asked 3 m/s, given 2.375 m/s, captured 0.5 to 2 m/s; below what was asked",
     );
+    const said = ["speed = 3 m/s lies outside", "time = 9 deg lies outside"];
+    assert.deepEqual(merged(said, found), [said[1], sentence(found[0]!)]);
     assert.equal(deviations(CARD, [-1, 0])[0]!.side, "above");
     assert.deepEqual(told([], 0.05), { band: "near" });
     assert.deepEqual(told(found, 0.5), { band: "guess", deviations: found });

@@ -16,7 +16,8 @@ from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer
 from posefield.synthesis import frame_times
 from posefield.synthesis.poses import POSE_OUTPUTS
-from posefield.synthesis.synthesizer import Synthesizer, deviation_warnings
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation import question_validation
 from posefield.validation.question_validation import ValidatedQuestion
 
 
@@ -75,8 +76,10 @@ def preview_clip(
     duration, misses = _duration_and_misses(model, question, asked)
     times = frame_times.sample_times(asked, duration, most)
     # A loop ends with its first frame again.
-    said = () if asked.extrapolate == "ok" else deviation_warnings(question.deviations)
-    return ClipPreview(len(times) + asked.loop, (*question.warnings, *said), misses)
+    warnings = question_validation.merge_warnings(
+        question.warnings, question.deviations, asked.extrapolate
+    )
+    return ClipPreview(len(times) + asked.loop, warnings, misses)
 
 
 def _named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:

@@ -13,7 +13,8 @@ from posefield.kriging import kriging_model, support
 from posefield.model_file.model_card import ModelCard
 from posefield.question.model_question import WhyQuestion
 from posefield.question.results import CapturedClip, Explanation, SupportReport
-from posefield.synthesis.synthesizer import Synthesizer, deviation_warnings
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation import question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
 NEAREST, MOST = 10, 10_000
@@ -36,8 +37,10 @@ def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
         _captured_clip(card, i, distances[i], weights[i], shares[i]) for i in near.tolist()
     )
     rest = float(weights[others].sum()), float(shares[others].sum())
-    apart = deviation_warnings(question.deviations) if asked.extrapolate == "warn" else ()
-    controls, who, said = question.controls, question.performer, (*question.warnings, *apart)
+    controls, who = question.controls, question.performer
+    said = question_validation.merge_warnings(
+        question.warnings, question.deviations, asked.extrapolate
+    )
     inferred, backing = question.inferred, _support_report(model.validator, question)
     return Explanation(
         model.identity, controls, who, said, backing, found, len(others), *rest, inferred

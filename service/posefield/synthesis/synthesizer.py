@@ -82,7 +82,7 @@ class Synthesizer(NamedModel):
     ) -> Trust:
         """Return the trust of an answer with this duration, s, and sigma, m."""
         who, apart = question.performer, question.deviations
-        said = () if asked.extrapolate == "ok" else deviation_warnings(apart)
+        warnings = question_validation.merge_warnings(question.warnings, apart, asked.extrapolate)
         seen = who is not None if self.session.card.performers else None
         shares = self.session.card.joint_sigma if asked.joint_sigma else ()
         return Trust(
@@ -90,7 +90,7 @@ class Synthesizer(NamedModel):
             question.controls,
             duration,
             sigma,
-            (*question.warnings, *said),
+            warnings,
             who,
             question.level,
             question.supported,
@@ -135,11 +135,6 @@ class Synthesizer(NamedModel):
                     control, question.controls[name], measured[name]
                 )
         return tuple(found[name] for name in question.controls if name in found)
-
-
-def deviation_warnings(apart: Sequence[Deviation]) -> tuple[str, ...]:
-    """Return a sentence for each control whose value the motion does not have."""
-    return tuple(each.sentence for each in apart)
 
 
 def miss_warnings(met: Sequence[ConstraintResult]) -> tuple[str, ...]:

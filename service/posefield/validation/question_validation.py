@@ -170,6 +170,20 @@ def limited_controls(controls: Sequence[Control], point: Sequence[float]) -> tup
     return tuple(found)
 
 
+def merge_warnings(
+    warnings: Sequence[str], deviations: Sequence[Deviation], extrapolate: ExtrapolationPolicy
+) -> tuple[str, ...]:
+    """Return the warnings of a question with those of deviations, one for each control.
+
+    A deviation tells the sampled range, too, so it replaces the warning of `range_warnings`.
+    """
+    if extrapolate == "ok":
+        return tuple(warnings)
+    told = tuple(f"{each.control} = " for each in deviations)
+    kept = (text for text in warnings if not text.startswith(told))
+    return (*kept, *(each.sentence for each in deviations))
+
+
 def deviation(control: Control, asked: float, given: float) -> Deviation:
     """Return the deviation of a control's given value from the requested one."""
     captured = control.minimum, control.maximum

@@ -92,6 +92,12 @@ export function sentence({ control, asked, given, unit, captured, side }: Deviat
   );
 }
 
+/** One warning for each control: a deviation tells the sampled range, too. */
+export function merged(warnings: readonly string[], found: readonly Deviation[]): string[] {
+  const told = (text: string) => found.some(({ control }) => text.startsWith(`${control} = `));
+  return [...warnings.filter((text) => !told(text)), ...found.map(sentence)];
+}
+
 /** What trust says of deviations, and the band of sigma. */
 export function told(found: readonly Deviation[], sigma: number) {
   return { ...(found.length ? { deviations: [...found] } : {}), band: band(sigma) };

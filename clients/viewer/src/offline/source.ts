@@ -15,7 +15,7 @@ import type {
 } from "@posefield/client";
 
 import type { Source } from "../page.ts";
-import { type Deviation, deviations, sentence, told } from "./bounds.ts";
+import { type Deviation, deviations, merged, told } from "./bounds.ts";
 import { card as read } from "./card.ts";
 import { type Course, closed, inPlace, times, type Way } from "./course.ts";
 import { crowd } from "./crowd.ts";
@@ -134,7 +134,7 @@ export class Offline implements Source {
       who: Int32Array.of(door.performer(this.#card, question.performer)),
       performer: question.performer ?? null,
       level: door.level(this.#card, question.level ?? 0),
-      warnings: policy === "warn" ? [...said, ...apart.map(sentence)] : [],
+      warnings: policy === "warn" ? merged(said, apart) : [],
       supported,
       deviations: apart,
     };

@@ -34,7 +34,7 @@ class Begun:
 def begin(opened: Session, level: int = 0) -> Begun:
     """A motion in the middle of the controls, of the first performer."""
     bench = constrained_motion.build_corrector(opened, level)
-    point = np.array([[control.default for control in opened.card.controls]])
+    point = np.median(opened.card.examples, axis=0, keepdims=True)
     performers = len(opened.card.performers)
     state = opened.state(point, np.array([0.0, 0.3, 0.61]), np.eye(1, performers), level)
     return Begun(opened, bench, bench.predict(state))
