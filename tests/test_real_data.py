@@ -301,3 +301,35 @@ def test_a_crowds_feet_slide_no_more_than_those_of_the_clips(made, model):
         rate,
     )
     assert left.mean() == pytest.approx(feet.mean(), rel=0.01)
+
+
+OUTSIDE = (-40.0, -3.0, -0.3, -0.1, 0.0, 1.0, 1.1, 1.3, 4.0, 40.0)
+"""Places of asked values: 0 is the smallest sampled one, 1 the largest."""
+
+
+def test_outside_the_samples_nothing_runs_away(model):
+    card, bounds = model.session.card, model.session.bounds
+    shortest, longest = bounds.duration_limits
+    for performer in (None, *card.performers):
+        for control in card.controls:
+            width, given = control.maximum - control.minimum, []
+            for share in OUTSIDE:
+                value = control.minimum + share * width
+                question = ClipQuestion(controls={control.name: value}, performer=performer)
+                trust = clips.synthesize_clip(model, question).trust
+                given.append(trust.measured[control.name])
+                assert shortest - 1e-6 <= trust.duration <= longest + 1e-6
+                beyond = given[-1] - value if share > 1.0 else value - given[-1]
+                assert beyond < 1e-3 * width or 0.0 <= share <= 1.0
+                told = [each.control for each in trust.deviations]
+                assert (control.name in told) == (abs(given[-1] - value) > 1e-3)
+            assert np.all(np.diff(given) > -1e-3 * width)
+            assert given[-1] - given[0] > 0.9 * width, "negative control: the control acts"
+
+
+def test_the_default_is_a_captured_clip(model):
+    card = model.session.card
+    defaults = tuple(control.default for control in card.controls)
+    assert defaults in card.examples
+    found = clips.synthesize_clip(model, ClipQuestion(controls={})).trust
+    assert tuple(found.controls.values()) == defaults and found.supported
