@@ -98,20 +98,24 @@ def test_why_lists_the_nearest_clips_and_the_others(posefield, labelled_path):
     head, *lines, others, support = out.splitlines()
     assert (code, err, len(lines)) == (0, "", 3)
     assert support.startswith("something like it was captured: variance 0.0")
-    assert head.split() == ["clip", "distance", "weight"]
+    assert head.split() == ["clip", "distance", "share", "weight"]
     assert re.fullmatch(
-        r"reach_\d+\.bvh +0\.\d{3} +\d+\.\d %  (tall|middle|short), stature .*", lines[0]
+        r"reach_\d+\.bvh +0\.\d{3} +\d+\.\d % +-?\d+\.\d %  (tall|middle|short), stature .*",
+        lines[0],
     )
-    assert re.fullmatch(r"43 others +-?\d+\.\d %", others)
+    assert re.fullmatch(r"43 others +\d+\.\d % +-?\d+\.\d %", others)
 
 
 def test_why_answers_as_json(posefield, labelled_path):
     code, out, err = posefield("why", labelled_path, *CONTROLS[:-1], "target_height=9", "--json")
     found = json.loads(out)
-    assert code == 0 and err.startswith("warning: target_height = 9 m lies outside")
-    weights = [clip["weight"] for clip in found["nearest"]]
-    assert len(weights) == 10 and found["others"]["count"] == 36
-    assert abs(sum(weights) + found["others"]["weight"] - 1.0) < 1e-7
+    assert code == 0 and err.startswith("warning: target_height: asked 9 m, given 2.")
+    assert err.endswith("; below what was asked\n") and err.count("warning") == 1
+    for number in ("weight", "share"):
+        each = [clip[number] for clip in found["nearest"]]
+        assert len(each) == 10 and found["others"]["count"] == 36
+        assert abs(sum(each) + found["others"][number] - 1.0) < 1e-7
+    assert min(clip["share"] for clip in found["nearest"]) >= 0.0
 
 
 def test_a_gap_is_warned_of_and_refused_where_that_is_asked(posefield, refused, labelled_path):
@@ -501,7 +505,7 @@ def test_clip_writes_every_format(posefield, model_path, tmp_path, ending):
         "file": str(path),
         "frames": len(answer.clip),
         "rate": 30.0,
-        **answer.trust.facts(),
+        **answer.trust.document(),
     }
     assert path.read_bytes() == CLIP_ENCODERS[ending].encode(answer)
     assert stat.S_IMODE(path.stat().st_mode) == 0o644

@@ -408,6 +408,8 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     level: int
     duration: float
     sigma: float
+    band: str | None = None
+    deviations: tuple[Deviation, ...] = ()
     supported: bool | None = None
     performer_seen: bool | None = None
     joint_sigma: tuple[float, ...] = ()

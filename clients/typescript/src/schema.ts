@@ -969,6 +969,9 @@ export interface components {
             duration: number;
             /** @description As in Trust, in metres. */
             sigma: number;
+            band?: components["schemas"]["Band"];
+            /** @description As in Trust. */
+            deviations?: components["schemas"]["Deviation"][];
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];

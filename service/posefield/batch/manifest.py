@@ -13,7 +13,7 @@ def entry(name: str, file: str, content: bytes, answer: ClipAnswer) -> dict[str,
 
     file: path relative to the manifest. content: the file's bytes.
     """
-    facts = answer.trust.facts()
+    facts = answer.trust.document()
     return {
         "name": name,
         "file": file,

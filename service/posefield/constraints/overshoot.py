@@ -48,8 +48,8 @@ def bring_back(
     found = replace(held, numbers=numbers)
     measured = bench.measured(found)
     first = len(held.results) - len(goals.targets)
-    own = [_result(met, asked, measured) for met in held.results[:first]]
-    return replace(found, results=(*own, *held.results[first:]))
+    controls = [_result(met, asked, measured) for met in held.results[:first]]
+    return replace(found, results=(*controls, *held.results[first:]))
 
 
 def _limit_duration(held: ConstrainedMotion, bounds: AnswerBounds) -> Floats:

@@ -28,7 +28,8 @@ def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
     card = model.session.card
     question = model.validator.question(asked.controls, asked.extrapolate, asked.performer, level=0)
     distances = model.session.kriging_weights.distances(_point(card, question))[0]
-    acting = replace(question, point=model.session.bounds.limit(question.point))
+    limited = model.session.bounds.limit(question.point).astype(np.float64)
+    acting = replace(question, point=limited)
     weights = model.session.kriging_weights.weights(_point(card, acting))[0]
     order = np.argsort(distances, kind="stable")
     near, others = order[: asked.nearest], order[asked.nearest :]
