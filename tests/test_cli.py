@@ -433,7 +433,7 @@ OUTSIDE = [*CONTROLS[:-1], "target_height=2.5"]
 def test_outside_the_samples_is_warned_of_or_refused(posefield, refused, model_path):
     code, out, err = posefield("pose", model_path, *OUTSIDE)
     assert code == 0
-    assert err.startswith("warning: target_height = 2.5 m lies outside what was sampled, ")
+    assert err.startswith("warning: target_height: asked 2.5 m, given 2.27 m, captured 0.309 to ")
     assert [f"warning: {w}\n" for w in json.loads(out)["trust"]["warnings"]] == [err]
     said = refused(2, "pose", model_path, *OUTSIDE, "--extrapolate", "refuse")
     assert said.startswith("controls: target_height = 2.5 m lies outside")
