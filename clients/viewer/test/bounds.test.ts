@@ -39,6 +39,7 @@ describe("bounds of answers", () => {
     const said = ["speed = 3 m/s lies outside", "time = 9 deg lies outside"];
     assert.deepEqual(merged(said, found), [said[1], sentence(found[0]!)]);
     assert.equal(deviations(CARD, [-1, 0])[0]!.side, "above");
+    assert.deepEqual(deviations(CARD, [2.376, 30.03]), []);
     assert.deepEqual(told([], 0.05), { band: "near" });
     assert.deepEqual(told(found, 0.5), { band: "guess", deviations: found });
   });

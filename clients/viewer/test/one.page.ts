@@ -214,6 +214,12 @@ test("outside of what was sampled is marked, and inside is not", () =>
     assert.notEqual(await control.getAttribute("data-outside"), null);
     assert.match((await slider(page, "turn").getAttribute("aria-valuetext"))!, /outside/);
     await page.getByText("That is a guess").first().waitFor();
+    // A quarter of the range outside a value acts as it is; beyond, the slider says what is given.
+    const [field, given] = [control.getByRole("textbox"), control.locator("[data-given]")];
+    assert.equal(await given.textContent(), "");
+    await field.fill("900");
+    await field.press("Enter");
+    await given.getByText(/^Given 1\d\d deg: below what was asked\.$/).waitFor();
     await control.getByRole("button", { name: "Reset Turn" }).click();
     await until(async () => (await warnings.count()) === 0, "the warning goes");
   }));

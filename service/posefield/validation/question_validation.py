@@ -19,6 +19,12 @@ from posefield.validation import input_limits
 from posefield.validation.imputation import ControlImputer
 
 
+DEVIATION_SHARE = 1e-3
+"""Share of a control's range by which it may act at another value without a word: a slider that
+ends at the limit rounds its value.
+"""
+
+
 @dataclass(frozen=True)
 class ValidatedQuestion:
     """A validated question.
@@ -165,7 +171,7 @@ def limited_controls(controls: Sequence[Control], point: Sequence[float]) -> tup
     found = []
     for control, value in zip(controls, point, strict=True):
         acting = answer_bounds.limit_control(control, value)
-        if acting != value:
+        if abs(acting - value) > DEVIATION_SHARE * (control.maximum - control.minimum):
             found.append(deviation(control, value, acting))
     return tuple(found)
 

@@ -126,6 +126,8 @@ def test_a_control_that_is_not_measured_acts_as_at_the_limit(labelled_path):
     one, other = (clips.synthesize_clip(model, ClipQuestion(controls=c)) for c in (far, end))
     assert one.clip.rotations.tobytes() == other.clip.rotations.tobytes()
     assert [each.given for each in one.trust.deviations] == [limit]
+    rounded = {**typical, "turn": limit + 5e-4 * (turn.maximum - turn.minimum)}
+    assert trust(model, rounded).deviations == ()
     assert other.trust.deviations == ()
     # Sigma is that of the asked values, and a little inside the limit it is another clip.
     assert one.trust.sigma > other.trust.sigma

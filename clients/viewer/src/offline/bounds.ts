@@ -6,6 +6,8 @@ import { band } from "../bands.ts";
 
 const MARGIN = 0.25;
 const SLACK = 1e-6;
+/** Share of a range by which a control acts at another value without a word. */
+const DEVIATION = 1e-3;
 
 type Control = ModelCard["controls"][number];
 
@@ -75,8 +77,8 @@ export class Bounds {
 export function deviations(card: ModelCard, values: readonly number[]): Deviation[] {
   return card.controls.flatMap((control, i) => {
     const [asked, given] = [values[i]!, limited(control, values[i]!)];
-    if (asked === given) return [];
     const { name, unit, minimum, maximum } = control;
+    if (Math.abs(asked - given) <= DEVIATION * (maximum - minimum)) return [];
     const side = given > asked ? ("above" as const) : ("below" as const);
     return [{ control: name, asked, given, unit, captured: [minimum, maximum], side }];
   });
