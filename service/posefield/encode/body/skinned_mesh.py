@@ -1,0 +1,68 @@
+"""A body mesh skinned to a skeleton, which follows the bone lengths of each clip."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from posefield.common.units import Floats, Singles
+
+Integers = npt.NDArray[np.int32]
+Bytes = npt.NDArray[np.uint8]
+
+FULL_WEIGHT = 255
+"""Sum of the weights of a point, which are whole numbers, so that they fit a byte in glTF."""
+
+
+@dataclass(frozen=True)
+class SkinnedMesh:
+    """P points, with normals, faces and weights, about a skeleton of J joints and E tips at rest.
+
+    points (P, 3): m. normals (P, 3): unit, outward. anchors (P, 2): two joints or, after all
+    joints, tips. shares (P,): a point moves by (1 - share) of the displacement of its first anchor
+    and share of its second's. joints, weights (P, I): the joints that move each point, and their
+    weights out of FULL_WEIGHT; points with fewer of them have zeros. counts: corners of each face;
+    corners: their points, counterclockwise from outside. tints (P,): index of the point's colour.
+    """
+
+    points: Floats
+    normals: Singles
+    anchors: Integers
+    shares: Floats
+    joints: Integers
+    weights: Bytes
+    counts: Integers
+    corners: Integers
+    tints: Integers
+
+    def points_at(self, moved: Floats) -> Singles:
+        """Return the points (M, P, 3), m, for anchors displaced by `moved` (M, J + E, 3), m."""
+        first, second = (moved.take(self.anchors[:, end], axis=1) for end in (0, 1))
+        second -= first
+        second *= self.shares[:, None]
+        first += second
+        first += self.points
+        return first.astype(np.float32)
+
+
+def triangles(counts: Integers, corners: Integers) -> Integers:
+    """Return the corners (T, 3) of faces cut into triangle fans."""
+    cut = counts - 2
+    owner = np.repeat(np.arange(len(cut)), cut)
+    first = (np.cumsum(counts) - counts)[owner]
+    turn = np.arange(len(owner)) - (np.cumsum(cut) - cut)[owner]
+    return corners[np.stack([first, first + turn + 1, first + turn + 2], axis=-1)]
+
+
+def vertex_normals(points: Floats, faces: Integers) -> Singles:
+    """Return unit normals (P, 3): the mean of the triangles (T, 3) at a point, by their areas."""
+    a, b, c = (points[faces[:, corner]] for corner in range(3))
+    areas = np.cross(b - a, c - a)
+    summed = np.zeros_like(points)
+    for corner in range(3):
+        np.add.at(summed, faces[:, corner], areas)
+    lengths = np.linalg.norm(summed, axis=-1, keepdims=True)
+    up = np.array([0.0, 1.0, 0.0])
+    return np.where(lengths > 0, summed / np.where(lengths > 0, lengths, 1.0), up).astype(
+        np.float32
+    )
