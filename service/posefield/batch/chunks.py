@@ -137,7 +137,9 @@ class _ChunkInProgress:
         contents: dict[int, bytes] = {}
         for extension in dict.fromkeys(one.query.format for one in made):
             own = [index for index, one in enumerate(made) if one.query.format == extension]
-            convention = CLIP_ENCODERS[extension].convention(self.job.unit, self.job.up)
+            convention = CLIP_ENCODERS[extension].convention(
+                self.job.unit, self.job.up, self.job.body
+            )
             answers = [made[index].answer for index in own]
             files = self.layout.encode(extension)(answers, convention)
             contents |= zip(own, files, strict=True)

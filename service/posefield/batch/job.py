@@ -13,6 +13,7 @@ from posefield.common.errors import InvalidField
 from posefield.encode.files.file_convention import Unit, Up
 from posefield.inference import session
 from posefield.motion.joint_roles import NamingConvention
+from posefield.question.body_kind import BodyKind
 from posefield.synthesis.synthesizer import Synthesizer
 
 VERSIONED_PACKAGES = ("numpy", "onnxruntime", "usd-core")
@@ -25,7 +26,8 @@ class ExportJob:
 
     model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
     layout: name of the layout. chunk: rows per chunk. unit, up: None for the convention of each
-    format. names: default naming convention of the joints.
+    format. names: default naming convention of the joints. body: None for the default of each
+    format.
     """
 
     model: str
@@ -36,6 +38,7 @@ class ExportJob:
     unit: Unit | None = None
     up: Up | None = None
     names: NamingConvention = "own"
+    body: BodyKind | None = None
 
     def __post_init__(self) -> None:
         if self.chunk < 1:

@@ -189,15 +189,15 @@ def _row_count(source: RowSource, skip: bool) -> int:
 def _checked_source(job: ExportJob, source: RowSource) -> RowSource:
     """Return the source with faults in place of the queries that the job cannot write."""
     misfit = layouts.find_layout(job.layout).misfit
-    if misfit is None and (job.unit or job.up):
+    if misfit is None and (job.unit or job.up or job.body):
         misfit = _convention_misfit
     return source if misfit is None else _CheckedSource(source, job, misfit)
 
 
 def _convention_misfit(job: ExportJob, query: ClipQuery) -> str | None:
-    """Return the reason for which a format cannot have the job's unit and up axis, or None."""
+    """Return the reason for which a format cannot have the job's unit, up axis and body, or None."""
     try:
-        CLIP_ENCODERS[query.format].convention(job.unit, job.up)
+        CLIP_ENCODERS[query.format].convention(job.unit, job.up, job.body)
     except InvalidField as fault:
         return str(fault)
     return None

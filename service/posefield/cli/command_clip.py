@@ -41,7 +41,7 @@ def clip(
     rate.
     """
     found = encoder_for(output)
-    convention = found.convention(question.unit, question.up)
+    convention = found.convention(question.unit, question.up, question.body)
     answer = clips.synthesize_clip(open_model(model), question)
     atomic_files.write(found.encode(answer, convention), output)
     print_warnings(answer.trust)

@@ -48,5 +48,5 @@ def crowd(
         raise InvalidField("count", f"{count}, expected none: every path has one character")
     question = structs.replace(question, count=DEFAULT_COUNT if count is None else count)
     asked = crowd_order.from_question(question, crowd_files.routes(paths) if paths else ())
-    facts = crowd_files.write_crowd(open_model(model), asked, question.instancing, output)
+    facts = crowd_files.write_crowd(open_model(model), asked, question, output)
     typer.echo(as_json(facts) if json else crowd_files.report_text(facts))

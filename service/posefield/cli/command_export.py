@@ -122,6 +122,7 @@ def export(
         question.unit,
         question.up,
         question.names,
+        question.body,
     )
     part = Shard.parse(execution.shard)
     place = _absolute(output) if execution.scheduler else output

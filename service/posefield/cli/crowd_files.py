@@ -24,13 +24,15 @@ from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.routes import Route
 from posefield.motion.crowd_clip import CrowdClip, Motions
+from posefield.question.body_kind import DEFAULT_BODY
+from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
 EXTENSIONS = (*usd_crowd.FILES, "npz")
 
 
 def write_crowd(
-    model: Synthesizer, asked: CrowdOrder, instancing: str, output: Path
+    model: Synthesizer, asked: CrowdOrder, question: WalkQuestion, output: Path
 ) -> dict[str, Any]:
     """Write a crowd to a file, and return its report as plain values.
 
@@ -40,6 +42,8 @@ def write_crowd(
     ending = output.suffix.removeprefix(".")
     if ending not in EXTENSIONS:
         raise InvalidField("output", f"{output.name!r} ends in none of {', '.join(EXTENSIONS)}")
+    if ending == "npz" and question.body is not None:
+        raise InvalidField("body", f"{question.body!r}, expected none given: npz files carry no body")
     opened = gait.fit_gait(model.session)
     made = crowd_order.build_crowd(model, opened, asked)
     feet = _FootSkateMeter(opened, asked.fps)
@@ -47,7 +51,9 @@ def write_crowd(
     if ending == "npz":
         crowd_tables.write_npz(watched, output)
     else:
-        crowd_writer.write(watched, output, instancing)
+        crowd_writer.write(
+            watched, output, question.instancing, question.body or DEFAULT_BODY
+        )
     return {
         "file": str(output),
         "model": made.facts["model"],

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 from posefield.common import cancellation
+from posefield.common.errors import InvalidField
 from posefield.encode import glb
 from posefield.encode.files import axis_conversion
 from posefield.encode.files import file_convention as conventions
@@ -21,6 +22,7 @@ from posefield.encode.tables.table import Table
 from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
+from posefield.question.body_kind import BodyKind
 from posefield.question.results import ClipAnswer, PoseAnswer, SigmaGrid
 
 
@@ -41,7 +43,8 @@ class ClipEncoder(Format):
     computed together. usual: the format's default convention, which its readers expect. law:
     whether the format allows no other convention. at_once: number of frames up to which a file is
     written in a millisecond or two, so that other requests may wait for it. per_joint: largest
-    number of bytes of a joint in a frame, without the parts that all frames share.
+    number of bytes of a joint in a frame, without the parts that all frames share. has_body:
+    whether the format carries a body.
     """
 
     write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
@@ -49,13 +52,23 @@ class ClipEncoder(Format):
     usual: Convention = METRES
     convention_fixed: bool = False
     inline_limit: int = 200
+    has_body: bool = False
 
-    def convention(self, unit: Unit | None, up: Up | None) -> Convention:
+    def convention(
+        self, unit: Unit | None, up: Up | None, body: BodyKind | None = None
+    ) -> Convention:
         """Return the requested convention; None is the format's default.
 
-        Raises InvalidField for a convention that the format does not allow.
+        Raises InvalidField for a convention that the format does not allow, and for a body in a
+        format that carries none.
         """
-        found = conventions.requested_convention(unit, up, self.usual)
+        if body is not None and not self.has_body:
+            raise InvalidField(
+                "body",
+                f"{body!r}, expected none given: {self.extension} files carry no body, "
+                "usda, usdc, usdz and glb do",
+            )
+        found = conventions.requested_convention(unit, up, body, self.usual)
         if self.convention_fixed:
             conventions.check_convention(found, self.usual, self.extension)
         return found
@@ -111,13 +124,13 @@ def _lazy_usd_writer(name: str) -> Callable[[Sequence[ClipAnswer], Convention], 
 
 CLIP_ENCODERS = by_extension(
     # A template takes 30 ms to make, and each number of frames needs another one.
-    ClipEncoder("usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, inline_limit=0),
+    ClipEncoder("usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, inline_limit=0, has_body=True),
     # Unlike those of usda and usdz, not registered with IANA, but in common use.
-    ClipEncoder("usdc", "model/vnd.usdc", _lazy_usd_writer("usdc"), 48, inline_limit=0),
-    ClipEncoder("usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0),
+    ClipEncoder("usdc", "model/vnd.usdc", _lazy_usd_writer("usdc"), 48, inline_limit=0, has_body=True),
+    ClipEncoder("usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0, has_body=True),
     ClipEncoder("json", JSON, sequential_writer(clip_tables.clip_json), 96),
     ClipEncoder("bvh", "application/x-bvh", sequential_writer(bvh), 72, CENTIMETRES),
-    ClipEncoder("glb", "model/gltf-binary", sequential_writer(glb.glb), 24, convention_fixed=True),
+    ClipEncoder("glb", "model/gltf-binary", sequential_writer(glb.glb), 24, convention_fixed=True, has_body=True),
     ClipEncoder("npz", NPZ, table_writer(tables.npz_table), 24),
     ClipEncoder("arrow", ARROW, table_writer(arrow_stream), 24),
     ClipEncoder("msgpack", MSGPACK, table_writer(tables.msgpack_table), 24),
@@ -181,7 +194,7 @@ GRID_ENCODERS: dict[str, TableEncoder[SigmaGrid]] = by_extension(
 class CrowdWriter(Format):
     """Writer of walking crowds as streams of USD in one format."""
 
-    def stream(self, crowd: CrowdClip, instancing: str) -> Iterator[bytes]:
+    def stream(self, crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
         """Return an iterator over the bytes of a crowd.
 
         Raises InvalidField as `crowd_writer.stream` does.
@@ -190,7 +203,7 @@ class CrowdWriter(Format):
             crowd_writer,  # usd-core: 0.12 CPU seconds of the start
         )
 
-        return crowd_writer.stream(crowd, self.extension, instancing)
+        return crowd_writer.stream(crowd, self.extension, instancing, body)
 
 
 CROWD_WRITERS = by_extension(

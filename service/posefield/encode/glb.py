@@ -14,8 +14,9 @@ import numpy.typing as npt
 import orjson
 
 from posefield.common.units import Floats, Singles
-from posefield.encode.character import body_mesh, character
-from posefield.encode.character.body_mesh import Integers
+from posefield.encode.body import body_colours, skinned_mesh
+from posefield.encode.body.skinned_mesh import SkinnedMesh
+from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig, RestPose
 from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import METRES, Convention
@@ -29,11 +30,6 @@ MAGIC, VERSION, TEXT, BINARY = 0x46546C67, 2, 0x4E4F534A, 0x004E4942
 VERTICES, CORNERS = 34962, 34963
 """Targets of buffer views, by their OpenGL constants."""
 COMPONENTS = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}
-# The byte 255 stands for a weight of one.
-FULL_WEIGHT = np.array([255, 0, 0, 0], np.uint8)
-TINT_COLORS = np.round(255 * np.pad(body_mesh.TINTS, ((0, 0), (0, 1)), constant_values=1.0)).astype(
-    np.uint8
-)
 CONSTANT_TOLERANCE = 1e-9
 """Largest variation, m, of a joint's translation that is taken as constant."""
 
@@ -89,22 +85,22 @@ def glb(answer: ClipAnswer, said: Convention) -> bytes:
     """
     file_convention.check_convention(said, METRES, "glb")
     clip, store = answer.clip, GlbBuffer()
-    rig = character.rig(clip.skeleton)
+    rig = character.rig(clip.skeleton, said.body)
     resting = character.rest_pose(rig, clip.translations[:1])
     offsets = resting.offsets[0]
-    joints = len(offsets)
     document = {
         "asset": _asset(answer),
         "scene": 0,
-        "scenes": [{"nodes": [0, joints]}],
-        "nodes": [*_joints(clip, offsets), {"name": "Body", "mesh": 0, "skin": 0}],
-        "meshes": [{"name": "Body", "primitives": [_primitive(store, resting)]}],
-        "materials": [{"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.8}}],
-        "skins": [_skin(store, clip.skeleton.at_rest(offsets))],
+        "scenes": [{"nodes": [0]}],
+        "nodes": _joints(clip, offsets),
+        **_body(store, resting),
         "animations": [_animation(store, clip)],
         "bufferViews": store.views,
         "accessors": store.accessors,
     }
+    if rig.body is not None:
+        document["scenes"] = [{"nodes": [0, len(offsets)]}]
+        document["nodes"].append({"name": "Body", "mesh": 0, "skin": 0})
     binary = b"".join(store.parts)
     return _container(document | {"buffers": [{"byteLength": len(binary)}]}, binary)
 
@@ -128,19 +124,38 @@ def _joints(clip: Clip, offsets: Floats) -> list[dict[str, Any]]:
     return nodes
 
 
-def _primitive(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
-    points, normals = (
-        _as_float32(values[0]) for values in body_mesh.points_and_normals(resting.boxes)
-    )
-    fixed = _mesh_arrays(resting.rig)
+def _body(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
+    """Return mesh, material and skin; nothing for a rig without a body."""
+    mesh = resting.rig.body
+    if mesh is None:
+        return {}
+    rest = resting.rig.skeleton.at_rest(resting.offsets[0])
     return {
-        "attributes": {
-            "POSITION": store.add_bounded(points, "VEC3", target=VERTICES),
-            "NORMAL": store.add(normals, "VEC3", target=VERTICES),
-            "COLOR_0": _normalized_bytes(store, fixed.colors),
-            "JOINTS_0": store.add(fixed.joints, "VEC4", target=VERTICES),
-            "WEIGHTS_0": _normalized_bytes(store, fixed.weights),
-        },
+        "meshes": [{"name": "Body", "primitives": [_primitive(store, resting, mesh)]}],
+        "materials": [_material(_mesh_arrays(resting.rig).colors is None)],
+        "skins": [_skin(store, rest)],
+    }
+
+
+def _material(plain: bool) -> dict[str, Any]:
+    """Return the material; plain: whether it has a colour of its own, instead of the points'."""
+    own = {"baseColorFactor": [*body_colours.SKIN, 1.0]} if plain else {}
+    surface = {**own, "metallicFactor": 0.0, "roughnessFactor": body_colours.ROUGHNESS}
+    return {"name": "Body", "pbrMetallicRoughness": surface}
+
+
+def _primitive(store: GlbBuffer, resting: RestPose, mesh: SkinnedMesh) -> dict[str, Any]:
+    fixed = _mesh_arrays(resting.rig)
+    attributes = {
+        "POSITION": store.add_bounded(resting.points[0], "VEC3", target=VERTICES),
+        "NORMAL": store.add(mesh.normals, "VEC3", target=VERTICES),
+        "JOINTS_0": store.add(fixed.joints, "VEC4", target=VERTICES),
+        "WEIGHTS_0": _normalized_bytes(store, fixed.weights),
+    }
+    if fixed.colors is not None:
+        attributes["COLOR_0"] = _normalized_bytes(store, fixed.colors)
+    return {
+        "attributes": attributes,
         "indices": store.add(fixed.corners, "SCALAR", target=CORNERS),
         "material": 0,
     }
@@ -150,27 +165,32 @@ def _primitive(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
 class MeshArrays:
     """Arrays of a body mesh that are equal for all bone offsets of a rig.
 
-    colors, joints, weights: of the points (P, 4). corners: of the triangles (3 T,).
+    joints, weights: of the points (P, 4). corners: of the triangles (3 T,). colors: of the points
+    (P, 4); None if the material has the colour.
     """
 
-    colors: Bytes
     joints: npt.NDArray[Any]
     weights: Bytes
     corners: npt.NDArray[Any]
+    colors: Bytes | None
 
 
 @lru_cache(maxsize=64)
 def _mesh_arrays(rig: CharacterRig) -> MeshArrays:
-    owners = np.repeat(rig.bones.joints, body_mesh.POINTS_PER_BOX)
-    joints = np.zeros((len(owners), 4), _smallest_index_type(len(rig.skeleton)))
-    joints[:, 0] = owners
-    weights = np.tile(FULL_WEIGHT, (len(owners), 1))
-    corners = _triangles(*body_mesh.faces(rig.bones)).astype(_smallest_index_type(len(owners)))
+    mesh = rig.body
+    assert mesh is not None
+    missing = ((0, 0), (0, 4 - mesh.joints.shape[1]))
+    joints = np.pad(mesh.joints, missing).astype(_smallest_index_type(len(rig.skeleton)))
+    cut = skinned_mesh.triangles(mesh.counts, mesh.corners).reshape(-1)
+    colors, shown = None, body_colours.colours(mesh)
+    if len(shown) > 1:
+        colors = np.full((len(mesh.tints), 4), 255, np.uint8)
+        colors[:, :3] = np.round(255 * shown[mesh.tints])
     return MeshArrays(
-        np.repeat(TINT_COLORS[rig.bones.tints], body_mesh.POINTS_PER_BOX, axis=0),
         joints,
-        weights,
-        corners,
+        np.pad(mesh.weights, missing),
+        cut.astype(_smallest_index_type(len(mesh.points))),
+        colors,
     )
 
 
@@ -219,15 +239,6 @@ def _tracks(store: GlbBuffer, tracks: Singles, kind: str) -> list[int]:
 
 def _as_float32(values: Floats | Singles) -> Singles:
     return np.ascontiguousarray(values, dtype=np.float32)
-
-
-def _triangles(counts: Integers, points: Integers) -> Integers:
-    """Return the corners (3 T,) of faces cut into triangle fans."""
-    cut = counts - 2
-    owner = np.repeat(np.arange(len(cut)), cut)
-    first = (np.cumsum(counts) - counts)[owner]
-    turn = np.arange(len(owner)) - (np.cumsum(cut) - cut)[owner]
-    return points[np.stack([first, first + turn + 1, first + turn + 2], axis=-1)].reshape(-1)
 
 
 def _smallest_index_type(count: int) -> type[np.unsignedinteger[Any]]:

@@ -43,7 +43,7 @@ class ClipTask:
 async def validate(context: Clips, question: FileQuestion) -> ClipTask:
     """Return the question with the limits that its format sets; synthesis checks the rest."""
     encoder, model = context.form, context.model
-    convention = encoder.convention(question.unit, question.up)
+    convention = encoder.convention(question.unit, question.up, question.body)
     joints = len(model.session.card.skeleton)
     fits = max_poses(context.service.settings.output_limit, joints, encoder.bytes_per_joint)
     corrected = bool(model.solver.measures or question.has_constraints)

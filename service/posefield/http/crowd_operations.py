@@ -21,6 +21,7 @@ from posefield.http.steps import Context, Steps, from_url
 from posefield.locomotion import crowd_order, gait
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
+from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 from posefield.question.walk_question import WalkQuestion
 from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
@@ -82,10 +83,14 @@ QUERY_CROWD = Steps(
 
 @dataclass(frozen=True)
 class WalkTask:
-    """A walking crowd within the limits of the settings. instancing: how USD repeats characters."""
+    """A walking crowd within the limits of the settings.
+
+    instancing: how USD repeats characters. body: that they have.
+    """
 
     order: CrowdOrder
     instancing: str
+    body: BodyKind
 
 
 async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
@@ -93,7 +98,7 @@ async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
     joints = len(context.model.session.card.skeleton)
     settings = context.service.settings
     order = crowd_query.checked_order(question, context.form.extension, joints, settings)
-    return WalkTask(order, question.instancing)
+    return WalkTask(order, question.instancing, question.body or DEFAULT_BODY)
 
 
 async def plan_walk(context: Walks, task: WalkTask) -> CrowdClip:
@@ -107,7 +112,9 @@ def _planned(model: Synthesizer, task: WalkTask) -> CrowdClip:
 
 async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iterator[bytes]:
     """Return an iterator over the pieces of the file."""
-    return await worker_threads.within(context.form.stream, answer, task.instancing)
+    return await worker_threads.within(
+        context.form.stream, answer, task.instancing, task.body
+    )
 
 
 def send_walk(context: Walks, answer: CrowdClip, content: Iterator[bytes]) -> Response:

@@ -7,6 +7,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from posefield.motion.joint_roles import NamingConvention
+from posefield.question.body_kind import Body
 
 ExtrapolationPolicy = Literal["ok", "warn", "refuse"]
 RootMode = Literal["travelling", "in_place"]
@@ -146,7 +147,7 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
 
 
 class FileQuestion(ClipQuestion, frozen=True, kw_only=True):
-    """Query for a clip in a file; unit and up are None for the format's defaults."""
+    """Query for a clip in a file; unit, up and body are None for the format's defaults."""
 
     unit: Annotated[
         LengthUnit | None, Meta(description="unit of length in the file; default: the format's")
@@ -154,6 +155,7 @@ class FileQuestion(ClipQuestion, frozen=True, kw_only=True):
     up: Annotated[UpAxis | None, Meta(description="up axis of the file; default: the format's")] = (
         None
     )
+    body: Body = None
 
 
 class NamedClipQuestion(ClipQuestion, frozen=True, kw_only=True):
@@ -169,6 +171,7 @@ class ClipsQuestion(Struct, frozen=True, forbid_unknown_fields=True):
     clips: list[NamedClipQuestion]
     unit: LengthUnit | None = None
     up: UpAxis | None = None
+    body: Body = None
 
 
 replace = msgspec.structs.replace

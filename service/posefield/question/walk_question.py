@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from posefield.common.errors import InvalidField
+from posefield.question.body_kind import Body
 
 Instancing = Literal["references", "scenegraph", "flatten"]
 DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
@@ -53,6 +54,7 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     instancing: Annotated[
         Instancing, Meta(description="sharing of data between characters in USD")
     ] = "references"
+    body: Body = None
 
     def __post_init__(self) -> None:
         if self.camera is None:

@@ -49,12 +49,12 @@ def finish(mesh: MeshBuilder, joints: int) -> SkinnedMesh:
     counts = np.array([len(face) for face in mesh.faces], np.int32)
     corners = np.array([point for face in mesh.faces for point in face], np.int32)
     cut = skinned_mesh.triangles(counts, corners)
+    shares = np.array([place.share for place in mesh.places])
     chosen, weights = skin_weights.weights(mesh, joints)
     return SkinnedMesh(
-        points,
+        points.astype(np.float32),
         skinned_mesh.vertex_normals(points, cut),
-        _anchors(mesh),
-        np.array([place.share for place in mesh.places]),
+        *skinned_mesh.distinct_places(_anchors(mesh), shares),
         chosen,
         weights,
         counts,

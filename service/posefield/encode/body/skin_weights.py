@@ -7,7 +7,7 @@ from posefield.encode.body.mesh_builder import MeshBuilder
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, Bytes, Integers
 
 INFLUENCES = 4
-ROUNDS, PULL = 3, 0.5
+ROUNDS, PULL = 5, 0.5
 """How often each point's weights move to the mean of its neighbours', and by what share."""
 
 

@@ -15,20 +15,40 @@ FULL_WEIGHT = 255
 
 
 @dataclass(frozen=True)
+class BonePlaces:
+    """R places along bones, which follow their ends.
+
+    anchors (R, 2): two joints or, after all joints, tips. shares (R,): a place moves by (1 - share)
+    of the displacement of its first anchor and share of its second's.
+    """
+
+    anchors: Integers
+    shares: Floats
+
+    def displacements(self, moved: Floats) -> Floats:
+        """Return how far (M, R, 3) the places move, m, with anchors moved by (M, J + E, 3)."""
+        first, second = (moved.take(self.anchors[:, end], axis=1) for end in (0, 1))
+        second -= first
+        second *= self.shares[:, None]
+        first += second
+        return first
+
+
+@dataclass(frozen=True)
 class SkinnedMesh:
     """P points, with normals, faces and weights, about a skeleton of J joints and E tips at rest.
 
-    points (P, 3): m. normals (P, 3): unit, outward. anchors (P, 2): two joints or, after all
-    joints, tips. shares (P,): a point moves by (1 - share) of the displacement of its first anchor
-    and share of its second's. joints, weights (P, I): the joints that move each point, and their
-    weights out of FULL_WEIGHT; points with fewer of them have zeros. counts: corners of each face;
-    corners: their points, counterclockwise from outside. tints (P,): index of the point's colour.
+    points (P, 3): m. normals (P, 3): unit, outward. places: along bones; place (P,): the one that
+    each point moves with where bones are longer or shorter. joints, weights (P, I): the joints that
+    move each point, and their weights out of FULL_WEIGHT; points with fewer of them have zeros.
+    counts: corners of each face; corners: their points, counterclockwise from outside. tints (P,):
+    index of the point's colour.
     """
 
-    points: Floats
+    points: Singles
     normals: Singles
-    anchors: Integers
-    shares: Floats
+    places: BonePlaces
+    place: Integers
     joints: Integers
     weights: Bytes
     counts: Integers
@@ -36,13 +56,18 @@ class SkinnedMesh:
     tints: Integers
 
     def points_at(self, moved: Floats) -> Singles:
-        """Return the points (M, P, 3), m, for anchors displaced by `moved` (M, J + E, 3), m."""
-        first, second = (moved.take(self.anchors[:, end], axis=1) for end in (0, 1))
-        second -= first
-        second *= self.shares[:, None]
-        first += second
-        first += self.points
-        return first.astype(np.float32)
+        """Return the points (M, P, 3), m, for places that move by (M, R, 3), m."""
+        found = moved.astype(np.float32).take(self.place, axis=1)
+        found += self.points
+        return found
+
+
+def distinct_places(anchors: Integers, shares: Floats) -> tuple[BonePlaces, Integers]:
+    """Return the distinct places of points, and the index (P,) of each point's."""
+    rows = np.concatenate([anchors, shares[:, None]], axis=1)
+    found, index = np.unique(rows, axis=0, return_inverse=True)
+    places = BonePlaces(found[:, :2].astype(np.int32), found[:, 2].copy())
+    return places, index.reshape(-1).astype(np.int32)
 
 
 def triangles(counts: Integers, corners: Integers) -> Integers:

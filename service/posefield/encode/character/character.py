@@ -9,41 +9,46 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
-from posefield.encode.character import body_mesh, joint_names
+from posefield.encode.body.bones_body import bones_body
+from posefield.encode.body.mannequin import mannequin
+from posefield.encode.body.skinned_mesh import SkinnedMesh
+from posefield.encode.character import body_bounds, joint_names
 from posefield.encode.character import extent as reach
-from posefield.encode.character.body_mesh import BoneBoxes, Bones
+from posefield.encode.character.body_bounds import BodyBounds
 from posefield.encode.character.extent import PointTree
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.motion.skeleton import Skeleton
+from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 
 CharacterArrays = Mapping[str, npt.NDArray[Any]]
 """Arrays of one character by name.
 
-bind, rest: matrices (J, 4, 4). points, normals: (P, 3). extent: (2, 3).
+bind, rest: matrices (J, 4, 4). points: (P, 3), if it has a body. extent: (2, 3).
 """
 
 
 @dataclass(frozen=True, eq=False)
 class CharacterRig:
-    """Properties shared by all clips of a skeleton; compared by identity.
+    """Properties shared by all clips of a skeleton with one kind of body; compared by identity.
 
-    names, paths: of the joints, the latter as in USD. tree: of joints and tips. bones: boxes of the
-    body mesh.
+    names, paths: of the joints, the latter as in USD. tree: of joints and tips. body: the mesh, for
+    the skeleton's own bones; None for none. bounds: what bounds it in any pose.
     """
 
     skeleton: Skeleton
     names: tuple[str, ...]
     paths: tuple[str, ...]
     tree: PointTree
-    bones: Bones
+    body: SkinnedMesh | None
+    bounds: BodyBounds
 
 
-def rig(skeleton: Skeleton) -> CharacterRig:
-    """Return the rig of a skeleton, cached: it takes milliseconds to build."""
+def rig(skeleton: Skeleton, body: BodyKind = DEFAULT_BODY) -> CharacterRig:
+    """Return the rig of a skeleton, cached: it takes up to a tenth of a second to build."""
     tips = skeleton.tip_offsets.tobytes()
     shape = (skeleton.offsets.tobytes(), skeleton.tip_joints, tips)
-    return _cached_rig(_SkeletonKey((skeleton.names, skeleton.parents, *shape), skeleton))
+    return _cached_rig(_SkeletonKey((skeleton.names, skeleton.parents, *shape), skeleton), body)
 
 
 class _SkeletonKey:
@@ -60,64 +65,64 @@ class _SkeletonKey:
 
 
 @lru_cache(maxsize=64)
-def _cached_rig(key: _SkeletonKey) -> CharacterRig:
+def _cached_rig(key: _SkeletonKey, kind: BodyKind) -> CharacterRig:
     joints = key.skeleton
     paths = joint_names.joint_paths(joint_names.legal_names(joints.names), joints.parents)
-    return CharacterRig(joints, joints.names, paths, reach.tree(joints), body_mesh.bones(joints))
+    body = _mesh(joints, kind)
+    bounds = body_bounds.bounds(joints, body)
+    return CharacterRig(joints, joints.names, paths, reach.tree(joints), body, bounds)
+
+
+def _mesh(skeleton: Skeleton, kind: BodyKind) -> SkinnedMesh | None:
+    if kind == "none":
+        return None
+    return mannequin(skeleton) if kind == "mannequin" else bones_body(skeleton)
 
 
 @dataclass(frozen=True)
 class RestPose:
     """M characters of one rig in the rest pose.
 
-    offsets: from the parents (M, J, 3), m. boxes: of their body meshes.
+    offsets: from the parents (M, J, 3), m. points: of their body meshes (M, P, 3), m, without
+    points if they have none. radii (M, J + E): of spheres about joints and tips, m; in any pose the
+    body lies in the convex hull of those about the ends of each bone.
     """
 
     rig: CharacterRig
     offsets: Floats
-    boxes: BoneBoxes
+    points: Singles
+    radii: Floats
 
 
 def rest_pose(rig: CharacterRig, offsets: Floats | Singles) -> RestPose:
     """Return characters with bone offsets (M, J, 3), m; each root is at the rig's root position."""
     rest = offsets.astype(np.float64)
     rest[:, 0] = rig.skeleton.offsets[0]
-    return RestPose(rig, rest, body_mesh.bone_boxes(rig.skeleton, rig.bones, rest))
+    if rig.body is None:
+        none = np.zeros((len(rest), len(rig.tree.order)))
+        return RestPose(rig, rest, np.empty((len(rest), 0, 3), np.float32), none)
+    moved = rig.bounds.displacements(rest)
+    along = rig.body.places.displacements(moved)
+    return RestPose(rig, rest, rig.body.points_at(along), rig.bounds.radii(moved, along))
 
 
 def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.NDArray[Any]]:
     """Return the arrays (M, ...) of the characters, without their extents."""
-    points, normals = body_mesh.points_and_normals(rest.boxes)
-    points, normals = (
-        axis_conversion.convert_positions(convention, points),
-        axis_conversion.convert_directions(convention, normals),
-    )
     bind = _translation_matrices(convention, rest.rig.skeleton.at_rest(rest.offsets))
     local = _translation_matrices(convention, rest.offsets)
-    return {"bind": bind, "rest": local, "points": points, "normals": normals}
-
-
-def bounding_radii(rest: RestPose) -> Floats:
-    """Return radii (M, P), m, of spheres about joints and tips that bound the body mesh.
-
-    Each box lies in the convex hull of the spheres about its two ends.
-    """
-    bones, found, (characters, joints, _) = rest.rig.bones, rest.boxes, rest.offsets.shape
-    radii = np.zeros((characters, joints + len(rest.rig.tree.tips)))
-    every = np.arange(characters)[:, None]
-    count, near = len(bones.ends), found.radii.copy()
-    # A stub is as high as it is wide.
-    near[:, count:] *= np.sqrt(2.0)
-    np.maximum.at(radii, (every, bones.joints), near)
-    np.maximum.at(radii, (every, bones.ends), near[:, :count])
-    return radii
+    made = {"bind": bind, "rest": local}
+    if rest.rig.body is not None:
+        made["points"] = axis_conversion.convert_positions(convention, rest.points)
+    return made
 
 
 def rest_pose_arrays(rig: CharacterRig, convention: Convention = METRES) -> CharacterArrays:
     """Return the arrays of the character in the skeleton's rest pose."""
     rest = rest_pose(rig, rig.skeleton.offsets[None])
     made = {name: array[0] for name, array in character_arrays(rest, convention).items()}
-    places = np.concatenate([made["bind"][:, 3, :3], made["points"]])
+    places = made["bind"][:, 3, :3]
+    if "points" in made:
+        places = np.concatenate([places, made["points"]])
     extent = reach.enlarged_box(places.min(axis=0), places.max(axis=0))
     return made | {"extent": extent.astype(np.float32)}
 

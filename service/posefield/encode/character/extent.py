@@ -12,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
-from posefield.encode.character import body_mesh
 from posefield.encode.character.animation_samples import AnimationSamples
 from posefield.motion.skeleton import Skeleton
 
@@ -21,6 +20,8 @@ PointIndices = npt.NDArray[np.intp]
 # Rounding to float32 accumulates along a chain of joints and far from the origin. Points and joints
 # in a file are rounded separately, and readers compute with them in float32.
 RELATIVE_MARGIN = 1e-5
+THICKEST_BODY = 0.2
+"""Largest distance of a body from its bones beside the size of its skeleton."""
 FRAMES_AT_ONCE = 3200
 """Poses that are computed at a time: their arrays fit the processor's cache."""
 
@@ -90,8 +91,8 @@ def pose_independent_box(skeleton: Skeleton, offsets: Floats, path: Floats) -> F
     far = [0.0]
     for arm, parent in zip(arms[1:], (*skeleton.parents[1:], *skeleton.tip_joints), strict=True):
         far.append(far[parent] + arm)
-    # The body mesh of a skeleton of zero size is drawn as if its size were a metre.
-    reached = max(far) + body_mesh.THICKEST * (2.0 * max(far) or 1.0)
+    # The body of a skeleton of zero size is drawn as if its size were a metre.
+    reached = max(far) + THICKEST_BODY * (2.0 * max(far) or 1.0)
     return enlarged_box(path.min(axis=0) - reached, path.max(axis=0) + reached)
 
 

@@ -1,9 +1,10 @@
-"""Conventions of files: unit of length and up axis."""
+"""Conventions of files: unit of length, up axis and body."""
 
 from dataclasses import dataclass
 from typing import Literal
 
 from posefield.common.errors import InvalidField
+from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 
 Up = Literal["y", "z"]
 Unit = Literal["m", "cm"]
@@ -13,23 +14,28 @@ METRES_PER_UNIT: dict[Unit, float] = {"m": 1.0, "cm": 0.01}
 
 @dataclass(frozen=True)
 class Convention:
-    """Unit of length, as metres per unit, and up axis of a file.
+    """Unit of length, as metres per unit, up axis, and kind of body of a file.
 
-    A character whose up axis is Z still faces its front: Y up, +Z ahead becomes Z up, -Y ahead.
+    Formats without a body take no notice of it. A character whose up axis is Z still faces its front: Y up, +Z ahead becomes Z up, -Y ahead.
     """
 
     metres_per_unit: float
     up: Up
+    body: BodyKind = DEFAULT_BODY
 
 
 METRES = Convention(1.0, "y")
 CENTIMETRES = Convention(0.01, "y")
 
 
-def requested_convention(unit: Unit | None, up: Up | None, usual: Convention) -> Convention:
+def requested_convention(
+    unit: Unit | None, up: Up | None, body: BodyKind | None, usual: Convention
+) -> Convention:
     """Return the requested convention; None is the default of the format."""
     length = usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
-    return Convention(length, usual.up if up is None else up)
+    return Convention(
+        length, usual.up if up is None else up, usual.body if body is None else body
+    )
 
 
 def check_convention(found: Convention, law: Convention, name: str) -> None:

@@ -8,59 +8,83 @@ from typing import Any
 import numpy as np
 from pxr import Gf, Vt
 
-from posefield.encode.character import body_mesh
+from posefield.common.units import Singles
+from posefield.encode.body import body_colours
+from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
 from posefield.encode.character.character import CharacterArrays, CharacterRig
-from posefield.encode.usd import prim_specs
+from posefield.encode.files import axis_conversion
+from posefield.encode.files.file_convention import METRES, Convention
+from posefield.encode.usd import material_prims, prim_specs
 from posefield.encode.usd.prim_specs import ValueTypes
 
 BINDING_SCHEMAS = ("SkelBindingAPI",)
+MESH_SCHEMAS = ("SkelBindingAPI", "MaterialBindingAPI")
 
 UsdValues = Mapping[str, Any]
 """Arrays of `Numbers` by the same names, in types of usd-core, whose copies share their memory."""
 
 
 @dataclass(frozen=True)
-class _RigArrays:
-    """Arrays of a rig that all its characters share, as usd-core's own."""
+class _MeshArrays:
+    """Arrays of a body that all characters of a rig share, as usd-core's own."""
 
-    paths: Any
-    names: Any
     counts: Any
     corners: Any
-    tints: Any
-    tinted: Any
+    normals: Any
     joints: Any
     weights: Any
+    influences: int
+    colours: Any
+    tinted: Any
 
 
 @lru_cache(maxsize=64)
-def _rig_arrays(rig: CharacterRig) -> _RigArrays:
-    counts, corners = map(Vt.IntArray.FromNumpy, body_mesh.faces(rig.bones))
-    joints = np.repeat(rig.bones.joints, body_mesh.POINTS_PER_BOX)
-    return _RigArrays(
-        Vt.TokenArray(rig.paths),
-        Vt.TokenArray(rig.names),
-        counts,
-        corners,
-        prim_specs.float3_array(body_mesh.TINTS),
-        Vt.IntArray.FromNumpy(np.repeat(rig.bones.tints, body_mesh.POINTS_PER_BOX)),
-        Vt.IntArray.FromNumpy(joints),
-        Vt.FloatArray(len(joints), 1.0),
+def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | None:
+    mesh = rig.body
+    if mesh is None:
+        return None
+    used = max(1, int(np.flatnonzero(mesh.weights.any(axis=0)).max(initial=0)) + 1)
+    weights = mesh.weights[:, :used].astype(np.float32) / np.float32(FULL_WEIGHT)
+    colours = body_colours.colours(mesh)
+    return _MeshArrays(
+        Vt.IntArray.FromNumpy(mesh.counts),
+        Vt.IntArray.FromNumpy(mesh.corners),
+        Vt.Vec3fArray.FromNumpy(_normals(mesh, convention)),
+        Vt.IntArray.FromNumpy(np.ascontiguousarray(mesh.joints[:, :used]).reshape(-1)),
+        Vt.FloatArray.FromNumpy(weights.reshape(-1)),
+        used,
+        Vt.Vec3fArray.FromNumpy(colours),
+        Vt.IntArray.FromNumpy(mesh.tints) if len(colours) > 1 else None,
     )
 
 
-def root(parent: Any, name: str, rig: CharacterRig) -> Any:
-    """Return a new SkelRoot with a skeleton and a body bound to it, without numeric values."""
+def _normals(mesh: SkinnedMesh, convention: Convention) -> Singles:
+    return np.ascontiguousarray(axis_conversion.convert_directions(convention, mesh.normals))
+
+
+def fixed_vectors(rig: CharacterRig, convention: Convention) -> tuple[Singles, ...]:
+    """Return the arrays of vectors that all characters of a rig share."""
+    if rig.body is None:
+        return ()
+    return _normals(rig.body, convention), body_colours.colours(rig.body)
+
+
+def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = METRES) -> Any:
+    """Return a new SkelRoot with a skeleton, and a body bound to it, without numeric values."""
     made = prim_specs.prim(parent, name, "SkelRoot", BINDING_SCHEMAS)
     made.kind = "component"
     prim_specs.varying_attribute(made, "extent", ValueTypes.Float3Array)
     skeleton = prim_specs.prim(made, "Skel", "Skeleton", BINDING_SCHEMAS)
-    mesh = prim_specs.prim(made, "Body", "Mesh", BINDING_SCHEMAS)
-    for bound in (made, mesh):
-        prim_specs.add_relationship(bound, "skel:skeleton", skeleton.path)
-    arrays = _rig_arrays(rig)
-    _skeleton(skeleton, arrays)
-    _mesh(mesh, arrays)
+    prim_specs.add_relationship(made, "skel:skeleton", skeleton.path)
+    _skeleton(skeleton, rig)
+    arrays = _mesh_arrays(rig, convention)
+    if arrays is not None:
+        mesh = prim_specs.prim(made, "Body", "Mesh", MESH_SCHEMAS)
+        prim_specs.add_relationship(mesh, "skel:skeleton", skeleton.path)
+        _mesh(mesh, arrays)
+        prim_specs.add_relationship(
+            mesh, "material:binding", material_prims.material(made, tinted=bool(arrays.tinted))
+        )
     return made
 
 
@@ -68,19 +92,22 @@ def values(numbers: CharacterArrays) -> UsdValues:
     """Return the arrays of a character in the types of usd-core."""
     made = {name: Vt.Matrix4dArray.FromNumpy(numbers[name]) for name in ("bind", "rest")}
     vectors = {
-        name: Vt.Vec3fArray.FromNumpy(numbers[name]) for name in ("points", "normals", "extent")
+        name: Vt.Vec3fArray.FromNumpy(numbers[name])
+        for name in ("points", "extent")
+        if name in numbers
     }
     return made | vectors
 
 
 def set_values(root: Any, values: UsdValues) -> None:
     """Set the arrays of a SkelRoot, its skeleton and its body."""
-    for prim in ("", "Body"):
+    prims = ("", "Body") if "points" in values else ("",)
+    for prim in prims:
         _attribute(root, prim, "extent").default = values["extent"]
     for name, key in (("bindTransforms", "bind"), ("restTransforms", "rest")):
         _attribute(root, "Skel", name).default = values[key]
-    for name in ("points", "normals"):
-        _attribute(root, "Body", name).default = values[name]
+    if "points" in values:
+        _attribute(root, "Body", "points").default = values["points"]
 
 
 def bind_animation(root: Any, animation: Any) -> None:
@@ -107,33 +134,40 @@ def _attribute(root: Any, prim: str, name: str) -> Any:
     return root.layer.GetAttributeAtPath(path.AppendProperty(name))
 
 
-def _skeleton(prim: Any, arrays: _RigArrays) -> None:
-    prim_specs.uniform_attribute(prim, "joints", ValueTypes.TokenArray, arrays.paths)
-    prim_specs.uniform_attribute(prim, "jointNames", ValueTypes.TokenArray, arrays.names)
+def _skeleton(prim: Any, rig: CharacterRig) -> None:
+    paths, names = Vt.TokenArray(rig.paths), Vt.TokenArray(rig.names)
+    prim_specs.uniform_attribute(prim, "joints", ValueTypes.TokenArray, paths)
+    prim_specs.uniform_attribute(prim, "jointNames", ValueTypes.TokenArray, names)
     for name in ("bindTransforms", "restTransforms"):
         prim_specs.uniform_attribute(prim, name, ValueTypes.Matrix4dArray)
 
 
-def _mesh(prim: Any, arrays: _RigArrays) -> None:
+def _mesh(prim: Any, arrays: _MeshArrays) -> None:
     prim_specs.varying_attribute(prim, "points", ValueTypes.Point3fArray)
-    prim_specs.vertex_attribute(prim, "normals", ValueTypes.Normal3fArray)
+    prim_specs.vertex_attribute(prim, "normals", ValueTypes.Normal3fArray, arrays.normals)
     prim_specs.varying_attribute(prim, "faceVertexCounts", ValueTypes.IntArray, arrays.counts)
     prim_specs.varying_attribute(prim, "faceVertexIndices", ValueTypes.IntArray, arrays.corners)
     prim_specs.uniform_attribute(prim, "subdivisionScheme", ValueTypes.Token, "none")
     prim_specs.varying_attribute(prim, "extent", ValueTypes.Float3Array)
-    prim_specs.vertex_attribute(
-        prim, "primvars:displayColor", ValueTypes.Color3fArray, arrays.tints
-    )
-    prim_specs.varying_attribute(
-        prim, "primvars:displayColor:indices", ValueTypes.IntArray, arrays.tinted
-    )
+    _colours(prim, arrays)
     for name, kind, value in (
         ("jointIndices", ValueTypes.IntArray, arrays.joints),
         ("jointWeights", ValueTypes.FloatArray, arrays.weights),
     ):
         prim_specs.vertex_attribute(prim, f"primvars:skel:{name}", kind, value).SetInfo(
-            "elementSize", 1
+            "elementSize", arrays.influences
         )
     prim_specs.varying_attribute(
         prim, "primvars:skel:geomBindTransform", ValueTypes.Matrix4d, Gf.Matrix4d(1.0)
     )
+
+
+def _colours(prim: Any, arrays: _MeshArrays) -> None:
+    """Create the colours that readers without materials show."""
+    name = "primvars:displayColor"
+    if arrays.tinted is None:
+        spec = prim_specs.varying_attribute(prim, name, ValueTypes.Color3fArray, arrays.colours)
+        spec.SetInfo("interpolation", "constant")
+        return
+    prim_specs.vertex_attribute(prim, name, ValueTypes.Color3fArray, arrays.colours)
+    prim_specs.varying_attribute(prim, f"{name}:indices", ValueTypes.IntArray, arrays.tinted)

@@ -21,6 +21,9 @@ FRAMES_AT_ONCE = 3200
 """Frames of clips that are computed at a time; a longer clip is computed alone."""
 
 
+WITHOUT_BODY = Convention(1.0, "y", "none")
+
+
 class ClipArrays(NamedTuple):
     """Rig, frame rate and layer content of one clip."""
 
@@ -33,10 +36,10 @@ def arrays_with_character(
     answers: Sequence[ClipAnswer], convention: Convention
 ) -> Iterator[ClipArrays]:
     """Yield takes in the order of their results, with samples, character values and facts."""
-    for rig, some in _grouped_by_rig(answers):
+    for rig, some in _grouped_by_rig(answers, convention):
         made = animation_samples.from_clips([answer.clip for answer in some])
         rest = character.rest_pose(rig, made.offsets)
-        boxes = extent.bounding_boxes(rig.tree, made, character.bounding_radii(rest))
+        boxes = extent.bounding_boxes(rig.tree, made, rest.radii)
         values = character.character_arrays(rest, convention)
         values["extent"] = axis_conversion.convert_box(convention, boxes).astype(np.float32)
         for index, samples in enumerate(_samples(made, convention)):
@@ -48,14 +51,14 @@ def arrays_without_character(
     answers: Sequence[ClipAnswer], convention: Convention
 ) -> Iterator[ClipArrays]:
     """Yield takes in the order of their results, with samples and facts only."""
-    for rig, some in _grouped_by_rig(answers):
+    for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
         made = animation_samples.from_clips([answer.clip for answer in some])
         for answer, samples in zip(some, _samples(made, convention), strict=True):
             yield _clip_arrays(rig, answer, samples, {})
 
 
 def _grouped_by_rig(
-    answers: Sequence[ClipAnswer],
+    answers: Sequence[ClipAnswer], convention: Convention
 ) -> Iterator[tuple[CharacterRig, list[ClipAnswer]]]:
     """Yield consecutive results of one skeleton, at most TOGETHER frames at a time."""
     _keep_freed_memory()
@@ -65,10 +68,10 @@ def _grouped_by_rig(
         for answer in some:
             frames += len(answer.clip)
             if part and frames > FRAMES_AT_ONCE:
-                yield character.rig(part[0].clip.skeleton), part
+                yield character.rig(part[0].clip.skeleton, convention.body), part
                 part, frames = [], len(answer.clip)
             part.append(answer)
-        yield character.rig(part[0].clip.skeleton), part
+        yield character.rig(part[0].clip.skeleton, convention.body), part
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Clips as USD layers: a bound skeleton, its baked animation and a skinned body mesh.
+"""Clips as USD layers: a bound skeleton, its baked animation and a skinned body.
 
 The layers are written without a stage, which is faster; every opened stage also leaks memory. The
 names of prims are constant, because USD never frees a name.
@@ -9,10 +9,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
 from pxr import Sdf
 
-from posefield.encode.character import body_mesh
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.files import zip_archive
 from posefield.encode.files.file_convention import Convention
@@ -24,7 +22,6 @@ from posefield.question.results import ClipAnswer
 
 ROOT = Sdf.Path("/Character")
 ANIMATION = ROOT.AppendChild("Anim")
-TINTS = body_mesh.TINTS.astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class ClipLayerBuilder(BaseLayerBuilder):
     @property
     def values(self) -> tuple[Array, ...]:
         """Return the arrays that every layer holds."""
-        return (TINTS,)
+        return character_prims.fixed_vectors(self.rig, self.convention)
 
     def head(self, content: LayerContent) -> Any:
         """Return the layer without its prims."""
@@ -47,7 +44,7 @@ class ClipLayerBuilder(BaseLayerBuilder):
     def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
-        made.TransferContent(_character_prims(self.rig))
+        made.TransferContent(_character_prims(self.rig, self.convention))
         with Sdf.ChangeBlock():
             self.set_metadata(made, ROOT.name, content)
             character_prims.set_values(
@@ -58,13 +55,13 @@ class ClipLayerBuilder(BaseLayerBuilder):
 
 
 @lru_cache(maxsize=16)
-def _character_prims(rig: CharacterRig) -> Any:
+def _character_prims(rig: CharacterRig, convention: Convention) -> Any:
     """Return a layer of a character and its animation without numbers.
 
     Cached, since building it takes as long as exporting it.
     """
     made = Sdf.Layer.CreateAnonymous("prims.usda")
-    root = character_prims.root(made, ROOT.name, rig)
+    root = character_prims.root(made, ROOT.name, rig, convention)
     character_prims.bind_animation(
         root, character_prims.animation(root, ANIMATION.name, rig.paths).path
     )

@@ -79,10 +79,10 @@ def _character_text(
     bound: tuple[str, ...],
 ) -> str:
     """Return the text of the stage without its clips."""
-    rig, made = character.rig(skeleton), Sdf.Layer.CreateAnonymous("library.usda")
+    rig, made = character.rig(skeleton, convention.body), Sdf.Layer.CreateAnonymous("library.usda")
     lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
     layer_metadata.set_layer_metadata(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
-    root = character_prims.root(made, ROOT.name, rig)
+    root = character_prims.root(made, ROOT.name, rig, convention)
     numbers = character.rest_pose_arrays(rig, convention)
     extent = _library_box(numbers["extent"], entries, convention)
     character_prims.set_values(root, character_prims.values({**numbers, "extent": extent}))

@@ -16,7 +16,6 @@ from posefield.encode.usd.layer_content import LayerContent, Samples
 from posefield.encode.usd.template_cache import CRATE_CACHE, TemplateCache
 from posefield.encode.usd.usd_animation import AnimationLayerBuilder
 from posefield.encode.usd_crowd import crowd_extent
-from posefield.encode.usd_crowd.crowd_extent import BodyHull
 from posefield.motion.crowd_clip import CrowdClip, Motions
 
 
@@ -53,9 +52,9 @@ def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
 
     Raises ValueError for a number of motions other than the characters play, and for other shapes.
     """
-    made, hull = 0, crowd_extent.hull(rig)
+    made = 0
     # The variable of a for loop would keep each batch in memory while the next is computed.
-    for motion in chain.from_iterable(map(partial(_batch_motions, crowd, hull), crowd.batches)):
+    for motion in chain.from_iterable(map(partial(_batch_motions, crowd, rig), crowd.batches)):
         made += 1
         yield motion
     if made != motion_count(crowd):
@@ -72,12 +71,12 @@ def motion_layer(
     )
 
 
-def _batch_motions(crowd: CrowdClip, hull: BodyHull, batch: Motions) -> Iterator[MotionSamples]:
+def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Iterator[MotionSamples]:
     expected = (crowd.frames, len(crowd.skeleton), 4)
     if batch.rotations.shape[1:] != expected:
         raise ValueError(f"motions of {batch.rotations.shape[1:]}, expected {expected}")
     made = animation_samples.from_motions(batch)
-    boxes = crowd_extent.boxes(hull, made)
+    boxes = crowd_extent.boxes(rig, made)
     for part, box, levels in zip(made.parts(1), boxes, batch.levels, strict=True):
         samples = {"translations": part.translations, "rotations": part.rotations}
         yield MotionSamples(samples, MotionSummary(box, _level_changes(levels)))

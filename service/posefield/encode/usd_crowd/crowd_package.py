@@ -16,6 +16,7 @@ from posefield.encode.files.zip_archive import ZipMember
 from posefield.encode.usd import character_prims, layer_metadata, prim_specs
 from posefield.encode.usd_crowd import crowd_motions, crowd_scene, crowd_summary
 from posefield.motion.crowd_clip import CrowdClip
+from posefield.question.body_kind import BodyKind
 
 FOLDER, CHARACTER, SUMMARY = "crowd_clips", "character.usdc", "summary.usdc"
 
@@ -57,9 +58,9 @@ def root_layer(crowd: CrowdClip, instanced: bool, folder: str) -> bytes:
     return layer_metadata.crate_bytes(made)
 
 
-def referenced_layers(crowd: CrowdClip) -> Iterator[tuple[str, bytes]]:
+def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, bytes]]:
     """Yield name and content of each other layer, one at a time."""
-    rig, notes = character.rig(crowd.skeleton), []
+    rig, notes = character.rig(crowd.skeleton, body), []
     standing = _layer("Character", crowd)
     prim = character_prims.root(standing, "Character", rig)
     character_prims.set_values(prim, character_prims.values(character.rest_pose_arrays(rig)))
@@ -75,10 +76,10 @@ def referenced_layers(crowd: CrowdClip) -> Iterator[tuple[str, bytes]]:
     yield SUMMARY, layer_metadata.crate_bytes(last)
 
 
-def members(crowd: CrowdClip, instanced: bool) -> Iterator[ZipMember]:
+def members(crowd: CrowdClip, instanced: bool, body: BodyKind) -> Iterator[ZipMember]:
     """Yield all layers as members of an archive, the entry first."""
     yield zip_archive.whole("crowd.usdc", root_layer(crowd, instanced, FOLDER))
-    for name, content in referenced_layers(crowd):
+    for name, content in referenced_layers(crowd, body):
         yield zip_archive.whole(f"{FOLDER}/{name}", content)
 
 

@@ -23,12 +23,18 @@ from posefield.encode.usd_crowd import (
 )
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 from posefield.motion.crowd_clip import CrowdClip
+from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 
 CHILD_PROCESS_SIZE = 32_000_000
 """Bytes of a layer that usd-core writes in about 0.2 s, in which no other thread runs."""
 
 
-def write(crowd: CrowdClip, path: Path, instancing: str = "references") -> None:
+def write(
+    crowd: CrowdClip,
+    path: Path,
+    instancing: str = "references",
+    body: BodyKind = DEFAULT_BODY,
+) -> None:
     """Write a crowd atomically, in the form of the path's extension.
 
     .usda and .usdc: one layer. .usd: an entry with a folder `<stem>_clips` beside it, with a layer
@@ -39,15 +45,20 @@ def write(crowd: CrowdClip, path: Path, instancing: str = "references") -> None:
     ending = path.suffix.removeprefix(".")
     _validate(crowd, ending, FILES, instancing)
     if ending == "usdz":
-        atomic_files.write_chunks(_usdz(crowd, instancing), path)
+        atomic_files.write_chunks(_usdz(crowd, instancing, body), path)
     elif ending == "usd" and instancing != "flatten":
-        _write_folder(crowd, path, instancing == "scenegraph")
+        _write_folder(crowd, path, instancing == "scenegraph", body)
     else:
         with atomic_files.replacing(path) as made:
-            layer_metadata.export_layer(_layer(crowd, _form(ending), instancing), made)
+            layer_metadata.export_layer(_layer(crowd, _form(ending), instancing, body), made)
 
 
-def stream(crowd: CrowdClip, ending: str, instancing: str = "references") -> Iterator[bytes]:
+def stream(
+    crowd: CrowdClip,
+    ending: str,
+    instancing: str = "references",
+    body: BodyKind = DEFAULT_BODY,
+) -> Iterator[bytes]:
     """Return an iterator over the bytes of a crowd as usda, usdc or usdz.
 
     A usdz is sent while its motions are computed; a single layer is first exported to a file on
@@ -61,12 +72,16 @@ def stream(crowd: CrowdClip, ending: str, instancing: str = "references") -> Ite
     apart = (
         crowd_size.layer_size_bound(counts, ending, instancing == "flatten") > CHILD_PROCESS_SIZE
     )
-    return (encoding_process.stream if apart else encode_here)(crowd, ending, instancing)
+    return (encoding_process.stream if apart else encode_here)(crowd, ending, instancing, body)
 
 
-def encode_here(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
+def encode_here(
+    crowd: CrowdClip, ending: str, instancing: str, body: BodyKind = DEFAULT_BODY
+) -> Iterator[bytes]:
     """Return the bytes of a crowd as `stream` does, encoded by this process whatever its size."""
-    return _usdz(crowd, instancing) if ending == "usdz" else _single_file(crowd, ending, instancing)
+    if ending == "usdz":
+        return _usdz(crowd, instancing, body)
+    return _single_file(crowd, ending, instancing, body)
 
 
 def _validate(crowd: CrowdClip, ending: str, endings: tuple[str, ...], instancing: str) -> None:
@@ -86,36 +101,39 @@ def _form(ending: str) -> str:
     return "usda" if ending == "usda" else "usdc"
 
 
-def _layer(crowd: CrowdClip, form: str, instancing: str) -> Any:
+def _layer(crowd: CrowdClip, form: str, instancing: str, body: BodyKind) -> Any:
     if instancing == "flatten":
-        return single_layer.flat_layer(crowd, form)
-    return single_layer.referencing_layer(crowd, form, instancing == "scenegraph")
+        return single_layer.flat_layer(crowd, form, body)
+    return single_layer.referencing_layer(crowd, form, instancing == "scenegraph", body)
 
 
-def _single_file(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
+def _single_file(
+    crowd: CrowdClip, ending: str, instancing: str, body: BodyKind
+) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, f"crowd.{ending}")
-        layer_metadata.export_layer(_layer(crowd, _form(ending), instancing), path)
+        layer_metadata.export_layer(_layer(crowd, _form(ending), instancing, body), path)
         yield from atomic_files.read_chunks(path)
 
 
-def _usdz(crowd: CrowdClip, instancing: str) -> Iterator[bytes]:
+def _usdz(crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
     if instancing != "flatten":
-        return zip_archive.zip_chunks(crowd_package.members(crowd, instancing == "scenegraph"))
-    return _flat_usdz(crowd)
+        members = crowd_package.members(crowd, instancing == "scenegraph", body)
+        return zip_archive.zip_chunks(members)
+    return _flat_usdz(crowd, body)
 
 
-def _flat_usdz(crowd: CrowdClip) -> Iterator[bytes]:
+def _flat_usdz(crowd: CrowdClip, body: BodyKind) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, "crowd.usdc")
-        layer_metadata.export_layer(single_layer.flat_layer(crowd, "usdc"), path)
+        layer_metadata.export_layer(single_layer.flat_layer(crowd, "usdc", body), path)
         yield from zip_archive.zip_chunks([zip_archive.member_of_file(path.name, path)])
 
 
 CROWD_LAYER_NAME = re.compile(r"(m\d{5,}|character|summary)\.usdc")
 
 
-def _write_folder(crowd: CrowdClip, path: Path, instanced: bool) -> None:
+def _write_folder(crowd: CrowdClip, path: Path, instanced: bool, body: BodyKind) -> None:
     """Write a crowd's file and folder atomically, replacing an earlier crowd.
 
     Raises FileError if the folder contains other files than a crowd's layers, which would be lost.
@@ -124,7 +142,7 @@ def _write_folder(crowd: CrowdClip, path: Path, instanced: bool) -> None:
     _check_crowd_folder(folder)
     with atomic_files.replacing_pair(path, folder) as (entry, inside):
         entry.write_bytes(crowd_package.root_layer(crowd, instanced, folder.name))
-        for name, content in crowd_package.referenced_layers(crowd):
+        for name, content in crowd_package.referenced_layers(crowd, body):
             (inside / name).write_bytes(content)
 
 

@@ -1,6 +1,6 @@
 """Process that encodes one crowd.
 
-`python -m posefield.encode.usd_crowd.encoding_child PATH INSTANCING` reads pickles from standard
+`python -m posefield.encode.usd_crowd.encoding_child PATH INSTANCING BODY` reads pickles from standard
 input: the crowd without motions, batches of them, and None. It writes the file PATH.
 `encoding_process.stream` starts it.
 """
@@ -10,10 +10,11 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import IO
+from typing import IO, cast
 
 from posefield.encode.usd_crowd import crowd_writer
 from posefield.motion.crowd_clip import Motions
+from posefield.question.body_kind import BodyKind
 
 
 def main() -> None:
@@ -22,10 +23,11 @@ def main() -> None:
     Raises EOFError if the input ends early.
     """
     path, instancing = Path(sys.argv[1]), sys.argv[2]
+    body = cast(BodyKind, sys.argv[3])
     given = sys.stdin.buffer
     crowd = replace(pickle.load(given), batches=_received_batches(given))
     with path.open("wb") as file:
-        file.writelines(crowd_writer.encode_here(crowd, path.suffix[1:], instancing))
+        file.writelines(crowd_writer.encode_here(crowd, path.suffix[1:], instancing, body))
 
 
 def _received_batches(given: IO[bytes]) -> Iterator[Motions]:

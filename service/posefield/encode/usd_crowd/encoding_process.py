@@ -20,6 +20,7 @@ from posefield.common import atomic_files
 from posefield.common import cancellation as cancel
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.motion.crowd_clip import CrowdClip
+from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 
 CHILD_MODULE = "posefield.encode.usd_crowd.encoding_child"
 POLL_INTERVAL = 0.1
@@ -30,7 +31,9 @@ class EncoderDied(Exception):
     """Raised if the child process ended before it had written the whole crowd."""
 
 
-def stream(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
+def stream(
+    crowd: CrowdClip, ending: str, instancing: str, body: BodyKind = DEFAULT_BODY
+) -> Iterator[bytes]:
     """Yield the bytes of a crowd as usda, usdc or usdz, in chunks of a file made by a child.
 
     The child has ended when the first chunk is yielded: a client that reads slowly keeps a file
@@ -38,7 +41,7 @@ def stream(crowd: CrowdClip, ending: str, instancing: str) -> Iterator[bytes]:
     """
     with TemporaryDirectory() as folder:
         path = Path(folder, f"crowd.{ending}")
-        words = [sys.executable, "-P", "-m", CHILD_MODULE, str(path), instancing]
+        words = [sys.executable, "-P", "-m", CHILD_MODULE, str(path), instancing, body]
         with subprocess.Popen(words, stdin=subprocess.PIPE) as child:
             assert child.stdin is not None
             with _running_feeder(_Feeder(crowd, child.stdin, Cancellation()), child) as feeder:

@@ -16,11 +16,12 @@ from posefield.encode.usd import character_prims, prim_specs
 from posefield.encode.usd_crowd import crowd_motions, crowd_scene, crowd_summary
 from posefield.encode.usd_crowd.crowd_motions import MotionSamples
 from posefield.motion.crowd_clip import CrowdClip
+from posefield.question.body_kind import BodyKind
 
 
-def referencing_layer(crowd: CrowdClip, form: str, instanced: bool) -> Any:
+def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKind) -> Any:
     """Return a layer in which every character refers to one prototype; the caller must hold it."""
-    made, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton)
+    made, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton, body)
     root = made.GetPrimAtPath(crowd_scene.ROOT)
     prototype = character_prims.root(root, crowd_scene.PROTOTYPE.name, rig)
     character_prims.set_values(prototype, character_prims.values(character.rest_pose_arrays(rig)))
@@ -36,9 +37,9 @@ def referencing_layer(crowd: CrowdClip, form: str, instanced: bool) -> Any:
     return made
 
 
-def flat_layer(crowd: CrowdClip, form: str) -> Any:
+def flat_layer(crowd: CrowdClip, form: str, body: BodyKind) -> Any:
     """Return a layer in which every character has its own data; the caller must hold it."""
-    made, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton)
+    made, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton, body)
     _copy_prototype(made, crowd, rig)
     notes = []
     for index, motion in enumerate(crowd_motions.all_motions(crowd, rig)):

@@ -40,7 +40,7 @@ def decode_order(
         expected = f"expected 1 to {settings.clips_limit}"
         raise InvalidField("clips", f"{len(body.clips)} clips, {expected}")
     encoder = encoders[body.format]
-    convention = encoder.convention(body.unit, body.up)
+    convention = encoder.convention(body.unit, body.up, body.body)
     queries = [_clip_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
     _check_names(queries)
     _check_targets(model, queries, settings.clips_targets)

@@ -1,9 +1,4 @@
-"""Body mesh of a skeleton without one: one tapered box per bone, each skinned to one joint.
-
-Readers need it: some display nothing and some find no bones in a skeleton without a skinned mesh.
-The topology depends on the skeleton alone and is the same for all clips of a model; the points
-follow the bone offsets of a clip.
-"""
+"""Tapered boxes along the bones of a skeleton, one for each, which show its bones and sides."""
 
 from dataclasses import dataclass
 
