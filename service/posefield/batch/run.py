@@ -195,7 +195,7 @@ def _checked_source(job: ExportJob, source: RowSource) -> RowSource:
 
 
 def _convention_misfit(job: ExportJob, query: ClipQuery) -> str | None:
-    """Return the reason for which a format cannot have the job's unit, up axis and body, or None."""
+    """Return why a format cannot have the unit, up axis and body of a job; None if it can."""
     try:
         CLIP_ENCODERS[query.format].convention(job.unit, job.up, job.body)
     except InvalidField as fault:

@@ -43,7 +43,9 @@ def write_crowd(
     if ending not in EXTENSIONS:
         raise InvalidField("output", f"{output.name!r} ends in none of {', '.join(EXTENSIONS)}")
     if ending == "npz" and question.body is not None:
-        raise InvalidField("body", f"{question.body!r}, expected none given: npz files carry no body")
+        raise InvalidField(
+            "body", f"{question.body!r}, expected none given: npz files carry no body"
+        )
     opened = gait.fit_gait(model.session)
     made = crowd_order.build_crowd(model, opened, asked)
     feet = _FootSkateMeter(opened, asked.fps)
@@ -51,9 +53,7 @@ def write_crowd(
     if ending == "npz":
         crowd_tables.write_npz(watched, output)
     else:
-        crowd_writer.write(
-            watched, output, question.instancing, question.body or DEFAULT_BODY
-        )
+        crowd_writer.write(watched, output, question.instancing, question.body or DEFAULT_BODY)
     return {
         "file": str(output),
         "model": made.facts["model"],

@@ -124,13 +124,26 @@ def _lazy_usd_writer(name: str) -> Callable[[Sequence[ClipAnswer], Convention], 
 
 CLIP_ENCODERS = by_extension(
     # A template takes 30 ms to make, and each number of frames needs another one.
-    ClipEncoder("usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, inline_limit=0, has_body=True),
+    ClipEncoder(
+        "usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, inline_limit=0, has_body=True
+    ),
     # Unlike those of usda and usdz, not registered with IANA, but in common use.
-    ClipEncoder("usdc", "model/vnd.usdc", _lazy_usd_writer("usdc"), 48, inline_limit=0, has_body=True),
-    ClipEncoder("usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0, has_body=True),
+    ClipEncoder(
+        "usdc", "model/vnd.usdc", _lazy_usd_writer("usdc"), 48, inline_limit=0, has_body=True
+    ),
+    ClipEncoder(
+        "usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0, has_body=True
+    ),
     ClipEncoder("json", JSON, sequential_writer(clip_tables.clip_json), 96),
     ClipEncoder("bvh", "application/x-bvh", sequential_writer(bvh), 72, CENTIMETRES),
-    ClipEncoder("glb", "model/gltf-binary", sequential_writer(glb.glb), 24, convention_fixed=True, has_body=True),
+    ClipEncoder(
+        "glb",
+        "model/gltf-binary",
+        sequential_writer(glb.glb),
+        24,
+        convention_fixed=True,
+        has_body=True,
+    ),
     ClipEncoder("npz", NPZ, table_writer(tables.npz_table), 24),
     ClipEncoder("arrow", ARROW, table_writer(arrow_stream), 24),
     ClipEncoder("msgpack", MSGPACK, table_writer(tables.msgpack_table), 24),

@@ -95,9 +95,9 @@ class WalkTask:
 
 async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
     """Return the order of a walking crowd; InvalidField beyond the limits."""
-    joints = len(context.model.session.card.skeleton)
+    skeleton = context.model.session.card.skeleton
     settings = context.service.settings
-    order = crowd_query.checked_order(question, context.form.extension, joints, settings)
+    order = crowd_query.checked_order(question, context.form.extension, skeleton, settings)
     return WalkTask(order, question.instancing, question.body or DEFAULT_BODY)
 
 
@@ -112,9 +112,7 @@ def _planned(model: Synthesizer, task: WalkTask) -> CrowdClip:
 
 async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iterator[bytes]:
     """Return an iterator over the pieces of the file."""
-    return await worker_threads.within(
-        context.form.stream, answer, task.instancing, task.body
-    )
+    return await worker_threads.within(context.form.stream, answer, task.instancing, task.body)
 
 
 def send_walk(context: Walks, answer: CrowdClip, content: Iterator[bytes]) -> Response:

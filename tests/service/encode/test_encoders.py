@@ -163,7 +163,7 @@ def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
     ],
 )
 def test_what_is_not_asked_for_is_as_usual(unit, up, usual, meant):
-    assert file_convention.requested_convention(unit, up, usual) == meant
+    assert file_convention.requested_convention(unit, up, None, usual) == meant
 
 
 @pytest.mark.parametrize("extension", CLIP_ENCODERS)

@@ -54,7 +54,7 @@ def test_a_large_layer_is_encoded_apart(made):
     count = crowd_writer.CHILD_PROCESS_SIZE // crowd_size.CHARACTER
     few, many = (crowds.crowd(person, made, np.arange(n) % 5) for n in (6, count))
     assert (
-        crowd_size.layer_size_bound(CrowdCounts(len(person), count, 5, 12), "usdc", False)
+        crowd_size.layer_size_bound(CrowdCounts(len(person), count, 5, 12, 0), "usdc", False)
         > crowd_writer.CHILD_PROCESS_SIZE
     )
     # The process has ended when the first piece comes, and so has the generator's work here.

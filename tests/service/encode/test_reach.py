@@ -6,7 +6,7 @@ import crowds
 import numpy as np
 import pytest
 
-from posefield.encode.character import animation_samples, body_mesh, character
+from posefield.encode.character import animation_samples, character
 from posefield.encode.character import extent as exact
 from posefield.encode.usd_crowd import crowd_extent
 from posefield.motion import clip as clips
@@ -36,37 +36,37 @@ def case(seed):
 
 
 def reached(person, rig, made):
-    """Lowest and highest corner (M, 2, 3) of joints and ends of boxes, without their thickness."""
+    """Lowest and highest corner (M, 2, 3) of joints and of all points of the skinned body."""
     local = skeleton.translations(made.bone_offsets, made.root_position)
     places, turns = skeleton.forward_kinematics(person.parents, made.rotations.astype(float), local)
-    boxes, joints = body_mesh.bone_boxes(person, rig.bones, person.offsets), rig.bones.joints
-    starts = boxes.starts - person.at_rest(person.offsets)[joints]
-    ends = np.stack([starts, starts + boxes.arms])[:, None, None]
-    drawn = places[:, :, joints] + quat.rotate(turns[:, :, joints], ends)
-    points = np.concatenate([places, *drawn], axis=-2).reshape(len(made), -1, 3)
+    rest, body = person.at_rest(person.offsets), rig.body
+    drawn = np.zeros((*places.shape[:2], *body.points.shape))
+    for joints, weights in zip(body.joints.T, body.weights.T / 255.0, strict=True):
+        moved = places[:, :, joints] + quat.rotate(turns[:, :, joints], body.points - rest[joints])
+        drawn += weights[:, None] * moved
+    points = np.concatenate([places, drawn], axis=-2).reshape(len(made), -1, 3)
     return np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
 
 
-def holds(hull, seed):
+def holds(bounded, seed):
     person, rig, made = case(seed)
     found, least = (
-        crowd_extent.boxes(hull(rig), animation_samples.from_motions(made)),
+        crowd_extent.boxes(bounded(rig), animation_samples.from_motions(made)),
         reached(person, rig, made),
     )
     return np.all(found[:, 0] <= least[:, 0]) and np.all(found[:, 1] >= least[:, 1])
 
 
 def whole(rig):
-    return crowd_extent.hull(rig)
+    return rig
 
 
 def joints_alone(rig):
-    found = whole(rig)
-    return replace(found, ends=0 * found.ends, radii=0 * found.radii, moved=found.moved & False)
+    return replace(rig, bounds=character.rig(rig.skeleton, "none").bounds)
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_no_joint_and_no_end_leaves_its_box(seed):
+def test_no_joint_and_no_point_leaves_its_box(seed):
     assert holds(whole, seed)
 
 
@@ -149,11 +149,8 @@ def test_a_body_in_any_pose_stays_in_the_box_of_anywhere(seed):
     person, made = ragged(seed)
     rig = character.rig(person)
     whole = animation_samples.from_clips(made)
-    own = exact.bounding_boxes(
-        rig.tree, whole, character.bounding_radii(character.rest_pose(rig, whole.offsets))
-    )
+    own = exact.bounding_boxes(rig.tree, whole, character.rest_pose(rig, whole.offsets).radii)
     for clip, (low, high) in zip(made, own, strict=True):
         lowest, highest = exact.pose_independent_box(person, clip.translations[0], clip.root_path)
-        # A stub's ball holds its corners with some room.
         assert np.all(lowest <= low + 0.02) and np.all(highest >= high - 0.02)
         assert np.all(highest - lowest < 20)

@@ -9,7 +9,9 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 from posefield.encode.character import joint_names
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.usd import layer_metadata
+from posefield.motion import quat
 from posefield.motion.clip import Clip
+from posefield.motion.skeleton import forward_kinematics
 from posefield.question.results import ClipAnswer
 
 FOLDER = Path(__file__).parent
@@ -97,12 +99,15 @@ def test_prims_are_bound_to_each_other(stage):
         "/Character/Skel": "Skeleton",
         "/Character/Anim": "SkelAnimation",
         "/Character/Body": "Mesh",
+        "/Character/Material": "Material",
+        "/Character/Material/Surface": "Shader",
     }
     for path in ("", "/Skel", "/Body"):
         assert stage.GetPrimAtPath(f"/Character{path}").HasAPI(UsdSkel.BindingAPI)
     for path, target in (
         (".skel:skeleton", "Skel"),
         ("/Body.skel:skeleton", "Skel"),
+        ("/Body.material:binding", "Material"),
         ("/Skel.skel:animationSource", "Anim"),
     ):
         relation = stage.GetRelationshipAtPath(f"/Character{path}")
@@ -136,22 +141,29 @@ def test_neighbouring_quaternions_have_one_sign(stage, walk):
     assert np.any(np.sum(given[1:] * given[:-1], axis=-1) < 0)
 
 
-def test_the_body_stays_on_its_joints_and_within_the_extent(stage, walk):
+def test_usd_skins_the_body_as_we_blend_its_joints_and_within_the_extent(stage, walk):
     points, joints, extent = skinned(stage)
-    positions = walk.clip.positions()
+    weights = np.array(value(stage, "/Body.primvars:skel:jointWeights")).reshape(joints.shape)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, atol=1e-6)
+    clip = walk.clip
+    places, turns = forward_kinematics(clip.skeleton.parents, clip.rotations, clip.translations)
     rest = np.array(value(stage, "/Body.points"))
-    bind = np.array(value(stage, "/Skel.bindTransforms"))[joints, 3, :3]
+    bind = np.array(value(stage, "/Skel.bindTransforms"))[:, 3, :3]
     for frame, found in points.items():
-        reach = np.linalg.norm(found - positions[frame][joints], axis=-1)
-        np.testing.assert_allclose(reach, np.linalg.norm(rest - bind, axis=-1), atol=NEAR)
+        own = rest[:, None] - bind[joints]
+        moved = places[frame][joints] + quat.rotate(turns[frame][joints], own)
+        blended = np.sum(weights[..., None] * moved, axis=1)
+        np.testing.assert_allclose(found, blended, atol=NEAR)
+        # Joints that are not blended would be seen.
+        assert np.abs(found - moved[:, 0]).max() > 0.01
         assert np.all(found >= extent[0]) and np.all(found <= extent[1])
 
 
 def test_the_extent_is_not_much_too_large(stage):
     points, _, extent = skinned(stage, frames=range(45))
     found = np.concatenate(list(points.values()))
-    assert np.all(found.min(axis=0) - extent[0] < 0.1)
-    assert np.all(extent[1] - found.max(axis=0) < 0.1)
+    assert np.all(found.min(axis=0) - extent[0] < 0.12)
+    assert np.all(extent[1] - found.max(axis=0) < 0.12)
 
 
 def skinned(stage, frames=(0, 20, 44)):
@@ -165,7 +177,7 @@ def skinned(stage, frames=(0, 20, 44)):
         transforms = skeleton.ComputeSkinningTransforms(frame)
         assert skinning.ComputeSkinnedPoints(transforms, found, frame)
         points[frame] = np.array(found)
-    joints = np.array(value(stage, "/Body.primvars:skel:jointIndices"))
+    joints = np.array(value(stage, "/Body.primvars:skel:jointIndices")).reshape(len(found), -1)
     extent = np.array(value(stage, ".extent"))
     np.testing.assert_array_equal(extent, np.array(value(stage, "/Body.extent")))
     return points, joints, extent

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from counted import Counted
 
+from posefield.encode.body.bone_boxes import TINTS
 from posefield.encode.files.file_convention import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.encode.usd import (
@@ -238,9 +239,9 @@ def test_skeletons_whose_arrays_are_as_large_as_others_will_do(joints):
 
 def test_samples_that_equal_the_tints_are_written_as_usd_does():
     given = answers(4, person=chain(3))
-    tinted = np.broadcast_to(usd_clip.TINTS.astype(float), given[3].clip.translations.shape)
+    tinted = np.broadcast_to(TINTS, given[3].clip.translations.shape)
     given[3] = moved(given[3], tinted)
-    assert both(given)
+    assert both(given, Convention(1.0, "y", "bones"))
 
 
 def test_a_root_that_rests_nowhere_else_than_its_children_will_do():

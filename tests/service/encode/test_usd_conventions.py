@@ -5,6 +5,7 @@ import pytest
 from pxr import Usd, UsdGeom, UsdSkel
 
 from posefield.check import check
+from posefield.encode.body import skinned_mesh
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CENTIMETRES, CLIP_ENCODERS, METRES
 
@@ -93,15 +94,18 @@ def test_the_body_and_its_extent_are_where_they_are_in_metres(path, walk, tmp_pa
     np.testing.assert_allclose(corners, expected, atol=NEAR)
 
 
-def test_normals_look_outwards(path):
+def test_normals_look_outwards(path, convention):
     stage, _, _ = opened(path)
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/Character/Body"))
     places, normals = np.array(mesh.GetPointsAttr().Get()), np.array(mesh.GetNormalsAttr().Get())
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=1e-6)
-    centres = places.reshape(-1, 10, 3).mean(axis=1, keepdims=True)
-    assert np.all(
-        np.sum((places.reshape(-1, 10, 3) - centres) * normals.reshape(-1, 10, 3), -1) > 0
-    )
+    counts, corners = mesh.GetFaceVertexCountsAttr().Get(), mesh.GetFaceVertexIndicesAttr().Get()
+    faces = skinned_mesh.triangles(np.array(counts), np.array(corners))
+    again = skinned_mesh.vertex_normals(places.astype(float), faces)
+    assert np.all(np.sum(again * normals, axis=-1) > 0.99)
+    a, b, c = (places[faces[:, corner]].astype(float) for corner in range(3))
+    volume = np.sum(a * np.cross(b, c)) / 6 * convention.metres_per_unit**3
+    assert 0.03 < volume < 0.12
 
 
 def test_rest_and_bind_transforms_turn_nothing_and_agree(path, walk, convention):

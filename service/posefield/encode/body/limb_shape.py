@@ -142,7 +142,9 @@ def _hand(plan: PersonPlan, arm: Limb) -> Iterator[Ring]:
     for girth in HAND:
         place = arm.chain.at(float(marks[arm.end]) + girth.share * long)
         middle = wrist + girth.share * long * along
-        yield Ring(middle, plan.scale * girth.across * first, plan.scale * girth.deep * second, place)
+        yield Ring(
+            middle, plan.scale * girth.across * first, plan.scale * girth.deep * second, place
+        )
 
 
 def _foot(plan: PersonPlan, leg: Limb, sole: float) -> Iterator[Ring]:
@@ -160,9 +162,7 @@ def _foot(plan: PersonPlan, leg: Limb, sole: float) -> Iterator[Ring]:
     forth = max(0.05, float((tip - ball) @ plan.front) / scale)
     ball = np.array([ball[0], sole, ball[2]])
     yield _standing(plan, leg, ball, ((-0.012, None), (-0.012, 0.050)), 0.046, sole)
-    yield _standing(
-        plan, leg, ball, ((0.55 * forth, None), (0.55 * forth, 0.038)), 0.046, sole
-    )
+    yield _standing(plan, leg, ball, ((0.55 * forth, None), (0.55 * forth, 0.038)), 0.046, sole)
     yield _standing(plan, leg, ball, ((forth + 0.004, None), (forth, 0.026)), 0.034, sole)
 
 
@@ -238,7 +238,9 @@ def _thumb(
     place = mesh.places[face[0]]
     middle = corners.mean(axis=0)
     rings = [
-        Ring(middle + plan.scale * far * out, plan.scale * r * first, plan.scale * r * second, place)
+        Ring(
+            middle + plan.scale * far * out, plan.scale * r * first, plan.scale * r * second, place
+        )
         for far, r in THUMB
     ]
     _tube(mesh, arm.chain, face, rings, rings[-1].middle + 0.006 * plan.scale * out)

@@ -45,6 +45,7 @@ def build_person(mesh: MeshBuilder, plan: PersonPlan) -> None:
 
 def finish(mesh: MeshBuilder, joints: int) -> SkinnedMesh:
     """Return the mesh that was built, with normals and weights of its points."""
+    mesh.drop_unused()
     points: Floats = np.array(mesh.points)
     counts = np.array([len(face) for face in mesh.faces], np.int32)
     corners = np.array([point for face in mesh.faces for point in face], np.int32)

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from posefield.common.units import Floats
 from posefield.encode.body.bone_chain import BoneChain, ChainPlace
 
@@ -48,3 +46,12 @@ class MeshBuilder:
         """Add triangles from a ring to a point above it."""
         for at, point in enumerate(ring):
             self.faces.append((point, ring[(at + 1) % len(ring)], pole))
+
+    def drop_unused(self) -> None:
+        """Remove the points that no face has."""
+        used = sorted({point for face in self.faces for point in face})
+        place = {point: index for index, point in enumerate(used)}
+        self.points[:] = [self.points[point] for point in used]
+        self.chains[:] = [self.chains[point] for point in used]
+        self.places[:] = [self.places[point] for point in used]
+        self.faces[:] = [tuple(place[point] for point in face) for face in self.faces]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -127,7 +128,7 @@ def build(mesh: MeshBuilder, plan: PersonPlan) -> Trunk:
     own = frame(plan)
     chain = trunk_chain(plan, own)
     rings = tuple(_add(mesh, chain, points) for points in _rings(own))
-    for lower, upper in zip(rings, rings[1:], strict=False):
+    for lower, upper in pairwise(rings):
         mesh.join(lower, upper)
     removed = {face for ring in rings[ARM_ROWS][:2] for face in _arm_faces(mesh, ring)}
     mesh.faces[:] = [face for face in mesh.faces if face not in removed]

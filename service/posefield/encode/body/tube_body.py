@@ -5,6 +5,7 @@ as thick as what they carry: by the length of all bones that hang on them.
 """
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def add_tube(mesh: MeshBuilder, chain: BoneChain, radii: Floats) -> None:
     """Add a closed tube with round ends along a chain; radii (K,): at its points, m."""
     axes = _frames(chain.points)
     rings = [mesh.add_ring(*ring) for ring in _tube_rings(chain, radii, axes)]
-    for lower, upper in zip(rings, rings[1:], strict=False):
+    for lower, upper in pairwise(rings):
         mesh.join(lower, upper)
     along = np.diff(chain.points, axis=0)
     first, last = (arm / max(float(np.linalg.norm(arm)), 1e-12) for arm in (along[0], along[-1]))
@@ -102,7 +103,7 @@ def _tube_rings(
     for back, wide in CAP:
         middle = chain.points[0] + back * radii[0] * along[0]
         yield middle + wide * radii[0] * circle @ axes[0], chain, chain.at(0.0)
-    for segment, arm in enumerate(along):
+    for segment in range(len(along)):
         shares = (0.0, SPACING) if segment else (0.0, 0.5 * SPACING, SPACING)
         for share in shares:
             middle = chain.points[segment] + share * (

@@ -1,9 +1,10 @@
 """Bounds of a skinned body in any pose: spheres about joints and tips.
 
 A joint moves a point rigidly, with its own bones: so in any pose the point stays as far from a
-place along such a bone as at rest. A point that several joints move lies between the places to
-which each would move it. The body is therefore within the convex hull of spheres about the ends of
-each bone, whose radius is the largest of those distances.
+place along such a bone as at rest. A point that several joints move is the mean, by its weights, of
+the points to which each would move it; so it is as far from the mean of those places as the mean of
+those distances, at most. The body is therefore within the convex hull of spheres about the ends of
+bones, whose radius is the largest such mean of the points near to each.
 """
 
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats, Indices, Singles
-from posefield.encode.body.skinned_mesh import SkinnedMesh
+from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
 from posefield.motion.skeleton import Skeleton
 
 
@@ -22,7 +23,7 @@ class BodyBounds:
     joints, ends (K,): the joint, and where the bone that is near leads; the joint itself where none
     is nearer. places (K,): the place among those of the body that the points of a group follow.
     lowest, highest (K,): shares of the way along the bone between which the points lie. rest (K,):
-    largest distance of the points from the bone at rest, m.
+    largest mean distance of the points from their bones at rest, m.
     """
 
     skeleton: Skeleton
@@ -50,7 +51,7 @@ class BodyBounds:
         end -= start
         start -= along.take(self.places, axis=1)
         low, high = (start + share[:, None] * end for share in (self.lowest, self.highest))
-        return self._spheres(self.rest + np.maximum(_lengths(low), _lengths(high)))
+        return self._spheres(np.maximum(_lengths(low), _lengths(high)))
 
     def radii_of_others(self, offsets: Floats | Singles) -> Floats:
         """Return the radii (M, J + E), m, where bone offsets (M, J, 3) move a body made at rest."""
@@ -58,13 +59,18 @@ class BodyBounds:
         longer = np.concatenate([offsets - self.skeleton.offsets, tips], axis=1)
         arms = longer.take(self.ends, axis=1)
         arms[:, self.ends == self.joints] = 0.0
-        return self._spheres(self.rest + self.highest * _lengths(arms))
+        return self._spheres(self.highest * _lengths(arms))
 
-    def _spheres(self, radii: Floats) -> Floats:
-        """Return the radius (M, J + E) about each joint and tip of those (M, K) of groups."""
-        found = np.zeros((len(radii), len(self.skeleton) + len(self.skeleton.tip_joints)))
+    def _spheres(self, differences: Floats) -> Floats:
+        """Return the radius (M, J + E) about each joint and tip.
+
+        differences (M, K): by how much the points of each group may be further away than at rest,
+        m. A point may belong to several groups, so the largest counts for all.
+        """
+        found = np.zeros((len(differences), len(self.skeleton) + len(self.skeleton.tip_joints)))
         if not len(self.joints):
             return found
+        radii = self.rest + differences.max(axis=1, keepdims=True)
         for held in (self.joints, self.ends):
             order = np.argsort(held, kind="stable")
             points, firsts = np.unique(held[order], return_index=True)
@@ -81,6 +87,9 @@ def bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
     points, influences = np.nonzero(body.weights)
     joints = body.joints[points, influences].astype(np.intp)
     ends, shares, far = _nearest_bones(skeleton, body.points[points].astype(float), joints)
+    means = np.zeros(len(body.points))
+    np.add.at(means, points, far * body.weights[points, influences] / FULL_WEIGHT)
+    far = means[points]
     keys = np.stack([joints, ends, body.place[points]])
     order = np.lexsort(keys)
     keys, shares, far = keys[:, order], shares[order], far[order]

@@ -51,6 +51,12 @@ def rig(skeleton: Skeleton, body: BodyKind = DEFAULT_BODY) -> CharacterRig:
     return _cached_rig(_SkeletonKey((skeleton.names, skeleton.parents, *shape), skeleton), body)
 
 
+def body_size(skeleton: Skeleton, body: BodyKind) -> int:
+    """Return the number of points of a skeleton's body."""
+    mesh = rig(skeleton, body).body
+    return 0 if mesh is None else len(mesh.points)
+
+
 class _SkeletonKey:
     """Skeleton as a cache key, compared by content: arrays cannot be compared or hashed."""
 

@@ -20,7 +20,7 @@ PointIndices = npt.NDArray[np.intp]
 # Rounding to float32 accumulates along a chain of joints and far from the origin. Points and joints
 # in a file are rounded separately, and readers compute with them in float32.
 RELATIVE_MARGIN = 1e-5
-THICKEST_BODY = 0.2
+THICKEST_BODY = 0.1
 """Largest distance of a body from its bones beside the size of its skeleton."""
 FRAMES_AT_ONCE = 3200
 """Poses that are computed at a time: their arrays fit the processor's cache."""

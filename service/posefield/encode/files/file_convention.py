@@ -16,7 +16,8 @@ METRES_PER_UNIT: dict[Unit, float] = {"m": 1.0, "cm": 0.01}
 class Convention:
     """Unit of length, as metres per unit, up axis, and kind of body of a file.
 
-    Formats without a body take no notice of it. A character whose up axis is Z still faces its front: Y up, +Z ahead becomes Z up, -Y ahead.
+    Formats without a body take no notice of it. A character whose up axis is Z still faces its
+    front: Y up, +Z ahead becomes Z up, -Y ahead.
     """
 
     metres_per_unit: float
@@ -33,9 +34,7 @@ def requested_convention(
 ) -> Convention:
     """Return the requested convention; None is the default of the format."""
     length = usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]
-    return Convention(
-        length, usual.up if up is None else up, usual.body if body is None else body
-    )
+    return Convention(length, usual.up if up is None else up, usual.body if body is None else body)
 
 
 def check_convention(found: Convention, law: Convention, name: str) -> None:

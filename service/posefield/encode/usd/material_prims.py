@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from pxr import Gf, Sdf
+from pxr import Gf
 
 from posefield.encode.body import body_colours
 from posefield.encode.usd import prim_specs
@@ -21,9 +21,7 @@ def material(parent: Any, *, tinted: bool) -> Any:
     colour = prim_specs.varying_attribute(surface, "inputs:diffuseColor", ValueTypes.Color3f)
     if tinted:
         reader = _shader(made, "Colour", READER)
-        prim_specs.varying_attribute(
-            reader, "inputs:varname", ValueTypes.String, "displayColor"
-        )
+        prim_specs.varying_attribute(reader, "inputs:varname", ValueTypes.String, "displayColor")
         result = prim_specs.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
         _connect(colour, result)
     else:

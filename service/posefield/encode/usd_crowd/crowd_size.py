@@ -8,37 +8,42 @@ from dataclasses import dataclass
 
 # Bytes of a character that refers to the prototype, of one with its own skeleton and body, and of a
 # motion without its frames.
-CHARACTER, FLAT, MOTION = 2_600, 32_000, 8_000
+CHARACTER, FLAT, MOTION = 2_600, 40_000, 8_000
 # Bytes of a pose, and of each of its joints: seven numbers.
 POSE, JOINT = 40, 4 * (3 + 4)
-# Bytes of a joint of a pose, and of a joint's part of a body, as text.
-TEXT_JOINT, TEXT_BODY = 120, 1_200
+# Bytes of a point of a body, of which a binary file has one, and of a point as text.
+POINT, TEXT_POINT = 60, 220
+# Bytes of a joint of a pose, and of a joint of a skeleton at rest, as text.
+TEXT_JOINT, TEXT_REST = 120, 600
 
 
 @dataclass(frozen=True)
 class CrowdCounts:
-    """Number of joints, of characters, of motions, and of frames of each motion."""
+    """Number of joints, of characters, of motions, of frames of each, and of points of a body."""
 
     joints: int
     characters: int
     motions: int
     frames: int
+    points: int
 
 
 def file_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     """Return an upper bound of the bytes of a crowd as usda, usdc or usdz."""
-    binary = _characters(counts, flat) + counts.motions * _motion(counts)
+    body = POINT * counts.points
+    binary = body + _characters(counts, flat) + counts.motions * _motion(counts)
     if ending != "usda":
         return binary
     played = counts.characters if flat else counts.motions
     text = TEXT_JOINT * (counts.joints + 1) * counts.frames * played
-    return max(binary, text + TEXT_BODY * counts.joints * counts.characters * flat)
+    bodies = counts.characters if flat else 1
+    return max(binary, text) + bodies * (TEXT_REST * counts.joints + TEXT_POINT * counts.points)
 
 
 def layer_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     """Return an upper bound of the bytes of the largest layer of a crowd."""
     if ending == "usdz" and not flat:
-        return max(_characters(counts, flat), _motion(counts))
+        return max(_characters(counts, flat), _motion(counts), POINT * counts.points)
     return file_size_bound(counts, ending, flat)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
 from posefield.common.name_suggestion import did_you_mean
+from posefield.encode.character import character
 from posefield.encode.files import zip_archive
 from posefield.encode.usd import layer_metadata
 from posefield.encode.usd_crowd import (
@@ -67,7 +68,11 @@ def stream(
     """
     _validate(crowd, ending, STREAMS, instancing)
     counts = CrowdCounts(
-        len(crowd.skeleton), len(crowd.motion), crowd_motions.motion_count(crowd), crowd.frames
+        len(crowd.skeleton),
+        len(crowd.motion),
+        crowd_motions.motion_count(crowd),
+        crowd.frames,
+        character.body_size(crowd.skeleton, body),
     )
     apart = (
         crowd_size.layer_size_bound(counts, ending, instancing == "flatten") > CHILD_PROCESS_SIZE
@@ -107,9 +112,7 @@ def _layer(crowd: CrowdClip, form: str, instancing: str, body: BodyKind) -> Any:
     return single_layer.referencing_layer(crowd, form, instancing == "scenegraph", body)
 
 
-def _single_file(
-    crowd: CrowdClip, ending: str, instancing: str, body: BodyKind
-) -> Iterator[bytes]:
+def _single_file(crowd: CrowdClip, ending: str, instancing: str, body: BodyKind) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, f"crowd.{ending}")
         layer_metadata.export_layer(_layer(crowd, _form(ending), instancing, body), path)

@@ -1,7 +1,7 @@
 """Process that encodes one crowd.
 
-`python -m posefield.encode.usd_crowd.encoding_child PATH INSTANCING BODY` reads pickles from standard
-input: the crowd without motions, batches of them, and None. It writes the file PATH.
+`python -m posefield.encode.usd_crowd.encoding_child PATH INSTANCING BODY` reads pickles from
+standard input: the crowd without motions, batches of them, and None. It writes the file PATH.
 `encoding_process.stream` starts it.
 """
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.common.units import Floats, Indices
+from posefield.encode.character import character
 from posefield.encode.usd_crowd import crowd_size
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 from posefield.http.api.problems import BODY_TOO_LARGE, RequestError
@@ -22,7 +23,9 @@ from posefield.locomotion import crowd_order as orders
 from posefield.locomotion import walking_crowd
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion.crowd_clip import Placement
+from posefield.motion.skeleton import Skeleton
 from posefield.question import json_decoding as bodies
+from posefield.question.body_kind import DEFAULT_BODY
 from posefield.question.motion_question import ExtrapolationPolicy, RootMode
 from posefield.question.walk_question import WalkQuestion
 from posefield.validation.crowd_question import Blending, CrowdQuestion
@@ -172,31 +175,30 @@ def _view(body: CrowdBody) -> LevelCriteria:
 
 
 def checked_order(
-    question: WalkQuestion, ending: str, joints: int, settings: Settings
+    question: WalkQuestion, ending: str, skeleton: Skeleton, settings: Settings
 ) -> CrowdOrder:
     """Return the order of a question.
 
-    ending: extension of the format. joints: of the model's skeleton. Raises InvalidField for
+    ending: extension of the format. skeleton: the model's. Raises InvalidField for
     characters, poses, frames or bytes beyond the limits of the settings.
     """
     made, flat = orders.from_question(question), question.instancing == "flatten"
     _check_size(made, flat, settings)
-    _check_output(made, flat, ending, joints, settings)
+    points = character.body_size(skeleton, question.body or DEFAULT_BODY)
+    motions, frames = made.motions or made.count, walking_crowd.frames(made.seconds, made.fps)
+    counts = CrowdCounts(len(skeleton), made.count, motions, frames, points)
+    _check_output(counts, flat, ending, settings)
     return made
 
 
-def _check_output(
-    order: CrowdOrder, flat: bool, ending: str, joints: int, settings: Settings
-) -> None:
-    motions, frames = order.motions or order.count, walking_crowd.frames(order.seconds, order.fps)
-    taken = crowd_size.file_size_bound(
-        CrowdCounts(joints, order.count, motions, frames), ending, flat
-    )
+def _check_output(counts: CrowdCounts, flat: bool, ending: str, settings: Settings) -> None:
+    taken = crowd_size.file_size_bound(counts, ending, flat)
     if taken > settings.output_limit:
         raise InvalidField(
             "count",
-            f"{taken / 1e6:.1f} MB for {order.count} characters and {motions} motions of {frames} "
-            f"frames as {ending}, expected at most {settings.output_limit / 1e6:.1f} MB",
+            f"{taken / 1e6:.1f} MB for {counts.characters} characters and {counts.motions} motions "
+            f"of {counts.frames} frames as {ending}, expected at most "
+            f"{settings.output_limit / 1e6:.1f} MB",
         )
 
 

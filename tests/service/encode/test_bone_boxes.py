@@ -3,15 +3,15 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from posefield.encode.character import body_mesh
+from posefield.encode.body import bone_boxes
 from posefield.motion.skeleton import Skeleton
 
 
 def made(skeleton):
-    bones = body_mesh.bones(skeleton)
-    boxes = body_mesh.bone_boxes(skeleton, bones, skeleton.offsets)
-    points, normals = body_mesh.points_and_normals(boxes)
-    counts, corners = body_mesh.faces(bones)
+    bones = bone_boxes.bones(skeleton)
+    boxes = bone_boxes.bone_boxes(skeleton, bones, skeleton.offsets)
+    points, normals = bone_boxes.points_and_normals(boxes)
+    counts, corners = bone_boxes.faces(bones)
     joints = bones.joints.tolist()
     return Drawn(joints, bones.tints.tolist(), boxes, points, normals, counts, corners)
 
@@ -20,7 +20,7 @@ def made(skeleton):
 class Drawn:
     joints: list
     tints: list
-    boxes: body_mesh.BoneBoxes
+    boxes: bone_boxes.BoneBoxes
     points: np.ndarray
     normals: np.ndarray
     face_counts: np.ndarray
@@ -59,7 +59,7 @@ def test_every_box_is_closed(person):
 
 def test_faces_and_normals_look_outwards(person):
     mesh = made(person)
-    centres = np.repeat(mesh.boxes.starts + mesh.boxes.arms / 2, body_mesh.POINTS_PER_BOX, axis=0)
+    centres = np.repeat(mesh.boxes.starts + mesh.boxes.arms / 2, bone_boxes.POINTS_PER_BOX, axis=0)
     assert np.all(np.sum(mesh.normals * (mesh.points - centres), axis=-1) > 0)
     np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=-1), 1.0)
     for face in faces(mesh):
@@ -76,12 +76,12 @@ def test_a_joint_where_nothing_follows_gets_a_stub():
     mesh = made(chain((0, 1, 0), (0, 0.5, 0), tips=[(1, (0, 0, 0))]))
     assert mesh.joints == [0, 1]
     np.testing.assert_allclose(mesh.boxes.starts[1] + mesh.boxes.arms[1] / 2, [0, 1.5, 0])
-    assert np.ptp(mesh.points[body_mesh.POINTS_PER_BOX :], axis=0).max() < 0.1
+    assert np.ptp(mesh.points[bone_boxes.POINTS_PER_BOX :], axis=0).max() < 0.1
 
 
 def test_a_single_joint_has_a_body():
     mesh = made(chain((0, 0, 0)))
-    assert len(mesh.points) == body_mesh.POINTS_PER_BOX
+    assert len(mesh.points) == bone_boxes.POINTS_PER_BOX
 
 
 def test_boxes_in_one_place_are_drawn_once():
@@ -103,10 +103,10 @@ def test_many_bodies_are_the_same_as_one_by_one(person):
     rng = np.random.default_rng(2)
     offsets = person.offsets * rng.uniform(0.5, 1.5, (9, len(person), 1))
     offsets[3, 5] = 0.0
-    bones = body_mesh.bones(person)
-    many = body_mesh.points_and_normals(body_mesh.bone_boxes(person, bones, offsets))
+    bones = bone_boxes.bones(person)
+    many = bone_boxes.points_and_normals(bone_boxes.bone_boxes(person, bones, offsets))
     for index, own in enumerate(offsets):
-        alone = body_mesh.points_and_normals(body_mesh.bone_boxes(person, bones, own))
+        alone = bone_boxes.points_and_normals(bone_boxes.bone_boxes(person, bones, own))
         for values, value in zip(many, alone, strict=True):
             np.testing.assert_array_equal(values[index], value)
 
@@ -114,8 +114,8 @@ def test_many_bodies_are_the_same_as_one_by_one(person):
 def test_a_bone_that_has_no_length_in_one_clip_keeps_its_box(person):
     offsets = person.offsets.copy()
     offsets[5] = 0.0
-    points, normals = body_mesh.points_and_normals(
-        body_mesh.bone_boxes(person, body_mesh.bones(person), offsets)
+    points, normals = bone_boxes.points_and_normals(
+        bone_boxes.bone_boxes(person, bone_boxes.bones(person), offsets)
     )
     assert points.shape == made(person).points.shape
     assert np.all(np.isfinite(points))
