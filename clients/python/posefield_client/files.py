@@ -25,6 +25,7 @@ from posefield_client.wire import Request
 Root = Literal["travelling", "in_place"]
 Names = Literal["own", "mixamo", "ue5", "vrm", "humanik"]
 Instancing = Literal["references", "scenegraph", "flatten"]
+Body = Literal["none", "mannequin", "bones"]
 ClipFormat = Literal["usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack"]
 Place = Sequence[float]
 
@@ -79,6 +80,7 @@ def clip(
     joint_sigma: bool | None = None,
     unit: Literal["m", "cm"] | None = None,
     up: Literal["y", "z"] | None = None,
+    body: Body | None = None,
     extrapolate: Extrapolate | None = None,
     exact: Exact | None = None,
     targets: Targets | None = None,
@@ -91,7 +93,7 @@ def clip(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
-        **asking.said(joint_sigma=joint_sigma, pin_feet=pin_feet),
+        **asking.said(body=body, joint_sigma=joint_sigma, pin_feet=pin_feet),
         **holding.said(exact, targets),
     )
     ask = partial(asking.either, "ClipInFormat", model, question)
@@ -106,13 +108,14 @@ def clips(
     *,
     unit: Literal["m", "cm"] | None = None,
     up: Literal["y", "z"] | None = None,
+    body: Body | None = None,
 ) -> Files:
     """Return an archive of many clips of one format, with a manifest."""
     if format not in CLIP:
         hint = asking.did_you_mean(format, CLIP)
         raise WrongQuestion(f"format {format!r}{hint}, expected one of {', '.join(CLIP)}")
     listed = tuple(_named(place, each) for place, each in enumerate(clips))
-    question = ClipsQuestion(format=format, clips=listed, **asking.said(unit=unit, up=up))
+    question = ClipsQuestion(format=format, clips=listed, **asking.said(unit=unit, up=up, body=body))
     ask = partial(asking.body, "queryClipsInFormat", model, question)
     return Files(CLIPS, ask, len(listed), f"{model!r}, {len(listed)} clips as {format}")
 
@@ -181,6 +184,7 @@ def walk(
     height: float | None = None,
     pixels: float | None = None,
     instancing: Instancing | None = None,
+    body: Body | None = None,
 ) -> Files:
     """Return a walking crowd. camera: position x, y, z, m."""
     place = (
@@ -189,7 +193,7 @@ def walk(
     words = {
         **asking.said(count=count, motions=motions, seconds=seconds, fps=fps, seed=seed),
         **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),
-        **asking.said(instancing=instancing),
+        **asking.said(instancing=instancing, body=body),
     }
     said = "".join(f", {name}={value!r}" for name, value in words.items())
     return Files(

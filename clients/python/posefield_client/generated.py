@@ -81,6 +81,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     pin_feet: bool | UnsetType = UNSET
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
+    body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
 
 
 class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -111,6 +112,7 @@ class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     format: Literal["usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack"]
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
+    body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
     clips: tuple[NamedClipQuestion, ...]
 
 

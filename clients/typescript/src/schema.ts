@@ -685,6 +685,12 @@ export interface components {
          */
         Up: "y" | "z" | null;
         /**
+         * @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone; null for `mannequin`. Formats without a body refuse it.
+         * @default null
+         * @enum {string|null}
+         */
+        Body: "none" | "mannequin" | "bones" | null;
+        /**
          * @description Policy for controls without similar captured clips and for targets out of reach. `ok`
          *     reports the controls only in `supported`. `warn` adds one sentence for each control outside
          *     its sampled range, or one sentence if the controls lie in a gap between the samples, and one
@@ -766,6 +772,7 @@ export interface components {
             pin_feet?: components["schemas"]["PinFeet"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
+            body?: components["schemas"]["Body"];
         };
         /** @default 10 */
         Nearest: number;
@@ -914,6 +921,7 @@ export interface components {
             format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
+            body?: components["schemas"]["Body"];
             clips: components["schemas"]["NamedClipQuestion"][];
         };
         /** @description A ClipQuestion with the name of its file. */
@@ -1960,6 +1968,10 @@ export interface components {
         unit: "m" | "cm";
         /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
         up: "y" | "z";
+        /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
+        body: "none" | "mannequin" | "bones";
+        /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
+        crowdBody: "none" | "mannequin" | "bones";
         /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
         /** @description Number of characters. */
@@ -2503,6 +2515,8 @@ export interface operations {
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
                 up?: components["parameters"]["up"];
+                /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
+                body?: components["parameters"]["body"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -2634,6 +2648,8 @@ export interface operations {
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
                 up?: components["parameters"]["up"];
+                /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
+                body?: components["parameters"]["body"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -2802,6 +2818,8 @@ export interface operations {
                 pixels?: components["parameters"]["pixels"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
+                /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
+                body?: components["parameters"]["crowdBody"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -2894,6 +2912,8 @@ export interface operations {
                 pixels?: components["parameters"]["pixels"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
+                /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
+                body?: components["parameters"]["crowdBody"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
