@@ -1,6 +1,6 @@
 """Draws the README's picture of a crowd: a moment of it, coloured by level of detail.
 
-posefield crowd MODEL --count 144 --seconds 4 --camera=-34,6,-20 -o CROWD.usd
+posefield crowd MODEL --count 144 --seconds 4 --camera=-34,6,-20 --pixels 2 -o CROWD.usd
 .venv/bin/python docs/draw_crowd.py CROWD.usd > LEVELS.json
 .venv-blender/bin/python docs/draw_crowd.py CROWD.usd LEVELS.json PICTURE.png
 """
@@ -82,9 +82,10 @@ def light_and_look(bpy, scene) -> None:
     scene.camera.data.lens = 85
     world = bpy.data.worlds.new("world")
     world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.85, 0.9, 1.0, 1.0)
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.6, 0.68, 0.8, 1.0)
     scene.world = world
-    scene.render.engine, scene.cycles.samples = "CYCLES", 32
+    scene.render.engine, scene.cycles.samples = "CYCLES", 24
+    scene.cycles.use_denoising = True
     scene.view_settings.view_transform = "Standard"
     scene.render.resolution_x, scene.render.resolution_y = 1200, 520
 
