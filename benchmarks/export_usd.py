@@ -18,7 +18,7 @@ from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
 from rows import Row, table
 from timing import in_turn
 
-from posefield.encode.character import body_mesh, character, joint_names
+from posefield.encode.character import character, joint_names
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.formats import METRES
 from posefield.encode.usd import (
@@ -257,18 +257,19 @@ def _skeleton(stage: Any, rig: CharacterRig, content: LayerContent) -> Any:
 def _mesh(stage: Any, rig: CharacterRig, content: LayerContent, extent: Any) -> Any:
     made = UsdGeom.Mesh.Define(stage, "/Character/Body")
     made.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(content.values["points"]))
-    made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(content.values["normals"]))
+    made.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(rig.body.normals))
     made.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
-    counts, corners = map(Vt.IntArray.FromNumpy, body_mesh.faces(rig.bones))
+    counts, corners = (Vt.IntArray.FromNumpy(a) for a in (rig.body.counts, rig.body.corners))
     made.CreateFaceVertexCountsAttr(counts)
     made.CreateFaceVertexIndicesAttr(corners)
     made.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     made.CreateExtentAttr(extent)
     made.CreateDisplayColorAttr([Gf.Vec3f(0.75)])
     binding = UsdSkel.BindingAPI.Apply(made.GetPrim())
-    joints = np.repeat(rig.bones.joints, body_mesh.POINTS_PER_BOX)
-    binding.CreateJointIndicesPrimvar(False, 1).Set(Vt.IntArray.FromNumpy(joints))
-    binding.CreateJointWeightsPrimvar(False, 1).Set(Vt.FloatArray(len(joints), 1.0))
+    joints, weights = rig.body.joints.reshape(-1), rig.body.weights.reshape(-1) / np.float32(255)
+    each = rig.body.joints.shape[1]
+    binding.CreateJointIndicesPrimvar(False, each).Set(Vt.IntArray.FromNumpy(joints))
+    binding.CreateJointWeightsPrimvar(False, each).Set(Vt.FloatArray.FromNumpy(weights))
     binding.CreateGeomBindTransformAttr(Gf.Matrix4d(1.0))
     return made.GetPrim()
 

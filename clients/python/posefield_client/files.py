@@ -115,7 +115,9 @@ def clips(
         hint = asking.did_you_mean(format, CLIP)
         raise WrongQuestion(f"format {format!r}{hint}, expected one of {', '.join(CLIP)}")
     listed = tuple(_named(place, each) for place, each in enumerate(clips))
-    question = ClipsQuestion(format=format, clips=listed, **asking.said(unit=unit, up=up, body=body))
+    question = ClipsQuestion(
+        format=format, clips=listed, **asking.said(unit=unit, up=up, body=body)
+    )
     ask = partial(asking.body, "queryClipsInFormat", model, question)
     return Files(CLIPS, ask, len(listed), f"{model!r}, {len(listed)} clips as {format}")
 

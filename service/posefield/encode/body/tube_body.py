@@ -1,7 +1,7 @@
 """Body of a skeleton that is not built like a person: round-ended tubes along its bones.
 
 Each chain of bones is a closed tube; where it leaves another one it begins inside of it. Bones are
-as thick as what they carry: by the length of all bones that hang on them.
+as thick as what they carry: by the length of all bones beyond them.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.encode.body.body_plan import PointTree
-from posefield.encode.body.bone_chain import BoneChain
+from posefield.encode.body.bone_chain import BoneChain, ChainPlace
 from posefield.encode.body.mesh_builder import MeshBuilder
 
 SIDES = 8
@@ -69,7 +69,7 @@ def _paths(tree: PointTree, carried: Floats) -> Iterator[list[int]]:
 
 
 def _carried(tree: PointTree) -> Floats:
-    """Return the length (J + E,) of each point's bone and of all that hang on it, m."""
+    """Return the length (J + E,) of each point's bone and of all beyond it, m."""
     above = np.array(tree.above)
     arms = tree.places - tree.places[np.maximum(above, 0)]
     found = np.linalg.norm(arms, axis=-1)
@@ -94,7 +94,7 @@ def _radii(
 
 def _tube_rings(
     chain: BoneChain, radii: Floats, axes: Floats
-) -> Iterator[tuple[Floats, BoneChain, object]]:
+) -> Iterator[tuple[Floats, BoneChain, ChainPlace]]:
     turn = 2.0 * np.pi * np.arange(SIDES) / SIDES
     circle = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     marks = chain.marks
@@ -131,11 +131,9 @@ def _frames(points: Floats) -> Floats:
         length = np.linalg.norm(way)
         along = way / length if length > 1e-6 else arm
         across = first - (first @ along) * along
-        size = np.linalg.norm(across)
-        if size < 1e-6:
-            across, size = np.eye(3)[int(np.argmin(np.abs(along)))], 1.0
+        if np.linalg.norm(across) < 1e-6:
+            across = np.eye(3)[int(np.argmin(np.abs(along)))]
             across = across - (across @ along) * along
-            size = np.linalg.norm(across)
-        first = across / size
+        first = across / np.linalg.norm(across)
         found.append(np.stack([first, np.cross(along, first)]))
     return np.array(found)

@@ -83,7 +83,8 @@ def bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
     """Return the bounds of a body; None for no body."""
     if body is None:
         none = np.empty(0, np.intp)
-        return BodyBounds(skeleton, none, none, none, *([np.empty(0)] * 3))
+        share = np.empty(0)
+        return BodyBounds(skeleton, none, none, none, share, share, share)
     points, influences = np.nonzero(body.weights)
     joints = body.joints[points, influences].astype(np.intp)
     ends, shares, far = _nearest_bones(skeleton, body.points[points].astype(float), joints)
@@ -95,9 +96,12 @@ def bounds(skeleton: Skeleton, body: SkinnedMesh | None) -> BodyBounds:
     keys, shares, far = keys[:, order], shares[order], far[order]
     new = np.concatenate([[True], np.any(np.diff(keys) != 0, axis=0)])
     firsts = np.flatnonzero(new)
+    joints, ends, places = keys[:, firsts]
     return BodyBounds(
         skeleton,
-        *keys[:, firsts],
+        joints,
+        ends,
+        places,
         np.minimum.reduceat(shares, firsts),
         np.maximum.reduceat(shares, firsts),
         np.maximum.reduceat(far, firsts),

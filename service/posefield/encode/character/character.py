@@ -116,9 +116,10 @@ def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.ND
     """Return the arrays (M, ...) of the characters, without their extents."""
     bind = _translation_matrices(convention, rest.rig.skeleton.at_rest(rest.offsets))
     local = _translation_matrices(convention, rest.offsets)
-    made = {"bind": bind, "rest": local}
+    made: dict[str, npt.NDArray[Any]] = {"bind": bind, "rest": local}
     if rest.rig.body is not None:
-        made["points"] = axis_conversion.convert_positions(convention, rest.points)
+        points = axis_conversion.convert_positions(convention, rest.points)
+        made["points"] = points
     return made
 
 
