@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
+from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh, distinct_places
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
 
@@ -121,6 +122,28 @@ def faces(bones: Bones) -> tuple[Integers, Integers]:
     corners = np.array([point for face in FACES for point in face], dtype=np.int32)
     starts = np.arange(len(bones.joints), dtype=np.int32)[:, None] * POINTS_PER_BOX
     return np.tile(counts, len(starts)), (starts + corners).reshape(-1)
+
+
+def bones_body(skeleton: Skeleton) -> SkinnedMesh:
+    """Return the boxes of a skeleton as a mesh whose points follow both ends of their bones."""
+    found = bones(skeleton)
+    boxes = bone_boxes(skeleton, found, skeleton.offsets)
+    points, normals = points_and_normals(boxes)
+    counts, corners = faces(found)
+    ends = np.concatenate([found.ends, found.joints[len(found.ends) :]])
+    anchors = np.repeat(np.stack([found.joints, ends], axis=-1), POINTS_PER_BOX, axis=0)
+    joints = np.repeat(found.joints, POINTS_PER_BOX)[:, None]
+    shares = np.tile(RING_POSITIONS.reshape(-1).astype(float), len(ends))
+    return SkinnedMesh(
+        np.ascontiguousarray(points, np.float32),
+        np.ascontiguousarray(normals, np.float32),
+        *distinct_places(anchors, shares),
+        joints,
+        np.full(joints.shape, FULL_WEIGHT, np.uint8),
+        counts,
+        corners,
+        np.repeat(found.tints, POINTS_PER_BOX),
+    )
 
 
 def _body_size(rest: Floats) -> Floats:

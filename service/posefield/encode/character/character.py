@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats, Singles
-from posefield.encode.body.bones_body import bones_body
+from posefield.encode.body.bone_boxes import bones_body
 from posefield.encode.body.mannequin import mannequin
 from posefield.encode.body.skinned_mesh import SkinnedMesh
 from posefield.encode.character import body_bounds, joint_names

@@ -14,10 +14,11 @@ from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
 from posefield.encode.character.character import CharacterArrays, CharacterRig
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import METRES, Convention
-from posefield.encode.usd import material_prims, prim_specs
+from posefield.encode.usd import prim_specs
 from posefield.encode.usd.prim_specs import ValueTypes
 
 BINDING_SCHEMAS = ("SkelBindingAPI",)
+PRIMVAR_READER = "UsdPrimvarReader_float3"
 MESH_SCHEMAS = ("SkelBindingAPI", "MaterialBindingAPI")
 
 UsdValues = Mapping[str, Any]
@@ -83,7 +84,7 @@ def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = MET
         prim_specs.add_relationship(mesh, "skel:skeleton", skeleton.path)
         _mesh(mesh, arrays)
         prim_specs.add_relationship(
-            mesh, "material:binding", material_prims.material(made, tinted=bool(arrays.tinted))
+            mesh, "material:binding", _material(made, tinted=bool(arrays.tinted))
         )
     return made
 
@@ -171,3 +172,35 @@ def _colours(prim: Any, arrays: _MeshArrays) -> None:
         return
     prim_specs.vertex_attribute(prim, name, ValueTypes.Color3fArray, arrays.colours)
     prim_specs.varying_attribute(prim, f"{name}:indices", ValueTypes.IntArray, arrays.tinted)
+
+
+def _material(parent: Any, *, tinted: bool) -> Any:
+    """Return the path of a new material in a prim.
+
+    tinted: whether it takes its colour from the mesh instead of having one of its own.
+    """
+    made = prim_specs.prim(parent, "Material", "Material")
+    surface = _shader(made, "Surface", "UsdPreviewSurface")
+    colour = prim_specs.varying_attribute(surface, "inputs:diffuseColor", ValueTypes.Color3f)
+    if tinted:
+        reader = _shader(made, "Colour", PRIMVAR_READER)
+        prim_specs.varying_attribute(reader, "inputs:varname", ValueTypes.String, "displayColor")
+        result = prim_specs.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
+        _connect(colour, result)
+    else:
+        colour.default = Gf.Vec3f(*body_colours.SKIN)
+    for name, value in (("roughness", body_colours.ROUGHNESS), ("metallic", 0.0)):
+        prim_specs.varying_attribute(surface, f"inputs:{name}", ValueTypes.Float, value)
+    output = prim_specs.varying_attribute(surface, "outputs:surface", ValueTypes.Token)
+    _connect(prim_specs.varying_attribute(made, "outputs:surface", ValueTypes.Token), output)
+    return made.path
+
+
+def _shader(parent: Any, name: str, kind: str) -> Any:
+    made = prim_specs.prim(parent, name, "Shader")
+    prim_specs.uniform_attribute(made, "info:id", ValueTypes.Token, kind)
+    return made
+
+
+def _connect(taker: Any, giver: Any) -> None:
+    taker.connectionPathList.explicitItems = [giver.path]
