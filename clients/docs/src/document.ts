@@ -24,6 +24,7 @@ type Values = Readonly<Record<string, Json>>;
  */
 export function withExamples(contract: JsonObject, model: Model | undefined): JsonObject {
   const document = structuredClone(contract);
+  moveParameters(document);
   const { parameters, requestBodies } = document["components"] as Record<string, JsonObject>;
   const values = model ? valuesOf(model) : {};
   for (const [key, parameter] of Object.entries(parameters ?? {}))
@@ -35,6 +36,29 @@ export function withExamples(contract: JsonObject, model: Model | undefined): Js
   }
   for (const body of bodies) fillBody(document, body, values);
   return document;
+}
+
+/** Move the parameters that a path's operations share into each operation. */
+function moveParameters(document: JsonObject): void {
+  for (const item of Object.values(document["paths"] as JsonObject) as JsonObject[]) {
+    const { parameters = [] } = item;
+    delete item["parameters"];
+    for (const operation of [item["get"], item["post"]] as (JsonObject | undefined)[])
+      if (operation)
+        operation["parameters"] = [
+          ...(parameters as Json[]),
+          ...((operation["parameters"] ?? []) as Json[]),
+        ];
+  }
+}
+
+/** Fold what follows the first paragraph of the contract's description, before the operations. */
+export function foldDescription(document: JsonObject): void {
+  const info = document["info"] as JsonObject;
+  const [first, ...rest] = String(info["description"] ?? "").split(/\n\s*\n/);
+  if (!rest.length) return;
+  const conventions = `<details><summary>Conventions: units, formats, errors, caching, keys</summary>\n\n${rest.join("\n\n")}\n\n</details>`;
+  info["description"] = `${first}\n\n${conventions}`;
 }
 
 /** Values of parameters and properties by name: the smallest question that the model answers. */

@@ -1,11 +1,12 @@
 /** The page at `/docs`: the service's contract in Swagger UI. */
 
-import SwaggerUI from "swagger-ui-dist/swagger-ui-es-bundle.js";
-import "swagger-ui-dist/swagger-ui.css";
+import SwaggerUI from "swagger-ui";
+import "swagger-ui/dist/swagger-ui.css";
 import "./page.css";
 
-import { type JsonObject, type Model, withExamples } from "./document.ts";
+import { foldDescription, type JsonObject, type Model, withExamples } from "./document.ts";
 import { nameFields } from "./fields.ts";
+import { addSamples } from "./samples.ts";
 import { filtered } from "./search.ts";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -31,8 +32,11 @@ async function firstModel(): Promise<Model | undefined> {
 async function show(): Promise<void> {
   const [contract, model] = await Promise.all([fetched<JsonObject>("/openapi.json"), firstModel()]);
   if (!contract) throw new Error("/openapi.json was refused");
+  const document = withExamples(contract, model);
+  foldDescription(document);
+  addSamples(document, location.origin);
   SwaggerUI({
-    spec: withExamples(contract, model),
+    spec: document,
     dom_id: "#contract",
     deepLinking: true,
     filter: true,

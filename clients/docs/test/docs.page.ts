@@ -1,13 +1,16 @@
 /** The page at `/docs` in a browser: drawn, searched, driven by keys, and asked to try each operation. */
 
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
+import { dirname, join } from "node:path";
 import { after, before, test } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
 
 import { browser, SERVICE } from "../../viewer/test/harness.ts";
+import { COMMAND } from "../../viewer/test/static.ts";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
@@ -176,6 +179,28 @@ for (const scheme of ["light", "dark"] as const)
     );
     await page.close();
   });
+
+// The command that runs each language's code.
+const RUN: Readonly<Record<string, readonly string[]>> = {
+  curl: ["sh", "-c"],
+  Python: [join(dirname(COMMAND), "python"), "-c"],
+  JavaScript: [process.execPath, "--input-type=module", "-e"],
+};
+
+test("the code of an operation runs as it stands, and gets what this server answers", async () => {
+  const { page } = await shown();
+  await page.locator("#operations-models-getModel .opblock-summary-control").click();
+  await page.locator("#operations-models-getModel summary").click();
+  const codes = page.locator("#operations-models-getModel details pre");
+  const names = Object.keys(RUN);
+  assert.equal(await codes.count(), names.length);
+  for (const [i, name] of names.entries()) {
+    const [program, ...options] = RUN[name]!;
+    const said = execFileSync(program!, [...options, await codes.nth(i).innerText()]);
+    assert.match((JSON.parse(said.toString()) as { identity: string }).identity, /@/, name);
+  }
+  await page.close();
+});
 
 test("an address leads to an operation", async () => {
   const { page } = await shown();
