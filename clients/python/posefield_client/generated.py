@@ -240,6 +240,14 @@ class Level(Struct, frozen=True, kw_only=True):
     effector: float | None
 
 
+class Preset(Struct, frozen=True, kw_only=True):
+    """Named point of the controls, within the sampled ranges."""
+
+    name: str
+    controls: dict[str, float]
+    performer: str | None
+
+
 class ModelCardKriging(Struct, frozen=True, kw_only=True):
     """Parameters of the kriging model that weights the captured clips."""
 
@@ -285,6 +293,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     kriging: ModelCardKriging
     left_out: tuple[float, ...] = ()
     event: ModelCardEvent | None = None
+    presets: tuple[Preset, ...] = ()
 
 
 class Deviation(Struct, frozen=True, kw_only=True):

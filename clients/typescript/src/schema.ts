@@ -1246,6 +1246,18 @@ export interface components {
                 /** @description Mean time of the event over the captured clips, as a share of the duration. */
                 share: number;
             } | null;
+            /** @description Points of the controls that the recipe names, such as stroll and hurry; empty if it names none. */
+            presets?: components["schemas"]["Preset"][];
+        };
+        /** @description Named point of the controls, within the sampled ranges. */
+        Preset: {
+            name: string;
+            /** @description A value for each control. */
+            controls: {
+                [key: string]: number;
+            };
+            /** @description Performer of the motion; null for an unseen performer. */
+            performer: string | null;
         };
         /** @description A number for each character, or one number for all. */
         Column: number | number[];

@@ -67,13 +67,14 @@ def _train(
     # SciPy and onnx take a second to import, and other commands do not need them.
     from posefield_train import train
     from posefield_train.graph import onnx_export
-    from posefield_train.source import ingest, recipe
+    from posefield_train.source import ingest, preset_check, recipe
 
     output_files.expect_onnx(output)
     own = recipe.read(recipe_file)
     with ProgressPrinter(REPORT_STEPS if report else STEPS) as progress:
         progress(f"reading {recipe_file}")
         examples, notes = ingest.ingest(own, data or recipe_file.parent)
+        preset_check.check_presets(own, examples)
         trained = train.train(own, examples, progress)
         progress("writing the graph and comparing it with the reference")
         exported = onnx_export.export_model(own, trained, notes)

@@ -22,7 +22,7 @@ from posefield.kriging import typical_clip
 from posefield.kriging.kriging_model import Hyper, half_ranges
 from posefield.model_file import model_card
 from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import Control, ModelCard, TrainingParameters
+from posefield.model_file.model_card import Control, ModelCard, Preset, TrainingParameters
 from posefield_train.align import phase_alignment
 from posefield_train.graph import levels, truncation_cost
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
@@ -88,9 +88,11 @@ def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) 
 @single_thread.single_threaded()
 def export_finest(recipe: Recipe, trained: TrainedModel) -> bytes:
     """Return an unchecked file of the finest level alone, for measurements only."""
-    alone = recipe.model_copy(update={"size": recipe.size.model_copy(update={"levels": []})})
+    size = recipe.size.model_copy(update={"levels": []})
+    # Held-out clips narrow the sampled ranges, which presets have to lie in.
+    alone = recipe.model_copy(update={"size": size, "presets": {}})
     laddered = levels.build_levels(alone, trained)
-    own_card = _card(recipe, trained, laddered.levels, [], parity=0.0)
+    own_card = _card(alone, trained, laddered.levels, [], parity=0.0)
     return laddered.model.onnx(model_card.dump(own_card), _producer())
 
 
@@ -203,6 +205,9 @@ def _card(
         beside=_covariance_root(trained),
         joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
         making=_making(recipe, trained),
+        presets=tuple(
+            Preset(name, preset.values, preset.performer) for name, preset in recipe.presets.items()
+        ),
     )
 
 

@@ -68,6 +68,24 @@ rightLowerLeg = "RightLeg"
 rightFoot = "RightFoot"
 rightToes = "RightToeBase"
 
+[presets.high_shelf]
+stature = 1.75
+hip_height = 0.95
+turn = 10.0
+target_height = 1.75
+
+[presets.to_the_side]
+stature = 1.75
+hip_height = 0.95
+turn = 60.0
+target_height = 1.2
+
+[presets.seated]
+stature = 1.75
+hip_height = 0.52
+turn = 20.0
+target_height = 0.9
+
 [size]
 rms_budget_cm = 0.5
 """

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from posefield.common.errors import RecipeError
 from posefield.common.name_suggestion import did_you_mean
@@ -25,11 +25,13 @@ from posefield_train.source.control_sources import (
     ControlColumn,
     ControlMeasured,
     KeyFault,
+    Name,
     RecipePart,
     Text,
 )
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Source(RecipePart):
@@ -254,6 +256,22 @@ class Size(RecipePart):
         return self
 
 
+class Preset(RecipePart):
+    """Named point of the controls: a value for each control, by the control's name."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    __pydantic_extra__: dict[str, FiniteNumber] = Field(init=False)
+
+    performer: Text | None = Field(
+        default=None, description="performer of the motion; default: an unseen performer"
+    )
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Return the values of the controls by name."""
+        return dict(self.__pydantic_extra__)
+
+
 # Quantities that only a whole cycle has.
 CYCLE_QUANTITIES = (*measures.TRAVEL_QUANTITIES, "step_length")
 
@@ -280,6 +298,11 @@ class Recipe(RecipePart):
         default={},
         description="joints by role; exports need them for the joint names of Mixamo, Unreal, VRM "
         "or HumanIK",
+    )
+    presets: dict[Name, Preset] = Field(
+        default={},
+        description="named points of the controls within the sampled ranges, such as "
+        "[presets.stroll]: offered as buttons by the page",
     )
     size: Size
 
@@ -318,6 +341,25 @@ class Recipe(RecipePart):
         if twice:
             raise ValueError(f"controls named twice: {sorted(twice)}")
         return controls
+
+    @model_validator(mode="after")
+    def _check_presets(self) -> "Recipe":
+        names = [control.name for control in self.controls]
+        for name, preset in self.presets.items():
+            if sorted(preset.values) != sorted(names):
+                found = ", ".join(preset.values) or "nothing"
+                raise KeyFault(
+                    f"found {found}, expected a value for each of {names}", "presets", name
+                )
+            if preset.performer is not None and not self.kriging.label:
+                raise KeyFault(
+                    f"found {preset.performer!r} and no kriging.label, expected kriging.label = "
+                    "'performer'",
+                    "presets",
+                    name,
+                    "performer",
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_measured_controls(self) -> "Recipe":

@@ -45,6 +45,7 @@ def check(card: ModelCard) -> None:
     _check_skeleton(card)
     _check_levels(card)
     _check_training_parameters(card)
+    _check_presets(card)
 
 
 def check_graph(
@@ -209,6 +210,21 @@ def _check_training_parameters(card: ModelCard) -> None:
         _expect(right, f"making.fields.{name}", list(own), "a nugget, and degrees 0 or 1")
     for joint in card.making.joint_weights:
         _expect(joint in card.skeleton.names, "making.joint_weights", joint, "a joint")
+
+
+def _check_presets(card: ModelCard) -> None:
+    _expect_unique([preset.name for preset in card.presets], "presets")
+    names = [control.name for control in card.controls]
+    for index, preset in enumerate(card.presets):
+        path = f"presets[{index}]"
+        right = sorted(preset.controls) == sorted(names)
+        _expect(right, f"{path}.controls", [*preset.controls], f"a value for each of {names}")
+        for control in card.controls:
+            value, least, most = preset.controls[control.name], control.minimum, control.maximum
+            right = least <= value <= most
+            _expect(right, f"{path}.controls.{control.name}", value, f"{least} to {most}")
+        known = preset.performer is None or preset.performer in card.performers
+        _expect(known, f"{path}.performer", preset.performer, f"one of {[*card.performers]}")
 
 
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:

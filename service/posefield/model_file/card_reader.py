@@ -68,6 +68,9 @@ class Provenance(TypedDict):
     adapted: NotRequired[tuple[Adaptation, ...]]
 
 
+OPTIONAL = {"presets": b"[]"}
+"""Entries that a file may lack, and the text that stands for them."""
+
 _TYPES = get_type_hints(ModelCard, include_extras=True) | {
     "diagnostics": Diagnostics,
     "provenance": Provenance,
@@ -101,7 +104,7 @@ def _check_format(own: Mapping[str, bytes]) -> None:
 
 
 def _decode_entry(own: Mapping[str, bytes], name: str, kind: Any) -> Any:
-    text = own.get(PREFIX + name)
+    text = own.get(PREFIX + name, OPTIONAL.get(name))
     if text is None:
         raise ValueError(f"its card has no entry {name!r}")
     try:

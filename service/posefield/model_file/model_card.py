@@ -70,6 +70,18 @@ class Event:
 
 
 @dataclass(frozen=True)
+class Preset:
+    """Named point of the controls, within the sampled ranges.
+
+    controls: a value for each control. performer: None for an unseen performer.
+    """
+
+    name: Key
+    controls: Mapping[Key, Number]
+    performer: Name | None = None
+
+
+@dataclass(frozen=True)
 class TrainingParameters:
     """Parameters of training that the graph does not hold and that adapting a model needs.
 
@@ -101,7 +113,8 @@ class ModelCard:
     joint_sigma (J,): error of each joint as a share of sigma. making: not sent to clients. roles:
     joints by the part that each plays (`joint_roles`). event: None where the recipe names
     none. beside (4, 4): of a cycle, a root of the covariance of the errors of its duration's
-    logarithm and its travel, for a sigma of one metre; else empty.
+    logarithm and its travel, for a sigma of one metre; else empty. presets: named points of the
+    controls; the file has no such entry if the recipe names none.
     """
 
     name: Slug
@@ -129,6 +142,7 @@ class ModelCard:
     roles: Mapping[Name, Name] = field(default_factory=dict)
     event: Event | None = None
     beside: tuple[tuple[Number, ...], ...] = ()
+    presets: tuple[Preset, ...] = ()
 
     @property
     def labels(self) -> Floats:
@@ -147,6 +161,8 @@ def dump(card: ModelCard) -> dict[str, str]:
     # All defaults are false or empty.
     told = {key: value for key, value in making.items() if value}
     plain = {**plain_values(card), "format": FORMAT, "making": told}
+    if not card.presets:
+        del plain["presets"]
     return {PREFIX + key: json.dumps(plain[key], sort_keys=True) for key in sorted(plain)}
 
 
@@ -159,6 +175,8 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         control.pop("measure", None)
         if own.measure:
             control["measure"] = measures.to_dict(own.measure)
+    for preset, point in zip(plain["presets"], card.presets, strict=True):
+        preset["performer"] = point.performer
     joints = plain["skeleton"]
     # To the micrometre.
     joints["offsets"] = np.round(card.skeleton.offsets, 6).tolist()
