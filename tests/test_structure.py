@@ -200,7 +200,7 @@ def test_public_functions_have_few_parameters(own, tmp_path):
 
 
 def test_a_boolean_of_a_question_stands_in_few_files():
-    """`pin_feet`: its type, the contract, its check, and the signatures of the Python client."""
+    """`pin_feet`: type, contract, check, signatures of the Python client, and the page's download."""
     folders = (ROOT / folder for folder in ("service", "model_export", "clients", "api"))
     kinds = {".py", ".ts", ".yaml", ".json"}
     files = (path for folder in folders for path in folder.rglob("*") if path.suffix in kinds)
@@ -214,6 +214,7 @@ def test_a_boolean_of_a_question_stands_in_few_files():
     assert found == {
         "api/openapi.yaml",
         "clients/python/posefield_client/files.py",
+        "clients/viewer/src/files.ts",
         "clients/python/posefield_client/questions.py",
         "service/posefield/constraints/targets.py",
         "service/posefield/question/motion_question.py",

@@ -2,10 +2,13 @@
 
 import { button, el, id } from "./dom.ts";
 import type { Mount } from "./page.ts";
+import { presets } from "./presets.ts";
 import type { Session } from "./session.ts";
 import { Slider } from "./slider.ts";
 
-export function mount(host: HTMLElement, { card, player, signal, store }: Session): void {
+export function mount(host: HTMLElement, page: Session): void {
+  const { card, player, signal, store } = page;
+  const row = presets(page);
   const sliders = card.controls.map((control, column) => {
     const examples = card.examples.map((row) => row[column]!);
     const set = (value: number) =>
@@ -20,6 +23,7 @@ export function mount(host: HTMLElement, { card, player, signal, store }: Sessio
   };
   host.append(
     el("div", { class: "title" }, el("h2", {}, "Controls"), reset),
+    ...(row ? [row] : []),
     ...sliders.map(([, slider]) => slider.element),
   );
   if (card.performers.length) host.append(performers(card.performers, store, signal));
@@ -35,7 +39,7 @@ export function mount(host: HTMLElement, { card, player, signal, store }: Sessio
   });
 }
 
-const NOBODY = "Somebody never seen";
+const NOBODY = "Unknown performer";
 
 function performers(
   names: readonly string[],

@@ -32,19 +32,31 @@ interface Row {
   readonly performer: string | null;
 }
 
-/** Ten questions for a model of four levels: what its clips do, and then their poses. */
+/**
+ * Ten questions for a model of four levels: what its clips do, and then their poses.
+ *
+ * progress: called with the share that is done.
+ */
 export async function library(
   source: Source,
   model: string,
   card: ModelCard,
   signal: AbortSignal,
+  progress: (share: number) => void,
 ): Promise<Library> {
+  const questions = 2 + 2 * card.levels.length;
+  let answered = 0;
   const walks = card.cyclic && card.root === "travelling";
   const tried = rows(card);
   const ask = async (
     rows: readonly Row[],
     rest: Partial<CrowdQuestion> & Pick<CrowdQuestion, "time">,
-  ) => source.crowd(model, { ...asked(card, rows), ...rest }, signal);
+  ) => {
+    const poses = await source.crowd(model, { ...asked(card, rows), ...rest }, signal);
+    answered += 1;
+    progress(answered / questions);
+    return poses;
+  };
   const ways = await journeys(tried, ask);
   const gentle = tried.map((_, i) => i).filter((i) => Math.abs(ways.turning[i]!) <= SHARPEST);
   const chosen = spread(walks && gentle.length >= 6 ? gentle : tried.map((_, i) => i), MOTIONS);

@@ -14,6 +14,7 @@ export class Panel {
   readonly #said = el("p", { class: "crowd-said" });
   readonly #time = el("p", { class: "crowd-time" });
   readonly #seen = el("p", { class: "crowd-time" });
+  readonly #progress = el("progress", { max: 1, hidden: true, "aria-label": "Motions computed" });
   readonly #counts: readonly HTMLElement[];
 
   constructor(host: HTMLElement, page: Page) {
@@ -23,17 +24,18 @@ export class Panel {
     );
     const walks = page.card.cyclic && page.card.root === "travelling";
     const what = walks
-      ? "Everybody walks a straight or gently bent way, and comes back at the field's other side."
-      : "This model does not walk: everybody stays, and goes through a captured clip's controls there and back.";
+      ? "Characters walk along straight or gently curved paths, and re-enter on the opposite side."
+      : "This model does not walk: each character stays in place and repeats a captured motion forwards and backwards.";
     this.#host.append(
       el("h2", {}, "Crowd"),
       el("p", { class: "crowd-said" }, what),
+      this.#said,
+      this.#progress,
       people(page),
       limit(page),
       el("ul", {}, ...levels),
       this.#seen,
       this.#time,
-      this.#said,
     );
     host.append(this.#host);
     page.signal.addEventListener("abort", () => this.#host.remove());
@@ -45,6 +47,12 @@ export class Panel {
 
   say(text: string): void {
     this.#said.textContent = text;
+  }
+
+  /** Share of the motions that is there; null where none are waited for. */
+  progress(share: number | null): void {
+    this.#progress.hidden = share === null;
+    this.#progress.value = share ?? 0;
   }
 
   count(counts: Int32Array, seen: number): void {

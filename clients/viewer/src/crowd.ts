@@ -136,16 +136,18 @@ class CrowdView {
     const { source, store, card, signal, notice } = this.#page;
     this.#loading = true;
     try {
-      this.#panel.say("The motions are being made …");
-      this.#library = await library(source, store.state.model, card, signal);
+      this.#panel.say("Computing the motions …");
+      const done = (share: number) => this.#panel.progress(share);
+      this.#library = await library(source, store.state.model, card, signal, done);
       this.#panel.say("");
       if (!signal.aborted) this.#people();
     } catch (fault) {
       if (signal.aborted) return;
-      this.#panel.say(`The motions could not be had. ${understood(fault)?.text ?? ""}`);
+      this.#panel.say(`The motions could not be computed. ${understood(fault)?.text ?? ""}`);
       notice(fault);
     } finally {
       this.#loading = false;
+      this.#panel.progress(null);
     }
   }
 

@@ -5,8 +5,12 @@ import { type Client, type ClipFormat, type ClipQuestion, PosefieldError } from 
 import "./files.css";
 import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
 import { chooser, el, labelled } from "./dom.ts";
-import { type Mount, type Page, served } from "./page.ts";
+import { type Page, served } from "./page.ts";
+import { saveFile } from "./save-file.ts";
+import type { Session } from "./session.ts";
+import { title } from "./slider.ts";
 import type { State } from "./state.ts";
+import { videoButton } from "./video-button.ts";
 import { figure } from "./written.ts";
 
 const FORMATS = [
@@ -29,7 +33,7 @@ const WAYS = [
   ["travelling", "travels"],
   ["in_place", "stays in place"],
 ] as const;
-const USUAL = ["", "as usual"] as const;
+const USUAL = ["", "default"] as const;
 const UNITS = [USUAL, ["m", "metres"], ["cm", "centimetres"]] as const;
 const UPS = [USUAL, ["y", "Y"], ["z", "Z"]] as const;
 const TEXTS = { curl, python, link } as const;
@@ -45,22 +49,31 @@ interface Choice {
   names: Names;
   unit: "" | "m" | "cm";
   up: "" | "y" | "z";
+  pinFeet: boolean;
+  exact: "auto" | "none";
   text: Text;
 }
 
-export const mount: Mount = (host, page) => {
-  if (served(page.source)) new Files(host, page, page.source).begin();
-  else host.append(titled(el("p", { class: "files-said" }, NONE)));
-};
+export function mount(host: HTMLElement, session: Session): void {
+  if (served(session.source)) {
+    new Files(host, session, session.source).begin();
+    return;
+  }
+  const said = el("p", { class: "files-said", role: "status" }, NONE);
+  const video = videoButton(session, (text) => {
+    said.textContent = text;
+  });
+  host.append(titled(said, el("div", { class: "files-main" }, video)));
+}
 
 const NONE =
-  "Files, and texts that ask for them, need a service: this page runs without one, on the model file alone.";
+  "Animation files need a service: this page runs without one, on the model file alone. A video can be recorded.";
 
 function titled(...content: readonly HTMLElement[]): HTMLElement {
   return el(
     "section",
-    { class: "files", "aria-label": "Files" },
-    el("h2", {}, "Take it away"),
+    { class: "files", "aria-label": "Download" },
+    el("h2", {}, "Download"),
     ...content,
   );
 }
@@ -75,7 +88,8 @@ class Files {
   readonly #shows: (() => void)[] = [];
   #asked: AbortController | null = null;
 
-  constructor(host: HTMLElement, page: Page, service: Pick<Client, "file">) {
+  constructor(host: HTMLElement, session: Session, service: Pick<Client, "file">) {
+    const page = session;
     this.#page = page;
     this.#service = service;
     const fps = page.card.rate >= 1 && page.card.rate <= 60 ? page.card.rate : 30;
@@ -86,6 +100,8 @@ class Files {
       names: "own",
       unit: "",
       up: "",
+      pinFeet: false,
+      exact: "auto",
       text: "curl",
     };
     this.#said.setAttribute("role", "status");
@@ -97,9 +113,16 @@ class Files {
     kinds.setAttribute("aria-label", "Ask for it by");
     host.append(
       titled(
-        el("div", { class: "files-fields" }, ...this.#rows()),
-        this.#get,
+        el(
+          "div",
+          { class: "files-main" },
+          this.#get,
+          videoButton(session, (text) => this.#say(text)),
+        ),
         this.#said,
+        el("div", { class: "files-fields" }, ...this.#rows()),
+        ...this.#holds(),
+        el("h3", {}, "The same from a program"),
         kinds,
         this.#code,
       ),
@@ -130,7 +153,8 @@ class Files {
   /** What differs from what is usual, so that texts stay short. */
   get #question(): ClipQuestion {
     const { controls, performer, level, root } = this.#page.store.state;
-    const { fps, loop, names, unit, up, format } = this.#choice;
+    const { fps, loop, names, unit, up, format, pinFeet, exact } = this.#choice;
+    const targets = this.#targets;
     const measured = format === "glb" ? {} : { ...(unit && { unit }), ...(up && { up }) };
     return {
       controls,
@@ -139,13 +163,26 @@ class Files {
       ...(level && { level }),
       ...(root === "in_place" && { root }),
       ...(loop && { loop }),
+      ...(targets && { targets }),
+      ...(pinFeet && { pin_feet: true }),
+      ...(exact !== "auto" && { exact }),
       ...(names !== "own" && { names }),
       ...measured,
     };
   }
 
+  /** The target of the page's handle, for the file to meet exactly. */
+  get #targets(): ClipQuestion["targets"] | null {
+    const { card, store } = this.#page;
+    const { target } = store.state;
+    if (!target || !card.event) return null;
+    const joint = card.skeleton.names[card.event.joint]!;
+    const position = target.map((value) => Number(value.toFixed(4)));
+    return [{ joint, at: "event", position }];
+  }
+
   #changed(changed: ReadonlySet<keyof State>): void {
-    if (changed.has("root") || changed.has("level")) this.#draw();
+    if (["root", "level", "target"].some((key) => changed.has(key as "root"))) this.#draw();
     else if (changed.has("controls") || changed.has("performer")) this.#tell();
   }
 
@@ -186,20 +223,20 @@ class Files {
     const levels = card.levels.map((_, i) => [String(i), `${i}`] as const);
     const rows = [
       this.#list(
-        "format",
+        "Format",
         FORMATS,
         () => choice.format,
         (format) => this.#take({ format }),
       ),
       this.#rate(),
       this.#list(
-        "root",
+        "Movement",
         WAYS,
         () => store.state.root,
         (root) => store.set({ root }),
       ),
       this.#list(
-        "level",
+        "Level of detail",
         levels,
         () => String(store.state.level),
         (level) => store.set({ level: Number(level) }),
@@ -208,7 +245,7 @@ class Files {
     if (Object.keys(card.roles).length)
       rows.push(
         this.#list(
-          "joint names",
+          "Joint names",
           NAMES,
           () => choice.names,
           (names) => this.#take({ names }),
@@ -216,13 +253,13 @@ class Files {
       );
     const measures = [
       this.#list(
-        "unit",
+        "Unit",
         UNITS,
         () => choice.unit,
         (unit) => this.#take({ unit }),
       ),
       this.#list(
-        "up",
+        "Up axis",
         UPS,
         () => choice.up,
         (up) => this.#take({ up }),
@@ -233,7 +270,6 @@ class Files {
       for (const row of measures) row.hidden = choice.format === "glb";
     });
     rows.push(...measures);
-    if (card.cyclic) rows.push(this.#cycle());
     return rows;
   }
 
@@ -248,13 +284,32 @@ class Files {
       else show();
     });
     show();
-    return labelled("frames a second", field);
+    return labelled("Frames a second", field);
   }
 
   #cycle(): HTMLElement {
-    const box = el("input", { type: "checkbox" });
-    box.addEventListener("change", () => this.#take({ loop: box.checked }));
-    return labelled("closed loop", box);
+    return check("Closed loop", (loop) => this.#take({ loop }));
+  }
+
+  /** What the file holds exactly, where the shown motion only comes near. */
+  #holds(): HTMLElement[] {
+    const { card, store } = this.#page;
+    const rows: HTMLElement[] = card.cyclic ? [this.#cycle()] : [];
+    if (card.feet.length)
+      rows.push(check("Hold standing feet in place", (pinFeet) => this.#take({ pinFeet })));
+    const measured = card.controls.filter(({ measure }) => measure).map(({ name }) => title(name));
+    if (measured.length) {
+      const words = `Match exactly: ${measured.join(", ")}`;
+      rows.push(check(words, (on) => this.#take({ exact: on ? "auto" : "none" }), true));
+    }
+    if (card.event && !card.cyclic) {
+      const line = el("p", { class: "about" });
+      this.#shows.push(() => {
+        line.textContent = store.state.target ? TARGET : "";
+      });
+      rows.push(line);
+    }
+    return rows;
   }
 
   #tab(text: Text): HTMLButtonElement {
@@ -277,7 +332,7 @@ class Files {
     } catch {
       getSelection()?.selectAllChildren(this.#code);
       this.#say(
-        "This browser keeps its clipboard to itself; the text is selected, copy it by hand.",
+        "This browser does not let pages use the clipboard: the text is selected, copy it yourself.",
       );
     }
   }
@@ -287,7 +342,7 @@ class Files {
     const { signal } = this.#page;
     const wanted = this.#wanted;
     this.#asked = new AbortController();
-    this.#say(`Asking for ${fileName(wanted)} …`);
+    this.#say(`Requesting ${fileName(wanted)} …`);
     this.#tell();
     try {
       const both = AbortSignal.any([signal, this.#asked.signal]);
@@ -297,8 +352,8 @@ class Files {
         wanted.question,
         both,
       );
-      save(fileName(wanted), new Blob([content], { type: mediaType }));
-      this.#say(`${fileName(wanted)}: ${size(content.length)}, whole.`);
+      saveFile(fileName(wanted), new Blob([content], { type: mediaType }));
+      this.#say(`${fileName(wanted)} saved: ${size(content.length)}.`);
     } catch (fault) {
       this.#say(this.#asked.signal.aborted ? "Stopped; nothing was saved." : failed(fault));
     } finally {
@@ -320,10 +375,11 @@ function failed(fault: unknown): string {
 const size = (bytes: number): string =>
   bytes < 1e6 ? `${figure(bytes / 1e3)} kB` : `${figure(bytes / 1e6)} MB`;
 
-function save(name: string, content: Blob): void {
-  const address = URL.createObjectURL(content);
-  const anchor = el("a", { href: address, download: name });
-  anchor.click();
-  // The browser has read it by then.
-  setTimeout(() => URL.revokeObjectURL(address), 60_000);
+const TARGET = "The file meets the target above exactly, where the joint can reach it.";
+
+/** A box to tick, with its words after it. */
+function check(words: string, taken: (on: boolean) => void, on = false): HTMLElement {
+  const box = el("input", { type: "checkbox", checked: on });
+  box.addEventListener("change", () => taken(box.checked));
+  return el("label", { class: "files-check" }, box, el("span", {}, words));
 }

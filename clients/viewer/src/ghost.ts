@@ -109,5 +109,5 @@ class Ghost {
 }
 
 function says({ distance, source }: Captured): string {
-  return `Ghost: the model's answer at the controls of ${source}, the nearest captured clip, ${distance.toFixed(2)} away`;
+  return `Ghost: the model at the controls of ${source}, the nearest captured clip (distance ${distance.toFixed(2)})`;
 }

@@ -61,6 +61,7 @@ export function initial(model: string, card: ModelCard): State {
     body: "mannequin",
     ghost: false,
     feet: false,
+    target: null,
     view: "one",
     across,
     along,
@@ -135,6 +136,11 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   body: one("stick", "mannequin"),
   ghost: yes(),
   feet: yes(),
+  target: {
+    expected: () => "x,y,z in metres",
+    read: point,
+    write: (value) => (value ?? []).map(rounded).join(","),
+  },
   view: one("one", "levels", "crowd"),
   across: control(),
   along: control(),
@@ -156,6 +162,14 @@ function between(
     },
     write: rounded,
   };
+}
+
+/** Three numbers between commas. */
+function point(text: string): State["target"] | undefined {
+  const found = text.split(",").map(number);
+  const [x, y, z] = found;
+  const good = found.length === 3 && found.every((value) => typeof value === "number");
+  return good ? [x as number, y as number, z as number] : undefined;
 }
 
 function yes(): Field<boolean> {

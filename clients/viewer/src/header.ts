@@ -3,12 +3,12 @@
 import type { ModelSummary } from "@posefield/client";
 
 import { button, choice, el, icon, id } from "./dom.ts";
+import { shareButton } from "./share.ts";
 import type { Store, View } from "./state.ts";
 import * as theme from "./theme.ts";
 
 const VIEWS = [
-  ["one", "One"],
-  ["levels", "Levels"],
+  ["one", "Single"],
   ["crowd", "Crowd"],
 ] as const;
 
@@ -43,6 +43,7 @@ export class Header {
       el("span", { class: "field" }, el("label", { for: this.#models.id }, "Model"), this.#models),
       this.#about,
       this.#views,
+      shareButton(),
       shade,
       sign,
       help,

@@ -40,7 +40,7 @@ export class Note {
 
   show(now: Apart, ladder: Ladder, lens: Lens): void {
     const own = `${pixels(now.rms)} px, worst ${pixels(now.most)}`;
-    this.#now.textContent = this.#level ? own : "the measure of the others";
+    this.#now.textContent = this.#level ? own : "reference";
     this.#from.textContent = `from ${whole(Math.ceil(farEnough(ladder, this.#level, lens)))} m on`;
   }
 }

@@ -1,6 +1,6 @@
 /** How the body is shown: over the stage, where one looks. */
 
-import { choice, el, id, toggle } from "./dom.ts";
+import { choice, toggle } from "./dom.ts";
 import { type Mount, served } from "./page.ts";
 
 export const mount: Mount = (host, { card, signal, source, store }) => {
@@ -19,30 +19,15 @@ export const mount: Mount = (host, { card, signal, source, store }) => {
   );
   ghost.hidden = !served(source);
   root.hidden = card.root === "in_place";
-  const [level, chooser] = levels(card.levels.length, (value) => store.set({ level: value }));
   const show = () => {
     const { state } = store;
     body.set(state.body);
     ghost.set(state.ghost);
     feet.set(state.feet);
     root.set(state.root === "travelling");
-    level.value = String(state.level);
     host.hidden = state.view !== "one";
   };
-  host.append(body, ghost, feet, root, chooser);
+  host.append(body, ghost, feet, root);
   show();
   signal.addEventListener("abort", store.listen(show));
 };
-
-function levels(
-  count: number,
-  act: (level: number) => void,
-): readonly [HTMLSelectElement, HTMLElement] {
-  const label = id();
-  const options = Array.from({ length: count }, (_, level) =>
-    el("option", { value: level }, level ? String(level) : "0, finest"),
-  );
-  const select = el("select", { id: label }, ...options);
-  select.addEventListener("change", () => act(Number(select.value)));
-  return [select, el("span", { class: "field" }, el("label", { for: label }, "Level"), select)];
-}

@@ -3,9 +3,11 @@
 import * as bodies from "./bodies.ts";
 import * as controls from "./controls.ts";
 import * as crowd from "./crowd.ts";
+import * as detail from "./detail-panel.ts";
 import * as feet from "./feet.ts";
 import * as files from "./files.ts";
 import * as ghost from "./ghost.ts";
+import * as jumps from "./jumps.ts";
 import * as keys from "./keys.ts";
 import * as levels from "./levels.ts";
 import * as map from "./map.ts";
@@ -14,19 +16,28 @@ import type { Session } from "./session.ts";
 import * as target from "./target.ts";
 import * as transport from "./transport.ts";
 import * as trust from "./trust.ts";
+import * as welcome from "./welcome.ts";
 
 type Part = (host: HTMLElement, session: Session) => void;
 
 /** Each gets a section of its own, in this order, named for styles and tests. */
 const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<string, Part>>>> = {
-  stage: { options: options.mount, ghost: ghost.mount, levels: levels.mount, crowd: crowd.mount },
+  stage: {
+    options: options.mount,
+    ghost: ghost.mount,
+    levels: levels.mount,
+    crowd: crowd.mount,
+  },
   side: {
+    jumps: jumps.mount,
+    welcome: welcome.mount,
     controls: controls.mount,
     trust: trust.mount,
     target: target.mount,
     map: map.mount,
     feet: feet.mount,
     files: files.mount,
+    detail: detail.mount,
   },
   transport: { time: transport.mount },
 };

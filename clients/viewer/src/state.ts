@@ -18,6 +18,8 @@ export interface State {
   readonly body: "stick" | "mannequin";
   readonly ghost: boolean;
   readonly feet: boolean;
+  /** Where the event's joint shall be, m; null while no target is wanted. */
+  readonly target: readonly [number, number, number] | null;
   readonly view: View;
   /** The two controls of the map. */
   readonly across: string;

@@ -35,6 +35,8 @@ class Target {
   constructor(host: HTMLElement, session: Session, found: CardEvent) {
     const { card, player, scene, signal, store } = session;
     this.#session = session;
+    this.#wanted = store.state.target;
+    if (this.#wanted) this.#handle.position.set(...this.#wanted);
     this.#reach = new Reach(session, found);
     this.#ball = new Mesh(new SphereGeometry(0.035, 20, 14), new MeshBasicMaterial());
     this.#handle.add(this.#ball);
@@ -53,7 +55,7 @@ class Target {
       el(
         "p",
         { class: "about" },
-        `Drag the handle, or type where ${joint} shall be ${Math.round(100 * found.share)} % through the clip. Controls stay within what was sampled.`,
+        `Drag the handle on the stage, or type a position for ${joint}${moment(found.share)}. The controls follow within their sampled ranges.`,
       ),
       el("div", { class: "point" }, ...this.#fields.map((field, i) => labelled(AXES[i]!, field))),
       this.#fault,
@@ -66,7 +68,9 @@ class Target {
     this.#tint();
     const leave = store.listen((_, changed) => {
       if (changed.has("view")) this.#appear();
-      if (changed.has("controls") && !this.#reach.taking) this.#wanted = null;
+      if (changed.has("target")) this.#restore(store.state.target);
+      if (changed.has("controls") && !changed.has("target") && !this.#reach.taking)
+        store.set({ target: null });
     });
     signal.addEventListener("abort", () => {
       leave();
@@ -98,8 +102,17 @@ class Target {
 
   #want(point: Point): void {
     this.#wanted = point;
+    this.#session.store.set({ target: point });
     this.#write(point);
     this.#ask.ask(point);
+  }
+
+  /** A target that another part or the address has set or taken away. */
+  #restore(target: Point | null): void {
+    if (target === this.#wanted) return;
+    this.#wanted = target;
+    if (target) this.#handle.position.set(...target);
+    this.#rest();
   }
 
   async #follow(point: Point): Promise<void> {
@@ -180,6 +193,11 @@ class Target {
   #tint(): void {
     this.#ball.material.color.set(theme.colour("--accent"));
   }
+}
+
+/** When the event is, in words. */
+function moment(share: number): string {
+  return share > 0.995 ? " at the end of the clip" : `, ${Math.round(100 * share)} % into the clip`;
 }
 
 function labelled(axis: string, field: HTMLInputElement): HTMLElement {

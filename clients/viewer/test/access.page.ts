@@ -57,9 +57,12 @@ for (const scheme of ["light", "dark"] as const)
       await page.getByRole("button", { name: "Keys" }).click();
       assert.deepEqual(await broken(page), []);
       await page.keyboard.press("Escape");
-      for (const view of ["Levels", "Crowd"]) {
+      for (const [view, section] of [
+        ["Compare all", "levels"],
+        ["Crowd", "crowd"],
+      ] as const) {
         await page.getByRole("button", { name: view, exact: true }).click();
-        await page.locator(`section.${view.toLowerCase()}`).waitFor();
+        await page.locator(`section.${section}`).waitFor();
         assert.deepEqual(await broken(page), [], view);
       }
       await page.close();

@@ -40,14 +40,14 @@ describe("files", () => {
       page.waitForEvent("download"),
       page.locator(".files-get").click(),
     ]);
-    await said(/whole/);
+    await said(/saved: /);
     return readFileSync(await got.path());
   };
 
   it("of every format are saved whole, as the link gives them", async () => {
     const sizes = new Set<number>();
     for (const format of FORMATS) {
-      await choose("format", format);
+      await choose("Format", format);
       const found = await download();
       const answer = await fetch(await text("Link"));
       assert.deepEqual(found, Buffer.from(await answer.arrayBuffer()), format);
@@ -57,15 +57,15 @@ describe("files", () => {
   });
 
   it("say what was chosen, and curl and Python get the same", async () => {
-    await choose("format", "usda");
-    await choose("up", "z");
-    await choose("unit", "cm");
-    await choose("root", "in_place");
-    await choose("level", "1");
-    await choose("joint names", "mixamo");
-    await page.locator(".files").getByLabel("closed loop").check();
-    await page.locator(".files").getByLabel("frames a second").fill("24");
-    await page.locator(".files").getByLabel("frames a second").press("Tab");
+    await choose("Format", "usda");
+    await choose("Up axis", "z");
+    await choose("Unit", "cm");
+    await choose("Movement", "in_place");
+    await choose("Level of detail", "1");
+    await choose("Joint names", "mixamo");
+    await page.locator(".files").getByLabel("Closed loop").check();
+    await page.locator(".files").getByLabel("Frames a second").fill("24");
+    await page.locator(".files").getByLabel("Frames a second").press("Tab");
     const found = await download();
     const usda = found.toString();
     for (const word of [
@@ -98,7 +98,7 @@ describe("files", () => {
   });
 
   it("keeps the focus where something is chosen by keys", async () => {
-    const format = page.locator(".files").getByLabel("format", { exact: true });
+    const format = page.locator(".files").getByLabel("Format", { exact: true });
     await format.focus();
     const before = await format.inputValue();
     for (const [key, same] of [
@@ -120,7 +120,7 @@ describe("files", () => {
     await page.unroute(/clip\.usda/);
     await page.route(/clip\.usda/, () => undefined);
     await page.locator(".files-get").click();
-    await said(/Asking/);
+    await said(/Requesting/);
     await page.locator(".files-get", { hasText: "Stop" }).click();
     await said(/Stopped; nothing was saved/);
     await page.unroute(/clip\.usda/);

@@ -21,6 +21,7 @@ const OTHER: State = {
   body: "stick",
   ghost: true,
   feet: true,
+  target: [0.25, 1.5, -0.125],
   view: "crowd",
   across: "time",
   along: "speed",

@@ -39,7 +39,7 @@ test("the graphics card is given back what a model took", async () => {
   for (let round = 0; round < 3; round++) {
     for (const model of ["cmu_walk", "reaching"]) {
       await page.getByLabel("Model", { exact: true }).selectOption(model);
-      await page.getByRole("button", { name: "Levels" }).click();
+      await page.getByRole("button", { name: "Compare all" }).click();
       await page.locator(".levels-now", { hasText: "px" }).first().waitFor();
       await page.getByRole("button", { name: "Crowd" }).click();
       await page.locator(".crowd[data-frame]").waitFor({ timeout: 60_000 });

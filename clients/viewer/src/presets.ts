@@ -1,0 +1,35 @@
+/** Named points of the controls, from the model's recipe, as buttons. */
+
+import type { ModelCard } from "@posefield/client";
+
+import { el } from "./dom.ts";
+import type { Page } from "./page.ts";
+import { title } from "./slider.ts";
+import type { State } from "./state.ts";
+
+type Preset = NonNullable<ModelCard["presets"]>[number];
+
+/** A row of buttons; null for a model without presets. */
+export function presets({ card, store, signal }: Page): HTMLElement | null {
+  const all = card.presets ?? [];
+  if (!all.length) return null;
+  const buttons = all.map((preset) => {
+    const made = el("button", { type: "button" }, title(preset.name));
+    const { controls, performer } = preset;
+    made.addEventListener("click", () => store.set({ controls: { ...controls }, performer }));
+    return made;
+  });
+  const show = () => {
+    for (const [i, each] of buttons.entries())
+      each.setAttribute("aria-pressed", String(holds(store.state, all[i]!)));
+  };
+  show();
+  signal.addEventListener("abort", store.listen(show));
+  return el("div", { class: "presets", role: "group", "aria-label": "Presets" }, ...buttons);
+}
+
+/** Whether a state is at a preset's point. */
+export function holds({ controls, performer }: State, preset: Preset): boolean {
+  const same = Object.entries(preset.controls).every(([name, value]) => controls[name] === value);
+  return same && performer === (preset.performer ?? null);
+}

@@ -1,0 +1,20 @@
+/** A preset is pressed where the state is at its point, and nowhere else. */
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { initial } from "../src/hash.ts";
+import { holds } from "../src/presets.ts";
+import { CARD } from "./card.ts";
+
+const PRESET = { name: "stroll", controls: { speed: 0.7, time: 5 }, performer: null };
+const START = initial("hop", CARD);
+
+test("all values and the performer count", () => {
+  const there = { ...START, controls: { speed: 0.7, time: 5 } };
+  assert.ok(holds(there, PRESET));
+  assert.ok(!holds(START, PRESET));
+  assert.ok(!holds({ ...there, controls: { speed: 0.7, time: 5.001 } }, PRESET));
+  assert.ok(!holds({ ...there, performer: "ann" }, PRESET));
+  assert.ok(holds({ ...there, performer: "ann" }, { ...PRESET, performer: "ann" }));
+});
