@@ -200,7 +200,7 @@ def test_public_functions_have_few_parameters(own, tmp_path):
 
 
 def test_a_boolean_of_a_question_stands_in_few_files():
-    """`pin_feet`: type, contract, check, the Python client's signatures, and the page's download."""
+    """`pin_feet`: type, contract, check, the Python client's signatures, the page's download."""
     folders = (ROOT / folder for folder in ("service", "model_export", "clients", "api"))
     kinds = {".py", ".ts", ".yaml", ".json"}
     files = (path for folder in folders for path in folder.rglob("*") if path.suffix in kinds)
