@@ -3,7 +3,7 @@
 import type { Source } from "./page.ts";
 
 interface Part {
-  open(model: string, identity: string): Promise<Source>;
+  open(tables: string): Promise<Source>;
 }
 
 /**
@@ -16,5 +16,5 @@ export async function offline(): Promise<Source | null> {
   if (!meta) return null;
   const beside = (name: string) => new URL(name, document.baseURI).href;
   const part = (await import(/* @vite-ignore */ beside("offline.js"))) as Part;
-  return part.open(beside(meta.content), meta.dataset["identity"] ?? "model@offline");
+  return part.open(beside(meta.content));
 }

@@ -41,7 +41,7 @@ for (const model of ["reaching", "cmu_walk"]) {
       page = await from.newPage();
       await page.goto(hosted.base);
       await page.evaluate(
-        `import("/offline.js").then((part) => part.open("/${model}.onnx", "${card.identity}")).then((source) => { globalThis.source = source; })`,
+        `import("/offline.js").then((part) => part.open("/model.json")).then((source) => { globalThis.source = source; })`,
       );
     });
     after(async () => {

@@ -312,7 +312,7 @@ test("sticks, ghost, feet and level change the picture", () =>
     });
     assert.match(
       (await page.locator("[data-ghost]").textContent())!,
-      /model's answer.*nearest captured clip/,
+      /the model at the controls of .*nearest captured clip/,
     );
     assert.match((await page.locator("[data-skate]").textContent())!, /^\d+\.\d cm\/s$/);
   }));

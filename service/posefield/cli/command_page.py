@@ -4,11 +4,12 @@ Poses are then computed in the browser, by onnxruntime-web, which the container 
 """
 
 import gzip
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
-from urllib.parse import quote
 
+import numpy as np
+import orjson
 import typer
 
 from posefield.common import atomic_files
@@ -16,10 +17,14 @@ from posefield.common.errors import FileError
 from posefield.console.arguments import Json, ModelPath
 from posefield.console.output import as_json
 from posefield.inference import session
-from posefield.model_file import checked_file
+from posefield.inference.session import Session
+from posefield.kriging import support
+from posefield.model_file import checked_file, model_card, subgraph
 
 PAGES_FOLDER = Path(__file__).parents[1] / "http/pages"
 OFFLINE_FILES = ("offline.js", "ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm.gz")
+MODEL_TABLES = "model.json"
+"""File of the model's card and of the numbers that tell whether a point is supported."""
 _HEAD, _PRESSED = b"<head>", ".gz"
 
 
@@ -32,7 +37,8 @@ def page(
     content = checked_file.read(model)
     opened = session.load_bytes(content, str(model))
     identity = f"{model.stem}@{opened.digest}"
-    written = write_files(page_files(model.name, content, identity), output)
+    model_files = dict(browser_files(content, opened, identity))
+    written = write_files(page_files(model_files, identity), output)
     if json:
         plain = {"folder": str(output), "model": identity, "files": written}
         typer.echo(as_json(plain))
@@ -56,21 +62,37 @@ def write_files(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str
     return sizes
 
 
+def browser_files(content: bytes, opened: Session, identity: str) -> Iterator[tuple[str, bytes]]:
+    """Yield names and contents of the files that a browser needs to run a model.
+
+    The graph of each level has no defaults, and the tables hold what a browser cannot read from it.
+    """
+    card = opened.card
+    for level in range(len(card.levels)):
+        graph = subgraph.require_inputs(subgraph.fix_level(content, level))
+        yield f"level-{level}.onnx", graph
+    tables = {
+        "card": {"identity": identity, **model_card.plain_values(card)},
+        "support": support.fit_support(np.array(card.examples)).table(),
+    }
+    yield MODEL_TABLES, orjson.dumps(tables)
+
+
 def page_files(
-    name: str, model: bytes, identity: str, web: Path = PAGES_FOLDER
+    model_files: Mapping[str, bytes], identity: str, web: Path = PAGES_FOLDER
 ) -> Iterator[tuple[str, bytes]]:
     """Yield names and contents of the folder's files; the page itself is last.
 
-    The page refers to the other files. web: folder of the built page and its parts. Raises
-    FileError if one of them is missing.
+    The page refers to the other files. model_files: contents by name. web: folder of the built page
+    and its parts. Raises FileError if one of them is missing.
     """
     page = web / "viewer/index.html"
-    shown = _with_model_mark(_read(page), name, identity)
+    shown = _with_model_mark(_read(page), MODEL_TABLES, identity)
     for part in OFFLINE_FILES:
         content = _read(web / "offline" / part)
         plain = gzip.decompress(content) if part.endswith(_PRESSED) else content
         yield part.removesuffix(_PRESSED), plain
-    yield name, model
+    yield from model_files.items()
     yield page.name, shown
 
 
@@ -79,7 +101,7 @@ def _with_model_mark(content: bytes, model: str, identity: str) -> bytes:
     # Imported here, since other commands need no Jinja.
     from posefield.http.pages import templates
 
-    mark = templates.render("model.html", model=quote(model), identity=identity)
+    mark = templates.render("model.html", model=model, identity=identity)
     before, head, after = content.partition(_HEAD)
     return before + head + mark.encode() + after
 

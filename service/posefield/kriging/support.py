@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -74,6 +75,24 @@ class Support:
         squared = sum((x * f - o) ** 2 for x, (f, o) in zip(point, self._scale, strict=True))
         explained = math.exp(-2.0 * RATE * squared) * float(near @ (self._inverse @ near))
         return 1.0 - explained <= self.limit
+
+    def table(self) -> dict[str, Any]:
+        """Return the numbers that `is_supported` evaluates, by name, as plain lists.
+
+        bounds (d, 2): of supported points. slopes (n, d), offsets (n,): of the log covariance
+        between samples and a point, without the point's own square. scale (d, 2): factor and offset
+        to half-ranges. rate: factor of that square. inverse (n, n), limit: of the variance.
+        """
+        slopes, offsets = self._exponents
+        return {
+            "bounds": self._bounds,
+            "slopes": slopes.tolist(),
+            "offsets": offsets.tolist(),
+            "scale": self._scale,
+            "rate": RATE,
+            "inverse": self._inverse.tolist(),
+            "limit": self.limit,
+        }
 
     @cached_property
     def left_out(self) -> Floats:

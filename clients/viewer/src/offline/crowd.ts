@@ -6,7 +6,7 @@ import { choose, ladder, pixels } from "../detail.ts";
 import * as door from "./door.ts";
 import type { Answers, Graph, Rows } from "./graph.ts";
 import { turned, turnRoot } from "./plane.ts";
-import * as support from "./support.ts";
+import type { Support } from "./support.ts";
 
 /** Levels differ in how long a clip takes; so does float32. */
 const SLACK = 0.1;
@@ -26,6 +26,7 @@ interface Block {
 export async function crowd(
   graph: Graph,
   card: ModelCard,
+  support: Support,
   asked: CrowdQuestion,
 ): Promise<CrowdPoses> {
   const count = size(asked);
@@ -48,16 +49,16 @@ export async function crowd(
     boneOffsets: block.offsets,
     duration: block.duration,
     sigma: block.sigma,
-    supported: supported(card, rows),
+    supported: supported(support, rows),
     levels,
     errorPx,
   };
 }
 
-function supported(card: ModelCard, { count, controls }: Rows): boolean[] {
-  const [own, width] = [support.of(card), card.controls.length];
+function supported(support: Support, { count, controls }: Rows): boolean[] {
+  const width = controls.length / count;
   return Array.from({ length: count }, (_, row) =>
-    own.holds([...controls.subarray(row * width, (row + 1) * width)]),
+    support.holds(controls.subarray(row * width, (row + 1) * width)),
   );
 }
 

@@ -3,15 +3,29 @@
 import * as ort from "onnxruntime-web/wasm";
 
 import type { Source } from "../page.ts";
-import { Offline } from "./source.ts";
+import { Offline, type Tables } from "./source.ts";
 
-/** A model file as a source of answers; what onnxruntime-web needs lies beside this script. */
-export async function open(model: string, identity: string): Promise<Source> {
+/**
+ * A model as a source of answers; what onnxruntime-web needs lies beside this script.
+ *
+ * tables: address of the model's tables, beside which its graphs lie.
+ */
+export async function open(tables: string): Promise<Source> {
   ort.env.wasm.numThreads = 1;
   const beside = (name: string) => new URL(/* @vite-ignore */ name, import.meta.url).href;
   const [mjs, wasm] = ["ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm"].map(beside);
   ort.env.wasm.wasmPaths = { mjs: mjs!, wasm: wasm! };
-  const answer = await fetch(model);
-  if (!answer.ok) throw new Error(`${model}: status ${answer.status}, expected a model file`);
-  return new Offline(ort, new Uint8Array(await answer.arrayBuffer()), identity);
+  const read = (await (await got(tables)).json()) as Tables;
+  const address = new URL(tables, document.baseURI);
+  const level = async (level: number) => {
+    const graph = await got(new URL(`level-${level}.onnx`, address).href);
+    return new Uint8Array(await graph.arrayBuffer());
+  };
+  return new Offline(ort, level, read);
+}
+
+async function got(address: string): Promise<Response> {
+  const answer = await fetch(address);
+  if (!answer.ok) throw new Error(`${address}: status ${answer.status}, expected a file`);
+  return answer;
 }

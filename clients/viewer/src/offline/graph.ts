@@ -1,10 +1,9 @@
-/** The model's graph in onnxruntime-web: a session for each level, opened when it is first wanted. */
+/** The model's graphs in onnxruntime-web: one for each level, loaded when it is first wanted. */
 
 import type { ModelCard } from "@posefield/client";
 import type * as Runtime from "onnxruntime-web/wasm";
 
 import { Bounds } from "./bounds.ts";
-import { atLevel } from "./protobuf.ts";
 
 export type Ort = typeof Runtime;
 
@@ -27,14 +26,15 @@ export type Answers = Readonly<Record<Output, Float32Array>>;
 
 export class Graph {
   readonly #ort: Ort;
-  readonly #model: Uint8Array;
+  readonly #levels: (level: number) => Promise<Uint8Array>;
   readonly #card: ModelCard;
   readonly #bounds: Bounds;
   readonly #sessions: (Promise<Runtime.InferenceSession> | undefined)[] = [];
 
-  constructor(ort: Ort, model: Uint8Array, card: ModelCard) {
+  /** levels: the file of each level. */
+  constructor(ort: Ort, levels: (level: number) => Promise<Uint8Array>, card: ModelCard) {
     this.#ort = ort;
-    this.#model = model;
+    this.#levels = levels;
     this.#card = card;
     this.#bounds = new Bounds(card);
   }
@@ -109,10 +109,14 @@ export class Graph {
   }
 
   #session(level: number): Promise<Runtime.InferenceSession> {
-    this.#sessions[level] ??= this.#ort.InferenceSession.create(atLevel(this.#model, level), {
+    this.#sessions[level] ??= this.#opened(level);
+    return this.#sessions[level];
+  }
+
+  async #opened(level: number): Promise<Runtime.InferenceSession> {
+    return this.#ort.InferenceSession.create(await this.#levels(level), {
       executionProviders: ["wasm"],
       logSeverityLevel: 3,
     });
-    return this.#sessions[level];
   }
 }

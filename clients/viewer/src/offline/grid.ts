@@ -4,7 +4,7 @@ import type { ModelCard, SigmaGrid, SigmaQuestion } from "@posefield/client";
 
 import * as door from "./door.ts";
 import type { Graph } from "./graph.ts";
-import * as support from "./support.ts";
+import type { Support } from "./support.ts";
 
 const STEPS = 32;
 type Control = ModelCard["controls"][number];
@@ -12,6 +12,7 @@ type Control = ModelCard["controls"][number];
 export async function sigma(
   graph: Graph,
   card: ModelCard,
+  support: Support,
   asked: SigmaQuestion,
 ): Promise<SigmaGrid> {
   const [across, along] = [axis(card, asked.across), axis(card, asked.along)];
@@ -43,7 +44,7 @@ export async function sigma(
     along_values: up,
     sigma: split([...found.sigma]),
     inside: split(points.map(within)),
-    supported: split(points.map((values) => support.of(card).holds(values))),
+    supported: split(points.map((values) => support.holds(values))),
   };
 }
 

@@ -16,14 +16,13 @@ import type {
 
 import type { Source } from "../page.ts";
 import { type Deviation, deviations, merged, told } from "./bounds.ts";
-import { card as read } from "./card.ts";
 import { type Course, closed, inPlace, times, type Way } from "./course.ts";
 import { crowd } from "./crowd.ts";
 import * as door from "./door.ts";
 import { type Answers, Graph, type Ort } from "./graph.ts";
 import { sigma } from "./grid.ts";
 import { straightened } from "./plane.ts";
-import * as support from "./support.ts";
+import { Support, type SupportTable } from "./support.ts";
 
 /** The graph takes a time after the end for the end, s. */
 const AFTER = 1e9;
@@ -40,13 +39,21 @@ interface Asked {
   readonly deviations: readonly Deviation[];
 }
 
+/** What `posefield page` writes beside the graphs. */
+export interface Tables {
+  readonly card: ModelCard;
+  readonly support: SupportTable;
+}
+
 export class Offline implements Source {
   readonly #card: ModelCard;
+  readonly #support: Support;
   readonly #graph: Graph;
 
-  constructor(ort: Ort, model: Uint8Array, identity: string) {
-    this.#card = read(model, identity);
-    this.#graph = new Graph(ort, model, this.#card);
+  constructor(ort: Ort, levels: (level: number) => Promise<Uint8Array>, tables: Tables) {
+    this.#card = tables.card;
+    this.#support = new Support(tables.support);
+    this.#graph = new Graph(ort, levels, this.#card);
   }
 
   async models(): Promise<readonly ModelSummary[]> {
@@ -101,11 +108,11 @@ export class Offline implements Source {
   }
 
   crowd(_: string, question: CrowdQuestion): Promise<CrowdPoses> {
-    return crowd(this.#graph, this.#card, question);
+    return crowd(this.#graph, this.#card, this.#support, question);
   }
 
   sigma(_: string, question: SigmaQuestion): Promise<SigmaGrid> {
-    return sigma(this.#graph, this.#card, question);
+    return sigma(this.#graph, this.#card, this.#support, question);
   }
 
   async why(): Promise<never> {
@@ -124,7 +131,7 @@ export class Offline implements Source {
     const values = door.point(this.#card, question.controls);
     const policy = question.extrapolate ?? "warn";
     const found = door.warnings(this.#card, values);
-    const supported = support.of(this.#card).holds(values);
+    const supported = this.#support.holds(values);
     const said = found.length || supported ? found : [door.GAP];
     if (policy === "refuse" && said.length) throw new door.Refused(said.join("; "));
     const apart = deviations(this.#card, values);
