@@ -24,6 +24,15 @@ export interface Rows {
 /** Outputs, row by row. */
 export type Answers = Readonly<Record<Output, Float32Array>>;
 
+let last: Promise<unknown> = Promise.resolve();
+
+/** Wait for all earlier work: onnxruntime-web mixes up the outputs of calls at the same time. */
+function inTurn<Result>(work: () => Promise<Result>): Promise<Result> {
+  const done = last.then(work, work);
+  last = done.catch(() => undefined);
+  return done;
+}
+
 export class Graph {
   readonly #ort: Ort;
   readonly #levels: (level: number) => Promise<Uint8Array>;
@@ -105,7 +114,7 @@ export class Graph {
       feeds["performer"] = new this.#ort.Tensor("float32", labels, [count, performers.length]);
     }
     const session = await this.#session(level);
-    return session.run(feeds);
+    return inTurn(() => session.run(feeds));
   }
 
   #session(level: number): Promise<Runtime.InferenceSession> {
@@ -114,9 +123,8 @@ export class Graph {
   }
 
   async #opened(level: number): Promise<Runtime.InferenceSession> {
-    return this.#ort.InferenceSession.create(await this.#levels(level), {
-      executionProviders: ["wasm"],
-      logSeverityLevel: 3,
-    });
+    const graph = await this.#levels(level);
+    const options = { executionProviders: ["wasm"], logSeverityLevel: 3 } as const;
+    return inTurn(() => this.#ort.InferenceSession.create(graph, options));
   }
 }
