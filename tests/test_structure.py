@@ -215,6 +215,7 @@ def test_a_boolean_of_a_question_stands_in_few_files():
         "api/openapi.yaml",
         "clients/python/posefield_client/files.py",
         "clients/viewer/src/files.ts",
+        "clients/viewer/test/product.page.ts",
         "clients/python/posefield_client/questions.py",
         "service/posefield/constraints/targets.py",
         "service/posefield/question/motion_question.py",

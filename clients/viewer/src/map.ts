@@ -9,6 +9,7 @@ import { clips, distance, mover, nearestTo, others } from "./examples.ts";
 import { Latest } from "./latest.ts";
 import { legend, said, table } from "./map-words.ts";
 import type { Mount, Page } from "./page.ts";
+import { title } from "./slider.ts";
 import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
 import { type Veil, veil } from "./veil.ts";
@@ -58,7 +59,7 @@ class Map2 {
   constructor(host: HTMLElement, page: Page) {
     this.#page = page;
     this.#asking = new Latest((key) => this.#ask(key));
-    const names = page.card.controls.map(({ name }) => [name, name] as const);
+    const names = page.card.controls.map(({ name }) => [name, title(name)] as const);
     this.#across = chooser(names, "", (value) => this.#take("across", value));
     this.#along = chooser(names, "", (value) => this.#take("along", value));
     const axes = el(

@@ -12,13 +12,15 @@ const SHOWN = {
   "page-crowd": "/#cmu_walk?speed=1.3&turn=0&stride_length=1.4&~playing=no&~view=crowd",
 };
 
+/** What the side shows where it is not the controls. */
+const SECTIONS: Readonly<Record<string, string>> = { "page-one": "Map", "page-levels": "Detail" };
+
 const [folder = "."] = process.argv.slice(2);
 const chromium = await browser();
 for (const [name, path] of Object.entries(SHOWN)) {
   const { page } = await opened(chromium, path);
   await settled(page);
-  if (name === "page-one")
-    await page.locator("#side section[data-part=map]").evaluate((map) => map.scrollIntoView());
+  if (name === "page-one") await page.getByRole("button", { name: "Map", exact: true }).click();
   await page.waitForTimeout(4000);
   await page.screenshot({ path: join(folder, `${name}.png`) });
   await page.close();
