@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+import shape_checks
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from posefield_train.source.ingest import Example
     from posefield_train.source.recipe import Recipe
 
+# Before any module of the project is imported.
+shape_checks.install()
 
 # Coverage measures pytest-xdist's workers, but not their child processes: some of these are killed
 # while they would write their data.

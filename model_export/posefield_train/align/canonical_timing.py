@@ -1,9 +1,11 @@
 """Timing: from seconds to canonical time, with a duration and a warp per clip."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import ClipFrames, PerClip
 from posefield.common.units import Floats
 from posefield_train.align.warp import WarpBasis
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
@@ -16,7 +18,12 @@ class CanonicalTiming:
     basis: WarpBasis
     frames: int
 
-    def numpy(self, log_duration: Floats, logs: Floats, time: Floats) -> tuple[Floats, Floats]:
+    def numpy(
+        self,
+        log_duration: Annotated[Floats, "clips 1"],
+        logs: Annotated[Floats, "clips knots"],
+        time: ClipFrames,
+    ) -> tuple[PerClip, ClipFrames]:
         """Return durations (B,), s, and canonical frames (B, S) at times (B, S), s.
 
         log_duration: (B, 1). logs: (B, knots). Times outside the clip are clamped to its ends.

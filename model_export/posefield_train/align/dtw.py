@@ -1,9 +1,11 @@
 """Dynamic time warping with a slope limit (Sakoe & Chiba 1978), of many sequences in one pass."""
 
 from collections.abc import Iterator
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import ClipFrames, PerClip, Traces
 from posefield.common.units import Floats, Indices
 
 # Frames of each step (in the sequence, in the reference). Every step advances in both, and the
@@ -13,7 +15,7 @@ STEP_PATTERN = ((1, 1), (1, 2), (2, 1), (1, 3), (3, 1))
 BATCH = 16
 
 
-def warp(sequences: Floats, reference: Floats) -> Floats:
+def warp(sequences: Traces, reference: Annotated[Floats, "... frames features"]) -> ClipFrames:
     """Return reference phases (N, F) in [0, 1] at each frame of sequences (N, F, features).
 
     reference: (F, features), or one per sequence (N, F, features), with as many frames as the
@@ -28,7 +30,7 @@ def warp(sequences: Floats, reference: Floats) -> Floats:
     )
 
 
-def _batch_phases(sequences: Floats, references: Floats) -> Floats:
+def _batch_phases(sequences: Traces, references: Traces) -> ClipFrames:
     costs = _distances(sequences, references)
     best, choices = _initial_costs(costs), np.zeros(costs.shape, dtype=np.int64)
     for row, reached in _accumulate(costs, best):
@@ -37,7 +39,7 @@ def _batch_phases(sequences: Floats, references: Floats) -> Floats:
     return np.stack([_backtrack(choice) for choice in choices])
 
 
-def total_cost(sequences: Floats, reference: Floats) -> Floats:
+def total_cost(sequences: Traces, reference: Annotated[Floats, "... frames features"]) -> PerClip:
     """Return the cost (N,) of the best warp of each sequence to the reference."""
     costs = _distances(sequences, reference)
     best = _initial_costs(costs)
@@ -46,7 +48,9 @@ def total_cost(sequences: Floats, reference: Floats) -> Floats:
     return best[:, -1, -1]
 
 
-def _distances(sequences: Floats, reference: Floats) -> Floats:
+def _distances(
+    sequences: Traces, reference: Annotated[Floats, "... frames features"]
+) -> Annotated[Floats, "clips frames frames"]:
     """Return squared distances (N, F, F) between every frame and every reference frame."""
     squares = np.sum(np.square(sequences), axis=-1)[:, :, None]
     cross = sequences @ np.swapaxes(reference, -1, -2)
@@ -54,14 +58,18 @@ def _distances(sequences: Floats, reference: Floats) -> Floats:
     return np.maximum(squares + own - 2.0 * cross, 0.0)
 
 
-def _initial_costs(costs: Floats) -> Floats:
+def _initial_costs(
+    costs: Annotated[Floats, "clips rows columns"],
+) -> Annotated[Floats, "clips rows columns"]:
     """Return accumulated costs (N, F, F) before the first step, infinite but for the first cell."""
     best = np.full(costs.shape, np.inf)
     best[:, 0, 0] = costs[:, 0, 0]
     return best
 
 
-def _accumulate(costs: Floats, best: Floats) -> Iterator[tuple[int, Floats]]:
+def _accumulate(
+    costs: Annotated[Floats, "clips rows columns"], best: Annotated[Floats, "clips rows columns"]
+) -> Iterator[tuple[int, Floats]]:
     """Write the least accumulated cost of every cell to `best` (N, F, F), row by row.
 
     Yields each row's index and the costs (steps, N, F) of its cells by each step. Every step
@@ -79,7 +87,9 @@ def _accumulate(costs: Floats, best: Floats) -> Iterator[tuple[int, Floats]]:
         yield row, reached
 
 
-def _step_costs(costs: Floats, down: int, right: int) -> Floats:
+def _step_costs(
+    costs: Annotated[Floats, "clips rows columns"], down: int, right: int
+) -> Annotated[Floats, "clips rows-{down} columns-{right}"]:
     """Return costs (N, F - down, F - right) of one step into every cell that it can reach.
 
     The cells that the step skips count as part of the path. A step's cost is scaled by its length
@@ -96,7 +106,7 @@ def _step_costs(costs: Floats, down: int, right: int) -> Floats:
     return tolls
 
 
-def _backtrack(choice: Indices) -> Floats:
+def _backtrack(choice: Annotated[Indices, "rows columns"]) -> Annotated[Floats, "rows"]:
     """Return the reference phase at every frame by backtracking the chosen steps."""
     row, column = choice.shape[0] - 1, choice.shape[1] - 1
     rows, columns = [row], [column]

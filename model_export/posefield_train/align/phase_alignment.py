@@ -7,12 +7,14 @@ the family.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
+from posefield.common.array_shapes import JointWeights, PerClip, Traces
 from posefield.common.errors import RecipeError
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Floats, Indices
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield_train.align import time_alignment
@@ -30,7 +32,7 @@ NOTED_SHIFT = 0.08
 
 
 def align_phases(
-    recipe: Recipe, examples: tuple[Example, ...], joint_weights: Floats
+    recipe: Recipe, examples: tuple[Example, ...], joint_weights: JointWeights
 ) -> tuple[Example, ...]:
     """Shift examples to the family's phase, if they are cycles and the recipe requests it.
 
@@ -59,7 +61,7 @@ def _remeasure(recipe: Recipe, begun: Example) -> Example:
 
 
 def align_phases_to(
-    examples: Sequence[Example], references: Floats, joint_weights: Floats, in_place: bool
+    examples: Sequence[Example], references: Traces, joint_weights: JointWeights, in_place: bool
 ) -> tuple[Example, ...]:
     """Shift cyclic examples to the phase of their references (N, F, features).
 
@@ -72,7 +74,7 @@ def align_phases_to(
     return tuple(shift_start(e, share, in_place) for e, share in zip(examples, found, strict=True))
 
 
-def shifts(traces: Floats, rounds: int) -> Floats:
+def shifts(traces: Annotated[Floats, "clips steps features"], rounds: int) -> PerClip:
     """Return shares of a cycle (N,) at which traces (N, STEPS, features) have a common phase."""
     found = _centre(_shifts_to(traces, traces[_medoid(traces)]))
     for _ in range(rounds):
@@ -82,17 +84,22 @@ def shifts(traces: Floats, rounds: int) -> Floats:
     return found
 
 
-def _resample(trace: Floats) -> Floats:
+def _resample(trace: Annotated[Floats, "frames features"]) -> Annotated[Floats, "steps features"]:
     """Resample a closed trace (F, features) to (STEPS, features), without its repeated end."""
     u = np.arange(PHASE_STEPS) / PHASE_STEPS
     return time_alignment.interpolate(trace, u)
 
 
-def _spectra(traces: Floats) -> npt.NDArray[np.complex128]:
+def _spectra(
+    traces: Annotated[Floats, "*clips steps features"],
+) -> Annotated[npt.NDArray[np.complex128], "*clips half features"]:
     return np.fft.rfft(traces, axis=-2)
 
 
-def _costs(traces: Floats, references: Floats) -> Floats:
+def _costs(
+    traces: Annotated[Floats, "*clips steps features"],
+    references: Annotated[Floats, "... steps features"],
+) -> Annotated[Floats, "*clips steps"]:
     """Return squared distances (N, STEPS) of cycles (N, STEPS, features), at every shift.
 
     references: (STEPS, features), or one per cycle.
@@ -102,13 +109,16 @@ def _costs(traces: Floats, references: Floats) -> Floats:
     return np.maximum(own[..., None] - 2.0 * np.fft.irfft(cross, PHASE_STEPS, axis=-1), 0.0)
 
 
-def _medoid(traces: Floats) -> int:
+def _medoid(traces: Annotated[Floats, "clips steps features"]) -> int:
     """Return the cycle nearest to all others, each at its best shift."""
     totals = [np.sum(np.sqrt(_costs(traces, one).min(axis=1))) for one in traces]
     return int(np.argmin(np.round(totals, 9)))
 
 
-def _shifts_to(traces: Floats, references: Floats) -> Floats:
+def _shifts_to(
+    traces: Annotated[Floats, "clips steps features"],
+    references: Annotated[Floats, "... steps features"],
+) -> PerClip:
     """Return shares of a cycle (N,) in [-0.5, 0.5) that bring traces to their references' phase."""
     costs = _costs(traces, references)
     shares = np.fft.fftfreq(PHASE_STEPS)
@@ -118,7 +128,9 @@ def _shifts_to(traces: Floats, references: Floats) -> Floats:
     return shares[best] + _parabola_offsets(costs, best) / PHASE_STEPS
 
 
-def _parabola_offsets(costs: Floats, best: Floats) -> Floats:
+def _parabola_offsets(
+    costs: Annotated[Floats, "clips steps"], best: Annotated[Indices, "clips"]
+) -> PerClip:
     """Return offsets (N,), in steps, of the minima of parabolas through the best steps."""
     rows = np.arange(len(costs))
     before, at, after = (costs[rows, (best + side) % PHASE_STEPS] for side in (-1, 0, 1))
@@ -126,13 +138,15 @@ def _parabola_offsets(costs: Floats, best: Floats) -> Floats:
     return np.where(bend > 0, 0.5 * (before - after) / np.where(bend > 0, bend, 1.0), 0.0)
 
 
-def _shift_traces(traces: Floats, shifts: Floats) -> Floats:
+def _shift_traces(
+    traces: Annotated[Floats, "clips steps features"], shifts: PerClip
+) -> Annotated[Floats, "clips steps features"]:
     """Shift traces (N, STEPS, features) by shares (N,) of their cycles."""
     turn = np.exp(2j * np.pi * np.arange(PHASE_STEPS // 2 + 1) * shifts[:, None])
     return np.fft.irfft(_spectra(traces) * turn[:, :, None], PHASE_STEPS, axis=1)
 
 
-def _centre(shifts: Floats) -> Floats:
+def _centre(shifts: PerClip) -> PerClip:
     """Return the shifts, in [-0.5, 0.5), minus their circular mean."""
     around = np.exp(2j * np.pi * shifts)
     return np.angle(around * np.conj(around.sum())) / (2 * np.pi)
@@ -208,5 +222,5 @@ def _refuse_split_landmarks(examples: Sequence[Example]) -> None:
             )
 
 
-def _percentages(marks: Floats) -> str:
+def _percentages(marks: Annotated[Floats, "..."]) -> str:
     return ", ".join(f"{mark:.0%}" for mark in marks)

@@ -6,9 +6,19 @@ every clip is the medoid; in later rounds it is the prediction from the other al
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import (
+    ClipBones,
+    ClipPaths,
+    ClipPositions,
+    ClipRotations,
+    JointWeights,
+    PerClip,
+    Traces,
+)
 from posefield.common.units import UP, Floats
 from posefield.motion import blend, quat, skeleton
 from posefield.motion.clip import Clip
@@ -30,10 +40,10 @@ class AlignedClips:
     warp from its own time to canonical time. durations: (N,), s. reference: index of the medoid.
     """
 
-    rotations: Floats
-    root_path: Floats
-    logs: Floats
-    durations: Floats
+    rotations: ClipRotations
+    root_path: ClipPaths
+    logs: Annotated[Floats, "clips knots"]
+    durations: PerClip
     reference: int
 
 
@@ -46,7 +56,7 @@ def align(
     frames: int,
     basis: WarpBasis,
     rounds: int,
-    joint_weights: Floats,
+    joint_weights: JointWeights,
     predict: Predictor,
 ) -> AlignedClips:
     """Warp examples to one canonical time and resample them to `frames` frames.
@@ -81,11 +91,11 @@ class CanonicalTime:
 
     frames: int
     basis: WarpBasis
-    landmarks: Floats
-    joint_weights: Floats
+    landmarks: Annotated[Floats, "landmarks"]
+    joint_weights: JointWeights
 
 
-def align_to(examples: Sequence[Example], references: Floats, canon: CanonicalTime) -> AlignedClips:
+def align_to(examples: Sequence[Example], references: Traces, canon: CanonicalTime) -> AlignedClips:
     """Warp examples to an existing canonical time, each to its own reference.
 
     references: traces (N, FINE, features) at uniform steps of canonical time.
@@ -96,12 +106,16 @@ def align_to(examples: Sequence[Example], references: Floats, canon: CanonicalTi
     return _resample_all(examples, canon.frames, canon.basis, logs, medoid=0)
 
 
-def _landmark_times(examples: Sequence[Example]) -> Floats:
+def _landmark_times(examples: Sequence[Example]) -> Annotated[Floats, "{len(examples)} landmarks"]:
     return np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
 
 
 def _resample_all(
-    examples: Sequence[Example], frames: int, basis: WarpBasis, logs: Floats, medoid: int
+    examples: Sequence[Example],
+    frames: int,
+    basis: WarpBasis,
+    logs: Annotated[Floats, "clips knots"],
+    medoid: int,
 ) -> AlignedClips:
     resampled = [
         resample(e.clip, basis.invert(log, _uniform_times(frames)))
@@ -116,18 +130,20 @@ def _resample_all(
     )
 
 
-def _uniform_times(frames: int) -> Floats:
+def _uniform_times(frames: int) -> Annotated[Floats, "{frames}"]:
     return np.linspace(0.0, 1.0, frames)
 
 
-def trace(clip: Clip, weights: Floats) -> Floats:
+def trace(clip: Clip, weights: JointWeights) -> Annotated[Floats, "frames joints*3"]:
     """Return joint positions (F, J * 3), m, relative to root and heading, times weights (J,)."""
     joint_positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
     facing = quat.from_axis_angle(UP, -heading(clip))[:, None]
     return (quat.rotate(facing, joint_positions) * weights[:, None]).reshape(len(clip), -1)
 
 
-def interpolate(values: Floats, u: Floats) -> Floats:
+def interpolate(
+    values: Annotated[Floats, "frames features"], u: Annotated[Floats, "asked"]
+) -> Annotated[Floats, "asked features"]:
     """Interpolate rows of values (F, features) linearly at fractions u (S,) of their length.
 
     Returns (S, features).
@@ -142,11 +158,11 @@ class _Breakpoints:
     own: clip times (N, M + 2). canonical: canonical times (M + 2,).
     """
 
-    own: Floats
-    canonical: Floats
+    own: Annotated[Floats, "clips breakpoints"]
+    canonical: Annotated[Floats, "breakpoints"]
 
     @property
-    def weights(self) -> Floats:
+    def weights(self) -> Annotated[Floats, "clips fitted"]:
         """Return the weight (N, 501) of each sample in the fit of a warp."""
         weights = np.ones((len(self.own), len(FIT_TIMES)))
         for row, own in zip(weights, self.own[:, 1:-1], strict=True):
@@ -154,24 +170,33 @@ class _Breakpoints:
         return weights
 
 
-def _breakpoints(marks: Floats, canonical: Floats) -> _Breakpoints:
+def _breakpoints(
+    marks: Annotated[Floats, "clips landmarks"], canonical: Annotated[Floats, "landmarks"]
+) -> _Breakpoints:
     """Return breakpoints for landmarks (N, M) with canonical times (M,)."""
     ends = np.zeros((len(marks), 1)), np.ones((len(marks), 1))
     return _Breakpoints(np.hstack([ends[0], marks, ends[1]]), np.array([0.0, *canonical, 1.0]))
 
 
-def _align_piecewise(traces: list[Floats], knees: _Breakpoints, frames: int) -> Floats:
+def _align_piecewise(
+    traces: list[Annotated[Floats, "_ features"]], knees: _Breakpoints, frames: int
+) -> Annotated[Floats, "clips {frames} features"]:
     """Resample traces to (N, frames, features), with landmarks aligned by piecewise linear maps."""
     times = [np.interp(_uniform_times(frames), knees.canonical, own) for own in knees.own]
     return np.stack([interpolate(trace, u) for trace, u in zip(traces, times, strict=True)])
 
 
-def _medoid(traces: Floats) -> int:
+def _medoid(traces: Traces) -> int:
     totals = [float(np.sum(np.sqrt(dtw.total_cost(traces, reference)))) for reference in traces]
     return int(np.argmin(np.round(totals, 9)))
 
 
-def _warps_to(traces: Floats, reference: Floats, knees: _Breakpoints, basis: WarpBasis) -> Floats:
+def _warps_to(
+    traces: Traces,
+    reference: Annotated[Floats, "... frames features"],
+    knees: _Breakpoints,
+    basis: WarpBasis,
+) -> Annotated[Floats, "clips knots"]:
     """Return log increments (N, knots) of the warps to a reference.
 
     reference: (F, features), or one per clip (N, F, features).
@@ -188,7 +213,9 @@ def _warps_to(traces: Floats, reference: Floats, knees: _Breakpoints, basis: War
     return np.stack([basis.fit(warp, w) for warp, w in zip(warps, knees.weights, strict=True)])
 
 
-def _centre(logs: Floats, knees: _Breakpoints, basis: WarpBasis) -> Floats:
+def _centre(
+    logs: Annotated[Floats, "clips knots"], knees: _Breakpoints, basis: WarpBasis
+) -> Annotated[Floats, "clips knots"]:
     """Return the warps composed with their mean inverse.
 
     The mean inverse of the results is the identity.
@@ -198,7 +225,9 @@ def _centre(logs: Floats, knees: _Breakpoints, basis: WarpBasis) -> Floats:
     return np.stack([basis.fit(warp, w) for warp, w in zip(even, knees.weights, strict=True)])
 
 
-def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
+def resample(
+    clip: Clip, u: Annotated[Floats, "asked"]
+) -> tuple[Annotated[Floats, "asked joints 4"], Annotated[Floats, "asked 3"]]:
     """Return rotations (S, J, 4) and root path (S, 3) at fractions u (S,) of the duration."""
     place = np.clip(u, 0.0, 1.0) * (len(clip) - 1)
     before = np.minimum(place.astype(np.int64), len(clip) - 2)
@@ -207,7 +236,9 @@ def resample(clip: Clip, u: Floats) -> tuple[Floats, Floats]:
     return rotations, interpolate(clip.root_path, np.clip(u, 0.0, 1.0))
 
 
-def joint_positions(aligned: AlignedClips, parents: tuple[int, ...], offsets: Floats) -> Floats:
+def joint_positions(
+    aligned: AlignedClips, parents: tuple[int, ...], offsets: ClipBones
+) -> ClipPositions:
     """Return joint positions (N, T, J, 3), m, of aligned clips with bone offsets (N, J, 3), m."""
     translations = skeleton.translations(offsets, aligned.root_path)
     return skeleton.positions(parents, aligned.rotations, translations)

@@ -6,9 +6,11 @@ cycle closes exactly. Travel has its own kriging model and is added back at the 
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import ClipFrames, ClipPaths, ClipRotations, ClipTravel, PerClip
 from posefield.common.units import UP, Floats
 from posefield.motion import quat, root_travel
 from posefield_train.align.time_alignment import AlignedClips
@@ -21,7 +23,7 @@ HALF_TURN = quat.mul(quat.from_axis_angle(UP, np.array(np.pi)), np.eye(4))
 SLICE_END = 2**31 - 1
 
 
-def remove_travel(aligned: AlignedClips) -> tuple[AlignedClips, Floats]:
+def remove_travel(aligned: AlignedClips) -> tuple[AlignedClips, ClipTravel]:
     """Return clips (N) with their travel removed, and the travel (N, 3).
 
     Its components are left and forward, m, and the change of heading, rad.
@@ -35,8 +37,11 @@ def remove_travel(aligned: AlignedClips) -> tuple[AlignedClips, Floats]:
 
 
 def put_back(
-    rotations: Floats, root_path: Floats, travel: Floats, share: Floats
-) -> tuple[Floats, Floats]:
+    rotations: ClipRotations,
+    root_path: ClipPaths,
+    travel: ClipTravel,
+    share: Annotated[Floats, "... frames"],
+) -> tuple[ClipRotations, ClipPaths]:
     """Return rotations (B, S, J, 4) and root path (B, S, 3) with travel (B, 3) added.
 
     share: (..., S), share of the travel completed at each frame.
@@ -44,7 +49,7 @@ def put_back(
     return root_travel.add_travel(rotations, root_path, share[..., None] * travel[:, None])
 
 
-def mean_squared_distance(residuals: Floats) -> Floats:
+def mean_squared_distance(residuals: ClipTravel) -> PerClip:
     """Return the mean squared distance (N,), m², of all joints due to travel errors (N, 3).
 
     The error grows linearly from zero, so its mean square is a third of the square at the end.
@@ -60,8 +65,8 @@ class Travel:
     frames: int
 
     def numpy(
-        self, rotations: Floats, root: Floats, travel: Floats, place: Floats
-    ) -> tuple[Floats, Floats, Floats]:
+        self, rotations: ClipRotations, root: ClipPaths, travel: ClipTravel, place: ClipFrames
+    ) -> tuple[ClipRotations, ClipPaths, ClipPaths]:
         """Return rotations (B, S, J, 4) and root positions (B, S, 3) with travel (B, 3) added.
 
         The third value is the travel completed (B, S, 3). place: canonical frames (B, S).

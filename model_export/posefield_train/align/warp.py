@@ -8,6 +8,7 @@ warp, and zeros make the identity.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -32,31 +33,31 @@ class WarpBasis:
             raise ValueError(f"{self.knots} knots, expected at least {DEGREE}")
 
     @cached_property
-    def breaks(self) -> Floats:
+    def breaks(self) -> Annotated[Floats, "breaks"]:
         """Return the interior ends of the polynomial pieces in (0, 1)."""
         return np.linspace(0.0, 1.0, self.knots - DEGREE + 2)[1:-1]
 
     @cached_property
-    def _knot_vector(self) -> Floats:
+    def _knot_vector(self) -> Annotated[Floats, "..."]:
         return np.concatenate([np.zeros(DEGREE + 1), self.breaks, np.ones(DEGREE + 1)])
 
     @cached_property
-    def identity(self) -> Floats:
+    def identity(self) -> Annotated[Floats, "{self.knots}"]:
         """Return increments (knots,) of the identity: differences of the Greville abscissae."""
         greville = [self._knot_vector[i + 1 : i + 1 + DEGREE].mean() for i in range(self.knots + 1)]
         return np.diff(greville)
 
     @cached_property
-    def _dense_design(self) -> Floats:
+    def _dense_design(self) -> Annotated[Floats, "dense {self.knots}"]:
         return self.design(FIT_TIMES)
 
-    def design(self, u: Floats) -> Floats:
+    def design(self, u: Annotated[Floats, "*asked"]) -> Annotated[Floats, "*asked {self.knots}"]:
         """Return basis values (..., knots) that multiply increments to give s(u)."""
         values = BSpline(self._knot_vector, np.eye(self.knots + 1), DEGREE)(u)
         return np.cumsum(values[..., ::-1], axis=-1)[..., ::-1][..., 1:]
 
     @cached_property
-    def power_form(self) -> Floats:
+    def power_form(self) -> Annotated[Floats, "powers {self.knots}"]:
         """Return the matrix (2 + pieces, knots) of the basis over u, u² and (u - break)³₊.
 
         The first break is zero. The graph evaluates this form with products and a Relu.
@@ -65,27 +66,40 @@ class WarpBasis:
         coefficients, *_ = np.linalg.lstsq(self.powers(u), self.design(u), rcond=None)
         return np.asarray(coefficients, dtype=np.float64)
 
-    def powers(self, u: Floats) -> Floats:
+    def powers(self, u: Annotated[Floats, "*asked"]) -> Annotated[Floats, "*asked powers"]:
         """Return functions (..., 2 + pieces) of the power form at u (...)."""
         hinges = np.maximum(u[..., None] - np.concatenate([[0.0], self.breaks]), 0.0)
         return np.concatenate([np.stack([u, u * u], axis=-1), hinges**3], axis=-1)
 
-    def increments(self, logs: Floats) -> Floats:
+    def increments(
+        self, logs: Annotated[Floats, "*clips {self.knots}"]
+    ) -> Annotated[Floats, "*clips {self.knots}"]:
         """Return increments (..., knots), with sum one, of log increments (..., knots)."""
         raw = self.identity * np.exp(logs - logs.max(axis=-1, keepdims=True))
         return raw / raw.sum(axis=-1, keepdims=True)
 
-    def evaluate(self, logs: Floats, u: Floats) -> Floats:
-        """Return canonical time s (..., S) at clip times u (..., S) in [0, 1]."""
+    def evaluate(
+        self,
+        logs: Annotated[Floats, "*#clips {self.knots}"],
+        u: Annotated[Floats, "*#clips asked"],
+    ) -> Annotated[Floats, "*clips asked"]:
+        """Return canonical time s (..., S) at clip times u (..., S) in [0, 1].
+
+        Leading axes broadcast: one row of times serves all warps.
+        """
         # Training evaluates the times DENSE a thousand times.
         design = self._dense_design if u is FIT_TIMES else self.design(u)
         return np.einsum("...sk,...k->...s", design, self.increments(logs))
 
-    def invert(self, logs: Floats, s: Floats) -> Floats:
+    def invert(
+        self, logs: Annotated[Floats, "{self.knots}"], s: Annotated[Floats, "asked"]
+    ) -> Annotated[Floats, "asked"]:
         """Return clip times u (S,) at which one warp reaches canonical times s (S,)."""
         return np.interp(s, self.evaluate(logs, FIT_TIMES), FIT_TIMES)
 
-    def fit(self, s: Floats, weights: Floats) -> Floats:
+    def fit(
+        self, s: Annotated[Floats, "dense"], weights: Annotated[Floats, "dense"]
+    ) -> Annotated[Floats, "{self.knots}"]:
         """Return log increments (knots,) of the warp nearest to samples s (501,) at DENSE.
 
         Least squares with a lower bound FLOOR; the large weight of the last sample makes the

@@ -1,9 +1,11 @@
 """Coefficient models of the quantities besides the pose: bone offsets, duration, warp, travel."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import ClipBones, SampleValues
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel
@@ -30,10 +32,12 @@ class FittedModel:
 
     field: CoefficientModel
     explained: float
-    residuals: Floats
+    residuals: SampleValues
 
 
-def choose_covariance(settings: Kriging, samples: SamplePoints, values: Floats) -> TunedKriging:
+def choose_covariance(
+    settings: Kriging, samples: SamplePoints, values: SampleValues
+) -> TunedKriging:
     """Return the model of values (N, m) with the first covariance, or a clearly better one.
 
     A covariance is clearly better if its leave-one-out error is below CLEARLY times the first's.
@@ -47,7 +51,7 @@ def choose_covariance(settings: Kriging, samples: SamplePoints, values: Floats) 
 
 
 def tune_drift(
-    settings: Kriging, covariance: str, samples: SamplePoints, values: Floats
+    settings: Kriging, covariance: str, samples: SamplePoints, values: SampleValues
 ) -> TunedKriging:
     """Return the model of values (N, m) with the drift of the least leave-one-out error."""
     return _best_drift(
@@ -56,7 +60,7 @@ def tune_drift(
 
 
 def _variograms(
-    settings: Kriging, samples: SamplePoints, values: Floats
+    settings: Kriging, samples: SamplePoints, values: SampleValues
 ) -> dict[int, ExperimentalVariogram]:
     """Return the variogram of the residuals for each degree of drift; covariances share it."""
     degrees = {max(drifts) for drifts in settings.drifts}
@@ -70,7 +74,7 @@ def _best_drift(
     settings: Kriging,
     covariance: str,
     samples: SamplePoints,
-    values: Floats,
+    values: SampleValues,
     seen: dict[int, ExperimentalVariogram],
 ) -> TunedKriging:
     guesses = [
@@ -81,7 +85,9 @@ def _best_drift(
     return min(found, key=lambda field: field.unexplained)
 
 
-def fit(settings: Kriging, covariance: str, samples: SamplePoints, values: Floats) -> FittedModel:
+def fit(
+    settings: Kriging, covariance: str, samples: SamplePoints, values: SampleValues
+) -> FittedModel:
     """Return a model of values (N, m) in the controls.
 
     It is their mean if the controls do not explain them.
@@ -98,7 +104,7 @@ def fit(settings: Kriging, covariance: str, samples: SamplePoints, values: Float
     )
 
 
-def _is_significant(found: TunedKriging, samples: SamplePoints, values: Floats) -> bool:
+def _is_significant(found: TunedKriging, samples: SamplePoints, values: SampleValues) -> bool:
     """Return True if the gain over the mean of the other samples exceeds SURE standard errors.
 
     Scales and nugget were chosen to maximize this gain, so that a small one can be chance.
@@ -108,7 +114,7 @@ def _is_significant(found: TunedKriging, samples: SamplePoints, values: Floats) 
     return bool(gains.mean() > SIGNIFICANCE * gains.std(ddof=1) / np.sqrt(len(gains)))
 
 
-def fit_proportions(offsets: Floats) -> tuple[Proportions, Floats]:
+def fit_proportions(offsets: ClipBones) -> tuple[Proportions, Annotated[Floats, "clips rank"]]:
     """Return mean and directions of bone offsets (N, J, 3), and each clip's coefficients (N, r)."""
     mean = offsets.mean(axis=0)
     centred = (offsets - mean).reshape(len(offsets), -1)
@@ -123,7 +129,7 @@ def fit_proportions(offsets: Floats) -> tuple[Proportions, Floats]:
     return Proportions(mean, directions), left[:, :rank] * values[:rank] * turned
 
 
-def row_signs(rows: Floats) -> Floats:
+def row_signs(rows: Annotated[Floats, "rows columns"]) -> Annotated[Floats, "rows"]:
     """Return the sign (r,) of the largest entry of each row, 1 for a zero row.
 
     Multiplying by it makes the rows independent of the machine.
@@ -133,7 +139,11 @@ def row_signs(rows: Floats) -> Floats:
 
 
 def _largest_residual(
-    centred: Floats, left: Floats, values: Floats, right: Floats, rank: int
+    centred: Annotated[Floats, "clips numbers"],
+    left: Annotated[Floats, "clips rank"],
+    values: Annotated[Floats, "rank"],
+    right: Annotated[Floats, "rank numbers"],
+    rank: int,
 ) -> float:
     kept = (left[:, :rank] * values[:rank]) @ right[:rank]
     return float(np.abs(centred - kept).max())

@@ -9,9 +9,20 @@ quantities.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import (
+    PerControl,
+    PerPoint,
+    PointControls,
+    PointLabels,
+    Points,
+    PointValues,
+    SampleValues,
+    Values,
+)
 from posefield.common.units import Floats
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging import universal_kriging
@@ -22,9 +33,9 @@ from posefield_train.kriging.universal_kriging import UniversalKriging
 class ConstantModel:
     """A coefficient model (m,) that does not depend on the controls."""
 
-    mean: Floats
+    mean: Values
 
-    def predict(self, points: Floats) -> Floats:
+    def predict(self, points: Points) -> PointValues:
         """Return values (B, m) at points (B, d)."""
         return np.repeat(self.mean[None], len(points), axis=0)
 
@@ -49,13 +60,13 @@ class KrigingBank:
     pose's leading coefficients.
     """
 
-    low: Floats
-    high: Floats
+    low: PerControl
+    high: PerControl
     performers: tuple[str, ...]
     pose: UniversalKriging
     others: dict[str, CoefficientModel]
     sill: float
-    coarse: tuple[Floats, ...] = ()
+    coarse: tuple[Annotated[Floats, "rows columns"], ...] = ()
 
     @property
     def kriged(self) -> list[UniversalKriging]:
@@ -85,7 +96,7 @@ class KrigingBank:
         """Return the number of samples that a level evaluates."""
         return min(self.columns(level), len(self.pose.samples))
 
-    def sample_values(self, name: str) -> Floats:
+    def sample_values(self, name: str) -> SampleValues:
         """Return the values (n, m) that a model interpolates, or its mean in every row."""
         field = self.others[name]
         if isinstance(field, ConstantModel):
@@ -99,11 +110,11 @@ class KrigingBank:
         """
         return [1, *map(width, self.others.values()), pose]
 
-    def points(self, controls: Floats, labels: Floats) -> Floats:
+    def points(self, controls: PointControls, labels: PointLabels) -> Points:
         """Return points (B, d + p): controls (B, d) in half-ranges of their samples, and labels."""
         return np.hstack([half_ranges(controls, self.low, self.high), labels])
 
-    def numpy(self, points: Floats, level: int = 0) -> dict[str, Floats]:
+    def numpy(self, points: Points, level: int = 0) -> dict[str, Annotated[Floats, "points _"]]:
         """Return values (B, m) of each quantity at points (B, d + p), the variance as a share."""
         if level:
             return self._thinned(points, self.coarse[level - 1])
@@ -111,14 +122,16 @@ class KrigingBank:
         values = {name: field.predict(points) for name, field in self.others.items()}
         return {VARIANCE: own, **values, POSE: self.pose.predict(points)}
 
-    def _thinned(self, points: Floats, weights: Floats) -> dict[str, Floats]:
+    def _thinned(
+        self, points: Points, weights: Annotated[Floats, "rows columns"]
+    ) -> dict[str, Annotated[Floats, "points _"]]:
         basis = self.basis(points, len(weights) - self.linear)
         ends = np.cumsum([0, *self.sizes(0)[:-1], weights.shape[1]])
         parts = (basis @ weights[:, start:end] for start, end in pairwise(ends))
         values = dict(zip([VARIANCE, *self.others, POSE], parts, strict=True))
         return {**values, VARIANCE: np.exp(values[VARIANCE])}
 
-    def basis(self, points: Floats, columns: int) -> Floats:
+    def basis(self, points: Points, columns: int) -> Annotated[Floats, "points rows"]:
         """Return labels, one, controls and the first covariances (B, p + 1 + d + m)."""
         d, n = len(self.low), len(self.pose.samples)
         fields = self.kriged[: -(-columns // n)]
@@ -129,13 +142,13 @@ class KrigingBank:
         return np.hstack([points[:, d:], one, points[:, :d], np.hstack(near)[:, :columns]])
 
     @property
-    def precision(self) -> Floats:
+    def precision(self) -> Annotated[Floats, "system system"]:
         """Return the variance's quadratic form (drift + n, drift + n) in controls, covariances."""
         order = self._order
         return self.pose.form[np.ix_(order, order)]
 
     @property
-    def slope(self) -> tuple[Floats, float]:
+    def slope(self) -> tuple[Annotated[Floats, "system"], float]:
         """Return the linear part (drift + n,) and the constant part of the variance."""
         n, nugget = len(self.pose.samples), self.pose.hyper.nugget
         return -2.0 * self.pose.form[n, self._order], 1.0 + nugget - float(self.pose.form[n, n])
@@ -146,7 +159,7 @@ class KrigingBank:
         n = len(self.pose.samples)
         return [*range(n + 1, n + 1 + self.drift), *range(n)]
 
-    def sigma(self, variance: Floats) -> Floats:
+    def sigma(self, variance: Annotated[Floats, "points 1"]) -> PerPoint:
         """Return the standard deviation (B,), m, of a captured clip from the prediction.
 
         variance: share of the sill (B, 1).

@@ -1,7 +1,10 @@
 """ONNX graph of the bank of coefficient models; `kriging_bank` is its NumPy counterpart."""
 
+from typing import Annotated
+
 import numpy as np
 
+from posefield.common.array_shapes import SampleValues
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_bank
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -188,11 +191,13 @@ def _duals(bank: KrigingBank, net: GraphBuilder) -> list[str]:
     return blocks
 
 
-def _dual_part(field: UniversalKriging) -> Floats:
+def _dual_part(field: UniversalKriging) -> SampleValues:
     return field.dual[: len(field.samples)]
 
 
-def _linear_part(field: CoefficientModel, controls: int) -> Floats:
+def _linear_part(
+    field: CoefficientModel, controls: int
+) -> Annotated[Floats, "{controls}+1 values"]:
     """Return weights (1 + d, m) of one and the controls, zero for terms outside the drift."""
     if isinstance(field, ConstantModel):
         return np.vstack([field.mean, np.zeros((controls, len(field.mean)))])

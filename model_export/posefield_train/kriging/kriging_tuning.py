@@ -2,10 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import minimize
 
+from posefield.common.array_shapes import PerSample, SampleValues
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.sample_points import SamplePoints
@@ -35,9 +37,9 @@ class TunedKriging:
     """
 
     hyper: Hyper
-    residuals: Floats
+    residuals: SampleValues
     unexplained: float
-    variances: Floats
+    variances: PerSample
     sill: float
 
 
@@ -55,7 +57,7 @@ def initial_guess(
     return Hyper(covariance, drifts, scales, float(np.clip(share, *NUGGET_BOUNDS)), 0.0)
 
 
-def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: Floats) -> TunedKriging:
+def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) -> TunedKriging:
     """Return the model of given parameters with its leave-one-out residuals."""
     left_out = universal_kriging.leave_out(hyper, samples.points, samples.groups)
     variances = universal_kriging.left_out_variances(hyper, samples.points, left_out)
@@ -70,7 +72,9 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: Floats) -> Tuned
     )
 
 
-def tune(guess: Hyper, samples: SamplePoints, values: Floats, nugget: float | None) -> TunedKriging:
+def tune(
+    guess: Hyper, samples: SamplePoints, values: SampleValues, nugget: float | None
+) -> TunedKriging:
     """Return the model with scales, label distance and nugget that minimize the squared residuals.
 
     values: (n, m), in a Euclidean metric. nugget: fixed value; None to tune it. Nelder and Mead's
@@ -103,7 +107,7 @@ def tune(guess: Hyper, samples: SamplePoints, values: Floats, nugget: float | No
     return evaluate_fixed(read(np.array(best[1])), samples, values)
 
 
-def _starts(guess: Hyper, labelled: bool) -> list[Floats]:
+def _starts(guess: Hyper, labelled: bool) -> list[Annotated[Floats, "parameters"]]:
     """Return logarithms of scales, label and nugget: the guess and an isotropic grid."""
     even = np.ones_like(guess.scales)
     pairs = [(guess.scales, guess.nugget)]
@@ -113,7 +117,10 @@ def _starts(guess: Hyper, labelled: bool) -> list[Floats]:
 
 
 def _descend(
-    loss: Callable[[Floats], float], start: Floats, low: Floats, high: Floats
+    loss: Callable[[Floats], float],
+    start: Annotated[Floats, "parameters"],
+    low: Annotated[Floats, "parameters"],
+    high: Annotated[Floats, "parameters"],
 ) -> tuple[float, list[float]]:
     """Return the least loss found from a start within bounds, and its location."""
     # Steps of a factor of two: SciPy's default simplex is degenerate if a logarithm is near zero.

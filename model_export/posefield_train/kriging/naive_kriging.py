@@ -7,9 +7,11 @@ joints; pose vectors are interpolated directly.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import ClipPositions, PointControls, PoseVectors
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -28,9 +30,9 @@ class NaiveKriging:
     """
 
     fields: tuple[UniversalKriging, ...]
-    values: Floats
+    values: PoseVectors
 
-    def numpy(self, points: Floats) -> Floats:
+    def numpy(self, points: PointControls) -> Annotated[Floats, "points frames dof"]:
         """Return pose vectors (B, T, D) at points (B, d) in half-ranges, as weighted averages."""
         weights = np.stack([field.weights(points) for field in self.fields], axis=1)
         return np.einsum("btn,ntd->btd", weights, self.values, optimize=True)
@@ -73,7 +75,11 @@ class NaiveKriging:
 
 
 def fit_naive(
-    points: Floats, positions: Floats, values: Floats, covariance: str, fitter: VariogramFitter
+    points: Annotated[Floats, "clips controls"],
+    positions: ClipPositions,
+    values: PoseVectors,
+    covariance: str,
+    fitter: VariogramFitter,
 ) -> NaiveKriging:
     """Fit naive kriging to pose vectors (N, T, D), joint positions (N, T, J, 3) at points (N, d).
 

@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import SampleControls, Samples, SampleValues
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
@@ -23,12 +25,12 @@ class SamplePoints:
     group (n,) of each sample; a group is left out together.
     """
 
-    points: Floats
+    points: Samples
     controls: int
-    groups: Indices
+    groups: Annotated[Indices, "samples"]
 
     @property
-    def half_ranges(self) -> Floats:
+    def half_ranges(self) -> SampleControls:
         """Return the controls (n, d) in half-ranges, without labels."""
         return self.points[:, : self.controls]
 
@@ -38,11 +40,11 @@ class SamplePoints:
         return self.points.shape[1] > self.controls
 
     @property
-    def moved_by(self) -> Indices:
+    def moved_by(self) -> Annotated[Indices, "samples"]:
         """Return the index (n,) of each sample's performer; empty without labels."""
         return np.argmax(self.points[:, self.controls :], axis=1) if self.labelled else NO_SAMPLES
 
-    def from_mean(self, values: Floats) -> Floats:
+    def from_mean(self, values: SampleValues) -> SampleValues:
         """Return the differences of values (n, m) from the mean of all other groups."""
         _, inverse, counts = np.unique(self.groups, return_inverse=True, return_counts=True)
         sums = np.zeros((len(counts), values.shape[1]))
@@ -52,7 +54,9 @@ class SamplePoints:
         return values - others
 
 
-def performer_labels(names: Sequence[str], performers: Sequence[str]) -> Floats:
+def performer_labels(
+    names: Sequence[str], performers: Sequence[str]
+) -> Annotated[Floats, "{len(names)} {len(performers)}"]:
     """Return one-hot labels (N, p) of performers, zeros for an unknown name."""
     own = [[float(name == performer) for performer in performers] for name in names]
     return np.array(own).reshape(len(names), len(performers))
@@ -89,17 +93,19 @@ def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     return said
 
 
-def _points(examples: Sequence[Example]) -> Floats:
+def _points(examples: Sequence[Example]) -> SampleControls:
     controls = np.stack([example.controls for example in examples])
     return half_ranges(controls, controls.min(axis=0), controls.max(axis=0))
 
 
-def take_numbers(examples: Sequence[Example]) -> Indices:
+def take_numbers(examples: Sequence[Example]) -> Annotated[Indices, "{len(examples)}"]:
     """Return the number (N,) of the file that each example was cut from."""
     return np.unique([str(e.row.place) for e in examples], return_inverse=True)[1]
 
 
-def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indices:
+def _groups(
+    recipe: Recipe, examples: Sequence[Example], points: SampleControls
+) -> Annotated[Indices, "samples"]:
     """Return groups (N,) by file, or singletons if the drift is undetermined without a file.
 
     Raises TrainingError if the drift is undetermined without a single example.
@@ -118,7 +124,9 @@ def _groups(recipe: Recipe, examples: Sequence[Example], points: Floats) -> Indi
     return alone
 
 
-def _indispensable_group(groups: Indices, points: Floats, degree: int) -> int | None:
+def _indispensable_group(
+    groups: Annotated[Indices, "samples"], points: SampleControls, degree: int
+) -> int | None:
     """Return the first group without which points (N, d) do not determine the drift, or None."""
     return kriging_model.find_required_group(
         groups, kriging_model.drift(points, points.shape[1], degree)

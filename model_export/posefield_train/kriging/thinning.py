@@ -6,6 +6,7 @@ covariance, with weights for all quantities that fit the full models by least sq
 """
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -34,7 +35,7 @@ def sort_samples(bank: KrigingBank) -> KrigingBank:
     return replace(bank, pose=_permute_kriging(bank.pose, order), others=others)
 
 
-def pivoted_order(pose: UniversalKriging) -> Indices:
+def pivoted_order(pose: UniversalKriging) -> Annotated[Indices, "samples"]:
     """Return samples (n,), each the least determined by the previous ones (pivoted Cholesky)."""
     left = universal_kriging.covariances(pose.hyper, pose.samples, pose.samples)
     taken: list[int] = []
@@ -49,11 +50,13 @@ def pivoted_order(pose: UniversalKriging) -> Indices:
     return np.array(taken)
 
 
-def _permute(field: CoefficientModel, order: Indices) -> CoefficientModel:
+def _permute(field: CoefficientModel, order: Annotated[Indices, "samples"]) -> CoefficientModel:
     return field if isinstance(field, ConstantModel) else _permute_kriging(field, order)
 
 
-def _permute_kriging(field: UniversalKriging, order: Indices) -> UniversalKriging:
+def _permute_kriging(
+    field: UniversalKriging, order: Annotated[Indices, "samples"]
+) -> UniversalKriging:
     rows = np.concatenate([order, np.arange(len(order), len(field.dual))])
     return UniversalKriging(
         field.hyper,
@@ -64,7 +67,9 @@ def _permute_kriging(field: UniversalKriging, order: Indices) -> UniversalKrigin
     )
 
 
-def random_points(bank: KrigingBank, reach: float, count: int) -> Floats:
+def random_points(
+    bank: KrigingBank, reach: float, count: int
+) -> Annotated[Floats, "{count} coordinates"]:
     """Return random points (Q, d + p) within `reach` half-ranges.
 
     No performer is as likely as each of the performers.
@@ -80,15 +85,15 @@ def random_points(bank: KrigingBank, reach: float, count: int) -> Floats:
 class ThinningData:
     """Fit data of coarser levels: values of a bank's models at points beyond its samples.
 
-    basis: labels, one, controls and all covariances (P, p + 1 + d + m). said: values (P, m) by
+    basis: labels, one, controls and all covariances (P, p + 1 + d + m). values: (P, m) by
     name.
     """
 
-    basis: Floats
-    values: dict[str, Floats]
+    basis: Annotated[Floats, "points rows"]
+    values: dict[str, Annotated[Floats, "points _"]]
     bank: KrigingBank
 
-    def weights(self, columns: int, rank: int, error: float) -> Floats:
+    def weights(self, columns: int, rank: int, error: float) -> Annotated[Floats, "rows columns"]:
         """Return weights (p + 1 + d + m, M) of the first m covariances.
 
         rank: number of pose coefficients. error: of the level, m, added to its variance.

@@ -8,9 +8,19 @@ prediction is continuous in the controls.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import (
+    PerPoint,
+    Points,
+    PointSamples,
+    PointValues,
+    SampleControls,
+    Samples,
+    SampleValues,
+)
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.kriging import kriging_model
@@ -36,34 +46,34 @@ class UniversalKriging:
     """
 
     hyper: Hyper
-    samples: Floats
-    dual: Floats
-    weighing: Floats
-    form: Floats
+    samples: Samples
+    dual: Annotated[Floats, "system values"]
+    weighing: Annotated[Floats, "system samples"]
+    form: Annotated[Floats, "system system"]
 
-    def predict(self, points: Floats) -> Floats:
+    def predict(self, points: Points) -> PointValues:
         """Return values (B, m) at points (B, d + p)."""
         return self._basis(points) @ self.dual
 
-    def weights(self, points: Floats) -> Floats:
+    def weights(self, points: Points) -> PointSamples:
         """Return the weight of each sample (B, n); they sum to one, and may be negative."""
         return self._basis(points) @ self.weighing
 
-    def variance(self, points: Floats) -> Floats:
+    def variance(self, points: Points) -> PerPoint:
         """Return the kriging variance (B,) of the filtered model, as a share of the sill."""
         basis = self._basis(points)
         return 1.0 - np.sum(basis @ self.form * basis, axis=1)
 
     @property
-    def values(self) -> Floats:
+    def values(self) -> SampleValues:
         """Return the sample values (n, m) that the model was solved for."""
         return values(self.hyper, self.samples, self.dual)
 
-    def _basis(self, points: Floats) -> Floats:
+    def _basis(self, points: Points) -> Annotated[Floats, "points system"]:
         return kriging_model.basis_functions(self.hyper, points, self.samples)
 
 
-def solve(hyper: Hyper, samples: Floats, values: Floats) -> UniversalKriging:
+def solve(hyper: Hyper, samples: Samples, values: SampleValues) -> UniversalKriging:
     """Return the kriging model of values (n, m) at samples (n, d + p).
 
     `check_samples` the samples first.
@@ -77,7 +87,9 @@ def solve(hyper: Hyper, samples: Floats, values: Floats) -> UniversalKriging:
     return UniversalKriging(hyper, samples, weighing @ values, weighing, form)
 
 
-def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
+def values(
+    hyper: Hyper, samples: Samples, dual: Annotated[Floats, "system values"]
+) -> SampleValues:
     """Return the sample values (n, m) for dual weights (n + k, m): the system times the weights."""
     n, degree = len(samples), max(hyper.drifts)
     functions = drift(samples, len(hyper.scales), degree)
@@ -85,7 +97,10 @@ def values(hyper: Hyper, samples: Floats, dual: Floats) -> Floats:
 
 
 def check_samples(
-    samples: Floats, names: tuple[str, ...], degree: int, nugget_is_zero: bool
+    samples: Annotated[Floats, "samples {len(names)}"],
+    names: tuple[str, ...],
+    degree: int,
+    nugget_is_zero: bool,
 ) -> None:
     """Raise TrainingError for samples that make the kriging system singular.
 
@@ -110,7 +125,7 @@ def check_samples(
         _refuse_duplicates(samples)
 
 
-def _refuse_duplicates(samples: Floats) -> None:
+def _refuse_duplicates(samples: SampleControls) -> None:
     _, first, inverse = np.unique(samples, axis=0, return_index=True, return_inverse=True)
     for row, group in enumerate(np.ravel(inverse)):
         if first[group] != row:

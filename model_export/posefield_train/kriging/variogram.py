@@ -7,10 +7,12 @@ would be mistaken for a long range.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from posefield.common.array_shapes import SampleControls, SampleValues
 from posefield.common.units import Floats, Indices
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -28,9 +30,9 @@ BATCH_NUMBERS = 65_536
 class ExperimentalVariogram:
     """Mean distance, semivariance and number of pairs of each lag (L,)."""
 
-    distances: Floats
-    values: Floats
-    pairs: Floats
+    distances: Annotated[Floats, "lags"]
+    values: Annotated[Floats, "lags"]
+    pairs: Annotated[Floats, "lags"]
 
 
 @dataclass(frozen=True)
@@ -42,19 +44,28 @@ class VariogramModel:
     range: float
 
 
-def residuals(samples: Floats, values: Floats, drift: int) -> Floats:
+def residuals(samples: SampleControls, values: SampleValues, drift: int) -> SampleValues:
     """Return the residuals of values (n, m) at samples (n, d) after least squares on the drift."""
     functions = universal_kriging.drift(samples, samples.shape[1], drift)
     coefficients, *_ = np.linalg.lstsq(functions, values, rcond=None)
     return values - functions @ coefficients
 
 
-def residual_variogram(samples: Floats, values: Floats, drift: int) -> ExperimentalVariogram:
+def residual_variogram(
+    samples: SampleControls, values: SampleValues, drift: int
+) -> ExperimentalVariogram:
     """Return the experimental variogram of the residuals of values (n, m) from a drift."""
     return experimental_variogram(samples, residuals(samples, values, drift))
 
 
-def pairs_by_lag(samples: Floats) -> tuple[Indices, Indices, Floats, Indices]:
+def pairs_by_lag(
+    samples: SampleControls,
+) -> tuple[
+    Annotated[Indices, "pairs"],
+    Annotated[Indices, "pairs"],
+    Annotated[Floats, "pairs"],
+    Annotated[Indices, "pairs"],
+]:
     """Return pairs of samples (n, d) by lag: indices of both, their distances, and their lag."""
     first, second = np.triu_indices(len(samples), k=1)
     distances = np.linalg.norm(samples[first] - samples[second], axis=1)
@@ -64,7 +75,7 @@ def pairs_by_lag(samples: Floats) -> tuple[Indices, Indices, Floats, Indices]:
     return first[near], second[near], distances[near], lag[near]
 
 
-def experimental_variogram(samples: Floats, values: Floats) -> ExperimentalVariogram:
+def experimental_variogram(samples: SampleControls, values: SampleValues) -> ExperimentalVariogram:
     """Return Matheron's estimate over lags with enough pairs."""
     first, second, distances, lag = pairs_by_lag(samples)
     halves = 0.5 * _squared_distances(values, first, second)
@@ -77,7 +88,9 @@ def experimental_variogram(samples: Floats, values: Floats) -> ExperimentalVario
     )
 
 
-def _squared_distances(values: Floats, first: Indices, second: Indices) -> Floats:
+def _squared_distances(
+    values: SampleValues, first: Annotated[Indices, "pairs"], second: Annotated[Indices, "pairs"]
+) -> Annotated[Floats, "pairs"]:
     """Return the squared distances (P,) of pairs of rows of values (n, m).
 
     Pairs are taken in batches that stay in the processor's cache: the differences of all pairs
@@ -111,7 +124,11 @@ def fit_by_grid(experimental_variogram: ExperimentalVariogram, covariance: str) 
     return VariogramModel(float(nuggets[best]), float(sills[best]), float(RANGES[best]))
 
 
-def _nonnegative_lines(rising: Floats, values: Floats, weights: Floats) -> tuple[Floats, Floats]:
+def _nonnegative_lines(
+    rising: Annotated[Floats, "ranges lags"],
+    values: Annotated[Floats, "lags"],
+    weights: Annotated[Floats, "lags"],
+) -> tuple[Annotated[Floats, "ranges"], Annotated[Floats, "ranges"]]:
     """Return intercepts and slopes (R,), not negative, of values (L,) over rising (R, L)."""
     mean_x, mean_y = rising @ weights / weights.sum(), values @ weights / weights.sum()
     spread = (rising - mean_x[:, None]) ** 2 @ weights

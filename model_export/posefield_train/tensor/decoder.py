@@ -2,9 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import (
+    Bones,
+    ClipBones,
+    ClipFrames,
+    ClipPaths,
+    ClipRotations,
+    ClipTravel,
+    JointRotations,
+)
 from posefield.common.units import Floats, Indices
 from posefield.motion import blend, quat
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
@@ -42,9 +52,9 @@ class Decoder:
     """
 
     reduced: TuckerTensor
-    mean: Floats
-    unwhiten: Floats
-    means: Floats
+    mean: Annotated[Floats, "dof"]
+    unwhiten: Annotated[Floats, "dof varying"]
+    means: JointRotations
     coarse: tuple[LevelSize, ...] = ()
 
     @property
@@ -64,11 +74,13 @@ class Decoder:
         )
 
     @property
-    def directions(self) -> Floats:
+    def directions(self) -> Annotated[Floats, "freedoms dof"]:
         """Return the pose vectors (r1, D) that the first mode's coefficients multiply."""
         return self.reduced.bases[0].T @ self.unwhiten.T
 
-    def numpy(self, coefficients: Floats, place: Floats) -> tuple[Floats, Floats]:
+    def numpy(
+        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+    ) -> tuple[ClipRotations, ClipPaths]:
         """Return rotations (B, S, J, 4) and root positions (B, S, 3) at canonical frames (B, S).
 
         coefficients: (B, r3). The time basis is interpolated linearly between frames (Mukai &
@@ -77,7 +89,9 @@ class Decoder:
         numbers = self.mean + self.reduced_poses(coefficients, place) @ self.directions
         return PoseChart(self.means).poses(numbers)
 
-    def at_frame(self, coefficients: Floats, frame: int) -> tuple[Floats, Floats]:
+    def at_frame(
+        self, coefficients: Annotated[Floats, "clips modes"], frame: int
+    ) -> tuple[Annotated[Floats, "clips joints 4"], ClipTravel]:
         """Return rotations (B, J, 4) and root positions (B, 3) at one canonical frame of all.
 
         The core is contracted with that frame first, which saves nearly all of the work of `numpy`.
@@ -98,7 +112,9 @@ class Decoder:
             coarse=(),
         )
 
-    def reduced_poses(self, coefficients: Floats, place: Floats) -> Floats:
+    def reduced_poses(
+        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+    ) -> Annotated[Floats, "clips frames freedoms"]:
         """Return coefficients (B, S, r1) of the first mode."""
         table, (r1, r2, r3) = self.reduced.bases[1], self.reduced.core.shape
         time = blend.interpolate_rows(table, place)
@@ -210,7 +226,12 @@ class Decoder:
         )
 
     def _partly_fixed_rotations(
-        self, net: GraphBuilder, flat: str, turning: str, offset: Floats, ends: dict[str, str]
+        self,
+        net: GraphBuilder,
+        flat: str,
+        turning: str,
+        offset: Annotated[Floats, "..."],
+        ends: dict[str, str],
     ) -> str:
         """Build quaternions where some level fixes joints.
 
@@ -238,13 +259,15 @@ class Decoder:
         back = net("Gather", both, net.weights("joint_places", np.argsort(order)))
         return innermost_joints(net, back, joints)
 
-    def _order(self) -> Indices:
+    def _order(self) -> Annotated[Indices, "joints"]:
         """Return the joints sorted by the number of coarser levels that keep them, descending."""
         kept = [[j in rung.joints for j in range(len(self.means))] for rung in self.coarse]
         return np.argsort(-np.sum(kept, axis=0), kind="stable")
 
 
-def half_angle_products(means: Floats, vectors: Floats) -> Floats:
+def half_angle_products(
+    means: JointRotations, vectors: Annotated[Floats, "*batch joints*3"]
+) -> Annotated[Floats, "*batch joints*4"]:
     """Return mean · v / 2 of rotation vectors (..., 3 J) about means (J, 4), as (..., 4 J).
 
     mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2. The bracket is linear in
@@ -256,7 +279,7 @@ def half_angle_products(means: Floats, vectors: Floats) -> Floats:
     return quat.mul(means, pure).reshape(*vectors.shape[:-1], -1)
 
 
-def half_angle_products_onnx(net: GraphBuilder, means: Floats, vectors: str) -> str:
+def half_angle_products_onnx(net: GraphBuilder, means: JointRotations, vectors: str) -> str:
     """Build `half_angle_products` in a graph: columns (3 J, r) to columns (4 J, r)."""
     # A quaternion's product with each axis is linear in it: (J, 4) becomes (J, 4, 3).
     axes = quat.mul(np.eye(4)[:, None], 0.5 * np.eye(4)[1:]).swapaxes(1, 2).reshape(4, 12)
@@ -301,10 +324,10 @@ class Proportions:
     mean: (J, 3). directions: (r, J, 3).
     """
 
-    mean: Floats
-    directions: Floats
+    mean: Bones
+    directions: Annotated[Floats, "rank joints 3"]
 
-    def numpy(self, coefficients: Floats) -> Floats:
+    def numpy(self, coefficients: Annotated[Floats, "clips rank"]) -> ClipBones:
         """Return bone offsets (B, J, 3), m, of coefficients (B, r)."""
         return self.mean + np.einsum("br,rjk->bjk", coefficients, self.directions)
 

@@ -7,6 +7,7 @@ Kuriyama 2006, section 2, apply it to the motion tensor.
 
 from dataclasses import dataclass
 from functools import reduce
+from typing import Annotated
 
 import numpy as np
 
@@ -38,11 +39,13 @@ class TuckerTensor:
         return TuckerTensor(self.core[prefix], tuple(bases))
 
     @property
-    def motions(self) -> Floats:
+    def motions(self) -> Annotated[Floats, "samples modes"]:
         """Return the slices along the last mode as rows (N, r) with equal distances."""
         return self.bases[-1] * self._lengths
 
-    def slices(self, motions: Floats) -> Floats:
+    def slices(
+        self, motions: Annotated[Floats, "samples modes"]
+    ) -> Annotated[Floats, "... samples"]:
         """Return the slices (..., B) of the tensor for rows (B, r) of coordinates as `motions`."""
         # Directions with tiny singular values are rounding errors; do not divide by these.
         lengths = self._lengths
@@ -52,7 +55,7 @@ class TuckerTensor:
         return rest.restored()
 
     @property
-    def _lengths(self) -> Floats:
+    def _lengths(self) -> Annotated[Floats, "modes"]:
         """Return the singular values (r,) of the last mode."""
         return np.linalg.norm(unfold(self.core, self.core.ndim - 1), axis=1)
 
@@ -61,12 +64,12 @@ class TuckerTensor:
         return reduce(lambda x, mb: mode_dot(x, mb[1], mb[0]), enumerate(self.bases), self.core)
 
 
-def unfold(tensor: Floats, mode: int) -> Floats:
+def unfold(tensor: Floats, mode: int) -> Annotated[Floats, "size rest"]:
     """Return the mode-n unfolding: the mode's fibres as columns (size of the mode, rest)."""
     return np.moveaxis(tensor, mode, 0).reshape(tensor.shape[mode], -1)
 
 
-def mode_dot(tensor: Floats, matrix: Floats, mode: int) -> Floats:
+def mode_dot(tensor: Floats, matrix: Annotated[Floats, "rows size"], mode: int) -> Floats:
     """Return the mode-n product: matrix (rows, size of the mode) applied to every fibre.
 
     The tensor is not rearranged in memory, which would take longer than the product.
@@ -102,19 +105,19 @@ def _project(tensor: Floats, bases: tuple[Floats, ...]) -> TuckerTensor:
     return TuckerTensor(core, bases)
 
 
-def _basis(unfolded: Floats) -> Floats:
+def _basis(unfolded: Annotated[Floats, "size rest"]) -> Annotated[Floats, "size rank"]:
     _, vectors = np.linalg.eigh(unfolded @ unfolded.T)
     return fix_signs(vectors[:, ::-1])
 
 
-def fix_signs(columns: Floats) -> Floats:
+def fix_signs(columns: Annotated[Floats, "size rank"]) -> Annotated[Floats, "size rank"]:
     """Return columns (D, r) with signs such that the largest entry of each is positive."""
     # Rounded, so that rounding errors do not decide between two entries of equal size.
     largest = np.argmax(np.round(np.abs(columns), 9), axis=0)
     return columns * np.sign(columns[largest, np.arange(columns.shape[1])])
 
 
-def squared_errors(core: Floats) -> Floats:
+def squared_errors(core: Annotated[Floats, "*ranks"]) -> Annotated[Floats, "*ranks"]:
     """Return the exact squared error of every truncation: entry (i, j, …) for ranks (i+1, j+1, …).
 
     The bases are orthonormal, so the error is the squared norm of the core outside its prefix: |A|²

@@ -4,9 +4,11 @@ It is expressed in a metric of joint positions, see `metric`.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import ClipBones, JointWeights, PoseVectors
 from posefield.common.units import Floats
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.source import half_turns
@@ -29,26 +31,26 @@ class MotionTensor:
     weight: sum of the joints' weights.
     """
 
-    values: Floats
-    mean: Floats
-    whiten: Floats
-    unwhiten: Floats
+    values: Annotated[Floats, "varying frames clips"]
+    mean: Annotated[Floats, "dof"]
+    whiten: Annotated[Floats, "varying dof"]
+    unwhiten: Annotated[Floats, "dof varying"]
     chart: PoseChart
     weight: float
 
-    def numbers(self, values: Floats) -> Floats:
+    def numbers(self, values: Annotated[Floats, "varying frames clips"]) -> PoseVectors:
         """Return pose vectors (B, T, D) of slices (D', T, B) of the tensor."""
         return self.mean + values.transpose(2, 1, 0) @ self.unwhiten.T
 
-    def rms(self, squared: Floats) -> Floats:
+    def rms(self, squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
         """Return the RMS joint distance, m, of squared distances summed over the tensor."""
         _, frames, samples = self.values.shape
         return np.sqrt(squared / (self.weight * frames * samples))
 
 
 def pose_vectors(
-    aligned: AlignedClips, parents: tuple[int, ...], offsets: Floats
-) -> tuple[Floats, PoseChart, list[Finding]]:
+    aligned: AlignedClips, parents: tuple[int, ...], offsets: ClipBones
+) -> tuple[PoseVectors, PoseChart, list[Finding]]:
     """Return pose vectors (N, T, D) of aligned clips, their chart, and flips and far joints.
 
     offsets: bone offsets (N, J, 3) of each clip's performer, m.
@@ -60,11 +62,11 @@ def pose_vectors(
 
 
 def build_tensor(
-    numbers: Floats,
+    numbers: PoseVectors,
     own_chart: PoseChart,
     parents: tuple[int, ...],
-    offsets: Floats,
-    joint_weights: Floats,
+    offsets: ClipBones,
+    joint_weights: JointWeights,
 ) -> MotionTensor:
     """Return the tensor of pose vectors (N, T, D) in the metric of their own poses.
 
@@ -80,7 +82,9 @@ def build_tensor(
     return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, float(joint_weights.sum()))
 
 
-def _whiten(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
+def _whiten(
+    numbers: PoseVectors, mean: Annotated[Floats, "dof"], whiten: Annotated[Floats, "varying dof"]
+) -> Annotated[Floats, "varying frames clips"]:
     """Return the tensor (D', T, N) of pose vectors (N, T, D), transposed in small blocks."""
     samples, frames, _ = numbers.shape
     flat = whiten @ numbers.reshape(samples * frames, -1).T
@@ -89,12 +93,12 @@ def _whiten(numbers: Floats, mean: Floats, whiten: Floats) -> Floats:
 
 
 def sampled_gram(
-    numbers: Floats,
+    numbers: PoseVectors,
     own_chart: PoseChart,
     parents: tuple[int, ...],
-    offsets: Floats,
-    joint_weights: Floats,
-) -> Floats:
+    offsets: ClipBones,
+    joint_weights: JointWeights,
+) -> Annotated[Floats, "dof dof"]:
     """Return the Gram matrix (D, D) over poses spaced evenly through pose vectors (N, T, D)."""
     samples, frames, _ = numbers.shape
     chosen = np.unique(

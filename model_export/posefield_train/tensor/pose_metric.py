@@ -9,8 +9,11 @@ composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, 2008, sect
 motions and forces as six numbers about the origin. The Jacobian is never formed.
 """
 
+from typing import Annotated
+
 import numpy as np
 
+from posefield.common.array_shapes import JointWeights
 from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 
@@ -25,11 +28,11 @@ FLOOR = 1e-6
 
 def gram(
     parents: tuple[int, ...],
-    rotations: Floats,
-    vectors: Floats,
-    translations: Floats,
-    joint_weights: Floats,
-) -> Floats:
+    rotations: Annotated[Floats, "poses joints 4"],
+    vectors: Annotated[Floats, "poses joints 3"],
+    translations: Annotated[Floats, "poses joints 3"],
+    joint_weights: JointWeights,
+) -> Annotated[Floats, "3+joints*3 3+joints*3"]:
     """Return the mean over poses of JᵀJ (D, D), D = 3 + 3 J, in m² per squared unit.
 
     rotations: local (P, J, 4). vectors: the same as rotation vectors about the means (P, J, 3).
@@ -47,13 +50,17 @@ def gram(
     return upper + np.triu(upper, k=1).T
 
 
-def _axes(orientations: Floats, vectors: Floats) -> Floats:
+def _axes(
+    orientations: Annotated[Floats, "poses joints 4"], vectors: Annotated[Floats, "poses joints 3"]
+) -> Annotated[Floats, "poses joints 3 3"]:
     """Return the world axis (P, J, 3 numbers, 3) of each number of a rotation vector."""
     turned = quat.to_matrix(orientations) @ quat.right_jacobian(vectors)
     return np.swapaxes(turned, -1, -2)
 
 
-def _motions(positions: Floats, axes: Floats) -> Floats:
+def _motions(
+    positions: Annotated[Floats, "poses joints 3"], axes: Annotated[Floats, "poses joints 3 3"]
+) -> Annotated[Floats, "poses 3+joints*3 6"]:
     """Return the motion (P, 3 + 3 J, 6) of each degree of freedom.
 
     It is the angular velocity and the velocity at the origin.
@@ -66,7 +73,12 @@ def _motions(positions: Floats, axes: Floats) -> Floats:
     return motions
 
 
-def _forces(motions: Floats, positions: Floats, mass: Floats, below: Floats) -> Floats:
+def _forces(
+    motions: Annotated[Floats, "poses dof 6"],
+    positions: Annotated[Floats, "poses joints 3"],
+    mass: JointWeights,
+    below: Annotated[Floats, "joints joints"],
+) -> Annotated[Floats, "poses dof 6"]:
     """Return the moment about the origin and the force (P, 3 + 3 J, 6) that each motion needs.
 
     The joint and its descendants move as one rigid body.
@@ -85,7 +97,9 @@ def _forces(motions: Floats, positions: Floats, mass: Floats, below: Floats) -> 
     return np.concatenate([moment, force], axis=-1)
 
 
-def whitening(gram: Floats) -> tuple[Floats, Floats]:
+def whitening(
+    gram: Annotated[Floats, "dof dof"],
+) -> tuple[Annotated[Floats, "dof dof"], Annotated[Floats, "dof dof"]]:
     """Return the square root (D, D) of a Gram matrix and its inverse.
 
     Eigenvalues below FLOOR times the largest are raised to it.

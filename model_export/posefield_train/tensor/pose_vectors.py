@@ -5,10 +5,19 @@ are unwrapped so that no clip is discontinuous, and every such joint is reported
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.array_shapes import (
+    ClipPaths,
+    ClipPositions,
+    ClipRotations,
+    JointRotations,
+    RootPath,
+    Vector,
+)
+from posefield.common.units import Booleans, Floats
 from posefield.motion import quat, quat_planes
 from posefield.motion.skeleton import POSES_PER_BLOCK
 from posefield_train.source.half_turns import Finding
@@ -21,14 +30,18 @@ REPORTED_ANGLE = 0.9 * np.pi
 class PoseChart:
     """Chart of poses. means: rotations (J, 4) about which rotation vectors are taken."""
 
-    means: Floats
+    means: JointRotations
 
-    def numbers(self, rotations: Floats, root_path: Floats) -> Floats:
+    def numbers(
+        self, rotations: ClipRotations, root_path: ClipPaths
+    ) -> Annotated[Floats, "clips frames 3+joints*3"]:
         """Return pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4), root paths (N, T, 3)."""
         vectors = _unwrap(quat.log(quat.mul(quat.conj(self.means), rotations)))
         return np.concatenate([root_path, vectors.reshape(*root_path.shape[:2], -1)], axis=-1)
 
-    def poses(self, numbers: Floats) -> tuple[Floats, Floats]:
+    def poses(
+        self, numbers: Annotated[Floats, "*poses dof"]
+    ) -> tuple[Annotated[Floats, "*poses joints 4"], Annotated[Floats, "*poses 3"]]:
         """Return rotations (..., J, 4), root positions (..., 3) of pose vectors (..., 3 + 3 J)."""
         *lead, freedoms = numbers.shape
         rows = numbers.reshape(-1, freedoms)
@@ -39,7 +52,9 @@ class PoseChart:
             rotations[block] = planes.reshape(rotations.shape[1], -1).T
         return rotations.reshape(*lead, -1, 4), numbers[..., :3]
 
-    def rotation_planes(self, vectors: Floats) -> Floats:
+    def rotation_planes(
+        self, vectors: Annotated[Floats, "numbers *poses"]
+    ) -> Annotated[Floats, "joints 4 *poses"]:
         """Return rotations (J, 4, ...) of rotation vectors about the means (3 J, ...)."""
         planes = vectors.reshape(len(self.means), 3, *vectors.shape[1:]).swapaxes(0, 1)
         rotations = np.empty((len(self.means), 4, *vectors.shape[1:]))
@@ -47,25 +62,25 @@ class PoseChart:
         quat_planes.product(means, quat_planes.exp(planes), out=rotations.swapaxes(0, 1))
         return rotations
 
-    def far_joints(self, rotations: Floats) -> list[Finding]:
+    def far_joints(self, rotations: ClipRotations) -> list[Finding]:
         """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
         return _far_joints(quat.log(quat.mul(quat.conj(self.means), rotations)))
 
 
-def fit_chart(rotations: Floats) -> tuple[PoseChart, list[Finding]]:
+def fit_chart(rotations: ClipRotations) -> tuple[PoseChart, list[Finding]]:
     """Return the chart about the chordal means of rotations (N, T, J, 4), and far joints."""
     own_chart = PoseChart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])))
     return own_chart, own_chart.far_joints(rotations)
 
 
-def _jumps(vectors: Floats) -> Floats:
+def _jumps(vectors: ClipPositions) -> Annotated[Booleans, "clips joints"]:
     """Return a mask (N, J) of rotation vectors with a jump of over half a turn between frames."""
     steps = np.linalg.norm(np.diff(vectors, axis=1), axis=-1)
-    jumps: Floats = np.any(steps > np.pi, axis=1)
+    jumps: Booleans = np.any(steps > np.pi, axis=1)
     return jumps
 
 
-def _far_joints(vectors: Floats) -> list[Finding]:
+def _far_joints(vectors: ClipPositions) -> list[Finding]:
     largest = np.linalg.norm(vectors, axis=-1).max(axis=1)
     jumps = _jumps(vectors)
     return [
@@ -75,14 +90,14 @@ def _far_joints(vectors: Floats) -> list[Finding]:
     ]
 
 
-def _unwrap(vectors: Floats) -> Floats:
+def _unwrap(vectors: ClipPositions) -> ClipPositions:
     vectors = vectors.copy()
     for clip, joint in np.argwhere(_jumps(vectors)):
         vectors[clip, :, joint] = _unwrap_path(vectors[clip, :, joint])
     return vectors
 
 
-def _unwrap_path(path: Floats) -> Floats:
+def _unwrap_path(path: RootPath) -> RootPath:
     """Unwrap rotation vectors (T, 3) in both directions from the frame nearest to the mean.
 
     Starting at that frame puts all clips on the same branch.
@@ -96,7 +111,7 @@ def _unwrap_path(path: Floats) -> Floats:
     return path
 
 
-def _nearest_turn(vector: Floats, neighbour: Floats) -> Floats:
+def _nearest_turn(vector: Vector, neighbour: Vector) -> Vector:
     """Return the same rotation with whole turns added so that it lies nearest to a neighbour."""
     angle = float(np.linalg.norm(vector))
     if angle < 1e-9:

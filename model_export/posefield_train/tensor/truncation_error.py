@@ -6,9 +6,11 @@ distances.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import ClipBones, ClipPositions, JointWeights
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Event
@@ -53,10 +55,10 @@ class TruncationReference:
 
     own_tensor: MotionTensor
     parents: tuple[int, ...]
-    offsets: Floats
-    weights: Floats
+    offsets: ClipBones
+    weights: JointWeights
     event_frame: EventFrame | None
-    whole: Floats
+    whole: ClipPositions
 
     def evaluate(self, reduced: TuckerTensor) -> TruncationErrors:
         """Return the fidelity of a truncation of this tensor."""
@@ -85,8 +87,8 @@ class TruncationReference:
 class _Distances:
     """Distances (N, T, J), m, with the statistics of `TruncationErrors`, computed on access."""
 
-    gaps: Floats
-    weights: Floats
+    gaps: Annotated[Floats, "clips frames joints"]
+    weights: JointWeights
     event_frame: EventFrame | None
 
     @property
@@ -113,7 +115,7 @@ class _Distances:
         )
 
 
-def joint_weights(recipe: Recipe, examples: Sequence[Example]) -> Floats:
+def joint_weights(recipe: Recipe, examples: Sequence[Example]) -> JointWeights:
     """Return the weight (J,) of each joint's position from the recipe, by default one."""
     names = examples[0].clip.skeleton.names
     return np.array([recipe.motion.joint_weights.get(name, 1.0) for name in names])
@@ -135,8 +137,11 @@ def truncation_reference(
 
 
 def positions(
-    own_tensor: MotionTensor, values: Floats, parents: tuple[int, ...], offsets: Floats
-) -> Floats:
+    own_tensor: MotionTensor,
+    values: Annotated[Floats, "varying frames clips"],
+    parents: tuple[int, ...],
+    offsets: ClipBones,
+) -> ClipPositions:
     """Return joint positions (N, T, J, 3), m, of whitened values (D', T, N).
 
     offsets: bone offsets (N, J, 3), m.
@@ -147,8 +152,11 @@ def positions(
 
 
 def _joint_positions(
-    own_tensor: MotionTensor, centred: Floats, parents: tuple[int, ...], offsets: Floats
-) -> Floats:
+    own_tensor: MotionTensor,
+    centred: Annotated[Floats, "dof frames clips"],
+    parents: tuple[int, ...],
+    offsets: ClipBones,
+) -> ClipPositions:
     """Return joint positions (N, T, J, 3) of pose vectors (D, T, N) less the tensor's mean."""
     _, frames, samples = centred.shape
     places = np.empty((len(parents), 3, frames, samples))

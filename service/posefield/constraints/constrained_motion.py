@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.array_shapes import Frames, RootPath, Rotations, Variables, Vector
 from posefield.constraints import constraint, gauss_newton, pinned_feet
 from posefield.constraints.constraint import Constraint, PositionConstraint
 from posefield.constraints.motion_variables import MotionVariables
@@ -26,13 +26,13 @@ from posefield.question.results import ConstraintResult
 class ConstrainedMotion:
     """A motion, predicted or corrected.
 
-    numbers: the motion as the variables of the correction. state: the model's prediction. met:
-    error of each constraint. steps: of the correction. distance: Mahalanobis distance of the
-    constraints from the prediction.
+    numbers: the motion as the variables of the correction. state: the model's prediction.
+    results: error of each constraint. steps: of the correction. distance: Mahalanobis distance of
+    the constraints from the prediction.
     """
 
     scene: MotionVariables
-    numbers: Floats
+    numbers: Variables
     state: PredictionState
     results: tuple[ConstraintResult, ...]
     steps: int = 0
@@ -49,11 +49,11 @@ class ConstrainedMotion:
         return 1.0 if self.scene.cyclic else self.state.duration
 
     @property
-    def travel(self) -> Floats:
+    def travel(self) -> Vector:
         """Travel of a whole cycle (3,): to the left and ahead, m, and change of heading, rad."""
         return self.scene.duration_and_travel(self.numbers)[1]
 
-    def poses(self, frames: Floats) -> tuple[Floats, Floats]:
+    def poses(self, frames: Frames) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, at canonical frames (S,)."""
         scene = self.scene
         rotations, roots = scene.reduced.poses(scene.motion(self.numbers), frames)

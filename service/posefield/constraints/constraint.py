@@ -2,17 +2,18 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import Gradients, ReducedMotions, Values, Variables
 from posefield.common.units import Floats
 from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariables
 from posefield.motion import measures
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
 
-ValuesAndGradients = tuple[Floats, Floats]
+ValuesAndGradients = tuple[Values, Gradients]
 """Values (k,), and their gradients (k, numbers) with respect to the numbers of the motion."""
 
 
@@ -28,13 +29,15 @@ class Constraint(Protocol):
         """Unit of the values."""
 
     @property
-    def target(self) -> Floats:
+    def target(self) -> Values:
         """Target values (k,)."""
 
-    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
+    def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the values of a motion and their gradients."""
 
-    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(
+        self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
+    ) -> Annotated[Floats, "motions values"]:
         """Return the values (n, k) of other reduced motions (n, r2 r1) at the moment of this one.
 
         All other numbers, such as the travel, are those of this motion.
@@ -46,13 +49,13 @@ class PositionConstraint:
     """Constraint on the mean position of joints at a moment, along some axes, m.
 
     names: one for all axes, or one each. moment: rule that determines the moment. axes: indices of
-    the coordinates. goal: target values (k,). at: canonical frame, where the moment is a given one.
+    the coordinates. target: values (k,). at: canonical frame, where the moment is a given one.
     """
 
     names: tuple[str, ...]
     moment: Measure
     axes: tuple[int, ...]
-    target: Floats
+    target: Values
     at: float = 0.0
     unit: str = "m"
 
@@ -61,7 +64,7 @@ class PositionConstraint:
         known = {"start": 0.0, "end": last, "landmark": self.at}
         return known.get(self.moment.at or "")
 
-    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
+    def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the values and their gradients."""
         joints = self.moment.joints
         at = _moment_frame(scene, numbers, self.moment, self.at)
@@ -70,7 +73,12 @@ class PositionConstraint:
         gradients = np.mean([gradient for _, gradient in found], axis=0)
         return values[list(self.axes)], gradients[list(self.axes)]
 
-    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(
+        self,
+        scene: MotionVariables,
+        numbers: Variables,
+        motions: ReducedMotions,
+    ) -> Annotated[Floats, "motions values"]:
         """Return the values (n, k) of other motions."""
         at = _moment_frame(scene, numbers, self.moment, self.at)
         found = [
@@ -85,10 +93,10 @@ class StepLengthConstraint:
 
     names: tuple[str, ...]
     moment: Measure
-    target: Floats
+    target: Annotated[Floats, "1"]
     unit: str = "m"
 
-    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
+    def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the value and its gradient."""
         at = _moment_frame(scene, numbers, self.moment, 0.0)
         first, second = (
@@ -98,7 +106,12 @@ class StepLengthConstraint:
         sign = 1.0 if ahead >= 0.0 else -1.0
         return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
 
-    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(
+        self,
+        scene: MotionVariables,
+        numbers: Variables,
+        motions: ReducedMotions,
+    ) -> Annotated[Floats, "motions 1"]:
         """Return the values (n, 1) of other motions."""
         at = _moment_frame(scene, numbers, self.moment, 0.0)
         first, second = (
@@ -113,10 +126,10 @@ class TravelConstraint:
 
     names: tuple[str, ...]
     quantity: str
-    target: Floats
+    target: Annotated[Floats, "1"]
     unit: str
 
-    def evaluate(self, scene: MotionVariables, numbers: Floats) -> ValuesAndGradients:
+    def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the value and its gradient."""
         log_duration, travel = scene.duration_and_travel(numbers)
         duration = float(np.exp(log_duration))
@@ -132,13 +145,18 @@ class TravelConstraint:
             gradients[0, -CYCLE_VARIABLES] = -value
         return np.array([value]), gradients
 
-    def evaluate_motions(self, scene: MotionVariables, numbers: Floats, motions: Floats) -> Floats:
+    def evaluate_motions(
+        self,
+        scene: MotionVariables,
+        numbers: Variables,
+        motions: ReducedMotions,
+    ) -> Annotated[Floats, "motions 1"]:
         """Return the values (n, 1) of other motions: all equal, without their own travel."""
         return np.repeat(self.evaluate(scene, numbers)[0][None], len(motions), axis=0)
 
 
 def evaluate(
-    aims: Sequence[Constraint], scene: MotionVariables, numbers: Floats
+    aims: Sequence[Constraint], scene: MotionVariables, numbers: Variables
 ) -> ValuesAndGradients:
     """Return the concatenated values and gradients of several constraints."""
     cancellation.check()
@@ -172,7 +190,7 @@ def from_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> l
     return aims
 
 
-def _moment_frame(scene: MotionVariables, numbers: Floats, own: Measure, given: float) -> float:
+def _moment_frame(scene: MotionVariables, numbers: Variables, own: Measure, given: float) -> float:
     """Return the canonical frame at which a quantity is measured.
 
     given: frame of a landmark.

@@ -4,10 +4,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import Frames
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.constraints import constrained_motion, constraint, overshoot
@@ -129,25 +131,25 @@ class ConstraintSolver:
         return self._corrector(question.level).measured(held)
 
     def poses(
-        self, question: ValidatedQuestion, held: ConstrainedMotion, when: Floats, trust: Trust
+        self, question: ValidatedQuestion, held: ConstrainedMotion, when: Frames, trust: Trust
     ) -> PoseAnswer[np.float64]:
         """Return the poses of a motion at times (S,), s."""
         rotations, roots = held.poses(self._frames(question, held, when))
         return PoseAnswer(when, rotations, roots, held.state.bones, trust)
 
-    def _captured_positions(self, moment: Measure, time: float | None) -> Floats:
+    def _captured_positions(
+        self, moment: Measure, time: float | None
+    ) -> Annotated[Floats, "samples 3"]:
         """Return a joint's predicted position (n, 3), m, at a moment of each captured clip."""
         goal = JointTarget("", moment, (0.0, 0.0, 0.0), time)
         found = []
         for state in self._captured if time is None else self._predicted(time):
             cancellation.check()
             begun = self._corrector(0).predict(state)
-            aim, motion = (
-                self._position_constraint(goal, begun, state.frames[0]),
-                begun.scene.motion(begun.numbers),
-            )
+            aim = self._position_constraint(goal, begun, state.frames[0])
+            motions = begun.scene.motion(begun.numbers).reshape(1, -1)
             # `evaluate_motions` computes the value without its gradient, which is not needed here.
-            found.append(aim.evaluate_motions(begun.scene, begun.numbers, motion[None])[0])
+            found.append(aim.evaluate_motions(begun.scene, begun.numbers, motions)[0])
         return np.array(found)
 
     @cached_property
@@ -166,7 +168,7 @@ class ConstraintSolver:
             self._correctors[level] = constrained_motion.build_corrector(self._session, level)
         return self._correctors[level]
 
-    def _frames(self, question: ValidatedQuestion, held: ConstrainedMotion, when: Floats) -> Floats:
+    def _frames(self, question: ValidatedQuestion, held: ConstrainedMotion, when: Frames) -> Frames:
         """Return the canonical frames (S,) of times (S,), s, scaled by a corrected duration."""
         shares = when * (held.state.duration / held.duration)
         own = self._session.state(question.point, shares, question.labels, question.level)
@@ -287,6 +289,6 @@ def controls_from_targets(
     return found
 
 
-def target_values(goals: tuple[JointTarget, ...]) -> Floats:
+def target_values(goals: tuple[JointTarget, ...]) -> Annotated[Floats, "3*{len(goals)}"]:
     """Return the target positions (3 G,) of the goals, concatenated."""
     return np.array([value for goal in goals for value in goal.position])

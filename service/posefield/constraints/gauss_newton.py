@@ -9,10 +9,12 @@ up to that spread.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import Gradients, ValueMatrix, Values, Variables
 from posefield.common.units import Floats
 from posefield.constraints import constraint, reachability
 from posefield.constraints.constraint import Constraint, ValuesAndGradients
@@ -37,11 +39,11 @@ MISS_TOLERANCE = 1e-3
 class Correction:
     """Result of a correction.
 
-    numbers: of the corrected motion. met: error of each constraint. steps: number of iterations.
-    distance: Mahalanobis distance of the constraints from the prediction.
+    numbers: of the corrected motion. results: error of each constraint. steps: number of
+    iterations. distance: Mahalanobis distance of the constraints from the prediction.
     """
 
-    numbers: Floats
+    numbers: Variables
     results: tuple[ConstraintResult, ...]
     steps: int
     distance: float
@@ -51,29 +53,29 @@ class Correction:
 class _Problem:
     """Constraints and metric of one correction.
 
-    begun: numbers of the prediction. aims: hard constraints. pins: soft constraints. worth (a,):
-    weights of the aims' values in the squared error. loose (k,): variance that each value is left,
-    for a sigma of one metre; zero for the aims.
+    begun: numbers of the prediction. aims: hard constraints. pins: soft constraints. weights (a,):
+    weights of the aims' values in the squared error. pin_variances (k,): variance that each value
+    is left, for a sigma of one metre; zero for the aims.
     """
 
     scene: MotionVariables
     spread: ResidualCovariance
-    begun: Floats
+    begun: Variables
     aims: Sequence[Constraint]
     pins: Sequence[Constraint]
-    weights: Floats
-    pin_variances: Floats
+    weights: Annotated[Floats, "hard"]
+    pin_variances: Values
 
     @property
     def hard_count(self) -> int:
         """Number of values of hard constraints."""
         return sum(len(aim.target) for aim in self.aims)
 
-    def evaluate(self, numbers: Floats) -> ValuesAndGradients:
+    def evaluate(self, numbers: Variables) -> ValuesAndGradients:
         """Return values and gradients of aims and pins."""
         return constraint.evaluate([*self.aims, *self.pins], self.scene, numbers)
 
-    def least_change(self, gradients: Floats, toward: Floats) -> Floats:
+    def least_change(self, gradients: Gradients, toward: Values) -> Variables:
         """Return the least change (numbers,) that moves values with these gradients by `toward`."""
         carried = self.spread.apply_shrunk(gradients)
         return carried @ _solve(gradients @ carried + np.diag(self.pin_variances), toward)
@@ -83,7 +85,7 @@ def correct(
     scene: MotionVariables,
     spread: ResidualCovariance,
     sigma: float,
-    begun: Floats,
+    begun: Variables,
     aims: Sequence[Constraint],
     pins: Sequence[Constraint] = (),
 ) -> Correction:
@@ -103,8 +105,8 @@ def correct(
 
 
 def _descend(
-    task: _Problem, looked: ValuesAndGradients, goal: Floats
-) -> tuple[Floats, Floats, int]:
+    task: _Problem, looked: ValuesAndGradients, goal: Values
+) -> tuple[Variables, Values, int]:
     """Return the corrected numbers, their values, and the number of steps."""
     numbers, whole = task.begun, True
     for step in range(MAX_STEPS):
@@ -118,8 +120,12 @@ def _descend(
 
 
 def _next_iterate(
-    task: _Problem, numbers: Floats, looked: ValuesAndGradients, goal: Floats, whole: bool
-) -> tuple[Floats, ValuesAndGradients, bool] | None:
+    task: _Problem,
+    numbers: Variables,
+    looked: ValuesAndGradients,
+    goal: Values,
+    whole: bool,
+) -> tuple[Variables, ValuesAndGradients, bool] | None:
     """Return the next numbers, their values and gradients, and whether the step was shortened.
 
     whole: correct from the prediction anew, pins included. None if no step reduces the error.
@@ -143,7 +149,7 @@ def _next_iterate(
     return None
 
 
-def _solve(matrix: Floats, right: Floats) -> Floats:
+def _solve(matrix: ValueMatrix, right: Values) -> Values:
     """Return the solution of a covariance's system.
 
     A ridge distributes the error between contradicting constraints.
@@ -152,14 +158,14 @@ def _solve(matrix: Floats, right: Floats) -> Floats:
     return np.asarray(np.linalg.solve(matrix + ridge, right), np.float64)
 
 
-def _largest_distance(aims: Sequence[Constraint], left: Floats) -> float:
+def _largest_distance(aims: Sequence[Constraint], left: Values) -> float:
     """Return the largest distance, m, among the values (k,) in metres."""
     units = [aim.unit for aim in aims for _ in aim.target]
     places = zip(left[: len(units)], units, strict=True)
     return max((abs(value) for value, unit in places if unit == "m"), default=0.0)
 
 
-def _weighted_error(left: Floats, worth: Floats) -> float:
+def _weighted_error(left: Annotated[Floats, "hard"], worth: Annotated[Floats, "hard"]) -> float:
     return float(np.sum(worth * np.square(left)))
 
 
@@ -167,7 +173,7 @@ def distance(
     scene: MotionVariables,
     spread: ResidualCovariance,
     sigma: float,
-    numbers: Floats,
+    numbers: Variables,
     aims: Sequence[Constraint],
 ) -> float:
     """Return the Mahalanobis distance of the constraints from a motion (numbers,)."""
@@ -175,7 +181,7 @@ def distance(
     return reachability.assess(scene, spread, sigma, numbers, aims, looked).distance
 
 
-def _constraint_results(aims: Sequence[Constraint], found: Floats) -> list[ConstraintResult]:
+def _constraint_results(aims: Sequence[Constraint], found: Values) -> list[ConstraintResult]:
     said, start = [], 0
     for aim in aims:
         left = aim.target - found[start : start + len(aim.target)]

@@ -4,9 +4,11 @@ Only the joints of the chain from the root to this joint are computed.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import Bones, RootPath, Vector
 from posefield.common.units import UP, Floats
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.motion import quat
@@ -20,12 +22,14 @@ class JointChain:
     3 + 3 C): rows of the reduced tensor for the root's position and the chain's rotation vectors.
     """
 
-    bones: Floats
-    rotations: Floats
-    mean: Floats
-    directions: Floats
+    bones: Annotated[Floats, "chain 3"]
+    rotations: Annotated[Floats, "chain 3 3"]
+    mean: Annotated[Floats, "dof"]
+    directions: Annotated[Floats, "freedoms dof"]
 
-    def compute_poses(self, moves: Floats, gone: Floats) -> "ChainPoses":
+    def compute_poses(
+        self, moves: Annotated[Floats, "frames freedoms"], gone: RootPath
+    ) -> "ChainPoses":
         """Return the chain's poses at coefficients (S, r1) of the first mode.
 
         gone (S, 3): travel of the root so far: to the left and ahead, m, and turn, rad.
@@ -39,7 +43,9 @@ class JointChain:
         roots[:, [0, 2]] += gone[:, :2]
         return _forward(self.bones, vectors, turns, roots)
 
-    def gradient(self, pose: "ChainPoses", row: int) -> tuple[Floats, Floats]:
+    def gradient(
+        self, pose: "ChainPoses", row: int
+    ) -> tuple[Annotated[Floats, "3 freedoms"], Vector]:
         """Return the gradients of the last joint's position in one of the poses.
 
         The first is by the coefficients of the first mode (3, r1), m; the second by the turn of the
@@ -59,13 +65,13 @@ class ChainPoses:
     vectors: rotation vectors (S, C, 3). turned: orientations (S, C, 3, 3). positions: (S, C, 3), m.
     """
 
-    vectors: Floats
-    turned: Floats
-    positions: Floats
+    vectors: Annotated[Floats, "frames chain 3"]
+    turned: Annotated[Floats, "frames chain 3 3"]
+    positions: Annotated[Floats, "frames chain 3"]
 
 
 def chain_to(
-    joint: int, parents: tuple[int, ...], bones: Floats, reduced: ReducedTensor
+    joint: int, parents: tuple[int, ...], bones: Bones, reduced: ReducedTensor
 ) -> JointChain:
     """Return the chain that ends with a joint; bones (J, 3), m."""
     chain = [joint]
@@ -76,7 +82,12 @@ def chain_to(
     return JointChain(bones[chain], quat.to_matrix(reduced.rotations[chain]), mean, directions)
 
 
-def _forward(bones: Floats, vectors: Floats, turns: Floats, roots: Floats) -> ChainPoses:
+def _forward(
+    bones: Annotated[Floats, "chain 3"],
+    vectors: Annotated[Floats, "frames chain 3"],
+    turns: Annotated[Floats, "frames chain 3 3"],
+    roots: RootPath,
+) -> ChainPoses:
     turned, positions = turns.copy(), np.empty_like(vectors)
     positions[:, 0] = roots
     for link in range(1, len(bones)):

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import Bones, Frames, ReducedMotions, RootPath, Variables, Vector
 from posefield.common.units import Floats
 from posefield.constraints import limb_kinematics
 from posefield.constraints.limb_kinematics import JointChain
@@ -26,7 +28,7 @@ class MotionVariables:
 
     reduced: ReducedTensor
     parents: tuple[int, ...]
-    bones: Floats
+    bones: Bones
     cyclic: bool
 
     @cached_property
@@ -47,18 +49,18 @@ class MotionVariables:
         r2, r1, _ = self.reduced.core.shape
         return r2 * r1 + CYCLE_VARIABLES * self.cyclic
 
-    def motion(self, numbers: Floats) -> Floats:
+    def motion(self, numbers: Variables) -> Annotated[Floats, "times freedoms"]:
         """Return the reduced motion (r2, r1) among the variables."""
         r2, r1, _ = self.reduced.core.shape
         return numbers[: r2 * r1].reshape(r2, r1)
 
-    def duration_and_travel(self, numbers: Floats) -> tuple[float, Floats]:
+    def duration_and_travel(self, numbers: Variables) -> tuple[float, Vector]:
         """Return the logarithm of the duration and the travel (3,); zeros without a cycle."""
         if not self.cyclic:
             return 0.0, np.zeros(3)
         return float(numbers[-CYCLE_VARIABLES]), numbers[-CYCLE_VARIABLES + 1 :]
 
-    def positions(self, numbers: Floats, joint: int, places: Floats) -> Floats:
+    def positions(self, numbers: Variables, joint: int, places: Frames) -> RootPath:
         """Return the positions (S, 3), m, of a joint at canonical frames (S,)."""
         moves = self.reduced.rows(places) @ self.motion(numbers)
         return (
@@ -67,7 +69,13 @@ class MotionVariables:
             .positions[:, -1]
         )
 
-    def evaluate_motions(self, numbers: Floats, motions: Floats, joint: int, at: float) -> Floats:
+    def evaluate_motions(
+        self,
+        numbers: Variables,
+        motions: ReducedMotions,
+        joint: int,
+        at: float,
+    ) -> Annotated[Floats, "motions 3"]:
         """Return a joint's positions (n, 3), m, at a canonical frame of motions (n, r2 r1).
 
         All other variables, such as the travel, are those of this motion.
@@ -77,8 +85,8 @@ class MotionVariables:
         return self.chain(joint).compute_poses(moves, gone).positions[:, -1]
 
     def position_and_gradient(
-        self, numbers: Floats, joint: int, at: float
-    ) -> tuple[Floats, Floats]:
+        self, numbers: Variables, joint: int, at: float
+    ) -> tuple[Vector, Annotated[Floats, "3 variables"]]:
         """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
         places = np.array([at])
         row, own = self.reduced.row(at), self.chain(joint)
@@ -94,7 +102,7 @@ class MotionVariables:
             inner = np.hstack([inner, outer])
         return pose.positions[0, -1], inner
 
-    def _travel_so_far(self, numbers: Floats, places: Floats) -> Floats:
+    def _travel_so_far(self, numbers: Variables, places: Frames) -> RootPath:
         """Return the travel so far (S, 3) at canonical frames (S,)."""
         share = places / (self.reduced.frames - 1)
         return share[:, None] * self.duration_and_travel(numbers)[1]

@@ -5,10 +5,12 @@ frames, with the predicted ones as targets. Foot skate in the prediction remains
 """
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.array_shapes import RootPath, Variables
+from posefield.common.units import UP, Booleans
 from posefield.constraints.constraint import PositionConstraint
 from posefield.constraints.motion_variables import MotionVariables
 from posefield.motion.foot_skate import PLANTED_HEIGHT
@@ -21,13 +23,13 @@ PIN_INTERVAL = 8
 
 
 def build_pins(
-    scene: MotionVariables, numbers: Floats, feet: Sequence[int]
+    scene: MotionVariables, numbers: Variables, feet: Sequence[int]
 ) -> list[PositionConstraint]:
     """Return the pins of the feet of a motion, for each foot where it is planted."""
     return [pin for foot in feet for pin in _foot_pins(scene, numbers, foot)]
 
 
-def _foot_pins(scene: MotionVariables, numbers: Floats, foot: int) -> list[PositionConstraint]:
+def _foot_pins(scene: MotionVariables, numbers: Variables, foot: int) -> list[PositionConstraint]:
     places = np.arange(float(scene.reduced.frames))
     path = scene.positions(numbers, foot, places)
     moment = Measure("height", (foot,), "landmark")
@@ -37,7 +39,7 @@ def _foot_pins(scene: MotionVariables, numbers: Floats, foot: int) -> list[Posit
     ]
 
 
-def is_planted(path: Floats) -> Booleans:
+def is_planted(path: RootPath) -> Annotated[Booleans, "frames"]:
     """Return whether a foot on a path (F, 3), m, is planted at each frame (F,).
 
     It is planted where its height is near its lowest for at least two consecutive frames.
@@ -50,7 +52,7 @@ def is_planted(path: Floats) -> Booleans:
     return found
 
 
-def _pinned_frames(stands: Booleans) -> list[int]:
+def _pinned_frames(stands: Annotated[Booleans, "frames"]) -> list[int]:
     """Return frames of each planted interval: every EVERY-th, including the first and the last."""
     frames = np.flatnonzero(stands)
     runs = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)

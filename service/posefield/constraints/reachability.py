@@ -8,10 +8,12 @@ approached up to the largest distance of captured motions.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import Gradients, ReducedMotions, ValueMatrix, Values, Variables
 from posefield.common.units import Floats
 from posefield.constraints.constraint import Constraint, ValuesAndGradients
 from posefield.constraints.motion_variables import MotionVariables
@@ -37,9 +39,9 @@ class Reachability:
     aims): 1 where a value belongs to a constraint, else 0.
     """
 
-    differences: Floats
-    covariance: Floats
-    members: Floats
+    differences: Values
+    covariance: ValueMatrix
+    members: Annotated[Floats, "values aims"]
 
     @cached_property
     def distance(self) -> float:
@@ -47,7 +49,7 @@ class Reachability:
         return float(np.sqrt(self.differences @ np.linalg.solve(self.covariance, self.differences)))
 
     @cached_property
-    def weights(self) -> Floats:
+    def weights(self) -> Values:
         """Weight (k,) of each value in the squared error.
 
         The inverse mean variance of its constraint, so that metres and degrees compare.
@@ -55,7 +57,7 @@ class Reachability:
         return 1.0 / (self.members @ _means(self.members, np.diagonal(self.covariance)))
 
     @property
-    def reachable(self) -> Floats:
+    def reachable(self) -> Values:
         """Reachable part (k,) of the differences.
 
         All of them within the largest plausible distance; else a share of each constraint's
@@ -81,7 +83,7 @@ def assess(
     scene: MotionVariables,
     spread: ResidualCovariance,
     sigma: float,
-    numbers: Floats,
+    numbers: Variables,
     aims: Sequence[Constraint],
     looked: ValuesAndGradients,
 ) -> Reachability:
@@ -113,10 +115,10 @@ def distance_limit(values: int) -> float:
 def _residual_covariance(
     scene: MotionVariables,
     spread: ResidualCovariance,
-    numbers: Floats,
+    numbers: Variables,
     aims: Sequence[Constraint],
-    gradients: Floats,
-) -> Floats:
+    gradients: Gradients,
+) -> ValueMatrix:
     """Return the covariance (k, k) of leave-one-out residuals in the constrained values.
 
     For a sigma of one metre, with the skeleton and the travel of this motion.
@@ -130,13 +132,18 @@ def _residual_covariance(
 
 
 def _evaluate_motions(
-    aim: Constraint, scene: MotionVariables, numbers: Floats, motions: Floats
-) -> Floats:
+    aim: Constraint,
+    scene: MotionVariables,
+    numbers: Variables,
+    motions: ReducedMotions,
+) -> Annotated[Floats, "motions values"]:
     cancellation.check()
     return aim.evaluate_motions(scene, numbers, motions)
 
 
-def _blend_equal_shares(covariance: Floats, members: Floats) -> Floats:
+def _blend_equal_shares(
+    covariance: ValueMatrix, members: Annotated[Floats, "values aims"]
+) -> ValueMatrix:
     """Return the covariance blended with equal shares for all values of a constraint.
 
     The shares correlate between constraints as their mean covariances do; otherwise two
@@ -153,11 +160,13 @@ def _blend_equal_shares(covariance: Floats, members: Floats) -> Floats:
     return (1.0 - EQUAL_SHARE) * covariance + EQUAL_SHARE * alike * (members @ shared @ members.T)
 
 
-def _means(members: Floats, values: Floats) -> Floats:
+def _means(members: Annotated[Floats, "values aims"], values: Values) -> Annotated[Floats, "aims"]:
     return np.asarray(members.T @ values / members.sum(axis=0), np.float64)
 
 
-def _shares(apart: Floats, misses: Floats, price: float) -> Floats:
+def _shares(
+    apart: Annotated[Floats, "aims aims"], misses: Annotated[Floats, "aims aims"], price: float
+) -> Annotated[Floats, "aims"]:
     """Return the shares (aims,) of the differences for the least error plus weighted distance.
 
     price: weight of the squared distance.
@@ -168,5 +177,5 @@ def _shares(apart: Floats, misses: Floats, price: float) -> Floats:
     return np.asarray(np.clip(found, 0.0, 1.0), np.float64)
 
 
-def _length(apart: Floats, shares: Floats) -> float:
+def _length(apart: Annotated[Floats, "aims aims"], shares: Annotated[Floats, "aims"]) -> float:
     return float(np.sqrt(shares @ apart @ shares))

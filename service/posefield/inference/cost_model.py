@@ -2,9 +2,11 @@
 
 import time
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import PointControls, PointLabels
 from posefield.common.units import Floats
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.session import Session
@@ -26,7 +28,9 @@ def seconds_per_pose(session: Session) -> tuple[float, ...]:
     )
 
 
-def benchmark_levels(asked: Sequence[tuple[Session, int]], rounds: int) -> Floats:
+def benchmark_levels(
+    asked: Sequence[tuple[Session, int]], rounds: int
+) -> Annotated[Floats, "{len(asked)}"]:
     """Return the seconds per pose (N,) of levels of sessions: the median of the rounds.
 
     rounds: an odd number. Every round measures each level once, so that a slowdown of the machine
@@ -40,12 +44,14 @@ def benchmark_levels(asked: Sequence[tuple[Session, int]], rounds: int) -> Float
     return np.sort(taken, axis=0)[rounds // 2] / BATCH
 
 
-def monotone_costs(costs: Floats) -> tuple[float, ...]:
+def monotone_costs(costs: Annotated[Floats, "levels"]) -> tuple[float, ...]:
     """Return the costs (L,), each lowered to the minimum of itself and those before it."""
     return tuple(np.minimum.accumulate(costs).tolist())
 
 
-def _sample_inputs(session: Session) -> tuple[Floats, Floats, Floats]:
+def _sample_inputs(
+    session: Session,
+) -> tuple[PointControls, Annotated[Floats, "points 1"], PointLabels]:
     """Return controls (B, d) and times (B, 1), s, across the ranges, and zero labels (B, p)."""
     card = session.card
     low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))

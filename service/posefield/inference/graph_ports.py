@@ -1,6 +1,6 @@
 """Inputs and outputs of a model's graph by name, and a check of the graph's answers."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def check(runtime: Any, card: ModelCard, source: str) -> None:
         _check_outputs(runtime, card, source, level)
 
 
-def default_controls(card: ModelCard) -> Floats:
+def default_controls(card: ModelCard) -> Annotated[Floats, "1 controls"]:
     """Return the controls (1, d) at their defaults."""
     return np.array([[control.default for control in card.controls]])
 

@@ -11,9 +11,11 @@ levels of the last answer, and a character becomes coarser only with a margin (H
 import math
 from bisect import bisect_left
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import PerCharacter, Vector
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices, Singles
 
@@ -34,7 +36,7 @@ class Camera:
     position: (3,), m. fov: vertical field of view, rad. height: height of the image, pixels.
     """
 
-    position: Floats
+    position: Vector
     fov: float
     height: float
 
@@ -67,7 +69,7 @@ class LevelCriteria:
     camera: Camera
     pixels: float
     budget: float | None
-    previous: Indices | None
+    previous: Annotated[Indices, "characters"] | None
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,8 @@ class LevelTable:
     any finer one.
     """
 
-    errors: Floats
-    costs: Floats
+    errors: Annotated[Floats, "levels"]
+    costs: Annotated[Floats, "levels"]
 
 
 @dataclass(frozen=True)
@@ -90,11 +92,13 @@ class LevelChoice:
     coarsest.
     """
 
-    levels: Indices
+    levels: Annotated[Indices, "characters"]
     limit: float | None
 
 
-def pixels_per_metre(camera: Camera, centres: Floats, radius: float) -> Floats:
+def pixels_per_metre(
+    camera: Camera, centres: Annotated[Floats, "characters 3"], radius: float
+) -> PerCharacter:
     """Return the pixels (N,) that a metre covers on each character.
 
     centres: (N, 3), m. radius: of each body, m. Measured at the nearest point of a body, as in the
@@ -112,7 +116,7 @@ def pixels_per_metre(camera: Camera, centres: Floats, radius: float) -> Floats:
     return camera.pixels / distances
 
 
-def select_levels(ladder: LevelTable, scale: Floats, view: LevelCriteria) -> LevelChoice:
+def select_levels(ladder: LevelTable, scale: PerCharacter, view: LevelCriteria) -> LevelChoice:
     """Return the coarsest levels within the view's limit; within its budget, if that is tighter.
 
     scale: pixels (N,) that a metre covers on each character.
@@ -137,8 +141,11 @@ def budget_warnings(
 
 
 def select_by_error(
-    errors: Floats, scale: Floats, limit: float, previous: Indices | None = None
-) -> Indices:
+    errors: Annotated[Floats, "levels"],
+    scale: PerCharacter,
+    limit: float,
+    previous: Annotated[Indices, "characters"] | None = None,
+) -> Annotated[Indices, "characters"]:
     """Return the coarsest levels (N,) whose errors cover at most `limit` pixels; else the finest.
 
     errors: (L,), m. scale: (N,), pixels per metre. previous: (N,); a coarser level than these must
@@ -148,7 +155,10 @@ def select_by_error(
 
 
 def select_by_budget(
-    ladder: LevelTable, scale: Floats, budget: float, previous: Indices | None = None
+    ladder: LevelTable,
+    scale: PerCharacter,
+    budget: float,
+    previous: Annotated[Indices, "characters"] | None = None,
 ) -> LevelChoice:
     """Return the levels at the smallest limit whose poses take at most `budget` seconds.
 
@@ -171,7 +181,11 @@ def select_by_budget(
     return LevelChoice(_levels(thresholds, min(limits)), min(limits))
 
 
-def _thresholds(errors: Floats, scale: Floats, previous: Indices | None) -> Floats:
+def _thresholds(
+    errors: Annotated[Floats, "levels"],
+    scale: PerCharacter,
+    previous: Annotated[Indices, "characters"] | None,
+) -> Annotated[Floats, "levels-1 characters"]:
     """Return the smallest limits (L - 1, N), pixels, for level 1, 2, ... or coarser.
 
     They never decrease from a level to the next.
@@ -183,20 +197,26 @@ def _thresholds(errors: Floats, scale: Floats, previous: Indices | None) -> Floa
     return limits
 
 
-def _levels(thresholds: Floats, limit: float) -> Indices:
+def _levels(
+    thresholds: Annotated[Floats, "thresholds characters"], limit: float
+) -> Annotated[Indices, "characters"]:
     return np.count_nonzero(thresholds <= limit, axis=0)
 
 
-def _seconds(levels: Indices, ladder: LevelTable) -> float:
+def _seconds(levels: Annotated[Indices, "characters"], ladder: LevelTable) -> float:
     count = len(ladder.errors)
     return float(np.bincount(levels, minlength=count) @ ladder.costs)
 
 
-def _total(reached: Indices, ladder: LevelTable) -> float:
+def _total(reached: Annotated[Indices, "levels"], ladder: LevelTable) -> float:
     """Return the seconds of all poses for counts (L,) of characters at each level or coarser."""
     return float((reached - np.append(reached[1:], 0)) @ ladder.costs)
 
 
-def error_pixels(errors: Floats, scale: Floats, levels: Indices) -> Singles:
+def error_pixels(
+    errors: Annotated[Floats, "levels"],
+    scale: PerCharacter,
+    levels: Annotated[Indices, "characters"],
+) -> Annotated[Singles, "characters"]:
     """Return the pixels (N,) that the errors of the chosen levels cover."""
     return (errors[levels] * scale).astype(np.float32)

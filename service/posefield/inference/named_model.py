@@ -6,7 +6,7 @@ from hashlib import blake2b
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.array_shapes import Vector
 from posefield.inference import cost_model
 from posefield.inference.level_selection import LevelTable
 from posefield.inference.session import Session
@@ -47,7 +47,7 @@ class NamedModel:
         return LevelTable(errors, np.array(cost_model.seconds_per_pose(self.session)))
 
     @property
-    def rest_position(self) -> Floats:
+    def rest_position(self) -> Vector:
         """Root position at rest (3,), m."""
         return self.session.card.skeleton.offsets[0]
 

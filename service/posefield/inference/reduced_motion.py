@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from posefield.common.array_shapes import Bones, Frames, JointRotations, RootPath, Rotations
 from posefield.common.units import Floats
 from posefield.model_file.level_of_detail import Level
 from posefield.motion import blend, quat
@@ -24,33 +25,37 @@ class ReducedTensor:
     about its mean rotation. rotations: mean rotations (J, 4).
     """
 
-    core: Floats
-    time: Floats
-    directions: Floats
-    mean: Floats
-    rotations: Floats
+    core: Annotated[Floats, "times freedoms modes"]
+    time: Annotated[Floats, "frames times"]
+    directions: Annotated[Floats, "freedoms dof"]
+    mean: Annotated[Floats, "dof"]
+    rotations: JointRotations
 
     @property
     def frames(self) -> int:
         """Number of canonical frames T."""
         return len(self.time)
 
-    def motion(self, coefficients: Floats) -> Floats:
+    def motion(
+        self, coefficients: Annotated[Floats, "modes"]
+    ) -> Annotated[Floats, "times freedoms"]:
         """Return the reduced motion (r2, r1) of sample coefficients (r3,)."""
         return self.core @ coefficients
 
-    def row(self, place: float) -> Floats:
+    def row(self, place: float) -> Annotated[Floats, "times"]:
         """Return the time coefficients (r2,) at a canonical frame, interpolated linearly."""
         before = min(int(place), self.frames - 2)
         share = place - before
         found: Floats = (1.0 - share) * self.time[before] + share * self.time[before + 1]
         return found
 
-    def rows(self, places: Floats) -> Floats:
+    def rows(self, places: Frames) -> Annotated[Floats, "frames times"]:
         """Return the time coefficients (S, r2) at canonical frames (S,)."""
         return blend.interpolate_rows(self.time, places)
 
-    def poses(self, motion: Floats, places: Floats) -> tuple[Floats, Floats]:
+    def poses(
+        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+    ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
         numbers = self.mean + self.rows(places) @ motion @ self.directions
         vectors = numbers[:, 3:].reshape(len(places), -1, 3)
@@ -73,7 +78,7 @@ def read(weights: GraphConstants, level: Level) -> ReducedTensor:
     )
 
 
-def _directions(weights: GraphConstants) -> Floats:
+def _directions(weights: GraphConstants) -> Annotated[Floats, "dof freedoms"]:
     """Return the directions (D, r1), with zeros for degrees of freedom that never vary."""
     stored = weights["directions"]
     whole = np.vstack([stored, np.zeros((1, stored.shape[1]))])
@@ -81,7 +86,7 @@ def _directions(weights: GraphConstants) -> Floats:
     return found
 
 
-def _mean_vectors(weights: GraphConstants, rotations: Floats) -> Floats:
+def _mean_vectors(weights: GraphConstants, rotations: JointRotations) -> Bones:
     """Return the mean rotation vectors (J, 3); the graph stores mean rotation · vector / 2."""
     turned = weights["rotation_mean"].reshape(-1, 4).astype(np.float64)
     if "joint_order" in weights:

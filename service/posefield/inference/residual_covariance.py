@@ -7,9 +7,11 @@ marginals over time and degrees of freedom, which keeps corrections smooth in ti
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import Gradients, PerSample, Samples
 from posefield.common.units import Floats, Indices
 from posefield.inference.reduced_motion import GraphConstants, ReducedTensor
 from posefield.kriging import kriging_model, leave_one_out
@@ -32,15 +34,15 @@ class ResidualCovariance:
     times the root of n.
     """
 
-    residuals: Floats
-    time: Floats
-    freedoms: Floats
-    beside: Floats
-    captured: Floats
-    predicted: Floats
-    sigmas: Floats
+    residuals: Annotated[Floats, "reduced modes"]
+    time: Annotated[Floats, "times times"]
+    freedoms: Annotated[Floats, "freedoms freedoms"]
+    beside: Annotated[Floats, "beside beside"]
+    captured: Annotated[Floats, "samples reduced"]
+    predicted: Annotated[Floats, "samples reduced"]
+    sigmas: PerSample
 
-    def apply_shrunk(self, gradients: Floats) -> Floats:
+    def apply_shrunk(self, gradients: Gradients) -> Annotated[Floats, "variables values"]:
         """Return the shrunk covariance times gradients (k, r2 r1 + b): (r2 r1 + b, k)."""
         inner = gradients[:, : len(self.residuals)]
         r2, r1 = len(self.time), len(self.freedoms)
@@ -52,7 +54,7 @@ class ResidualCovariance:
 
 
 def estimate(
-    card: ModelCard, weights: GraphConstants, samples: Floats, reduced: ReducedTensor
+    card: ModelCard, weights: GraphConstants, samples: Samples, reduced: ReducedTensor
 ) -> ResidualCovariance:
     """Return the covariance for a model's level.
 
@@ -80,7 +82,9 @@ def estimate(
     return ResidualCovariance(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
 
 
-def sample_coefficients(card: ModelCard, weights: GraphConstants, samples: Floats) -> Floats:
+def sample_coefficients(
+    card: ModelCard, weights: GraphConstants, samples: Samples
+) -> Annotated[Floats, "samples modes"]:
     """Return the sample coefficients (n, r3) of the captured clips, in the card's order."""
     hyper = card.kriging
     r3 = weights["core"].shape[2]
@@ -94,7 +98,9 @@ def sample_coefficients(card: ModelCard, weights: GraphConstants, samples: Float
     return found
 
 
-def importance_order(card: ModelCard, weights: GraphConstants, samples: Floats) -> Indices:
+def importance_order(
+    card: ModelCard, weights: GraphConstants, samples: Samples
+) -> Annotated[Indices, "samples"]:
     """Return the index on the card (n,) of each sample, in the file's order of importance."""
     held = weights["samples"][0].T
     listed = samples[:, : len(card.controls)].astype(np.float32)
@@ -105,7 +111,7 @@ def importance_order(card: ModelCard, weights: GraphConstants, samples: Floats) 
     return place
 
 
-def leave_out_groups(card: ModelCard, samples: Floats) -> Indices:
+def leave_out_groups(card: ModelCard, samples: Samples) -> Annotated[Indices, "samples"]:
     """Return indices (n,) of the groups of captured clips that are left out together.
 
     Clips of one file form a group; each clip is a group of its own if the other groups could not

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 from dataclasses import field as field_of
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Singles
 from posefield.inference import graph_ports, onnx_runtime
 from posefield.inference.graph_ports import OUTPUTS, PERFORMER
@@ -34,10 +35,10 @@ class PredictionState:
     controls that were limited; asked_sigma: m, at the controls as asked.
     """
 
-    coefficients: Floats
-    frames: Floats
-    travel: Floats
-    bones: Floats
+    coefficients: Annotated[Floats, "modes"]
+    frames: Frames
+    travel: Vector
+    bones: Bones
     duration: float
     sigma: float
     asked_sigma: float
@@ -65,10 +66,12 @@ class Session:
 
     def run(
         self,
-        controls: Floats | Singles,
-        time: Floats | Singles,
+        controls: PointControls | Annotated[Singles, "points controls"],
+        time: Annotated[Floats, "points frames"] | Annotated[Singles, "points frames"],
         *outputs: str,
-        labels: Floats | Singles | None = None,
+        labels: Annotated[Floats, "_ performers"]
+        | Annotated[Singles, "_ performers"]
+        | None = None,
         level: int = 0,
     ) -> list[Any]:
         """Return the graph's outputs, in their order, for controls (B, d) and times (B, S).
@@ -94,8 +97,13 @@ class Session:
         return answers
 
     def durations(
-        self, controls: Floats | Singles, labels: Floats | Singles | None = None, level: int = 0
-    ) -> Singles:
+        self,
+        controls: PointControls | Annotated[Singles, "points controls"],
+        labels: Annotated[Floats, "_ performers"]
+        | Annotated[Singles, "_ performers"]
+        | None = None,
+        level: int = 0,
+    ) -> Annotated[Singles, "points"]:
         """Return the durations (B,), s, of `run`, in a quarter of its time."""
         if self.bounds.is_inside(controls):
             return self._durations(controls, labels, level)
@@ -167,7 +175,13 @@ class Session:
     def _state_outputs(self) -> tuple[str, ...]:
         return state_outputs(self.card)
 
-    def sigmas(self, controls: Floats | Singles, labels: Floats | Singles | None = None) -> Singles:
+    def sigmas(
+        self,
+        controls: PointControls | Annotated[Singles, "points controls"],
+        labels: Annotated[Floats, "_ performers"]
+        | Annotated[Singles, "_ performers"]
+        | None = None,
+    ) -> Annotated[Singles, "points"]:
         """Return the sigmas (B,), m, of `run` at level 0, in half of its time."""
         answers: list[Singles] = self.sigma_sessions[0].run(["sigma"], self._feed(controls, labels))
         return answers[0]
@@ -194,7 +208,9 @@ class Session:
         )
 
     def _feed(
-        self, controls: Floats | Singles, labels: Floats | Singles | None
+        self,
+        controls: PointControls | Annotated[Singles, "points controls"],
+        labels: Annotated[Floats, "_ performers"] | Annotated[Singles, "_ performers"] | None,
     ) -> dict[str, Singles]:
         feed = {"controls": controls.astype(np.float32, copy=False)}
         if labels is not None and self.card.performers:

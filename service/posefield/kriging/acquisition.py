@@ -6,10 +6,12 @@ been captured already.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import SampleControls
 from posefield.common.units import Floats, Indices
 from posefield.kriging.support import NUGGET, covariances
 
@@ -26,7 +28,7 @@ class VarianceReduction:
 
 
 def rank_candidates(
-    candidates: Floats, samples: Floats, count: int
+    candidates: Annotated[Floats, "candidates controls"], samples: SampleControls, count: int
 ) -> list[tuple[int, VarianceReduction]]:
     """Return the candidates (C, d) of the largest gains, by index, in greedy order.
 
@@ -50,18 +52,20 @@ class _ConditionedField:
     """Kriging field over candidates (C, d), conditioned on the captured points.
 
     whitened: k rows (C,), the whitened covariances of each captured point with the candidates.
-    variances (C,): remaining variances. toward (C, G): remaining covariances with the candidates
-    over which the variance is averaged, `averaged`.
+    variances (C,): of the candidates. remaining (C, G): covariances with the candidates over which
+    the variance is averaged, `averaged`.
     """
 
-    candidates: Floats
-    whitened: list[Floats]
-    variances: Floats
-    remaining: Floats
-    averaged: Indices
+    candidates: Annotated[Floats, "candidates controls"]
+    whitened: list[Annotated[Floats, "candidates"]]
+    variances: Annotated[Floats, "candidates"]
+    remaining: Annotated[Floats, "candidates averaged"]
+    averaged: Annotated[Indices, "averaged"]
 
     @classmethod
-    def conditioned_on(cls, candidates: Floats, samples: Floats) -> "_ConditionedField":
+    def conditioned_on(
+        cls, candidates: Annotated[Floats, "candidates controls"], samples: SampleControls
+    ) -> "_ConditionedField":
         """Return the field conditioned on samples (n, d)."""
         averaged = np.unique(
             np.linspace(0, len(candidates) - 1, AVERAGED_CANDIDATES).astype(np.int64)
@@ -72,7 +76,7 @@ class _ConditionedField:
         left = 1.0 - np.sum(np.square(known), axis=0)
         return cls(candidates, list(known), left, toward, averaged)
 
-    def gains(self) -> Floats:
+    def gains(self) -> Annotated[Floats, "candidates"]:
         """Return the share by which the mean variance falls if each candidate (C,) is captured."""
         falls = np.mean(np.square(self.remaining), axis=1) / (self.variances + NUGGET)
         return np.asarray(falls / self.variances[self.averaged].mean())

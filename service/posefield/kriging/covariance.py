@@ -5,6 +5,7 @@ The training job has the same formulas as graph operations.
 """
 
 from collections.abc import Callable
+from typing import Annotated
 
 import numpy as np
 
@@ -14,29 +15,29 @@ from posefield.common.units import Floats
 RATE32, RATE52 = 4.743865, 5.918277
 
 
-def exponential(squared: Floats) -> Floats:
+def exponential(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
     """Return exp(-3 h)."""
     return np.exp(-3.0 * np.sqrt(squared))
 
 
-def gaussian(squared: Floats) -> Floats:
+def gaussian(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
     """Return exp(-3 h²)."""
     return np.exp(-3.0 * squared)
 
 
-def spherical(squared: Floats) -> Floats:
+def spherical(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
     """Return 1 - 3/2 h + 1/2 h³ up to h = 1, and zero beyond."""
     h = np.minimum(np.sqrt(squared), 1.0)
     return 1.0 - 1.5 * h + 0.5 * h**3
 
 
-def matern32(squared: Floats) -> Floats:
+def matern32(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
     """Return the Matérn covariance of smoothness 3/2."""
     a = RATE32 * np.sqrt(squared)
     return (1.0 + a) * np.exp(-a)
 
 
-def matern52(squared: Floats) -> Floats:
+def matern52(squared: Annotated[Floats, "*batch"]) -> Annotated[Floats, "*batch"]:
     """Return the Matérn covariance of smoothness 5/2."""
     a = RATE52 * np.sqrt(squared)
     return (1.0 + a + RATE52**2 / 3.0 * squared) * np.exp(-a)

@@ -7,9 +7,18 @@ model file; the service computes the weights to explain a result.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import (
+    PerControl,
+    PointControls,
+    Points,
+    PointSamples,
+    SampleMatrix,
+    Samples,
+)
 from posefield.common.bounded_types import Degree, NonNegative
 from posefield.common.units import Floats, Indices
 from posefield.kriging.covariance import COVARIANCE_MODELS
@@ -26,7 +35,7 @@ class Hyper:
 
     covariance: str
     drifts: tuple[Degree, ...]
-    scales: Floats
+    scales: PerControl
     nugget: NonNegative
     label: NonNegative
 
@@ -40,18 +49,18 @@ class KrigingWeights:
     """
 
     hyper: Hyper
-    samples: Floats
+    samples: Samples
 
     @cached_property
-    def weight_matrix(self) -> Floats:
+    def weight_matrix(self) -> Annotated[Floats, "system samples"]:
         """Return the matrix (n + k, n) from covariances and drift functions to sample weights."""
         return weight_matrix(self.hyper, self.samples)
 
-    def weights(self, points: Floats) -> Floats:
+    def weights(self, points: Points) -> PointSamples:
         """Return the kriging weights (B, n) of the samples: they sum to one and may be negative."""
         return basis_functions(self.hyper, points, self.samples) @ self.weight_matrix
 
-    def distances(self, points: Floats) -> Floats:
+    def distances(self, points: Points) -> PointSamples:
         """Return the distances (B, n) to the samples.
 
         At distance one at most 5 % of the covariance is left.
@@ -59,12 +68,14 @@ class KrigingWeights:
         return np.sqrt(squared_distances(self.hyper, points, self.samples))
 
 
-def half_ranges(controls: Floats, low: Floats, high: Floats) -> Floats:
+def half_ranges(controls: PointControls, low: PerControl, high: PerControl) -> PointControls:
     """Return controls (B, d) scaled so that the range from low to high (d,) is -1 to 1."""
     return (2.0 * controls - low - high) / (high - low)
 
 
-def squared_distances(hyper: Hyper, a: Floats, b: Floats) -> Floats:
+def squared_distances(
+    hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
+) -> Annotated[Floats, "a b"]:
     """Return the squared distances (A, B) between points (A, d + p) and (B, d + p).
 
     Any two different performers are `label` apart: the product of their labels is 0, and 1 for the
@@ -78,12 +89,14 @@ def squared_distances(hyper: Hyper, a: Floats, b: Floats) -> Floats:
     return np.sum(np.square(gaps, out=gaps), axis=0) + hyper.label**2 * others
 
 
-def covariances(hyper: Hyper, a: Floats, b: Floats) -> Floats:
+def covariances(
+    hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
+) -> Annotated[Floats, "a b"]:
     """Return the covariances (A, B) between points (A, d + p) and (B, d + p)."""
     return COVARIANCE_MODELS[hyper.covariance](squared_distances(hyper, a, b))
 
 
-def drift(points: Floats, controls: int, degree: int) -> Floats:
+def drift(points: Points, controls: int, degree: int) -> Annotated[Floats, "points functions"]:
     """Return the drift functions (B, k) at points (B, d + p).
 
     A constant, and for degree one also the controls.
@@ -92,7 +105,9 @@ def drift(points: Floats, controls: int, degree: int) -> Floats:
     return np.hstack([one, points[:, :controls]]) if degree else one
 
 
-def find_required_group(groups: Indices, functions: Floats) -> int | None:
+def find_required_group(
+    groups: Annotated[Indices, "samples"], functions: Annotated[Floats, "samples functions"]
+) -> int | None:
     """Return the first group of samples that cannot be left out; None if there is none.
 
     A group is needed if the drift functions (n, k) of the other samples do not determine a drift.
@@ -104,18 +119,22 @@ def find_required_group(groups: Indices, functions: Floats) -> int | None:
     return None
 
 
-def basis_functions(hyper: Hyper, points: Floats, samples: Floats) -> Floats:
+def basis_functions(
+    hyper: Hyper, points: Points, samples: Samples
+) -> Annotated[Floats, "points system"]:
     """Return covariances with all samples and drift functions (B, n + k) at points (B, d + p)."""
     near = covariances(hyper, points, samples)
     return np.hstack([near, drift(points, len(hyper.scales), max(hyper.drifts))])
 
 
-def noisy(hyper: Hyper, samples: Floats) -> Floats:
+def noisy(hyper: Hyper, samples: Samples) -> SampleMatrix:
     """Return the covariance (n, n) of measured samples: the field's, plus the nugget."""
     return covariances(hyper, samples, samples) + hyper.nugget * np.eye(len(samples))
 
 
-def invert_system(hyper: Hyper, samples: Floats, degree: int) -> Floats:
+def invert_system(
+    hyper: Hyper, samples: Samples, degree: int
+) -> Annotated[Floats, "system system"]:
     """Return the inverse (n + k, n + k) of the kriging system with a drift of one degree."""
     f = drift(samples, len(hyper.scales), degree)
     n, k = f.shape
@@ -125,7 +144,7 @@ def invert_system(hyper: Hyper, samples: Floats, degree: int) -> Floats:
     return np.linalg.inv(system)
 
 
-def weight_matrix(hyper: Hyper, samples: Floats) -> Floats:
+def weight_matrix(hyper: Hyper, samples: Samples) -> Annotated[Floats, "system samples"]:
     """Return the matrix (n + k, n) from covariances and drift functions to sample weights.
 
     With more than one drift the weights are averaged.

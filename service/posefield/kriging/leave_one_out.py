@@ -6,9 +6,11 @@ kriging in a unique neighborhood", Mathematical Geology 1983, extended to blocks
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import PerSample, SampleMatrix, Samples
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
 from posefield.kriging.covariance import COVARIANCE_MODELS
@@ -26,11 +28,11 @@ class LeaveOneOut:
     samples of one group, such as strides cut from one take, are left out together.
     """
 
-    samples: Floats
+    samples: Samples
     controls: int
-    groups: Indices
+    groups: Annotated[Indices, "samples"]
 
-    def residual_matrix(self, hyper: Hyper) -> Floats:
+    def residual_matrix(self, hyper: Hyper) -> SampleMatrix:
         """Return the matrix (n, n) from values to residuals.
 
         A residual is a sample's value minus its prediction from all other groups; with more than
@@ -45,7 +47,7 @@ class LeaveOneOut:
         total /= len(hyper.drifts)
         return total
 
-    def _noisy(self, hyper: Hyper) -> Floats:
+    def _noisy(self, hyper: Hyper) -> SampleMatrix:
         """Return the covariance (n, n) of measured samples: the field's, plus the nugget."""
         gaps = self._gaps * hyper.scales[:, None, None]
         squared = np.sum(np.square(gaps, out=gaps), axis=0)
@@ -56,33 +58,33 @@ class LeaveOneOut:
         return covariance
 
     @cached_property
-    def _gaps(self) -> Floats:
+    def _gaps(self) -> Annotated[Floats, "controls samples samples"]:
         """Return the differences (d, n, n), one plane per control as in `squared_distances`."""
         planes = self.samples.T[: self.controls]
         return np.subtract(planes[:, :, None], planes[:, None, :], order="C")
 
     @cached_property
-    def _others(self) -> Floats:
+    def _others(self) -> SampleMatrix:
         """Return the matrix (n, n): one where two samples have different performers, else zero."""
         labels = self.samples[:, self.controls :]
         return 1.0 - labels @ labels.T
 
     @cached_property
-    def _drifts(self) -> dict[int, Floats]:
+    def _drifts(self) -> dict[int, Annotated[Floats, "samples functions"]]:
         """Return the drift functions (n, k) of each degree."""
         return {
             degree: kriging_model.drift(self.samples, self.controls, degree) for degree in (0, 1)
         }
 
     @cached_property
-    def _blocks(self) -> list[Indices]:
+    def _blocks(self) -> list[Annotated[Indices, "groups size"]]:
         """Return sample indices (groups, size) of the groups of each size above one."""
         _, names, sizes = np.unique(self.groups, return_inverse=True, return_counts=True)
         order = np.argsort(names, kind="stable")
         several = np.unique(sizes[sizes > 1])
         return [order[sizes[names[order]] == size].reshape(-1, size) for size in several]
 
-    def _residuals(self, inverse: Floats, degree: int) -> Floats:
+    def _residuals(self, inverse: SampleMatrix, degree: int) -> SampleMatrix:
         """Return the matrix (n, n) for a drift of one degree.
 
         inverse (n, n): of the covariances alone; it serves the drifts of all degrees.
@@ -98,7 +100,9 @@ class LeaveOneOut:
         return residuals
 
 
-def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
+def leave_out(
+    hyper: Hyper, samples: Samples, groups: Annotated[Indices, "samples"]
+) -> SampleMatrix:
     """Return the matrix (n, n) from values to leave-one-out residuals of one field.
 
     samples (n, d + p) and groups (n,) as for `LeaveOneOut`.
@@ -106,7 +110,7 @@ def leave_out(hyper: Hyper, samples: Floats, groups: Indices) -> Floats:
     return LeaveOneOut(samples, len(hyper.scales), groups).residual_matrix(hyper)
 
 
-def left_out_variances(hyper: Hyper, samples: Floats, left_out: Floats) -> Floats:
+def left_out_variances(hyper: Hyper, samples: Samples, left_out: SampleMatrix) -> PerSample:
     """Return the variances (n,) of residuals by a matrix (n, n) of `leave_out`.
 
     They include the nugget and are shares of the sill.

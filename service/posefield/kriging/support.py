@@ -10,11 +10,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import (
+    PerControl,
+    PerPoint,
+    PerSample,
+    PointControls,
+    SampleControls,
+    SampleMatrix,
+)
 from posefield.common.units import Booleans, Floats, Singles
 from posefield.kriging.kriging_model import half_ranges
 
@@ -38,15 +46,15 @@ class Support:
     low, high (d,): range of the samples. samples (n, d): in half-ranges.
     """
 
-    low: Floats
-    high: Floats
-    samples: Floats
+    low: PerControl
+    high: PerControl
+    samples: SampleControls
 
-    def beyond(self, points: Floats) -> Floats:
+    def beyond(self, points: PointControls) -> PointControls:
         """Return how far points lie beyond the range of each control (B, d), as shares of it."""
         return np.maximum(0.5 * (np.abs(self.scaled(points)) - 1.0), 0.0)
 
-    def variance(self, points: Floats) -> Floats:
+    def variance(self, points: PointControls) -> PerPoint:
         """Return the kriging variance (B,) at points (B, d), from 0 to 1.
 
         Near 0 among dense samples and near 1 far from all samples.
@@ -54,7 +62,7 @@ class Support:
         near = covariances(self.scaled(points), self.samples)
         return 1.0 - np.sum(near @ self._inverse * near, axis=1)
 
-    def supported(self, points: Floats) -> Booleans:
+    def supported(self, points: PointControls) -> Annotated[Booleans, "points"]:
         """Return whether each of the points (B, d) is supported, as (B,)."""
         low, high = np.transpose(self._bounds)
         inside = ((low <= points) & (points <= high)).all(axis=1)
@@ -95,7 +103,7 @@ class Support:
         }
 
     @cached_property
-    def left_out(self) -> Floats:
+    def left_out(self) -> PerSample:
         """Return the kriging variance (n,) at each sample, computed without it."""
         return 1.0 / np.diagonal(self._inverse) - NUGGET
 
@@ -105,7 +113,7 @@ class Support:
         return float(np.quantile(self.left_out, SUPPORT_QUANTILE))
 
     @cached_property
-    def _inverse(self) -> Floats:
+    def _inverse(self) -> SampleMatrix:
         own = covariances(self.samples, self.samples) + NUGGET * np.eye(len(self.samples))
         return np.asarray(np.linalg.inv(own))
 
@@ -122,7 +130,7 @@ class Support:
         return list(zip(*ends, strict=True))
 
     @cached_property
-    def _exponents(self) -> tuple[Floats, Floats]:
+    def _exponents(self) -> tuple[SampleControls, PerSample]:
         """Return slopes (n, d) and offsets (n,) of the log covariance between samples and a point.
 
         The term of the point's own square is left out: `is_supported` multiplies by it once.
@@ -133,14 +141,20 @@ class Support:
         return slopes * factors, -slopes @ offsets - own
 
     @cached_property
-    def _float32_factors(self) -> tuple[Singles, Singles, Singles]:
+    def _float32_factors(
+        self,
+    ) -> tuple[
+        Annotated[Singles, "controls samples"],
+        Annotated[Singles, "samples"],
+        Annotated[Singles, "samples samples"],
+    ]:
         """Return in float32 `_exponents` for half-ranges, (d, n) and (n,), and the inverse."""
         own = RATE * np.sum(np.square(self.samples), axis=1)
         parts = (2.0 * RATE * self.samples.T, -own, self._inverse)
         slopes, offsets, inverse = (np.ascontiguousarray(part, dtype=np.float32) for part in parts)
         return slopes, offsets, inverse
 
-    def _float32_variance(self, points: Floats) -> Floats:
+    def _float32_variance(self, points: PointControls) -> PerPoint:
         """Return `variance` (B,) in single precision, for points near the range."""
         slopes, offsets, inverse = self._float32_factors
         scaled = self.scaled(points).astype(np.float32)
@@ -154,18 +168,20 @@ class Support:
             found[rows] = 1.0 - np.einsum("bi,bi->b", near @ inverse, near)
         return found
 
-    def scaled(self, points: Floats) -> Floats:
+    def scaled(self, points: PointControls) -> PointControls:
         """Return points (B, d) in half-ranges."""
         return half_ranges(points, self.low, self.high)
 
 
-def fit_support(controls: Floats) -> Support:
+def fit_support(controls: SampleControls) -> Support:
     """Return the support of captured clips' controls (n, d); each control must vary."""
     low, high = controls.min(axis=0), controls.max(axis=0)
     return Support(low, high, half_ranges(controls, low, high))
 
 
-def covariances(a: Floats, b: Floats) -> Floats:
+def covariances(
+    a: Annotated[Floats, "a controls"], b: Annotated[Floats, "b controls"]
+) -> Annotated[Floats, "a b"]:
     """Return the covariances (A, B) between points (A, d) and (B, d) in half-ranges."""
     gaps = a[:, None] - b
     return np.asarray(np.exp(-RATE * np.sum(np.square(gaps), axis=-1)))

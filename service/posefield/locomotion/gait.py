@@ -5,9 +5,11 @@ speed and rate of turning.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import PerClip, PerPoint, PointControls
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.inference.session import Session
@@ -25,18 +27,20 @@ class Gait:
     """Relation between the controls of a model and the rates at which it walks.
 
     rates: (N, 2), speed, m/s, and rate of turning, rad/s, of each captured clip as the model
-    synthesises it. slopes: (3, d), regression of controls on 1 and rates. manners: (p + 1, d), mean
-    residual of each performer; zeros at the end, for an unseen performer. region: convex hull of
-    the rates, extended by walking straight at all speeds.
+    synthesises it. slopes: (3, d), regression of controls on 1 and rates. performer_offsets: (p +
+    1, d), mean residual of each performer; zeros at the end, for an unseen performer. region:
+    convex hull of the rates, extended by walking straight at all speeds.
     """
 
     session: Session
-    rates: Floats
-    slopes: Floats
-    performer_offsets: Floats
+    rates: Annotated[Floats, "clips 2"]
+    slopes: Annotated[Floats, "3 controls"]
+    performer_offsets: Annotated[Floats, "offsets controls"]
     region: GaitRegion
 
-    def mean_controls(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
+    def mean_controls(
+        self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
+    ) -> PointControls:
         """Return the conditional mean of the controls (K, d) at given rates.
 
         speeds: (K,), m/s. turning: (K,), rad/s. who: performers (K,) by index on the card, -1 for
@@ -45,7 +49,9 @@ class Gait:
         """
         return _design_matrix(speeds, turning) @ self.slopes + self.performer_offsets[who]
 
-    def controls(self, speeds: Floats, turning: Floats, who: Indices) -> Floats:
+    def controls(
+        self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
+    ) -> PointControls:
         """Return the controls (K, d), along the regression, that lead to these rates."""
         labels = stride.PerformerLabels(self.session, who)
         speed, turn = speeds, turning
@@ -79,7 +85,7 @@ def fit_gait(session: Session) -> Gait:
     )
 
 
-def _check_speeds(name: str, speeds: Floats) -> None:
+def _check_speeds(name: str, speeds: PerClip) -> None:
     low, high = speeds.min(), speeds.max()
     if low < MIN_SPEED or high - low < MIN_SPEED:
         raise InvalidField(
@@ -88,7 +94,7 @@ def _check_speeds(name: str, speeds: Floats) -> None:
         )
 
 
-def _add_straight_rates(rates: Floats) -> Floats:
+def _add_straight_rates(rates: Annotated[Floats, "clips 2"]) -> Annotated[Floats, "clips+2 2"]:
     """Return the rates with straight walking added at the slowest and the fastest speed.
 
     A stride cut from a straight walk turns by a few degrees, which is no lower bound of the
@@ -98,11 +104,15 @@ def _add_straight_rates(rates: Floats) -> Floats:
     return np.vstack([rates, np.column_stack([ends, np.zeros(2)])])
 
 
-def _design_matrix(speeds: Floats, turning: Floats) -> Floats:
+def _design_matrix(speeds: PerPoint, turning: PerPoint) -> Annotated[Floats, "points 3"]:
     return np.column_stack([np.ones(len(speeds)), speeds, turning])
 
 
-def mean_residuals(residuals: Floats, who: Indices, performers: int) -> Floats:
+def mean_residuals(
+    residuals: Annotated[Floats, "clips controls"],
+    who: Annotated[Indices, "clips"],
+    performers: int,
+) -> Annotated[Floats, "{performers}+1 controls"]:
     """Return the mean residuals (p + 1, d) of performers, with zeros at the end.
 
     Each mean is shrunk by one additional clip with a residual of zero.

@@ -5,10 +5,12 @@ levels are known in advance, so a finer level is complete before the coarser one
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import CharacterFrames
 from posefield.common.units import Floats, Indices
 from posefield.inference import level_selection
 from posefield.inference.level_selection import HYSTERESIS, Camera, LevelTable
@@ -22,15 +24,15 @@ TRANSITION_SECONDS = 0.25
 class LevelSchedule:
     """Levels of detail of N characters in F frames.
 
-    levels: (N, F). before: (N, F), previous levels. shares: (N, F), completed share of the
+    levels: (N, F). previous: (N, F), levels before. shares: (N, F), completed share of the
     transition, 1 outside transitions.
     """
 
-    levels: Indices
-    previous: Indices
-    shares: Floats
+    levels: Annotated[Indices, "*frames"]
+    previous: Annotated[Indices, "*frames"]
+    shares: Annotated[Floats, "*frames"]
 
-    def select(self, who: Indices) -> "LevelSchedule":
+    def select(self, who: Annotated[Indices, "chosen"]) -> "LevelSchedule":
         """Return the levels of some characters (M,)."""
         return LevelSchedule(self.levels[who], self.previous[who], self.shares[who])
 
@@ -46,7 +48,9 @@ def constant_schedule(level: int, shape: tuple[int, ...]) -> LevelSchedule:
     return LevelSchedule(levels, levels, np.ones(shape))
 
 
-def scale(camera: Camera, centres: Floats, radius: float) -> Floats:
+def scale(
+    camera: Camera, centres: Annotated[Floats, "characters frames 3"], radius: float
+) -> CharacterFrames:
     """Return the pixels (N, F) that a metre covers on each character.
 
     centres: (N, F, 3), m. radius: of each body, m. Raises InvalidField, which names a character
@@ -59,7 +63,9 @@ def scale(camera: Camera, centres: Floats, radius: float) -> Floats:
     return np.stack(columns, axis=1)
 
 
-def schedule_levels(ladder: LevelTable, scale: Floats, limit: float, rate: float) -> LevelSchedule:
+def schedule_levels(
+    ladder: LevelTable, scale: CharacterFrames, limit: float, rate: float
+) -> LevelSchedule:
     """Return the coarsest levels with errors of at most `limit` pixels, transitions included.
 
     scale: (N, F), pixels per metre. rate: frames a second. The finest level where none is within
@@ -84,11 +90,15 @@ def schedule_levels(ladder: LevelTable, scale: Floats, limit: float, rate: float
     return LevelSchedule(levels, origins, blend.smoothstep(shares))
 
 
-def _levels(ladder: LevelTable, scale: Floats, limit: float) -> Indices:
+def _levels(
+    ladder: LevelTable, scale: CharacterFrames, limit: float
+) -> Annotated[Indices, "characters frames"]:
     return level_selection.select_by_error(ladder.errors, scale.ravel(), limit).reshape(scale.shape)
 
 
-def _finest_ahead(levels: Indices, frames: int) -> Indices:
+def _finest_ahead(
+    levels: Annotated[Indices, "characters frames"], frames: int
+) -> Annotated[Indices, "characters frames"]:
     """Return the finest level (N, F) from each frame on, over `frames` frames ahead."""
     padded = np.pad(levels, ((0, 0), (0, frames)), mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, frames + 1, axis=1)

@@ -5,10 +5,11 @@ of character and frame.
 """
 
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 
+from posefield.common.array_shapes import CharacterFrames, CharacterPoints, PerCharacter
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.inference.session import Session
@@ -30,15 +31,15 @@ class LocomotionPlan:
     characters. rate: frames a second.
     """
 
-    controls: Floats
-    who: Indices
-    phases: Floats
-    places: FloorVectors
-    headings: Floats
+    controls: Annotated[Floats, "characters frames controls"]
+    who: Annotated[Indices, "characters"]
+    phases: CharacterFrames
+    places: Annotated[FloorVectors, "characters frames"]
+    headings: CharacterFrames
     rate: float
 
     @property
-    def roots(self) -> Floats:
+    def roots(self) -> Annotated[Floats, "characters frames 3"]:
         """Points (N, F, 3), m, on the floor under the characters."""
         return floor_plane.at_height(self.places, np.zeros(self.places.shape))
 
@@ -51,10 +52,10 @@ class LocomotionPlan:
 
 def plan_from_controls(
     gait: Gait,
-    controls: Floats,
-    who: Indices,
-    phases: Floats,
-    starts: tuple[FloorVectors, Floats],
+    controls: Annotated[Floats, "characters frames controls"],
+    who: Annotated[Indices, "characters"],
+    phases: PerCharacter,
+    starts: tuple[Annotated[FloorVectors, "characters"], PerCharacter],
     rate: float,
 ) -> LocomotionPlan:
     """Return the plan of controls (N, F, d); the trajectories follow from the model's travel.
@@ -71,7 +72,12 @@ def plan_from_controls(
 
 
 def plan_along_paths(
-    gait: Gait, paths: Paths, who: Indices, phases: Floats, frames: int, rate: float
+    gait: Gait,
+    paths: Paths,
+    who: Annotated[Indices, "characters"],
+    phases: PerCharacter,
+    frames: int,
+    rate: float,
 ) -> LocomotionPlan:
     """Return the plan of characters along paths, at the speed of the synthesised gait.
 
@@ -95,7 +101,11 @@ def plan_along_paths(
 
 
 def synthesize_poses(
-    session: Session, plan: LocomotionPlan, who: Indices, frames: Indices, level: int = 0
+    session: Session,
+    plan: LocomotionPlan,
+    who: Annotated[Indices, "poses"],
+    frames: Annotated[Indices, "poses"],
+    level: int = 0,
 ) -> RelativePoses:
     """Return the poses of K pairs of a character (K,) and a frame (K,) of the plan."""
     performers = stride.labels(session, plan.who[who])
@@ -108,7 +118,11 @@ def synthesize_poses(
     return RelativePoses(floor_plane.turn_roots(own.rotations, headings), own.heights, places)
 
 
-def _measure_strides(gait: Gait, controls: Floats, who: Indices) -> Strides:
+def _measure_strides(
+    gait: Gait,
+    controls: Annotated[Floats, "characters frames controls"],
+    who: Annotated[Indices, "characters"],
+) -> Strides:
     """Return the cycles of controls (N, F, d), with fields (N, F)."""
     frames = controls.shape[:2]
     labels = stride.PerformerLabels(gait.session, np.repeat(who, frames[1]))
@@ -125,11 +139,13 @@ def _cumulative_sums(steps: Numbers) -> Numbers:
     return np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
 
 
-def _phases(own: Strides, first: Floats, rate: float) -> Floats:
+def _phases(own: Strides, first: PerCharacter, rate: float) -> CharacterFrames:
     return (first[:, None] + _cumulative_sums(_increments(1.0 / own.durations, rate))) % 1.0
 
 
-def _distances(speeds: Floats, frames: int, rate: float) -> Floats:
+def _distances(
+    speeds: CharacterPoints, frames: int, rate: float
+) -> Annotated[Floats, "characters {frames}"]:
     """Return the distances (N, F), m, along paths with speeds (N, K) at their known points."""
     arrived = _cumulative_sums(0.5 * POINT_SPACING * (1.0 / speeds[:, 1:] + 1.0 / speeds[:, :-1]))
     # One interpolation for all rows: each row's times are offset beyond those of the row before.
@@ -140,7 +156,7 @@ def _distances(speeds: Floats, frames: int, rate: float) -> Floats:
     return np.interp((when + apart).ravel(), (arrived + apart).ravel(), ways).reshape(-1, frames)
 
 
-def _check_path_lengths(paths: Paths, gone: Floats, seconds: float) -> None:
+def _check_path_lengths(paths: Paths, gone: CharacterFrames, seconds: float) -> None:
     for index in np.flatnonzero(gone[:, -1] >= paths.lengths)[:1]:
         raise InvalidField(
             f"paths/{index}",

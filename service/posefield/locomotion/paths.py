@@ -1,9 +1,11 @@
 """Paths on the floor that characters follow, with speeds."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import CharacterFrames, CharacterPoints, PerCharacter
 from posefield.common.units import Floats, Indices
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
@@ -20,18 +22,18 @@ class Paths:
     points a path is an arc. speeds: (N, K), m/s. lengths: (N,), m.
     """
 
-    starts: FloorVectors
-    headings: Floats
-    speeds: Floats
-    lengths: Floats
+    starts: Annotated[FloorVectors, "characters"]
+    headings: CharacterPoints
+    speeds: CharacterPoints
+    lengths: PerCharacter
 
     @property
-    def curvatures(self) -> Floats:
+    def curvatures(self) -> CharacterPoints:
         """Curvature (N, K), 1/m, positive to the left."""
         return np.gradient(self.headings, POINT_SPACING, axis=1)
 
     @property
-    def places(self) -> FloorVectors:
+    def places(self) -> Annotated[FloorVectors, "characters points"]:
         """Known points of the paths (N, K)."""
         turns = np.diff(self.headings, axis=1)
         steps = floor_plane.unit_vectors(self.headings[:, :-1]) * floor_plane.arc_displacement(
@@ -39,7 +41,9 @@ class Paths:
         )
         return self.starts[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0)))
 
-    def at(self, gone: Floats) -> tuple[FloorVectors, Floats]:
+    def at(
+        self, gone: CharacterFrames
+    ) -> tuple[Annotated[FloorVectors, "characters frames"], CharacterFrames]:
         """Return points (N, F) and headings (N, F), rad, of the tangents after (N, F) metres."""
         before, share = self._between(gone)
         turns = share * np.take_along_axis(np.diff(self.headings, axis=1), before, axis=1)
@@ -49,13 +53,19 @@ class Paths:
         )
         return np.take_along_axis(self.places, before, axis=1) + along, first + turns
 
-    def interpolate(self, values: Floats, gone: Floats) -> Floats:
+    def interpolate(
+        self,
+        values: Annotated[Floats, "characters points *values"],
+        gone: CharacterFrames,
+    ) -> Annotated[Floats, "characters frames *values"]:
         """Return values (N, K, ...) of the known points after (N, F) metres: (N, F, ...)."""
         before, share = self._between(gone)
         rows = np.arange(len(values))[:, None]
         share = share.reshape(*share.shape, *[1] * (values.ndim - 2))
         return (1.0 - share) * values[rows, before] + share * values[rows, before + 1]
 
-    def _between(self, gone: Floats) -> tuple[Indices, Floats]:
+    def _between(
+        self, gone: CharacterFrames
+    ) -> tuple[Annotated[Indices, "characters frames"], CharacterFrames]:
         before = np.minimum((gone / POINT_SPACING).astype(np.int64), self.headings.shape[1] - 2)
         return before, gone / POINT_SPACING - before

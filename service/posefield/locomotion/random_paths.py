@@ -5,9 +5,11 @@ on the seed and the character's index, not on the size of the crowd or the durat
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import CharacterPoints, PerCharacter, PerPoint
 from posefield.common.units import Floats, Indices
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.floor_plane import FloorVectors
@@ -30,12 +32,12 @@ class Characters:
     """Performers, phases and random numbers of N characters.
 
     who: (N,), performers by index on the card, -1 for a model without any. phases: (N,), of the
-    cycle at the beginning. drawn: (N, columns), random numbers from 0 to 1 for the paths.
+    cycle at the beginning. random_numbers: (N, columns), random numbers from 0 to 1 for the paths.
     """
 
-    who: Indices
-    phases: Floats
-    random_numbers: Floats
+    who: Annotated[Indices, "characters"]
+    phases: PerCharacter
+    random_numbers: Annotated[Floats, "characters columns"]
 
 
 def draw_characters(gait: Gait, count: int, seed: int) -> Characters:
@@ -71,15 +73,17 @@ def draw_paths(gait: Gait, characters: Characters, seconds: float) -> Paths:
     return Paths(_starts(spot), headings, speeds, np.full(len(spot), along[-1]))
 
 
-def _random_table(count: int, seed: int) -> Floats:
+def _random_table(count: int, seed: int) -> Annotated[Floats, "{count} columns"]:
     return np.random.Generator(np.random.PCG64(seed)).random((count, 6 + 2 * len(WAVELENGTHS)))
 
 
-def _initial_headings(drawn: Floats) -> Floats:
+def _initial_headings(
+    drawn: Annotated[Floats, "characters columns"],
+) -> PerCharacter:
     return 2.0 * np.pi * drawn[:, 2]
 
 
-def _starts(spot: Floats) -> FloorVectors:
+def _starts(spot: Annotated[Floats, "characters 2"]) -> Annotated[FloorVectors, "characters"]:
     """Return starts (N,), m, on a grid numbered in growing squares.
 
     A character's start does not depend on how many characters follow.
@@ -92,13 +96,15 @@ def _starts(spot: Floats) -> FloorVectors:
     return (SPACING * ahead + moved[:, 0]) + 1j * (SPACING * across + moved[:, 1])
 
 
-def _wave(along: Floats, phases: Floats) -> Floats:
+def _wave(along: PerPoint, phases: Annotated[Floats, "characters waves"]) -> CharacterPoints:
     """Return values (N, K) from -1 to 1 that vary smoothly along (K,) m."""
     angles = 2.0 * np.pi * along[:, None] / WAVELENGTHS + phases[:, None]
     return np.sin(angles) @ WAVE_WEIGHTS
 
 
-def _captured_speeds(gait: Gait, who: Indices, drawn: Floats) -> Floats:
+def _captured_speeds(
+    gait: Gait, who: Annotated[Indices, "characters"], drawn: PerCharacter
+) -> Annotated[Floats, "characters 1"]:
     """Return speeds (N, 1), m/s, of captured clips, each of the character's own performer."""
     moved_by = stride.clip_performers(gait.session.card)
     order = np.argsort(moved_by, kind="stable")
@@ -107,7 +113,11 @@ def _captured_speeds(gait: Gait, who: Indices, drawn: Floats) -> Floats:
     return gait.rates[clips, :1]
 
 
-def _speeds(gait: Gait, usual: Floats, wave: Floats) -> Floats:
+def _speeds(
+    gait: Gait,
+    usual: Annotated[Floats, "characters 1"],
+    wave: CharacterPoints,
+) -> CharacterPoints:
     """Return speeds (N, K), m/s, that vary about the mean ones (N, 1)."""
     ends = np.array(gait.region.speeds)
     low, high = ends + SPEED_MARGIN * (ends[::-1] - ends)
@@ -117,7 +127,11 @@ def _speeds(gait: Gait, usual: Floats, wave: Floats) -> Floats:
     return _vary(wave, slower, middle, faster)
 
 
-def _curvatures(gait: Gait, speeds: Floats, wave: Floats) -> Floats:
+def _curvatures(
+    gait: Gait,
+    speeds: CharacterPoints,
+    wave: CharacterPoints,
+) -> CharacterPoints:
     """Return curvatures (N, K), 1/m; straight where the wave is zero."""
     low, high = gait.region.turning(speeds)
     return _vary(TURNING_SHARE * wave, low, np.zeros(1), high) / speeds

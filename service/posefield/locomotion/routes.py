@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from posefield.common.array_shapes import PerPoint
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.inference.level_selection import MAX_COORDINATE
@@ -101,7 +102,7 @@ def _check_route(gait: Gait, index: int, route: Route) -> None:
         )
 
 
-def _headings(waypoints: Floats) -> tuple[Floats, float]:
+def _headings(waypoints: Annotated[Floats, "waypoints 2"]) -> tuple[PerPoint, float]:
     """Return headings (K,), rad, at every STEP of a spline, and its length, m.
 
     waypoints: (P, 2), m, on the spline.
@@ -115,7 +116,9 @@ def _headings(waypoints: Floats) -> tuple[Floats, float]:
     return np.interp(along, gone, headings), float(gone[-1])
 
 
-def _spline(knots: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
+def _spline(
+    knots: Annotated[Floats, "knots"], values: Annotated[Floats, "knots 2"], at: PerPoint
+) -> tuple[Annotated[Floats, "points 2"], Annotated[Floats, "points 2"]]:
     """Return the natural cubic spline of values (P, 2) at knots (P,): values and slopes at (S,)."""
     gaps = np.diff(knots)
     seconds = np.zeros_like(values)

@@ -7,10 +7,12 @@ frame the last pose of a cycle equals its first, and the sway about the arc is p
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.array_shapes import PerPoint, PointControls, PointLabels
 from posefield.common.units import Floats, Indices, Singles
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane
@@ -26,29 +28,29 @@ AFTER_END = 1e9
 
 @dataclass(frozen=True)
 class Strides:
-    """One cycle each of B characters.
+    """One cycle each of B characters, or of N characters in F frames (N, F).
 
-    durations: (B,), s. ways: (B,), travel along the arc, m, in the character's own axes. turns:
+    durations: (B,), s. travels: (B,), along the arc, m, in the character's own axes. turns:
     (B,), change of heading, rad. starts: (B,), root positions at the beginning.
     """
 
-    durations: Floats
-    travels: FloorVectors
-    turns: Floats
-    starts: FloorVectors
+    durations: Annotated[Floats, "*strides"]
+    travels: Annotated[FloorVectors, "*strides"]
+    turns: Annotated[Floats, "*strides"]
+    starts: Annotated[FloorVectors, "*strides"]
 
     @property
-    def speeds(self) -> Floats:
+    def speeds(self) -> Annotated[Floats, "*strides"]:
         """Speed (B,) along the arc, m/s."""
         return np.abs(self.travels) / self.durations
 
     @property
-    def turning(self) -> Floats:
+    def turning(self) -> Annotated[Floats, "*strides"]:
         """Rate of turning (B,) to the left, rad/s."""
         return self.turns / self.durations
 
     @property
-    def drifts(self) -> Floats:
+    def drifts(self) -> Annotated[Floats, "*strides"]:
         """Direction of travel (B,) relative to the heading, positive to the left, rad."""
         return np.angle(self.travels)
 
@@ -62,9 +64,9 @@ class PerformerLabels:
     """
 
     session: Session
-    who: Indices
+    who: Annotated[Indices, "points"]
 
-    def __getitem__(self, rows: slice) -> Floats:
+    def __getitem__(self, rows: slice) -> Annotated[Floats, "rows performers"]:
         return labels(self.session, self.who[rows])
 
 
@@ -75,13 +77,16 @@ class RelativePoses:
     rotations: (K, J, 4). heights: (K,), of the root, m. places: (K,), of the root over the floor.
     """
 
-    rotations: Floats
-    heights: Floats
-    places: FloorVectors
+    rotations: Annotated[Floats, "poses joints 4"]
+    heights: Annotated[Floats, "poses"]
+    places: Annotated[FloorVectors, "poses"]
 
 
 def strides(
-    session: Session, controls: Floats, labels: Floats | PerformerLabels, level: int = 0
+    session: Session,
+    controls: PointControls,
+    labels: PointLabels | PerformerLabels,
+    level: int = 0,
 ) -> Strides:
     """Return the cycles of controls (B, d) for performer labels (B, p), at a level of detail."""
     ends = np.full((len(controls), 1), AFTER_END)
@@ -93,7 +98,12 @@ def strides(
     return Strides(durations, floor_plane.inverse_arc(gap, turns), turns, starts)
 
 
-def straight_strides(session: Session, controls: Floats, labels: Floats, level: int = 0) -> Strides:
+def straight_strides(
+    session: Session,
+    controls: PointControls,
+    labels: PointLabels,
+    level: int = 0,
+) -> Strides:
     """Return the straight line from first to last pose of clips that are not cyclic."""
     times = np.tile([0.0, AFTER_END], (len(controls), 1))
     asked = ("duration", "root_position")
@@ -103,7 +113,11 @@ def straight_strides(session: Session, controls: Floats, labels: Floats, level: 
 
 
 def synthesize_poses(
-    session: Session, controls: Floats, labels: Floats, phases: Floats, level: int = 0
+    session: Session,
+    controls: PointControls,
+    labels: PointLabels,
+    phases: PerPoint,
+    level: int = 0,
 ) -> RelativePoses:
     """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
     own = strides(session, controls, labels, level)
@@ -113,7 +127,12 @@ def synthesize_poses(
     return relative_poses(own, phases, rotations[:, 0], roots[:, 0])
 
 
-def relative_poses(own: Strides, phases: Floats, rotations: Floats, roots: Floats) -> RelativePoses:
+def relative_poses(
+    own: Strides,
+    phases: Annotated[Floats, "poses"],
+    rotations: Annotated[Floats, "poses joints 4"],
+    roots: Annotated[Floats, "poses 3"],
+) -> RelativePoses:
     """Return poses relative to the travel, at phases (K,) of the cycle.
 
     own: K strides, or one for all. rotations: (K, J, 4) and roots: (K, 3), m, of the poses.
@@ -131,18 +150,22 @@ def relative_poses(own: Strides, phases: Floats, rotations: Floats, roots: Float
     )
 
 
-def bones(session: Session, controls: Floats, labels: Floats) -> Singles:
+def bones(
+    session: Session, controls: PointControls, labels: PointLabels
+) -> Annotated[Singles, "points joints 3"]:
     """Return the bone offsets (B, J, 3), m, at controls (B, d) and labels (B, p)."""
     begin = np.zeros((len(controls), 1))
     return _run_batches(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
 
 
-def clip_performers(card: ModelCard) -> Indices:
+def clip_performers(card: ModelCard) -> Annotated[Indices, "clips"]:
     """Return the performers (N,) of the captured clips by index on the card; -1 without any."""
     return np.array(card.moved_by or [-1] * len(card.examples))
 
 
-def labels(session: Session, who: Indices) -> Floats:
+def labels(
+    session: Session, who: Annotated[Indices, "*batch"]
+) -> Annotated[Floats, "*batch performers"]:
     """Return the labels (..., p) of performers by index on the card; all zero for -1."""
     performers = len(session.card.performers)
     return np.vstack([np.eye(performers), np.zeros(performers)])[who]
@@ -150,12 +173,12 @@ def labels(session: Session, who: Indices) -> Floats:
 
 def _run_batches(
     session: Session,
-    controls: Floats,
-    times: Floats,
-    labels: Floats | PerformerLabels,
+    controls: PointControls,
+    times: Annotated[Floats, "points frames"],
+    labels: PointLabels | PerformerLabels,
     level: int,
     *outputs: str,
-) -> list[Floats]:
+) -> list[Annotated[Floats, "points ..."]]:
     """Return the graph's outputs for any number of rows, computed in batches."""
     found: list[Floats] = []
     for rows in _batches(len(controls)):

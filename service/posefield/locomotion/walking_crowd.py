@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -149,7 +149,9 @@ def _batches(session: Session, plan: LocomotionPlan, shown: LevelSchedule) -> It
         yield motions(session, plan, who, shown.select(who))
 
 
-def motions(session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule) -> Motions:
+def motions(
+    session: Session, plan: LocomotionPlan, who: Annotated[Indices, "motions"], shown: LevelSchedule
+) -> Motions:
     """Return the motions of characters (M,) of the plan, at their levels of detail."""
     shape = (len(who), plan.phases.shape[1])
     count, joints = shape[0] * shape[1], len(session.card.skeleton)
@@ -200,7 +202,9 @@ def _at_levels(
     return poses
 
 
-def measure_foot_skate(card: ModelCard, motions: Motions, rate: float) -> Floats:
+def measure_foot_skate(
+    card: ModelCard, motions: Motions, rate: float
+) -> Annotated[Floats, "motions strides"]:
     """Return the mean foot skate (M, strides), m/s, of motions cut into lengths of a mean stride.
 
     The ground is at the lowest height of each stride, as for captured clips. A remainder at the end
@@ -218,7 +222,7 @@ def measure_foot_skate(card: ModelCard, motions: Motions, rate: float) -> Floats
     return foot_skate.mean_skate_speed(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
 
 
-def foot_skate_per_clip(gait: Gait, rate: float) -> Floats:
+def foot_skate_per_clip(gait: Gait, rate: float) -> Annotated[Floats, "clips 1"]:
     """Return the foot skate (N, 1), m/s, of one stride at each captured clip's controls."""
     card = gait.session.card
     controls = np.array(card.examples)

@@ -1,6 +1,6 @@
 """Interpolation between rows of a table, and between poses at a switch of level of detail."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,9 @@ Numbers = npt.NDArray[Any]
 """Array of any precision; results have the precision of the arguments."""
 
 
-def interpolate_rows(rows: Floats, places: Floats) -> Floats:
+def interpolate_rows(
+    rows: Annotated[Floats, "frames values"], places: Annotated[Floats, "*places"]
+) -> Annotated[Floats, "*places values"]:
     """Return rows (F, k) interpolated linearly at fractional indices (...) from 0 to F - 1.
 
     Shape of the result: (..., k).
@@ -21,13 +23,21 @@ def interpolate_rows(rows: Floats, places: Floats) -> Floats:
     return (1.0 - share) * rows[before] + share * rows[before + 1]
 
 
-def lerp(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
+def lerp(
+    before: Annotated[Numbers, "rows *values"],
+    after: Annotated[Numbers, "rows *values"],
+    shares: Annotated[Numbers, "rows"],
+) -> Annotated[Numbers, "rows *values"]:
     """Return linear interpolations (N, ...) from `before` to `after` by shares (N,), 0 to 1."""
     way = shares.reshape(-1, *(1 for _ in before.shape[1:]))
     return before + way * (after - before)
 
 
-def nlerp(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
+def nlerp(
+    before: Annotated[Numbers, "rows *values 4"],
+    after: Annotated[Numbers, "rows *values 4"],
+    shares: Annotated[Numbers, "rows"],
+) -> Annotated[Numbers, "rows *values 4"]:
     """Return unit quaternions (N, ..., 4) interpolated by shares (N,) along the shorter arc.
 
     Normalised linear interpolation: for rotations a few degrees apart it differs from slerp by a
@@ -39,7 +49,7 @@ def nlerp(before: Numbers, after: Numbers, shares: Numbers) -> Numbers:
     return turns
 
 
-def smoothstep(shares: Numbers) -> Numbers:
+def smoothstep(shares: Annotated[Numbers, "*batch"]) -> Annotated[Numbers, "*batch"]:
     """Return shares mapped by the smoothstep 3 s² - 2 s³, whose slope is zero at 0 and 1."""
     gentle: Numbers = shares * shares * (3.0 - 2.0 * shares)
     return gentle

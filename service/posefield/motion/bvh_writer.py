@@ -3,9 +3,11 @@
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import Bones, Vector
 from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -77,7 +79,7 @@ class BvhLayout:
         return [True, *(spread[1:] > CONSTANT_TOLERANCE).tolist()]
 
     @cached_property
-    def offsets(self) -> Floats:
+    def offsets(self) -> Bones:
         """Return the mean translations (J, 3) from each joint's parent, m; zero for the root."""
         offsets = self.clip.translations.mean(axis=0)
         offsets[0] = 0.0
@@ -110,13 +112,13 @@ class BvhLayout:
             lines += ["\tEnd Site", "\t{", f"\t\tOFFSET {self.format_lengths(tip)}", "\t}"]
         return lines
 
-    def end_sites(self, joint: int) -> list[Floats]:
+    def end_sites(self, joint: int) -> list[Vector]:
         """Return the offsets of the joint's end sites; one of zero length for a bare leaf."""
         sites = zip(self.skeleton.tip_joints, self.skeleton.tip_offsets, strict=True)
         tips = [offset for owner, offset in sites if owner == joint]
         return tips if tips or joint in self.skeleton.parents else [np.zeros(3)]
 
-    def format_lengths(self, metres: Floats) -> str:
+    def format_lengths(self, metres: Vector) -> str:
         """Return three lengths as text, in the unit of the file."""
         # Without a negative zero.
         lengths = np.round(metres / self.metres_per_unit, self.decimals) + 0.0
@@ -138,7 +140,7 @@ class BvhLayout:
         return format_numbers(np.concatenate(blocks, axis=1), self.decimals)
 
 
-def format_numbers(values: Floats, decimals: int) -> bytes:
+def format_numbers(values: Annotated[Floats, "rows columns"], decimals: int) -> bytes:
     """Return numbers (rows, columns) as text with fixed decimals and without a negative zero.
 
     The same bytes as %f in a fifth of the time: the digits of all numbers are computed at once, one
@@ -176,7 +178,9 @@ def depth_first(skeleton: Skeleton) -> list[tuple[int, int]]:
     return order
 
 
-def unwrap_euler(angles: Floats) -> Floats:
+def unwrap_euler(
+    angles: Annotated[Floats, "frames *joints 3"],
+) -> Annotated[Floats, "frames *joints 3"]:
     """Return equal rotations as ZYX angles (frames, ..., 3), rad, without jumps between frames.
 
     Besides whole turns there is a second triple for each rotation: the outer angles half a turn on,
@@ -192,7 +196,7 @@ def unwrap_euler(angles: Floats) -> Floats:
     return chosen - 2.0 * np.pi * np.cumsum(turns, axis=0)
 
 
-def _squared_wrapped(apart: Floats) -> Floats:
+def _squared_wrapped(apart: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch"]:
     """Return squared lengths (...) of differences of angles (..., 3), rad, each wrapped to pi."""
     nearest = apart - 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
     return np.einsum("...k,...k->...", nearest, nearest)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.array_shapes import Bones, Positions, RootPath, Rotations
 from posefield.motion import skeleton
 from posefield.motion.skeleton import Skeleton
 
@@ -19,8 +19,8 @@ class Clip:
     """
 
     skeleton: Skeleton
-    rotations: Floats
-    translations: Floats
+    rotations: Rotations
+    translations: Positions
     rate: float
 
     def __post_init__(self) -> None:
@@ -43,17 +43,17 @@ class Clip:
         return (len(self) - 1) / self.rate
 
     @property
-    def root_path(self) -> Floats:
+    def root_path(self) -> RootPath:
         """Return the root positions (F, 3), m."""
         return self.translations[:, 0]
 
-    def positions(self) -> Floats:
+    def positions(self) -> Positions:
         """Return the joint positions (F, J, 3) in the character's frame, m."""
         return skeleton.positions(self.skeleton.parents, self.rotations, self.translations)
 
 
 def assemble(
-    joints: Skeleton, rotations: Floats, root_path: Floats, bone_offsets: Floats, rate: float
+    joints: Skeleton, rotations: Rotations, root_path: RootPath, bone_offsets: Bones, rate: float
 ) -> Clip:
     """Return a clip with constant bone offsets (J, 3), m, whose root follows a path (F, 3), m."""
     return Clip(joints, rotations, skeleton.translations(bone_offsets, root_path), rate)

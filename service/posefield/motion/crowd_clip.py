@@ -2,10 +2,11 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
+from posefield.common.array_shapes import PerCharacter
 from posefield.common.units import UP, Booleans, Floats, Indices, Singles
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
@@ -19,18 +20,18 @@ class Placement:
     faces +Z in its own frame faces +X at a heading of a quarter turn.
     """
 
-    positions: Floats
-    headings: Floats
+    positions: Annotated[Floats, "characters 3"]
+    headings: PerCharacter
 
     def __len__(self) -> int:
         return len(self.headings)
 
-    def select(self, some: Indices) -> "Placement":
+    def select(self, some: Annotated[Indices, "chosen"]) -> "Placement":
         """Return the placement of the characters of some indices (M,)."""
         return Placement(self.positions[some], self.headings[some])
 
     @property
-    def turns(self) -> Floats:
+    def turns(self) -> Annotated[Floats, "characters 4"]:
         """Return the quaternions (N, 4) of the headings."""
         return quat.from_axis_angle(UP, self.headings)
 
@@ -43,10 +44,10 @@ class Motions:
     level of detail at which each pose was computed.
     """
 
-    rotations: Singles
-    root_position: Singles
-    bone_offsets: Singles
-    levels: Indices
+    rotations: Annotated[Singles, "motions frames joints 4"]
+    root_position: Annotated[Singles, "motions frames 3"]
+    bone_offsets: Annotated[Singles, "motions joints 3"]
+    levels: Annotated[Indices, "motions frames"]
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -65,14 +66,14 @@ class CrowdPoses:
 
     model: str
     skeleton: Skeleton
-    rotations: Singles
-    root_position: Singles
-    bone_offsets: Singles
-    levels: Indices
-    error_px: Singles | None
-    duration: Singles
-    sigma: Singles
-    supported: Booleans
+    rotations: Annotated[Singles, "characters joints 4"]
+    root_position: Annotated[Singles, "characters 3"]
+    bone_offsets: Annotated[Singles, "characters joints 3"]
+    levels: Annotated[Indices, "characters"]
+    error_px: Annotated[Singles, "characters"] | None
+    duration: Annotated[Singles, "characters"]
+    sigma: Annotated[Singles, "characters"]
+    supported: Annotated[Booleans, "characters"]
     warnings: tuple[str, ...]
 
     def __len__(self) -> int:
@@ -92,7 +93,7 @@ class CrowdClip:
     rate: float
     frames: int
     placement: Placement
-    motion: Indices
+    motion: Annotated[Indices, "characters"]
     batches: Iterable[Motions]
     facts: Mapping[str, Any]
 

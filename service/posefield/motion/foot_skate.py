@@ -1,5 +1,7 @@
 """Foot skate: sliding of planted feet."""
 
+from typing import Annotated
+
 import numpy as np
 
 from posefield.common.units import UP, Floats
@@ -8,7 +10,9 @@ from posefield.common.units import UP, Floats
 PLANTED_HEIGHT = 0.02
 
 
-def mean_skate_speed(feet: Floats, rate: float) -> Floats:
+def mean_skate_speed(
+    feet: Annotated[Floats, "*clips frames feet 3"], rate: float
+) -> Annotated[Floats, "*clips"]:
     """Return the mean horizontal speed (...) of planted feet (..., F, K, 3), m/s.
 
     feet: positions, m. rate: frames a second. A foot is planted while it is within 2 cm of the

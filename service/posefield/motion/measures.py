@@ -11,8 +11,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from posefield.common.array_shapes import Bones, Frames, Positions, RootPath, Vector
 from posefield.common.bounded_types import Index, Share
-from posefield.common.units import Floats
 from posefield.motion import blend, skeleton
 
 Quantity = Literal[
@@ -75,11 +75,11 @@ class MeasuredMotion:
     3), m. landmark: fractional frame index, 0 to F - 1, of the measure's landmark.
     """
 
-    positions: Floats
+    positions: Positions
     duration: float
-    travel: Floats
+    travel: Vector
     parents: tuple[int, ...]
-    offsets: Floats
+    offsets: Bones
     landmark: float = 0.0
 
 
@@ -100,7 +100,7 @@ def evaluate(measure: Measure, seen: MeasuredMotion) -> float:
             return float(place[POSITION_AXES[measure.quantity]])
 
 
-def travel_value(quantity: str, travel: Floats, duration: float) -> float:
+def travel_value(quantity: str, travel: Vector, duration: float) -> float:
     """Return the distance, m, the speed, m/s, or the change of heading, degrees, of a travel (3,).
 
     duration: s.
@@ -111,7 +111,7 @@ def travel_value(quantity: str, travel: Floats, duration: float) -> float:
     return way / duration if quantity == "speed" else way
 
 
-def moment_frame(measure: Measure, positions: Floats, landmark: float) -> float:
+def moment_frame(measure: Measure, positions: Positions, landmark: float) -> float:
     """Return the fractional frame index, 0 to F - 1, at which a quantity is measured.
 
     positions: (F, J, 3), m. landmark: fractional frame index of the landmark.
@@ -135,11 +135,11 @@ def moment_frame(measure: Measure, positions: Floats, landmark: float) -> float:
             return float(np.argmax(np.abs(_foot_separation(measure, positions))))
 
 
-def _mean_positions(measure: Measure, positions: Floats) -> Floats:
+def _mean_positions(measure: Measure, positions: Positions) -> RootPath:
     return positions[:, list(measure.joints)].mean(axis=1)
 
 
-def _foot_separation(measure: Measure, positions: Floats) -> Floats:
+def _foot_separation(measure: Measure, positions: Positions) -> Frames:
     """Return the distance (F,) of the first foot ahead of the second, m."""
     first, second = measure.joints
     return positions[:, first, 2] - positions[:, second, 2]

@@ -1,13 +1,16 @@
 """Unit quaternions w x y z over arrays (..., 4); all functions broadcast over leading axes."""
 
+from typing import Annotated
+
 import numpy as np
 
+from posefield.common.array_shapes import JointRotations, Quaternions, Scalars, Vector, Vectors
 from posefield.common.units import Floats
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def mul(a: Floats, b: Floats) -> Floats:
+def mul(a: Quaternions, b: Quaternions) -> Quaternions:
     """Return the product a b: the rotation b followed by a."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
@@ -22,24 +25,24 @@ def mul(a: Floats, b: Floats) -> Floats:
     )
 
 
-def conj(q: Floats) -> Floats:
+def conj(q: Quaternions) -> Quaternions:
     """Return the conjugate, which is the inverse of a unit quaternion."""
     return q * np.array([1.0, -1.0, -1.0, -1.0])
 
 
-def normalize(q: Floats) -> Floats:
+def normalize(q: Quaternions) -> Quaternions:
     """Return the unit quaternion in the direction of q."""
     return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
-def rotate(q: Floats, v: Floats) -> Floats:
+def rotate(q: Quaternions, v: Vectors) -> Vectors:
     """Return the vector v (..., 3) rotated by q."""
     w, u = q[..., :1], q[..., 1:]
     t = 2.0 * cross(u, v)
     return v + w * t + cross(u, t)
 
 
-def cross(a: Floats, b: Floats) -> Floats:
+def cross(a: Vectors, b: Vectors) -> Vectors:
     """Return the vector product (..., 3).
 
     Twice as fast as numpy.cross, which also supports other sizes.
@@ -49,14 +52,14 @@ def cross(a: Floats, b: Floats) -> Floats:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
 
 
-def exp(v: Floats) -> Floats:
+def exp(v: Vectors) -> Quaternions:
     """Return the quaternion of a rotation vector (..., 3), rad."""
     half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
     # np.sinc is sin(pi x) / (pi x), and exact at zero.
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1)
 
 
-def log(q: Floats) -> Floats:
+def log(q: Quaternions) -> Vectors:
     """Return the rotation vector (..., 3) of q, rad, of length at most pi."""
     q = np.where(q[..., :1] < 0, -q, q)
     sine = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
@@ -64,19 +67,19 @@ def log(q: Floats) -> Floats:
     return np.where(sine < 1e-12, 2.0, angle / np.maximum(sine, 1e-12)) * q[..., 1:]
 
 
-def slerp(a: Floats, b: Floats, t: Floats) -> Floats:
+def slerp(a: Quaternions, b: Quaternions, t: Scalars) -> Quaternions:
     """Return the rotation at a fraction t (...) of the shorter arc from a to b."""
     return mul(a, exp(np.asarray(t)[..., None] * log(mul(conj(a), b))))
 
 
-def unroll(q: Floats) -> Floats:
+def unroll(q: Annotated[Floats, "frames *joints 4"]) -> Annotated[Floats, "frames *joints 4"]:
     """Return equal rotations (frames, ..., 4) with signs such that neighbours lie close."""
     dots = np.einsum("...k,...k->...", q[1:], q[:-1])
     signs = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0, dtype=q.dtype)
     return np.concatenate([q[:1], q[1:] * signs[..., None]])
 
 
-def mean(q: Floats) -> Floats:
+def mean(q: Annotated[Floats, "samples joints 4"]) -> JointRotations:
     """Return the chordal mean (joints, 4) of rotations (samples, joints, 4), with w >= 0.
 
     The eigenvector of the largest eigenvalue of the sum of q qᵀ, which does not depend on the signs
@@ -87,24 +90,26 @@ def mean(q: Floats) -> Floats:
     return np.where(top[..., :1] < 0, -top, top)
 
 
-def twist(q: Floats, axis: Floats) -> Floats:
+def twist(q: Annotated[Floats, "*batch 4"], axis: Vector) -> Annotated[Floats, "*batch"]:
     """Return the angle (...) of the twist of q about the unit axis (3,), rad, in (-pi, pi]."""
     angle = 2.0 * np.arctan2(q[..., 1:] @ axis, q[..., 0])
     return np.arctan2(np.sin(angle), np.cos(angle))
 
 
-def from_axis_angle(axis: Floats, angle: Floats) -> Floats:
+def from_axis_angle(
+    axis: Vector, angle: Annotated[Floats, "*batch"]
+) -> Annotated[Floats, "*batch 4"]:
     """Return the quaternion of a rotation by angle (...), rad, about the unit axis (3,)."""
     half = 0.5 * np.asarray(angle)[..., None]
     return np.concatenate([np.cos(half), np.sin(half) * axis], axis=-1)
 
 
-def to_matrix(q: Floats) -> Floats:
+def to_matrix(q: Annotated[Floats, "*batch 4"]) -> Annotated[Floats, "*batch 3 3"]:
     """Return the rotation matrices (..., 3, 3), for column vectors."""
     return np.swapaxes(rotate(q[..., None, :], np.eye(3)), -1, -2)
 
 
-def from_matrix(m: Floats) -> Floats:
+def from_matrix(m: Annotated[Floats, "*batch 3 3"]) -> Annotated[Floats, "*batch 4"]:
     """Return the quaternions of rotation matrices (..., 3, 3), with w at or above zero.
 
     Of the four equivalent formulas the one with the largest divisor is taken (Shepperd 1978).
@@ -126,7 +131,9 @@ def from_matrix(m: Floats) -> Floats:
     return np.where(q[..., :1] < 0, -q, q)
 
 
-def from_euler(angles: Floats, axes: str) -> Floats:
+def from_euler(
+    angles: Annotated[Floats, "*batch {len(axes)}"], axes: str
+) -> Annotated[Floats, "*batch 4"]:
     """Return the rotation of angles (..., len(axes)), rad, about moving axes, the leftmost first.
 
     axes: any number of X, Y and Z; "ZYX" is the product Rz Ry Rx of BVH files.
@@ -137,7 +144,7 @@ def from_euler(angles: Floats, axes: str) -> Floats:
     return q
 
 
-def to_euler(q: Floats, axes: str) -> Floats:
+def to_euler(q: Annotated[Floats, "*batch 4"], axes: str) -> Annotated[Floats, "*batch 3"]:
     """Return the angles (..., 3), rad, about three different moving axes.
 
     The middle angle is in [-pi/2, pi/2]. Where it is a quarter turn the axes of the outer two
@@ -154,7 +161,7 @@ def to_euler(q: Floats, axes: str) -> Floats:
     return np.stack([first, middle, last], axis=-1)
 
 
-def right_jacobian(v: Floats) -> Floats:
+def right_jacobian(v: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch 3 3"]:
     """Return the matrix J (..., 3, 3) with exp(v + dv) = exp(v) exp(J dv) to first order."""
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     safe = np.maximum(angle, 1e-4)

@@ -5,12 +5,18 @@ For many poses planes take a third of the time of quaternions (..., 4), whose co
 in memory.
 """
 
+from typing import Annotated
+
 import numpy as np
 
 from posefield.common.units import Floats
 
 
-def product(a: Floats, b: Floats, out: Floats) -> None:
+def product(
+    a: Annotated[Floats, "4 *#batch"],
+    b: Annotated[Floats, "4 *#batch"],
+    out: Annotated[Floats, "4 *batch"],
+) -> None:
     """Write the products a b (4, ...), rotations b followed by a, to `out`."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
@@ -20,7 +26,11 @@ def product(a: Floats, b: Floats, out: Floats) -> None:
     np.add(aw * bz + ax * by - ay * bx, az * bw, out=out[3, ...])
 
 
-def rotate(q: Floats, v: Floats, out: Floats) -> None:
+def rotate(
+    q: Annotated[Floats, "4 *#batch"],
+    v: Annotated[Floats, "3 *#batch"],
+    out: Annotated[Floats, "3 *batch"],
+) -> None:
     """Write vectors v (3, ...) turned by q (4, ...) to `out`."""
     w, ux, uy, uz = q
     vx, vy, vz = v
@@ -32,7 +42,7 @@ def rotate(q: Floats, v: Floats, out: Floats) -> None:
     np.add(vz + w * tz, ux * ty - uy * tx, out=out[2, ...])
 
 
-def exp(v: Floats) -> Floats:
+def exp(v: Annotated[Floats, "3 *batch"]) -> Annotated[Floats, "4 *batch"]:
     """Return the quaternions (4, ...) of rotation vectors (3, ...), rad."""
     half = 0.5 * np.sqrt(np.sum(np.square(v), axis=0))
     found = np.empty((4, *half.shape))

@@ -1,12 +1,18 @@
 """Root travel of a cycle, added back to its poses."""
 
+from typing import Annotated
+
 import numpy as np
 
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 
 
-def add_travel(rotations: Floats, roots: Floats, gone: Floats) -> tuple[Floats, Floats]:
+def add_travel(
+    rotations: Annotated[Floats, "*poses joints 4"],
+    roots: Annotated[Floats, "*poses 3"],
+    gone: Annotated[Floats, "*poses 3"],
+) -> tuple[Annotated[Floats, "*poses joints 4"], Annotated[Floats, "*poses 3"]]:
     """Return rotations (..., J, 4) and root positions (..., 3), m, moved by a travel (..., 3).
 
     gone: travel to the left and ahead, m, and change of heading, rad.

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import Bones
 from posefield.common.bounded_types import Index, Name, Parent
 from posefield.common.units import Floats
 from posefield.motion import quat_planes
@@ -25,9 +27,9 @@ class Skeleton:
 
     names: tuple[Name, ...]
     parents: tuple[Parent, ...]
-    offsets: Floats
+    offsets: Bones
     tip_joints: tuple[Index, ...]
-    tip_offsets: Floats
+    tip_offsets: Annotated[Floats, "tips 3"]
 
     def __post_init__(self) -> None:
         count = len(self.names)
@@ -50,7 +52,9 @@ class Skeleton:
     def __len__(self) -> int:
         return len(self.names)
 
-    def at_rest(self, offsets: Floats) -> Floats:
+    def at_rest(
+        self, offsets: Annotated[Floats, "*poses joints 3"]
+    ) -> Annotated[Floats, "*poses joints 3"]:
         """Return the joint positions (..., J, 3) in the rest pose with offsets (..., J, 3), m."""
         positions = offsets.copy()
         for joint, parent in self._children():
@@ -62,7 +66,9 @@ class Skeleton:
         return self.names == other.names and self.parents == other.parents
 
 
-def translations(offsets: Floats, root_path: Floats) -> Floats:
+def translations(
+    offsets: Annotated[Floats, "*batch joints 3"], root_path: Annotated[Floats, "*batch frames 3"]
+) -> Annotated[Floats, "*batch frames joints 3"]:
     """Return local translations (..., T, J, 3) of constant bone offsets and a moving root.
 
     offsets: (..., J, 3). root_path: (..., T, 3).
@@ -74,8 +80,10 @@ def translations(offsets: Floats, root_path: Floats) -> Floats:
 
 
 def forward_kinematics(
-    parents: tuple[int, ...], rotations: Floats, translations: Floats
-) -> tuple[Floats, Floats]:
+    parents: tuple[int, ...],
+    rotations: Annotated[Floats, "*#poses joints 4"],
+    translations: Annotated[Floats, "*#poses joints 3"],
+) -> tuple[Annotated[Floats, "*poses joints 3"], Annotated[Floats, "*poses joints 4"]]:
     """Return joint positions (..., J, 3) and orientations (..., J, 4) in the character's frame.
 
     rotations (..., J, 4) and translations (..., J, 3) are local to the parent and broadcast against
@@ -90,7 +98,11 @@ def forward_kinematics(
     return places, turns
 
 
-def positions(parents: tuple[int, ...], rotations: Floats, translations: Floats) -> Floats:
+def positions(
+    parents: tuple[int, ...],
+    rotations: Annotated[Floats, "*#poses joints 4"],
+    translations: Annotated[Floats, "*#poses joints 3"],
+) -> Annotated[Floats, "*poses joints 3"]:
     """Return the joint positions (..., J, 3) alone; arguments as for `forward_kinematics`."""
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
     places = np.empty((*lead, len(parents), 3))
@@ -100,8 +112,10 @@ def positions(parents: tuple[int, ...], rotations: Floats, translations: Floats)
 
 
 def position_planes(
-    parents: tuple[int, ...], rotations: Floats, translations: Floats | Sequence[Floats]
-) -> Floats:
+    parents: tuple[int, ...],
+    rotations: Annotated[Floats, "joints 4 *poses"],
+    translations: Annotated[Floats, "joints 3 *#poses"] | Sequence[Annotated[Floats, "3 ..."]],
+) -> Annotated[Floats, "joints 3 *poses"]:
     """Return joint positions (J, 3, ...), one contiguous array per joint and component.
 
     rotations (J, 4, ...) and J translations (3, ...), which broadcast against the former, are local
@@ -122,27 +136,33 @@ def _blocks(
         yield block, _to_planes(turns[block], joints), _to_planes(arms[block], joints)
 
 
-def _rows(values: Floats) -> Floats:
+def _rows(
+    values: Annotated[Floats, "... joints components"],
+) -> Annotated[Floats, "poses joints*components"]:
     """Return values (..., J, k) of joints as one row (P, J k) per pose."""
     return values.reshape(-1, values.shape[-2] * values.shape[-1])
 
 
-def _to_planes(rows: Floats, joints: int) -> Floats:
+def _to_planes(
+    rows: Annotated[Floats, "poses columns"], joints: int
+) -> Annotated[Floats, "{joints} components poses"]:
     """Return rows (P, J k) as planes (J, k, P)."""
     return np.ascontiguousarray(rows.T).reshape(joints, -1, len(rows))
 
 
-def _from_planes(planes: Floats) -> Floats:
+def _from_planes(
+    planes: Annotated[Floats, "joints components poses"],
+) -> Annotated[Floats, "poses joints*components"]:
     """Return planes (J, k, P) as rows (P, J k)."""
     return planes.reshape(-1, planes.shape[-1]).T
 
 
 def _accumulate(
     parents: tuple[int, ...],
-    rotations: Floats,
-    translations: Floats | Sequence[Floats],
+    rotations: Annotated[Floats, "joints 4 *poses"],
+    translations: Annotated[Floats, "joints 3 *#poses"] | Sequence[Annotated[Floats, "3 ..."]],
     turning: frozenset[int],
-) -> tuple[Floats, Floats]:
+) -> tuple[Annotated[Floats, "joints 3 *poses"], Annotated[Floats, "joints 4 *poses"]]:
     """Return joint positions (J, 3, ...), and orientations (J, 4, ...) of the joints `turning`."""
     lead = rotations.shape[2:]
     places, turns = np.empty((len(parents), 3, *lead)), np.empty((len(parents), 4, *lead))
@@ -163,7 +183,7 @@ def joint_chain(parents: tuple[int, ...], joint: int) -> tuple[int, ...]:
     return tuple(reversed(found))
 
 
-def descendant_matrix(parents: tuple[int, ...]) -> Floats:
+def descendant_matrix(parents: tuple[int, ...]) -> Annotated[Floats, "joints joints"]:
     """Return the matrix (J, J) with 1 where the column's joint is the row's or a descendant."""
     below = np.eye(len(parents))
     for joint in range(len(parents) - 1, 0, -1):
