@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipPositions, PointControls, PoseVectors
+from posefield.common.array_shapes import PointControls, PoseVectors
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -76,14 +76,15 @@ class NaiveKriging:
 
 def fit_naive(
     points: Annotated[Floats, "clips controls"],
-    positions: ClipPositions,
+    positions: Annotated[Floats, "clips frames ..."],
     values: PoseVectors,
     covariance: str,
     fitter: VariogramFitter,
 ) -> NaiveKriging:
-    """Fit naive kriging to pose vectors (N, T, D), joint positions (N, T, J, 3) at points (N, d).
+    """Fit naive kriging to values (N, T, D) of each frame at points (N, d).
 
-    fitter: fits a variogram model to each frame's experimental variogram.
+    positions: joint positions (N, T, J, 3), or other quantities (N, T, ...), whose distances the
+    variogram is fitted to. fitter: fits a variogram model to each frame's experimental variogram.
     """
     fields = []
     for frame in range(values.shape[1]):
