@@ -112,7 +112,12 @@ def _with_shapes(hint: Any) -> Any:
     own = tuple(map(_with_shapes, args))
     if all(a is b for a, b in zip(own, args, strict=True)):
         return hint
-    return reduce(or_, own) if origin in (Union, UnionType) else origin[own]
+    if origin in (Union, UnionType):
+        return reduce(or_, own)
+    # Only arrays are checked: what stands beside them in a tuple may be anything.
+    return origin[
+        tuple(Any if a is b and a is not ... else a for a, b in zip(own, args, strict=True))
+    ]
 
 
 def _is_array(base: Any, dimensions: Any) -> bool:

@@ -144,7 +144,7 @@ def _next_iterate(
         if _weighted_error(
             (goal - found[0])[:hard_count], task.weights
         ) < SUFFICIENT_DECREASE * _weighted_error(left[:hard_count], task.weights):
-            return tried, found, share < 1.0
+            return tried, found, bool(share < 1.0)
         share *= 0.5
     return None
 

@@ -80,7 +80,10 @@ class MotionVariables:
 
         All other variables, such as the travel, are those of this motion.
         """
-        row, gone = self.reduced.row(at), self._travel_so_far(numbers, np.full(len(motions), at))
+        row, gone = (
+            self.reduced.row(at),
+            self._travel_so_far(numbers, np.full(len(motions), at, np.float64)),
+        )
         moves = row @ motions.reshape(len(motions), len(row), -1)
         return self.chain(joint).compute_poses(moves, gone).positions[:, -1]
 
@@ -88,7 +91,7 @@ class MotionVariables:
         self, numbers: Variables, joint: int, at: float
     ) -> tuple[Vector, Annotated[Floats, "3 variables"]]:
         """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
-        places = np.array([at])
+        places = np.array([at], np.float64)
         row, own = self.reduced.row(at), self.chain(joint)
         pose = own.compute_poses(
             row[None] @ self.motion(numbers), self._travel_so_far(numbers, places)
