@@ -161,10 +161,10 @@ def test_options_in_the_documents_exist():
         for block in document_pages.blocks(path.read_text()):
             text = block.text.replace("\\\n", " ")
             for name, rest in re.findall(r"^posefield (\w+)(.*)$", text, re.MULTILINE):
-                if name in found:
-                    options = {word for each in found[name].params for word in each.opts}
-                    words = re.findall(r"(?<!\S)(--[a-z-]+)", rest.partition("#")[0])
-                    assert set(words) <= options, (path, name)
+                assert name in found, (path, name)
+                options = {word for each in found[name].params for word in each.opts}
+                words = re.findall(r"(?<!\S)(--[a-z-]+)", rest.partition("#")[0])
+                assert set(words) <= options, (path, name)
 
 
 def test_every_problem_is_described():

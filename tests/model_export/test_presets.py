@@ -64,7 +64,7 @@ def with_preset(values, performer=None):
 def test_a_preset_within_the_clips_is_accepted():
     examples = fixture_models.reaches()
     who = examples[0].row.performer
-    preset_check.check_presets(with_preset({}, who), examples)
+    assert preset_check.check_presets(with_preset({}, who), examples) is None
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,6 @@ from posefield.question.results import Deviation
 from posefield.validation import input_limits
 from posefield.validation.imputation import ControlImputer
 
-
 DEVIATION_SHARE = 1e-3
 """Share of a control's range by which it may act at another value without a word: a slider that
 ends at the limit rounds its value.
