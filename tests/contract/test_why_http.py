@@ -24,7 +24,7 @@ def test_the_nearest_and_all_others_add_up_to_one(ask, controls, loaded):
 def test_all_are_listed_where_so_many_are_asked_for(ask, controls, loaded):
     found = ask("POST", WHY, json={"controls": controls, "nearest": 10000}).json()
     assert len(found["nearest"]) == loaded.find("reach").session.card.samples
-    assert found["others"] == {"count": 0, "weight": 0.0}
+    assert found["others"] == {"count": 0, "weight": 0.0, "share": 0.0}
 
 
 def test_who_is_asked_for_is_made_more_of_his_own_clips(ask, controls):
@@ -38,7 +38,7 @@ def test_who_is_asked_for_is_made_more_of_his_own_clips(ask, controls):
 
 def test_what_lies_outside_is_warned_of_or_refused(ask, controls):
     body = {"controls": {**controls, "turn": 1e3}}
-    assert "turn = 1000" in ask("POST", WHY, json=body).json()["warnings"][0]
+    assert "turn: asked 1000 deg, given" in ask("POST", WHY, json=body).json()["warnings"][0]
     refused = ask("POST", WHY, json={**body, "extrapolate": "refuse"})
     assert refused.json()["type"] == "urn:posefield:problem:outside-samples"
 

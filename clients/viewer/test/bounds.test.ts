@@ -37,7 +37,7 @@ describe("bounds of answers", () => {
       "speed: asked 3 m/s, given 2.375 m/s, captured 0.5 to 2 m/s; below what was asked",
     );
     const said = ["speed = 3 m/s lies outside", "time = 9 deg lies outside"];
-    assert.deepEqual(merged(said, found), [said[1], sentence(found[0]!)]);
+    assert.deepEqual(merged(said, found), [sentence(found[0]!), said[1]]);
     assert.equal(deviations(CARD, [-1, 0])[0]!.side, "above");
     assert.deepEqual(deviations(CARD, [2.376, 30.03]), []);
     assert.deepEqual(told([], 0.05), { band: "near" });

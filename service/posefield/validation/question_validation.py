@@ -184,9 +184,10 @@ def merge_warnings(
     """
     if extrapolate == "ok":
         return tuple(warnings)
-    told = tuple(f"{each.control} = " for each in deviations)
-    kept = (text for text in warnings if not text.startswith(told))
-    return (*kept, *(each.sentence for each in deviations))
+    told = {f"{each.control} =": each.sentence for each in deviations}
+    # A range warning begins with the control's name, an equals sign and the value.
+    merged = [told.pop(" ".join(text.split()[:2]), text) for text in warnings]
+    return (*merged, *told.values())
 
 
 def deviation(control: Control, asked: float, given: float) -> Deviation:

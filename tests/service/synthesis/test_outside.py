@@ -117,6 +117,15 @@ def test_what_was_asked_and_given_is_told_with_its_side(walk):
     assert "deviations" not in trust(walk, {"speed": at(speed, 0.5)}).facts()
 
 
+def test_warnings_are_one_for_each_control_in_the_card_s_order(labelled_path):
+    model = Synthesizer("labelled", session.load(labelled_path))
+    known = model.session.card.controls
+    shares = dict(zip([c.name for c in known], (3.0, 1.1, -3.0, -0.1), strict=True))
+    found = trust(model, {c.name: at(c, shares[c.name]) for c in known})
+    assert [text.split()[0].rstrip(":") for text in found.warnings] == list(shares)
+    assert ["asked" in text for text in found.warnings] == [True, False, True, False]
+
+
 def test_a_control_that_is_not_measured_acts_as_at_the_limit(labelled_path):
     model = Synthesizer("labelled", session.load(labelled_path))
     turn = model.session.card.control("turn")

@@ -96,8 +96,14 @@ export function sentence({ control, asked, given, unit, captured, side }: Deviat
 
 /** One warning for each control: a deviation tells the sampled range, too. */
 export function merged(warnings: readonly string[], found: readonly Deviation[]): string[] {
-  const told = (text: string) => found.some(({ control }) => text.startsWith(`${control} = `));
-  return [...warnings.filter((text) => !told(text)), ...found.map(sentence)];
+  const told = new Map(found.map((each) => [`${each.control} =`, sentence(each)]));
+  const merged = warnings.map((text) => {
+    const key = text.split(" ", 2).join(" ");
+    const own = told.get(key) ?? text;
+    told.delete(key);
+    return own;
+  });
+  return [...merged, ...told.values()];
 }
 
 /** What trust says of deviations, and the band of sigma. */
