@@ -87,8 +87,6 @@ def test_each_control_outside_the_samples_gives_a_warning(ask, controls, loaded)
     lines = answer.headers.get_list("posefield-warning")
     first = [re.match(r"\w+", json.loads(line))[0] for line in lines]
     assert first == [c.name for c in card.controls[:2]]
-        c.name for c in card.controls[:2]
-    ]
     # Proxies may join the lines: the joined line must come apart again.
     assert len(json.loads(f"[{', '.join(lines)}]")) == 2
     pose = ask("GET", url("/v1/models/reach/pose", outside, time=0)).json()
