@@ -3702,7 +3702,8 @@ export const KEYS = {
     "targets",
     "pin_feet",
     "unit",
-    "up"
+    "up",
+    "body"
   ],
   "NamedClipQuestion": [
     "name",
@@ -3769,7 +3770,8 @@ export const KEYS = {
     "fov",
     "height",
     "pixels",
-    "instancing"
+    "instancing",
+    "body"
   ],
   "SuggestQuestion": [
     "count",
