@@ -48,7 +48,7 @@ def refused(posefield):
 def quick(reaching_folder, tmp_path_factory):
     """Path of a recipe of few clips and frames."""
     text = (reaching_folder / "recipe.toml").read_text()
-    text = re.sub(r'(?s)\[\[controls\]\]\nname = "stature".*?\n\n', "", text)
+    text = re.sub(r'(?s)(\[\[controls\]\]\nname = "stature"|\[presets\.).*?\n\n', "", text)
     text = text.replace("frames = 100", "frames = 8").replace("0.5", "3.0")
     condition = '[clips.where]\nperformer = { among = ["tall"] }\n\n[alignment]\nrounds = 0\n\n'
     path = tmp_path_factory.mktemp("quick") / "quick.toml"

@@ -161,7 +161,9 @@ describe("the crowd", () => {
     await other.page.locator(".nearest li").first().waitFor();
     await other.page.route(/crowd.msgpack|readyz/, (route) => route.abort("connectionreset"));
     await other.page.getByRole("button", { name: "Crowd" }).click();
-    await other.page.getByText(/motions could not be computed. The service does not answer/).waitFor();
+    await other.page
+      .getByText(/motions could not be computed. The service does not answer/)
+      .waitFor();
     await other.page.unroute(/crowd.msgpack|readyz/);
     await other.page.locator(".crowd[data-frame]").waitFor({ timeout: 60_000 });
     await other.page.close();

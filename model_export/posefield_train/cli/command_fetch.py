@@ -11,7 +11,7 @@ from posefield.console.output import as_json
 
 
 def fetch(
-    data: Annotated[Literal["cmu", "hdm05"], typer.Argument(help="data set")],
+    data: Annotated[Literal["cmu", "hdm05"], typer.Argument(help="data set", metavar="DATA_SET")],
     source: Annotated[
         Path,
         typer.Argument(

@@ -53,7 +53,7 @@ def demo(
         bool, typer.Option("--once", help="end when the files are written, without a browser")
     ] = False,
 ) -> None:
-    """Serve the shipped models, write a few walks, a crowd and a reach, and show the page.
+    """Serve the shipped models, write some clips, and show the page.
 
     The service listens on this machine only and stays up until Ctrl-C. It takes no settings from
     the environment.

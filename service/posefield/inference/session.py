@@ -110,7 +110,11 @@ class Session:
         return self._raw_and_bounded_durations(controls, labels, level)[1]
 
     def state(
-        self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
+        self,
+        controls: Annotated[Floats, "1 controls"],
+        time: Frames,
+        labels: Annotated[Floats, "1 performers"] | None = None,
+        level: int = 0,
     ) -> PredictionState:
         """Return the intermediate values for one question: controls (1, d), times (S,).
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from posefield.common.array_shapes import (
     PerControl,
-    PointControls,
     Points,
     PointSamples,
     SampleMatrix,
@@ -68,8 +67,10 @@ class KrigingWeights:
         return np.sqrt(squared_distances(self.hyper, points, self.samples))
 
 
-def half_ranges(controls: PointControls, low: PerControl, high: PerControl) -> PointControls:
-    """Return controls (B, d) scaled so that the range from low to high (d,) is -1 to 1."""
+def half_ranges(
+    controls: Annotated[Floats, "*points controls"], low: PerControl, high: PerControl
+) -> Annotated[Floats, "*points controls"]:
+    """Return controls (..., d) scaled so that the range from low to high (d,) is -1 to 1."""
     return (2.0 * controls - low - high) / (high - low)
 
 

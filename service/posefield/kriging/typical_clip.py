@@ -5,9 +5,11 @@ the mean of sitting and standing. A medoid is a captured clip.
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import PerClip, Values
 from posefield.common.units import Floats, Indices
 
 NEAR = 0.25
@@ -21,12 +23,12 @@ NEIGHBOUR_QUANTILE = 0.95
 BISECTIONS = 30
 
 
-def medoid(places: Floats) -> int:
+def medoid(places: Annotated[Floats, "clips values"]) -> int:
     """Return the row of places (n, k) with the least sum of distances to all rows."""
     return typical_row(places, np.zeros(len(places)))
 
 
-def typical_row(places: Floats, costs: Floats) -> int:
+def typical_row(places: Annotated[Floats, "clips values"], costs: PerClip) -> int:
     """Return the medoid of the rows near given values.
 
     places (n, k): rows in the space of the open values. costs (n,): squared distances from the
@@ -48,10 +50,10 @@ class Neighbourhood:
     radius of that.
     """
 
-    places: Floats
+    places: Annotated[Floats, "clips values"]
     sets: tuple[tuple[Indices, float], ...]
 
-    def contains(self, point: Floats) -> bool:
+    def contains(self, point: Values) -> bool:
         """Return whether a point (k,) is near a captured clip, jointly and in each value."""
         apart = self.places - point
         return all(
@@ -59,7 +61,7 @@ class Neighbourhood:
             for columns, radius in self.sets
         )
 
-    def pull_in(self, start: Floats, end: Floats) -> Floats:
+    def pull_in(self, start: Values, end: Values) -> Values:
         """Return the point farthest from a clip `start` (k,) on the way to `end` (k,) inside."""
         if self.contains(end):
             return end
@@ -71,7 +73,7 @@ class Neighbourhood:
         return start + low * (end - start)
 
 
-def neighbourhood(places: Floats) -> Neighbourhood:
+def neighbourhood(places: Annotated[Floats, "clips values"]) -> Neighbourhood:
     """Return the surroundings of captured clips at places (n, k)."""
     width = places.shape[1]
     columns = [np.arange(width), *(np.array([i]) for i in range(width if width > 1 else 0))]

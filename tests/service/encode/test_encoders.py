@@ -55,7 +55,7 @@ def test_json_is_enough_to_place_the_joints(keyframes, walk):
 
 def test_json_states_its_units_and_trust(keyframes, walk):
     assert keyframes["units"]["rotation"].startswith("unit quaternion w x y z")
-    assert keyframes["trust"] == walk.trust.facts()
+    assert keyframes["trust"] == walk.trust.document()
 
 
 def test_json_never_holds_nan(walk):

@@ -13,7 +13,7 @@ from posefield.question.motion_question import PoseQuestion
 from posefield.synthesis import poses
 from posefield.synthesis.synthesizer import Synthesizer
 
-HASTE = [3.0 + 0.125 * number for number in range(2 * MAX_BATCH + 7)]
+HASTE = [3.0 + number / (2 * MAX_BATCH + 7) for number in range(2 * MAX_BATCH + 7)]
 
 
 @pytest.fixture(scope="module")
