@@ -192,6 +192,9 @@ def narrowed(spec, card):
     for name, only in (("unit", "m"), ("up", "y")):
         for question in ("ClipQuestion", "ClipsQuestion"):
             parts["schemas"][question]["properties"][name] = {"enum": [only, None]}
+    # Nor can it say which formats have a body.
+    for question in ("ClipQuestion", "ClipsQuestion"):
+        del parts["schemas"][question]["properties"]["body"]
     # That names differ cannot be said in a schema.
     del parts["schemas"]["NamedClipQuestion"]["properties"]["name"]
     parts["schemas"]["ClipsQuestion"]["properties"]["clips"]["maxItems"] = 3
@@ -207,6 +210,7 @@ def narrowed(spec, card):
         del narrow["paths"][f"/v1/models/{{model}}/{path}"]["get"]
     # One schema serves all formats, glTF too.
     given = narrow["paths"]["/v1/models/{model}/clip.{format}"]["get"]["parameters"]
+    given.remove({"$ref": "#/components/parameters/body"})
     for name, only in (("unit", "m"), ("up", "y")):
         given.remove({"$ref": f"#/components/parameters/{name}"})
         given.append({"name": name, "in": "query", "schema": {"enum": [only]}})

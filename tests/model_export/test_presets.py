@@ -36,15 +36,15 @@ def test_presets_keep_their_order_and_name_a_value_for_each_control():
     [
         (
             "[presets.stroll]\nspeed = 1.0\npace = 2.0\n",
-            "presets.stroll: found speed, pace, expected a",
+            "found speed, pace, expected a",
         ),
-        ("[presets.stroll]\n", "presets.stroll: found nothing, expected a value for each of"),
+        ("[presets.stroll]\n", "found nothing, expected a value for each of"),
         ("[presets.stroll]\nspeed = 'slow'\n", "presets.stroll.speed"),
         ("[presets.stroll]\nspeed = nan\n", "presets.stroll.speed"),
         ("[presets.Stroll]\nspeed = 1.0\n", "presets.Stroll"),
         (
             "[presets.stroll]\nspeed = 1.0\nperformer = 'ada'\n",
-            "presets.stroll.performer: found 'ada' and no kriging.label",
+            "found 'ada' and no kriging.label",
         ),
     ],
 )
