@@ -12,7 +12,7 @@ MAX_NAMES = 1000
 """Number of known names that are compared, as many as a motion file can have joints."""
 MIN_PREFIX = 3
 """Length from which the beginning of a name suggests it."""
-SIMILARITY = 0.66
+SIMILARITY = 0.7
 """Smallest similarity of a suggestion: share of equal characters, as `difflib` defines it."""
 
 

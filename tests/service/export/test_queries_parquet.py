@@ -66,7 +66,7 @@ def test_a_row_asks_for_a_clip(model, table):
         ({"turn": pa.array(["10"])}, "column 'turn' of type string, expected a number in deg"),
         ({"turn": pa.array([True])}, "column 'turn' of type bool, expected a number in deg"),
         ({"name": pa.array([7])}, "column 'name' of type int64, expected 1 to 100 of"),
-        ({"fsp": pa.array([7])}, "unknown column 'fsp', did you mean 'fps'?"),
+        ({"fpss": pa.array([7])}, "unknown column 'fpss', did you mean 'fps'?"),
         ({"stature [cm]": pa.array([7.0])}, "column 'stature' in the unit 'cm', expected m"),
         ({"stature [m]": pa.array([7.0])}, "column 'stature' twice, expected once"),
         ({"controls": pa.array([POINT])}, "unknown column 'controls', "),
