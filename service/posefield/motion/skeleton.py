@@ -67,7 +67,7 @@ class Skeleton:
 
 
 def translations(
-    offsets: Annotated[Floats, "*batch joints 3"], root_path: Annotated[Floats, "*batch frames 3"]
+    offsets: Annotated[Floats, "*#batch joints 3"], root_path: Annotated[Floats, "*batch frames 3"]
 ) -> Annotated[Floats, "*batch frames joints 3"]:
     """Return local translations (..., T, J, 3) of constant bone offsets and a moving root.
 
