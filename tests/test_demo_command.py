@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 
 import httpx
 import pytest
@@ -67,10 +68,20 @@ def test_usd_files_have_characters(made):
     assert set(counts.values()) == {1}
 
 
+@contextmanager
+def started(words, **options):
+    """Start a command and end it where the test fails, which would wait for it for ever."""
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, **options) as child:
+        try:
+            yield child
+        finally:
+            child.terminate()
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_stays_up_until_a_signal_and_takes_the_service_with_it(tmp_path, number):
     words = [*DEMO, "--no-browser", "--output", tmp_path]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+    with started(words) as child:
         lines = iter(child.stdout.readline, "")
         address = next(line.split()[2] for line in lines if line.startswith("the page: "))
         listed = httpx.get(f"{address}v1/models").json()["models"]
@@ -88,7 +99,7 @@ def test_the_browser_is_shown_the_page_unless_told_otherwise(tmp_path, words):
     browser.chmod(0o755)
     given = {**os.environ, "BROWSER": str(browser)}
     command = [*DEMO, *words, "--output", tmp_path / "demo"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=given) as child:
+    with started(command, env=given) as child:
         lines = iter(child.stdout.readline, "")
         page = next((line.split()[2] for line in lines if line.startswith("the page: ")), None)
         shown = serving.within(30 if not words else 1, seen.exists)

@@ -12,7 +12,7 @@ import urllib.error
 import urllib.request
 import webbrowser
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, NoReturn
@@ -40,6 +40,8 @@ FILES = {
 ANSWER_TIMEOUT, STOP_TIMEOUT = 60.0, 20.0
 """Seconds for an answer, and for the service's end."""
 
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
 
 def demo(
     output: Annotated[Path, typer.Option("--output", "-o", help="folder for the files")] = Path(
@@ -58,12 +60,14 @@ def demo(
     The service listens on this machine only and stays up until Ctrl-C. It takes no settings from
     the environment.
     """
-    # SIGTERM ends the service as well, by the `finally` below.
-    before = signal.signal(signal.SIGTERM, _exit_on_signal)
+    # Both end the service too, by `_served`. A shell starts commands in the background with SIGINT
+    # ignored, and Python keeps it so unless told otherwise.
+    before = {number: signal.signal(number, _exit_on_signal) for number in STOP_SIGNALS}
     try:
         _show(output, port, browser, once)
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _show(output: Path, port: int, browser: bool, once: bool) -> None:
@@ -78,9 +82,8 @@ def _show(output: Path, port: int, browser: bool, once: bool) -> None:
         typer.echo(f"the page: {address}/  the contract: {address}/docs  end with Ctrl-C")
         if browser and _has_desktop():
             webbrowser.open(f"{address}/")
-        with suppress(KeyboardInterrupt):
-            code = service.wait()
-            raise WorkerDied(f"the service of the demo has ended with exit code {code}")
+        code = service.wait()
+        raise WorkerDied(f"the service of the demo has ended with exit code {code}")
 
 
 @contextmanager
