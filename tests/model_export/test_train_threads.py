@@ -28,7 +28,7 @@ drift = 1
 def content(reaching_folder, tmp_path):
     """Function that trains thirty clips at eight frames in a process of its own."""
     text = (reaching_folder / "recipe.toml").read_text()
-    text = re.sub(r'(?s)\[\[controls\]\]\nname = "stature".*?\n\n', "", text)
+    text = re.sub(r'(?s)(\[\[controls\]\]\nname = "stature"|\[presets\.).*?\n\n', "", text)
     text = text.replace("frames = 100", "frames = 8").replace("[size]", f"{SHORT}[size]")
     recipe = tmp_path / "recipe.toml"
     recipe.write_text(text)

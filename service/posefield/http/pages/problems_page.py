@@ -40,7 +40,9 @@ PROBLEM_TEXTS: dict[ProblemKind, ProblemText] = {
     problems.BAD_BODY: ProblemText(
         "The body is not valid JSON, or a field is unknown, missing or of the wrong type.",
         "Compare the field at `pointer` with the schema of the operation's body.",
-        "frames: Object contains unknown field `frames`",
+        "frames: Object contains unknown field `frames` (did you mean 'names'?), expected some of "
+        "controls, extrapolate, performer, level, joint_sigma, exact, targets, pin_feet, fps, "
+        "start, end, names, root, loop, unit, up, body",
         {"pointer": "/frames"},
     ),
     problems.UNAUTHENTICATED: ProblemText(
@@ -64,7 +66,7 @@ PROBLEM_TEXTS: dict[ProblemKind, ProblemText] = {
         "The service has no model with this name, or with this name and hash, in the key's scope. "
         "The service removes old hashes when newer versions of a model arrive.",
         "List the models at `/v1/models`. The plain name selects the newest version of a model.",
-        "model: no model 'reich'; there are reach@0123456789abcdef",
+        "model: no model 'reich' (did you mean 'reach'?); there are reach@0123456789abcdef",
         {"parameter": "model"},
     ),
     QUERY_ERROR_PROBLEMS[UnknownFormat]: ProblemText(
