@@ -81,7 +81,7 @@ def not_ready(app):
 
 PROVOKED = {
     "bad-parameter": by_request("GET", f"{CLIP}?{CONTROLS}&turn=20&fps=abc"),
-    "bad-body": by_request("POST", CLIP, json={"controls": {}, "frames": 3}),
+    "bad-body": by_request("POST", CLIP, json={"controls": {}, "fps": "fast"}),
     "unknown-host": by_request("GET", "/livez", headers={"host": "evil.example"}),
     "unauthenticated": with_key(),
     "forbidden": with_key(authorization=f"Bearer {KEY}"),

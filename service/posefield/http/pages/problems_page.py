@@ -40,10 +40,8 @@ PROBLEM_TEXTS: dict[ProblemKind, ProblemText] = {
     problems.BAD_BODY: ProblemText(
         "The body is not valid JSON, or a field is unknown, missing or of the wrong type.",
         "Compare the field at `pointer` with the schema of the operation's body.",
-        "frames: Object contains unknown field `frames` (did you mean 'names'?), expected some of "
-        "controls, extrapolate, performer, level, joint_sigma, exact, targets, pin_feet, fps, "
-        "start, end, names, root, loop, unit, up, body",
-        {"pointer": "/frames"},
+        "fps: Expected `float`, got `str` 'fast'",
+        {"pointer": "/fps"},
     ),
     problems.UNAUTHENTICATED: ProblemText(
         "The service requires a key or a token, and the request has none, or one that is unknown, "
