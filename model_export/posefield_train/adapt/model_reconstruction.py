@@ -118,7 +118,7 @@ def _proportions(file: _ModelFile) -> Proportions:
 def _bank(file: _ModelFile) -> KrigingBank:
     """Return the coefficient models over the samples in the order of the card."""
     card = file.card
-    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
+    low, high = card.sampled_ranges
     points = kriging_model.half_ranges(np.array(card.examples), low, high)
     points = np.hstack([points, card.labels])
     order = _order(file, points)

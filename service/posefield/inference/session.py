@@ -194,8 +194,7 @@ class Session:
     def kriging_weights(self) -> KrigingWeights:
         """Kriging weights of the captured clips."""
         own = self.card
-        low, high = np.transpose([(c.minimum, c.maximum) for c in own.controls])
-        points = kriging_model.half_ranges(np.array(own.examples), low, high)
+        points = kriging_model.half_ranges(np.array(own.examples), *own.sampled_ranges)
         return KrigingWeights(own.kriging, np.hstack([points, own.labels]))
 
     @property

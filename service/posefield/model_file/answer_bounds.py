@@ -88,8 +88,7 @@ class AnswerBounds:
 
 def of_card(card: ModelCard) -> AnswerBounds:
     """Return the bounds of a model's answers."""
-    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
-    return AnswerBounds(low, high, card.durations)
+    return AnswerBounds(*card.sampled_ranges, card.durations)
 
 
 def limit_control(control: Control, value: float) -> float:

@@ -150,6 +150,12 @@ class ModelCard:
         moved = np.array(self.moved_by or [0] * len(self.examples))
         return np.eye(max(len(self.performers), 1), len(self.performers))[moved]
 
+    @property
+    def sampled_ranges(self) -> tuple[Floats, Floats]:
+        """Return the smallest and the largest sampled value (d,) of each control."""
+        low, high = np.transpose([(c.minimum, c.maximum) for c in self.controls])
+        return low, high
+
     def control(self, name: str) -> Control | None:
         """Return the control of that name; None for an unknown name."""
         return next((c for c in self.controls if c.name == name), None)

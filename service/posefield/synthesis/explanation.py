@@ -66,8 +66,8 @@ def _support_report(door: QuestionValidator, question: ValidatedQuestion) -> Sup
 
 def _point(card: ModelCard, question: ValidatedQuestion) -> Floats:
     """Return the point (1, d + p) of the kriging model."""
-    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
-    return np.hstack([kriging_model.half_ranges(question.point, low, high), question.labels])
+    place = kriging_model.half_ranges(question.point, *card.sampled_ranges)
+    return np.hstack([place, question.labels])
 
 
 def _captured_clip(

@@ -75,9 +75,8 @@ class ControlImputer:
     def __init__(self, card: ModelCard) -> None:
         self._controls = card.controls
         self._examples, self._labels = np.array(card.examples), card.labels
-        ends = np.transpose([(c.minimum, c.maximum) for c in card.controls])
-        self._low, self._high = ends
-        self._scaled = kriging_model.half_ranges(self._examples, *ends)
+        self._low, self._high = card.sampled_ranges
+        self._scaled = kriging_model.half_ranges(self._examples, self._low, self._high)
 
     def impute(self, given: Mapping[str, float], labels: Floats) -> dict[str, float]:
         """Return all controls in the card's order, those not given as in a typical captured clip.
@@ -112,6 +111,7 @@ class ControlImputer:
             fit_gaussian(samples, weights=np.exp(-0.5 * near)),
             known | (beside if who.any() else {}),
             open_,
+            (self._low[open_], self._high[open_]),
             typical_clip.neighbourhood(self._scaled[:, open_]),
         )
 
@@ -150,7 +150,8 @@ class LocalImputer:
 
     clip: controls (d,) of the captured clip. gaussian: of the clips about it: controls, labels and
     measured quantities. known: values of the given columns. open: controls that are not given (d,).
-    surroundings: of the captured clips, in the open controls in half-ranges.
+    ranges: smallest and largest sampled value of each open control. surroundings: of the captured
+    clips, in the open controls in half-ranges.
     """
 
     controls: tuple[Control, ...]
@@ -158,6 +159,7 @@ class LocalImputer:
     gaussian: ConditionalGaussian
     known: Mapping[int, float]
     open: Booleans
+    ranges: tuple[Floats, Floats]
     surroundings: Neighbourhood
 
     def captured(self) -> dict[str, float]:
@@ -176,12 +178,12 @@ class LocalImputer:
         for i, control in enumerate(self.controls):
             if self.open[i] and control.values:
                 row[i] = min(control.values, key=lambda value: abs(value - row[i]))
-        ends = np.transpose([(c.minimum, c.maximum) for c in self.controls])[:, self.open]
+        low, high = self.ranges
         start, end = (
-            kriging_model.half_ranges(place[self.open], *ends) for place in (self.clip, row)
+            kriging_model.half_ranges(place[self.open], low, high) for place in (self.clip, row)
         )
         inside = self.surroundings.pull_in(start, end)
-        row[self.open] = 0.5 * (inside * (ends[1] - ends[0]) + ends[0] + ends[1])
+        row[self.open] = 0.5 * (inside * (high - low) + low + high)
         return self._complete(row)
 
     def _complete(self, row: Floats) -> dict[str, float]:
