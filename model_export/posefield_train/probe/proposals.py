@@ -10,6 +10,8 @@ from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield_train.probe.figure import Figure
 from posefield_train.source.bone_lengths import UNITS
+from posefield_train.source.bvh import bvh_conversion
+from posefield_train.source.bvh.bvh_conversion import Up
 
 Confidence = Literal["certain", "high", "medium", "low", "none"]
 
@@ -91,11 +93,8 @@ def _rest_axis(figures: Sequence[Figure]) -> Vote:
     """Return the axis from the feet to the head of the figure at rest."""
     found = []
     for figure in figures:
-        rest = np.zeros((1, len(figure.names), 3))
-        for index, joint in enumerate(figure.file.joints):
-            before = rest[0, joint.parent] if joint.parent >= 0 else 0.0
-            rest[0, index] = before + np.array(joint.offset)
-        found.append(_upward(figure, rest))
+        joints = bvh_conversion.skeleton(figure.file, metres_per_unit=1.0, up="y")
+        found.append(_upward(figure, joints.at_rest(joints.offsets)[None]))
     known = [each for each in found if each is not None]
     return _main_axis(known, "from the feet to the head at rest")
 
@@ -141,7 +140,7 @@ def _floor_axis(figures: Sequence[Figure]) -> Vote:
     return name, f"{said}other axis by {others:.1%} or more"
 
 
-def propose_feet(figures: Sequence[Figure], up: str | None) -> Proposal:
+def propose_feet(figures: Sequence[Figure], up: Up | None) -> Proposal:
     """Return the joints of the feet: the lowest of the joints that are named as feet or toes."""
     first = figures[0]
     roles = [role for role in ("Toes", "Foot") if first.pair(role)]
@@ -166,7 +165,7 @@ def _alike(figure: Figure, other: Figure) -> bool:
     return figure.names == other.names
 
 
-def propose_facing(figures: Sequence[Figure], up: str | None) -> Proposal:
+def propose_facing(figures: Sequence[Figure], up: Up | None) -> Proposal:
     """Return the angle from the root's forward axis to the body's, degrees to the left.
 
     Training takes +z of the root (after conversion to y up) as forward.
@@ -188,20 +187,16 @@ def propose_facing(figures: Sequence[Figure], up: str | None) -> Proposal:
     return Proposal(value, "high" if agree > 0.9 and abs(mean) < 45.0 else "low", tuple(said))
 
 
-def _facing(figure: Figure, up: str) -> float | None:
+def _facing(figure: Figure, up: Up) -> float | None:
     """Return the mean angle of the body's forward direction to the root's +z, rad, or None."""
     pair = figure.pair("UpperLeg") or figure.pair("UpperArm")
     if pair is None:
         return None
-    left, right = (_y_up(points, up) for points in pair)
+    left, right = (bvh_conversion.to_y_up(points, up) for points in pair)
     across = left - right
     # Forward is left turned by a quarter: x to z, and z to -x.
     body = np.arctan2(-across[:, 2], across[:, 0])
     turns = figure.turns.copy()
-    turns[:, 1:] = _y_up(turns[:, 1:], up)
+    turns[:, 1:] = bvh_conversion.to_y_up(turns[:, 1:], up)
     heading = quat.twist(turns, np.array([0.0, 1.0, 0.0]))
     return float(np.angle(np.mean(np.exp(1j * (body - heading)))))
-
-
-def _y_up(vectors: Floats, up: str) -> Floats:
-    return vectors if up == "y" else vectors[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
