@@ -26,7 +26,7 @@ WIDE, HIGH, SCALE = 480, 400, 190.0
 LOWEST, HIGHEST, SPEEDS = 0.7, 1.6, 10
 TURN = np.radians(52.0)
 PARTS = 2
-"""How often each triangle is cut into four, so that its shades change smoothly."""
+"""Number of times that each triangle is divided into four, for smooth shading."""
 SUN = np.array([0.35, 0.65, 0.67])
 SKIN = np.array([122.0, 156.0, 214.0])
 BACKGROUND, FLOOR, INK, ACCENT = (238, 241, 246), (222, 227, 235), (60, 66, 80), (45, 100, 200)

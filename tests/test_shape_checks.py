@@ -70,7 +70,7 @@ print(len(names) > 200, hasattr(quat.conj, "__wrapped__"), quat.conj(np.array([1
 
 
 def bare(hint: ast.AST | None) -> bool:
-    """Whether an annotation has an array without a shape."""
+    """Return whether an annotation has an array without a shape."""
     if isinstance(hint, ast.Subscript) and ast.unparse(hint.value) == "Annotated":
         return False
     if isinstance(hint, ast.Name):

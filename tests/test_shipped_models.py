@@ -17,7 +17,7 @@ from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
 NAMES = ("cmu_walk", "reaching")
-# Share-alike and non-commercial licences bind whoever takes the wheel: nothing of theirs ships.
+# Share-alike and non-commercial licences would restrict users of the wheel: it has no such data.
 BINDING = re.compile(r"\b(SA|NC|ND)\b|share-?alike|non-?commercial|HDM05|Bandai", re.IGNORECASE)
 SAME = 1e-5
 """Bound, m, of the difference between answers of a shipped model and of one trained again."""

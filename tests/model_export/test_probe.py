@@ -77,7 +77,7 @@ def test_the_unit_follows_from_the_legs(clip, written, unit):
 
 
 def test_an_odd_unit_has_a_low_confidence(clip, written):
-    """Negative control: legs of 1.3 m in the nearest unit are nobody's."""
+    """Negative control: in the nearest unit the legs are 1.3 m long, longer than an adult's."""
     assert proposed(written(clip, metres=0.0065), "metres_per_unit").confidence == "low"
 
 

@@ -74,10 +74,7 @@ class PositionConstraint:
         return values[list(self.axes)], gradients[list(self.axes)]
 
     def evaluate_motions(
-        self,
-        scene: MotionVariables,
-        numbers: Variables,
-        motions: ReducedMotions,
+        self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
     ) -> Annotated[Floats, "motions values"]:
         """Return the values (n, k) of other motions."""
         at = _moment_frame(scene, numbers, self.moment, self.at)
@@ -107,10 +104,7 @@ class StepLengthConstraint:
         return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
 
     def evaluate_motions(
-        self,
-        scene: MotionVariables,
-        numbers: Variables,
-        motions: ReducedMotions,
+        self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
     ) -> Annotated[Floats, "motions 1"]:
         """Return the values (n, 1) of other motions."""
         at = _moment_frame(scene, numbers, self.moment, 0.0)
@@ -146,10 +140,7 @@ class TravelConstraint:
         return np.array([value]), gradients
 
     def evaluate_motions(
-        self,
-        scene: MotionVariables,
-        numbers: Variables,
-        motions: ReducedMotions,
+        self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
     ) -> Annotated[Floats, "motions 1"]:
         """Return the values (n, 1) of other motions: all equal, without their own travel."""
         return np.repeat(self.evaluate(scene, numbers)[0][None], len(motions), axis=0)

@@ -82,7 +82,7 @@ def edges(mesh):
 
 
 def closed(mesh):
-    """Whether every edge is gone along once in each direction."""
+    """Return whether each edge belongs to two faces, in opposite directions."""
     there = {tuple(edge) for edge in edges(mesh).tolist()}
     return len(there) == len(edges(mesh)) and there == {(b, a) for a, b in there}
 

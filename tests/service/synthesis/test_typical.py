@@ -115,7 +115,7 @@ def test_open_controls_are_those_of_one_captured_clip_near_the_given_ones(card):
 
 
 def test_a_choice_never_lies_between_two_clusters(card):
-    """Who sits or stands is one of the two, though the mean of all hips lies between them."""
+    """The chosen hip height is that of sitting or standing; the mean of all lies between them."""
     hips = np.unique([point[1] for point in card.examples])
     below, above = max(itertools.pairwise(hips), key=lambda pair: pair[1] - pair[0])
     chooser = ControlImputer(card)

@@ -11,7 +11,7 @@ from posefield.encode.body.bone_chain import BoneChain, ChainPlace
 from posefield.encode.body.mesh_builder import MeshBuilder
 
 EVEN = (0.35, 0.75)
-"""How far the first rings have turned from the angles of the trunk's points to even ones."""
+"""Shares, for the first two rings, of the change from the trunk's angles to even angles."""
 
 
 class Ring(NamedTuple):
@@ -80,7 +80,7 @@ ANKLE = (
 SOLE, TIP, ANKLE_HEIGHT = 0.024, 0.002, 0.075
 """Heights above the sole, m: of the toe joint and of its tip at least, else of the ankle."""
 THUMB = ((0.012, 0.014), (0.034, 0.012), (0.052, 0.008))
-"""How far the rings of a thumb lie from the hand, and their radii, m."""
+"""Distance from the hand and radius of each ring of a thumb, m."""
 
 
 def build_leg(mesh: MeshBuilder, plan: PersonPlan, leg: Limb, loop: Sequence[int]) -> None:

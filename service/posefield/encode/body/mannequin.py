@@ -17,7 +17,7 @@ from posefield.motion.skeleton import Skeleton
 
 INFLUENCES = 4
 ROUNDS, PULL = 5, 0.5
-"""How often each point's weights move to the mean of its neighbours', and by what share."""
+"""Rounds of smoothing of the skin weights, and share of the neighbours' mean in each round."""
 TAIL = 0.03
 """Radius, m, at the start of bones that no person has."""
 
