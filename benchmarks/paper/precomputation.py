@@ -4,8 +4,8 @@ import numpy as np
 from family import Family
 
 from posefield_train.align import time_alignment
-from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
 from posefield_train.kriging import naive_kriging as per_frame
+from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.naive_kriging import NaiveKriging, VariogramFitter
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor import hosvd, motion_tensor
@@ -16,6 +16,8 @@ NAIVE = (
     "naive kriging: kinematics of all frames, then for each frame the dissimilarity of all pairs "
     "of poses, an experimental variogram fitted by {}, and a kriging system with its inverse"
 )
+# Range of the nugget, in sills.
+NUGGETS = 1e-3, 10.0
 FITS: dict[str, VariogramFitter] = {
     "SciPy's least_squares": variogram.fit_by_search,
     "our own linearised grid search": variogram.fit_by_grid,
@@ -39,7 +41,10 @@ def ours(made: Family, ranks: tuple[int, int, int]) -> tuple[TuckerTensor, Unive
 def guess(made: Family, reduced: TuckerTensor) -> Hyper:
     """Return kriging parameters from the variogram of the motions' slices of the core."""
     experimental = variogram.residual_variogram(made.samples, reduced.motions, 1)
-    return kriging_tuning.initial_guess(experimental, made.samples.shape[1], "matern52", (1,))
+    fitted = variogram.fit_by_grid(experimental, "matern52")
+    nugget = fitted.nugget / fitted.sill if fitted.sill > 0.0 else NUGGETS[1]
+    scales = np.full(made.samples.shape[1], 1.0 / fitted.range)
+    return Hyper("matern52", (1,), scales, float(np.clip(nugget, *NUGGETS)), 1.0, 0.0, 0.0)
 
 
 def naive(made: Family, fitter: VariogramFitter) -> NaiveKriging:

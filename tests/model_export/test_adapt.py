@@ -65,9 +65,9 @@ def adapted(trained, known):
     return adaptation.adapt(known, examples(trained, "cy", SHOWN), "cy")
 
 
-def misses(recipe, trained, model, name):
-    """Mean distance of a model's answers from the newcomer's own clips that it was not shown, m."""
-    asked = examples(trained, "cy", ASKED)
+def misses(recipe, trained, model, name, whose="cy"):
+    """Mean distance of a model's answers from a performer's own clips that it was not shown, m."""
+    asked = examples(trained, whose, ASKED)
     said = Queries(np.stack([e.controls for e in asked]), [name] * len(asked))
     made = methods.predict_posefield(recipe, replace(trained, model=model), said)
     pairs = zip(made, asked, strict=True)
@@ -105,7 +105,17 @@ def test_the_newcomer_has_bones_of_their_own(trained, adapted):
     assert np.abs(found[1] - expected).max() > 0.02
 
 
-def test_those_who_were_known_are_met_as_before(trained, known, adapted):
+def test_those_who_were_known_are_met_as_before(recipe, trained, known, adapted):
+    """Measured 4.5 mm from their own clips before and 4.9 mm after.
+
+    Without a correlation and an offset of performers it was 8.3 and 8.7 mm.
+    """
+    before, after = (
+        np.mean([misses(recipe, trained, model, who, who) for who in ("a", "b", "d")])
+        for model in (trained.model, adapted.model)
+    )
+    assert after < 0.006 and after < 1.2 * before
+    assert misses(recipe, trained, adapted.model, "a", "b") > 0.02
     old, new = trained.model, adapted.model
     assert new.bank.performers == ("a", "b", "cy", "d")
     assert old.bank.performers == ("a", "b", "d")
@@ -120,7 +130,7 @@ def test_those_who_were_known_are_met_as_before(trained, known, adapted):
     gaps = np.linalg.norm(joints(new, whose) - joints(old, whose), axis=-1).mean()
     # Negative control: asked for by the places of their labels, which have moved.
     wrong = ["cy" if name == "d" else name for name in whose]
-    assert gaps < 0.004 < np.linalg.norm(joints(new, wrong) - joints(old, whose), axis=-1).mean()
+    assert gaps < 0.008 < np.linalg.norm(joints(new, wrong) - joints(old, whose), axis=-1).mean()
 
 
 def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(known, adapted):
@@ -140,7 +150,7 @@ def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(kno
     assert lost(numbers) < known.truncation
     # Negative control: by the old bases alone more is lost.
     r1, r2, _ = reduced.core.shape
-    assert extended.ranks[0] > r1
+    assert extended.ranks[:2] != (r1, r2)
     fewer = extended.full.truncated((r1, r2, extended.ranks[2])).restored()
     assert lost(extended.tensor.numbers(fewer)) > lost(numbers)
 

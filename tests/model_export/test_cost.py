@@ -38,8 +38,8 @@ def held(exported):
 def test_numbers_are_those_that_the_file_holds(held, trained):
     ranks = trained.model.decoder.reduced.core.shape
     motion = sum(held[name].size for name in ("core", "directions", "time_basis", "pose_weights"))
-    # Those of one and of the controls stand side by side for all fields.
-    drift = ranks[2] * len(held["drift_weights"])
+    # Those of one and of the controls stand side by side for all quantities.
+    drift = ranks[2] * len(held["linear_weights"])
     assert motion + drift == truncation_cost.storage_cost(trained.tensor, 4).evaluate(*ranks)
     assert motion + drift < sum(own.size for own in held.values()), "sigma's matrix is the largest"
 
@@ -48,7 +48,7 @@ def test_levels_read_what_the_file_holds_for_them(held, exported):
     model, levels = exported.model, exported.card.levels
     finest = ("core", "directions", "time_basis", "samples", "precision")
     duals = [f"{name}_weights" for name in ("pose", *model.bank.others)]
-    drift = held["drift_weights"][:, 2:].size
+    drift = held["linear_weights"][:, 2:].size
     whole = sum(held[name].size for name in (*finest, *(n for n in duals if n in held)))
     assert levels[0].numbers == whole + drift
     for number, level in enumerate(levels[1:], start=1):

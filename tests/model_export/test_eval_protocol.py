@@ -376,6 +376,16 @@ def test_what_cannot_be_trained_is_named(recipe, family):
         protocol.run_protocol(recipe, few, "performer", JOBS, lambda done, parts: None)
 
 
+def test_a_line_that_hangs_on_one_clip_cannot_be_compared(family):
+    names, lonely = ("v",), [replace(e, controls=np.zeros(1)) for e in family[:5]]
+    lonely[3] = replace(lonely[3], controls=np.ones(1))
+    line = lonely[3].row.line
+    with pytest.raises(TrainingError, match=f"without the clip of line {line} .* fit a line"):
+        methods.check_lines(lonely, names)
+    lonely[1] = replace(lonely[1], controls=np.ones(1))
+    methods.check_lines(lonely, names)
+
+
 def test_a_recipe_says_what_can_be_asked(recipe, family):
     assert protocol.protocols(recipe, family) == ["clip", "performer"]
     alone = [replace(e, row=replace(e.row, performer="a")) for e in family]

@@ -103,12 +103,12 @@ def test_a_joint_that_is_not_there_is_refused_by_name(small_recipe, trained):
         truncation_error.truncation_reference(own, trained.examples, trained.tensor)
 
 
-def chosen(own, trained, judge, **size):
+def chosen(own, trained, judge, limits=None, **size):
     """Fidelity and cost of the ranks that a size asks for."""
     empty = {"rms_budget_cm": None, "p99_budget_cm": None, "effector_budget_cm": None}
     asked = own.size.model_copy(update={**empty, **size})
     price = truncation_cost.RANK_COSTS[asked.cost](trained.tensor, 4)
-    found = ranks.choose_ranks(asked, trained.full, price, judge)
+    found = ranks.choose_ranks(asked, trained.full, price, judge, limits or {})
     return judge.evaluate(trained.full.truncated(found)), price.evaluate(*found), found
 
 
@@ -116,7 +116,7 @@ def chosen(own, trained, judge, **size):
 def test_a_budget_is_kept_by_true_distances_and_not_wasted(small_recipe, trained, judge, name):
     looser = {"rms": 1.5, "p99": 4.0, "effector": 2.0}
     found, price, _ = chosen(small_recipe, trained, judge, **{f"{name}_budget_cm": looser[name]})
-    assert 0.85 * looser[name] < 100 * getattr(found, name) <= looser[name]
+    assert 0.8 * looser[name] < 100 * getattr(found, name) <= looser[name]
     half = {f"{name}_budget_cm": 0.5 * looser[name]}
     assert chosen(small_recipe, trained, judge, **half)[1] > 1.3 * price
 
@@ -128,6 +128,25 @@ def test_all_budgets_given_are_kept(small_recipe, trained, judge):
     found, price, _ = chosen(small_recipe, trained, judge, **tight)
     assert found.rms <= 0.015 and found.effector <= 0.5 * alone.effector < alone.effector
     assert price > cheap
+
+
+def test_the_smaller_of_a_budget_and_its_limit_is_kept(small_recipe, trained, judge):
+    budget = {"rms_budget_cm": 1.5}
+    free, cheap, triple = chosen(small_recipe, trained, judge, **budget)
+    looser = chosen(small_recipe, trained, judge, {"rms": 0.02}, **budget)
+    assert looser == (free, cheap, triple)
+    for name in ("rms", "effector"):
+        limit = 0.5 * getattr(free, name)
+        found, price, _ = chosen(small_recipe, trained, judge, {name: limit}, **budget)
+        assert 0.8 * limit < getattr(found, name) <= limit and price > cheap
+
+
+def test_training_cuts_off_little_beside_what_it_cannot_predict(small_recipe, trained):
+    """The prediction of a left-out clip misses more than six times what truncation adds."""
+    assert small_recipe.event is not None
+    limit = np.sqrt(trained.left_out_errors.mean()) / 6
+    assert limit < 0.01 * small_recipe.size.rms_budget_cm
+    assert 0.7 * limit < trained.truncation_errors.rms <= limit
 
 
 def test_cost_decides_which_ranks_are_the_cheapest(small_recipe, trained, judge):
@@ -152,9 +171,6 @@ def test_predicted_error_is_the_true_one(small_recipe, trained, judge):
     predicted = trained.tensor.rms(np.sum(trained.full.core**2) - np.sum(kept.core**2))
     # Training computes on one thread, which rounds otherwise.
     assert vars(trained.truncation_errors) == pytest.approx(vars(judge.evaluate(kept)))
-    assert (
-        abs(trained.truncation_errors.rms / (0.01 * small_recipe.size.rms_budget_cm) - 1.0) < 0.05
-    )
     assert abs(predicted / trained.truncation_errors.rms - 1.0) > 0.005
 
 

@@ -1,13 +1,20 @@
 """Tests of the selection of kriging models by leave-one-out error."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from posefield_train.kriging import coefficient_models, kriging_tuning, variogram
+from posefield_train.kriging import coefficient_models, kriging_tuning
 from posefield_train.kriging.kriging_bank import ConstantModel
+from posefield_train.kriging.kriging_tuning import TuningProblem
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.kriging.universal_kriging import UniversalKriging as Field
 from posefield_train.source.recipe import Kriging
+
+BOTH = ("matern52", "gaussian")
+POSE = Hyper("matern52", (0,), np.array([0.5, 0.5]), 0.1, 1.0, 0.0, 1.0)
 
 
 @pytest.fixture
@@ -26,60 +33,56 @@ def values(request, laid, rng):
     return ways[request.param] + 0.1 * rng.normal(size=(24, 2))
 
 
-def candidates(laid, values, covariances=("matern52", "gaussian"), drifts=((1,), (0, 1, 1))):
-    found = {}
-    for covariance in covariances:
-        for own in drifts:
-            experimental = variogram.residual_variogram(laid.points, values, max(own))
-            guess = kriging_tuning.initial_guess(experimental, laid.controls, covariance, own)
-            found[covariance, own] = kriging_tuning.tune(guess, laid, values, None)
-    return found
-
-
-def test_the_least_left_out_is_chosen_and_gaussian_only_where_clearly_so(laid, values):
-    tried = candidates(laid, values)
-
-    def least(covariance):
-        own = [name for name in tried if name[0] == covariance]
-        return min(own, key=lambda name: tried[name].unexplained)
-
-    leasts = {covariance: least(covariance) for covariance in ("matern52", "gaussian")}
-    matern, gaussian = (tried[leasts[name]].unexplained for name in leasts)
-    best = leasts[
-        "gaussian" if gaussian < coefficient_models.CLEAR_IMPROVEMENT * matern else "matern52"
-    ]
+def test_gaussian_is_chosen_only_where_clearly_better(laid, values):
+    problem = TuningProblem(laid, values)
+    matern, gaussian = (kriging_tuning.tune(problem, name, None) for name in BOTH)
+    clearly = gaussian.unexplained < coefficient_models.CLEAR_IMPROVEMENT * matern.unexplained
     chosen = coefficient_models.choose_covariance(Kriging(), laid, values)
-    assert (chosen.hyper.covariance, chosen.hyper.drifts) == best
-    assert chosen.unexplained == tried[best].unexplained
-    assert len({field.unexplained for field in tried.values()}) > 1
+    assert chosen.hyper.covariance == ("gaussian" if clearly else "matern52")
+    assert chosen.unexplained == (gaussian if clearly else matern).unexplained
+    assert matern.unexplained != gaussian.unexplained
 
 
-@pytest.mark.parametrize(("drift", "drifts"), [(0, (0,)), (1, (1,)), ("mixed", (0, 1, 1))])
-def test_what_the_recipe_names_is_not_chosen_again(laid, values, drift, drifts):
+@pytest.mark.parametrize(("drift", "degree"), [(0, 0), (1, 1), ("chosen", 0)])
+def test_what_the_recipe_names_is_not_chosen_again(laid, values, drift, degree):
     settings = Kriging(covariance="exponential", drift=drift)
     chosen = coefficient_models.choose_covariance(settings, laid, values)
-    assert (chosen.hyper.covariance, chosen.hyper.drifts) == ("exponential", drifts)
+    assert (chosen.hyper.covariance, chosen.hyper.drifts) == ("exponential", (degree,))
+    assert (chosen.hyper.trend > 0.0) == (drift == "chosen")
 
 
-def test_fields_beside_the_pose_choose_their_drift_and_not_their_covariance(laid, values):
-    tried = candidates(laid, values, ("gaussian",))
-    best = min(tried, key=lambda name: tried[name].unexplained)
-    found = coefficient_models.fit(Kriging(), "gaussian", laid, values).field
+def test_the_trend_is_as_strong_as_the_values_are_straight(laid, rng):
+    x, y = laid.points.T
+    straight, wavy = 2.0 * x - y, np.sin(6.0 * x) * np.cos(6.0 * y)
+    trends = [
+        coefficient_models.choose_covariance(Kriging(), laid, own[:, None]).hyper.trend
+        for own in (straight, wavy)
+    ]
+    assert trends[0] > 10.0 * trends[1]
+
+
+@pytest.mark.parametrize("drift", [0, 1, "chosen"])
+def test_quantities_beside_the_pose_share_its_stationary_covariance(laid, values, drift):
+    settings = Kriging(drift=drift)
+    pose = coefficient_models.choose_covariance(settings, laid, values[::-1]).hyper
+    found = coefficient_models.fit(settings, pose, laid, values).field
     assert isinstance(found, Field)
-    assert (found.hyper.covariance, found.hyper.drifts) == best
+    shared = replace(pose, nugget=found.hyper.nugget, trend=found.hyper.trend)
+    assert found.hyper == shared
+    assert found.hyper.nugget != pose.nugget and (found.hyper.trend > 0.0) == (drift == "chosen")
 
 
 def test_noise_is_answered_with_its_mean_and_a_field_is_not(laid, rng):
     noise = rng.normal(size=(24, 2))
-    found = coefficient_models.fit(Kriging(), "matern52", laid, noise)
+    found = coefficient_models.fit(Kriging(), POSE, laid, noise)
     assert isinstance(found.field, ConstantModel)
     assert np.array_equal(found.field.mean, noise.mean(axis=0))
     assert np.array_equal(found.residuals, laid.from_mean(noise))
-    kept = coefficient_models.fit(Kriging(nugget=0.1), "matern52", laid, noise)
+    kept = coefficient_models.fit(Kriging(nugget=0.1), POSE, laid, noise)
     assert isinstance(kept.field, Field)
 
 
 def test_values_that_never_change_are_a_constant(laid):
-    found = coefficient_models.fit(Kriging(), "matern52", laid, np.full((24, 2), 3.0))
+    found = coefficient_models.fit(Kriging(), POSE, laid, np.full((24, 2), 3.0))
     assert isinstance(found.field, ConstantModel)
     assert found.explained == 0.0 and not found.residuals.any()

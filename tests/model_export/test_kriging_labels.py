@@ -1,22 +1,23 @@
-"""Tests of performer labels in the distances of a kriging model."""
+"""Tests of performer labels in the covariances of a kriging model."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from posefield.kriging import kriging_model
 from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import Hyper
 
 TOLERANCE = 1e-9
 PERFORMERS = ("ann", "bob", "cy")
-LABEL = 0.7
+CORRELATION, OFFSET, TREND = 0.6, 0.4, 1.5
 
 
 @pytest.fixture(params=COVARIANCES)
 def hyper(request):
-    return Hyper(request.param, (0, 1), np.array([0.5, 0.9]), 0.1, LABEL)
+    return Hyper(request.param, (0, 1), np.array([0.5, 0.9]), 0.1, CORRELATION, OFFSET, TREND)
 
 
 def who(*names):
@@ -53,36 +54,49 @@ def test_labels_are_ones_own_and_none_for_a_stranger():
     assert sample_points.performer_labels(("ann", "bob"), ()).shape == (2, 0)
 
 
-def test_a_performer_is_nothing_from_himself_and_the_label_from_all_others(hyper):
+def test_a_performer_varies_with_an_offset_and_correlates_with_all_others(hyper):
     points = np.hstack([np.zeros((5, 2)), who("ann", "bob", "cy", "ann", "eve")])
     near = universal_kriging.covariances(hyper, points, points[:4])
-    apart = COVARIANCES[hyper.covariance].numpy(np.array(LABEL**2))
     same = np.array([n == m for n in "abcae" for m in "abca"]).reshape(5, 4)
-    assert far(near, np.where(same, 1.0, apart)) < 1e-12
-    assert apart < 0.9
+    assert far(near, np.where(same, 1.0 + OFFSET, CORRELATION)) < 1e-12
 
 
-def test_labels_and_controls_add_up_as_squares(hyper, laid):
-    gaps = (laid[:, None] - laid)[..., :2] * hyper.scales
-    others = np.any(laid[:, None, 2:] != laid[:, 2:], axis=-1)
-    squared = np.sum(gaps**2, axis=-1) + np.where(others, LABEL**2, 0.0)
-    expected = COVARIANCES[hyper.covariance].numpy(squared)
-    assert far(universal_kriging.covariances(hyper, laid, laid), expected) < 1e-12
+def test_covariance_is_stationary_with_an_offset_and_a_trend(hyper, laid):
+    controls = laid[:, :2]
+    gaps = (controls[:, None] - controls) * hyper.scales
+    same = (np.argmax(laid[:, None, 2:], axis=-1) == np.argmax(laid[:, 2:], axis=-1)) * 1.0
     plain = COVARIANCES[hyper.covariance].numpy(np.sum(gaps**2, axis=-1))
-    assert far(universal_kriging.covariances(hyper, laid, laid), plain) > 1e-2
+    expected = plain * np.where(same, 1.0, CORRELATION) + OFFSET * same
+    expected += TREND * controls @ controls.T
+    assert far(universal_kriging.covariances(hyper, laid, laid), expected) < 1e-12
+    assert far(np.diagonal(expected), kriging_model.prior_variances(hyper, laid)) < 1e-12
+    for name in ("correlation", "offset", "trend"):
+        other = replace(hyper, **{name: 0.9 * getattr(hyper, name)})
+        assert far(universal_kriging.covariances(other, laid, laid), expected) > 1e-2
 
 
-@pytest.mark.parametrize("label", [0.05, LABEL, 4.0])
-def test_covariances_of_labelled_samples_are_positive_definite(hyper, laid, label):
-    """Performers are the corners of a simplex, one more dimension each, but for the spherical one:
-    that is no covariance in more than three."""
-    own = replace(hyper, label=label)
-    least = np.linalg.eigvalsh(universal_kriging.covariances(own, laid, laid))[0]
-    if hyper.covariance != "spherical":
-        assert least > -1e-12
-    # A distance that is none: two performers each near a third and far from one another.
-    gaps = np.array([[0.0, 0.1, 2.0], [0.1, 0.0, 0.1], [2.0, 0.1, 0.0]])
-    assert np.linalg.eigvalsh(COVARIANCES[hyper.covariance].numpy(gaps**2))[0] < -1e-2
+def test_linear_functions_and_stationary_covariances_hold_every_covariance(hyper, laid, rng):
+    """What the graph computes: one covariance for each sample, labels, one and controls."""
+    points = np.hstack([rng.uniform(-1.2, 1.2, (9, 2)), who(*(["ann", "bob", "eve"] * 3))])
+    terms = kriging_model.linear_terms(hyper, laid)
+    found = kriging_model.linear_functions(hyper, points) @ terms
+    found[:, :24] += kriging_model.stationary_covariances(hyper, points, laid)
+    assert far(found, kriging_model.basis_functions(hyper, points, laid)) < 1e-12
+    other = kriging_model.linear_terms(replace(hyper, trend=0.0), laid)
+    assert far(kriging_model.linear_functions(hyper, points) @ (other - terms), 0.0) > 1e-2
+
+
+@pytest.mark.parametrize("correlation", [0.0, CORRELATION, 1.0])
+@pytest.mark.parametrize(("offset", "trend"), [(0.0, 0.0), (OFFSET, TREND), (30.0, 300.0)])
+def test_covariances_of_labelled_samples_are_positive_definite(
+    hyper, laid, correlation, offset, trend
+):
+    own = replace(hyper, correlation=correlation, offset=offset, trend=trend)
+    assert np.linalg.eigvalsh(universal_kriging.covariances(own, laid, laid))[0] > -1e-10
+    # Negative control: performers who are further from one another than opposites.
+    beyond = replace(hyper, correlation=-1.0, offset=0.0, trend=0.0)
+    three = np.hstack([np.zeros((3, 2)), who(*PERFORMERS)])
+    assert np.linalg.eigvalsh(universal_kriging.covariances(beyond, three, three))[0] < -0.5
 
 
 def test_drift_does_not_see_the_labels(laid, controls):
@@ -92,20 +106,25 @@ def test_drift_does_not_see_the_labels(laid, controls):
     )
 
 
-def test_far_outside_only_the_drift_is_left_whoever_asks(hyper, laid, values):
+def test_far_outside_only_linear_functions_are_left(hyper, laid, values):
+    """Of a performer the offset is left, and of controls the trend and the drift."""
     far_away = np.full((3, 2), 50.0)
     asked = np.hstack([far_away, who("ann", "bob", "eve")])
     for drifts in ((0,), (1,), (0, 1)):
-        field = universal_kriging.solve(replace(hyper, drifts=drifts), laid, values)
-        found = field.predict(asked)
-        assert far(found, found[:1]) < TOLERANCE
-        near = field.predict(np.hstack([np.zeros((3, 2)), who("ann", "bob", "eve")]))
-        assert far(near, near[:1]) > 1e-2
+        own = replace(hyper, drifts=drifts)
+        field = universal_kriging.solve(own, laid, values)
+        linear = kriging_model.linear_functions(own, asked)
+        expected = linear @ kriging_model.linear_terms(own, laid) @ field.dual
+        assert far(field.predict(asked), expected) < TOLERANCE
+        assert far(expected[:1], expected) > 1e-3
+        alike = universal_kriging.solve(replace(own, offset=0.0), laid, values).predict(asked)
+        assert far(alike, alike[:1]) < TOLERANCE
+        assert far(field.predict(0.5 * asked), expected) > 1e-2
 
 
-def test_label_of_nothing_is_the_field_without(hyper, laid, controls, values):
+def test_performers_alike_without_offsets_are_the_field_without(hyper, laid, controls, values):
     groups = np.arange(24) // 2
-    own = replace(hyper, label=0.0)
+    own = replace(hyper, correlation=1.0, offset=0.0)
     with_labels, without = (
         universal_kriging.solve(own, where, values) for where in (laid, controls)
     )
@@ -122,7 +141,8 @@ def test_a_stranger_is_answered_with_less_certainty(hyper, laid, controls, names
     field = universal_kriging.solve(hyper, laid, values)
     stranger = np.hstack([controls, who(*["eve"] * 24)])
     assert np.all(field.variance(stranger) > field.variance(laid))
-    same = universal_kriging.solve(replace(hyper, label=0.0), laid, values)
+    alike = replace(hyper, correlation=1.0, offset=0.0)
+    same = universal_kriging.solve(alike, laid, values)
     assert far(same.variance(stranger), same.variance(laid)) < 1e-12
 
 

@@ -36,17 +36,17 @@ def mixed(performers, batch=BATCH):
     return np.eye(performers + 1, performers)[np.arange(batch) % (performers + 1)]
 
 
-def labelled_bank(covariance="matern52", drifts=(0, 1), names=NAMES, constant=()):
-    """Fields pose, offsets and duration, in each of which performers are another distance apart."""
+def labelled_bank(covariance="matern52", drifts=(0, 1), names=NAMES, constant=(), correlation=0.4):
+    """Fields pose, offsets and duration, in each of which performers have other offsets."""
     own = rng()
     points = own.uniform(-1.0, 1.0, (SAMPLES, CONTROLS))
     # Every sample is somebody's, and no performer has as many as another.
     whose = np.sqrt(np.arange(SAMPLES) / SAMPLES) * len(names)
     samples = np.hstack([points, np.eye(len(names))[whose.astype(int)]])
-    fields = {}
-    for name, size, label in (("pose", 6, 0.6), ("offsets", 2, 2.5), ("duration", 1, 0.1)):
-        scales, nugget = own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3)
-        hyper = Hyper(covariance, drifts, scales, nugget, label)
+    fields, scales = {}, own.uniform(0.3, 1.5, CONTROLS)
+    for name, size, offset in (("pose", 6, 0.6), ("offsets", 2, 9.0), ("duration", 1, 0.1)):
+        nugget, trend = own.uniform(0.01, 0.3), own.uniform(0.1, 3.0)
+        hyper = Hyper(covariance, drifts, scales, nugget, correlation, offset, trend)
         values = own.normal(size=(SAMPLES, size))
         solved = universal_kriging.solve(hyper, samples, values)
         fields[name] = ConstantModel(values.mean(axis=0)) if name in constant else solved
@@ -89,6 +89,8 @@ CASES = {
     },
     "one performer": {"names": ("ada",)},
     "a constant field": {"constant": ("offsets",)},
+    "motions of performers alike beside offsets": {"correlation": 1.0},
+    "unrelated motions of performers": {"correlation": 0.0},
 }
 
 
@@ -132,10 +134,10 @@ def test_a_batch_of_several_performers_is_each_of_them_alone():
     assert apart([value[:1] for value in whole], [value[1:2] for value in whole]) > 0.1
 
 
-def test_performers_of_no_distance_are_not_told_apart():
+def test_performers_without_offsets_who_move_alike_are_not_told_apart():
     bank = labelled_bank()
     pose = universal_kriging.solve(
-        replace(bank.pose.hyper, label=0.0), bank.pose.samples, np.eye(SAMPLES)
+        replace(bank.pose.hyper, correlation=1.0, offset=0.0), bank.pose.samples, np.eye(SAMPLES)
     )
     run = graph_of(replace(bank, pose=pose, others=dict.fromkeys(bank.others, pose)), SAMPLES)
     assert apart(run(asked()), run(asked(), performer=mixed(len(NAMES)))) < 1e-6

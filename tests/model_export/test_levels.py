@@ -11,10 +11,11 @@ import pytest
 from posefield.common.errors import TrainingError
 from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
+from posefield.kriging import kriging_model
 from posefield.model_file import subgraph
 from posefield.motion import skeleton
 from posefield_train.graph import level_errors, levels
-from posefield_train.kriging import thinning, universal_kriging
+from posefield_train.kriging import thinning
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.source.recipe import Detail
 
@@ -108,7 +109,7 @@ def test_durations_are_those_of_whole_answers(exported, exam):
 def test_samples_are_asked_in_the_order_in_which_they_say_most(trained):
     bank = thinning.sort_samples(trained.model.bank)
     own = bank.pose
-    matrix = universal_kriging.covariances(own.hyper, own.samples, own.samples)
+    matrix = kriging_model.stationary_covariances(own.hyper, own.samples, own.samples)
 
     def unsaid(first):
         known = matrix[first][:, first]

@@ -143,7 +143,12 @@ FAULTS = {
     "degree two": (
         "[size]",
         "[kriging]\ndrift = 2\n[size]",
-        ["kriging.drift", "0, 1, 'mixed' or 'chosen'", "found 2"],
+        ["kriging.drift", "0, 1 or 'chosen'", "found 2"],
+    ),
+    "mean of two drifts": (
+        "[size]",
+        '[kriging]\ndrift = "mixed"\n[size]',
+        ["kriging.drift", "0, 1 or 'chosen'", "found 'mixed'"],
     ),
     "unknown drift": ("[size]", '[kriging]\ndrift = "best"\n[size]', ["kriging.drift", "'best'"]),
     "unknown covariance": (
@@ -179,17 +184,13 @@ def test_a_fault_is_named_with_its_key_and_what_was_expected(read, tmp_path, old
         assert part in caught.value.message
 
 
-DRIFTS = {
-    "0": ((0,),),
-    "1": ((1,),),
-    '"mixed"': ((0, 1, 1),),
-    '"chosen"': ((1,), (0, 1, 1)),
-}
+DRIFTS = {"0": (0, 0), "1": (1, 1), '"chosen"': (0, None)}
 
 
-@pytest.mark.parametrize(("said", "tried"), DRIFTS.items())
-def test_a_drift_says_which_degrees_are_tried(read, said, tried):
-    assert read(MINIMAL + f"[kriging]\ndrift = {said}\n").kriging.drifts == tried
+@pytest.mark.parametrize(("said", "degrees"), DRIFTS.items())
+def test_a_drift_is_a_degree_or_a_constant_with_a_trend(read, said, degrees):
+    own = read(MINIMAL + f"[kriging]\ndrift = {said}\n").kriging
+    assert (own.degree, own.fixed_degree) == degrees
 
 
 @pytest.mark.parametrize("name", [*COVARIANCES, "chosen"])

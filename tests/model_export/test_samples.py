@@ -77,9 +77,9 @@ def test_one_performer_is_told_apart_from_nobody_and_it_is_noted():
 
 @pytest.mark.parametrize("files", ["aaaaaa", "aaaaab"], ids=["one file", "all but one of a file"])
 def test_files_without_which_no_drift_is_left_are_not_left_out_whole(files):
-    laid, _ = sample_points.make_samples(recipe(), examples(files=files))
+    laid, _ = sample_points.make_samples(recipe(drift=1), examples(files=files))
     assert laid.groups.tolist() == list(range(6))
-    said = sample_points.data_notes(recipe(), examples(files=files))
+    said = sample_points.data_notes(recipe(drift=1), examples(files=files))
     assert len(said) == 1 and said[0].startswith("clips of one file are not left out together")
     # A constant needs no more than one clip of another file.
     constant, _ = sample_points.make_samples(recipe(drift=0), examples(files=files))
@@ -91,10 +91,11 @@ def test_a_drift_that_hangs_on_one_clip_is_refused_with_its_line():
     with pytest.raises(
         TrainingError, match=r"without the clip of line 6 .* set kriging.drift to 0"
     ):
-        sample_points.make_samples(recipe(), lonely)
-    assert sample_points.make_samples(recipe(drift=0), lonely)[0].points[4, 0] == 1.0
+        sample_points.make_samples(recipe(drift=1), lonely)
+    for drift in (0, "chosen"):
+        assert sample_points.make_samples(recipe(drift=drift), lonely)[0].points[4, 0] == 1.0
     pair = examples(speeds=(1.0, 1.0, 7.0, 1.0, 7.0, 1.0), files="abcdef")
-    assert sample_points.make_samples(recipe(), pair)[0].points[4, 0] == 1.0
+    assert sample_points.make_samples(recipe(drift=1), pair)[0].points[4, 0] == 1.0
 
 
 def test_the_mean_is_that_of_the_other_groups(rng):

@@ -48,11 +48,11 @@ def bank(covariance="matern52", drifts=(1,), constant=(), offsets=None):
     """
     own = rng()
     samples = own.uniform(-1.0, 1.0, (SAMPLES, CONTROLS))
+    scales = own.uniform(0.3, 1.5, CONTROLS)
     fields = {}
     for name, size in {"pose": 6, "offsets": 2, "duration": 1, "warp": 4}.items():
-        hyper = Hyper(
-            covariance, drifts, own.uniform(0.3, 1.5, CONTROLS), own.uniform(0.01, 0.3), 0.0
-        )
+        nugget, trend = own.uniform(0.01, 0.3), own.uniform(0.1, 3.0)
+        hyper = Hyper(covariance, drifts, scales, nugget, 1.0, 0.0, trend)
         if name == "offsets" and offsets is not None:
             hyper = replace(hyper, drifts=offsets)
         values = own.normal(size=(SAMPLES, size))
@@ -94,15 +94,15 @@ def field_bank(**given):
     other = own.numpy(points(replace(own, high=HIGH * 1.05), controls))
     # At a sample the distance is a root of what rounding leaves, where these have their kink.
     kinked = given.get("covariance") in ("exponential", "spherical")
-    allowed = 2e-3 if kinked else 2e-4
+    allowed = 3e-3 if kinked else 2e-4
     return Case(found[:-1], list(expected.values())[1:], list(other.values())[1:], allowed)
 
 
-LEVELS = ((5, 4), (SAMPLES, 3), (3 * SAMPLES, 3), (4 * SAMPLES, 6))
+LEVELS = ((5, 4), (15, 3), (20, 3), (SAMPLES, 6))
 
 
 def coarse_bank():
-    """A bank of coarser levels that ask some samples, all of them, and further fields."""
+    """A bank of coarser levels that ask some samples, and all of them."""
     own = thinning.sort_samples(bank())
     lesson = thinning.thinning_data(own)
     weights = tuple(lesson.weights(columns, rank, 0.1) for columns, rank in LEVELS)

@@ -168,7 +168,11 @@ def rms(gaps):
 
 
 def test_between_the_samples_the_model_is_near_the_truth(trained, examples, rng):
-    """Measured 2.5 cm against 26 cm of the mean motion, with trials that are 1 to 2 cm off."""
+    """Measured 1.6 cm against 26 cm of the mean motion, with trials that are 1 to 2 cm off.
+
+    Durations share the scales of the poses: they are 4.7 % off in the mean of four draws, and were
+    3.8 % with scales of their own, where poses were 2.5 cm off.
+    """
     figure = examples[0].clip.skeleton
     points, elapsed = unseen(rng, 40), np.linspace(0.0, 1.0, 20)
     expected = np.stack([true_positions(point, elapsed, figure) for point in points])
@@ -177,13 +181,13 @@ def test_between_the_samples_the_model_is_near_the_truth(trained, examples, rng)
     seen = [true_positions(example.controls, elapsed, figure) for example in examples]
     error = rms(answer.positions(figure.parents) - expected)
     of_mean = rms(np.mean(seen, axis=0) - expected)
-    assert error < 0.028
-    assert error < of_mean / 9
+    assert error < 0.019
+    assert error < of_mean / 13
     seconds = np.array([noise_free.duration(point.tolist()) for point in points])
     late = np.abs(np.log(durations / seconds))
     of_mean_late = np.abs(np.log(seconds / seconds.mean()))
-    # One trial in itself is 4 % early or late, and so is the model.
-    assert late.mean() < 0.045 and late.mean() < of_mean_late.mean() / 2
+    # One trial in itself is 4 % early or late.
+    assert late.mean() < 0.06 and late.mean() < of_mean_late.mean() / 2
 
 
 def test_sigma_says_how_far_the_truth_may_lie(trained, examples, rng):
@@ -266,16 +270,26 @@ def test_a_control_that_never_changes_is_refused_by_name(small_recipe, few):
         train.train(small_recipe, same, quiet)
 
 
+def with_drift(recipe, degree):
+    kriging = recipe.kriging.model_copy(update={"drift": degree})
+    return recipe.model_copy(update={"kriging": kriging})
+
+
 def test_a_control_that_follows_from_another_is_refused(small_recipe, few):
     doubled = with_controls(few, 2, [2.0 * example.controls[0] - 1.0 for example in few])
     with pytest.raises(TrainingError, match="follows linearly from the others"):
-        train.train(small_recipe, doubled, quiet)
+        train.train(with_drift(small_recipe, 1), doubled, quiet)
+    # A trend within the covariance needs no slope of each control alone.
+    assert train.train(small_recipe, doubled, quiet).model
 
 
 def test_fewer_samples_than_the_drift_needs_are_refused(small_recipe, few):
     message = "5 samples, expected at least 6 for 4 controls and a drift of degree 1"
     with pytest.raises(TrainingError, match=message):
-        train.train(small_recipe, few[:5], quiet)
+        train.train(with_drift(small_recipe, 1), few[:5], quiet)
+    with pytest.raises(TrainingError, match="1 samples, expected at least 2"):
+        train.train(small_recipe, few[:1], quiet)
+    assert train.train(small_recipe, few[::5], quiet).model
 
 
 def test_ranks_that_the_tensor_does_not_have_are_refused(small_recipe, few):
@@ -284,8 +298,10 @@ def test_ranks_that_the_tensor_does_not_have_are_refused(small_recipe, few):
 
 
 def test_a_budget_is_kept_and_not_wasted(trained, small_recipe):
-    budget = 0.01 * small_recipe.size.rms_budget_cm
-    assert 0.9 * budget < trained.truncation_errors.rms <= budget
+    tight = small_recipe.size.model_copy(update={"rms_budget_cm": 0.2})
+    other = train.train(small_recipe.model_copy(update={"size": tight}), trained.examples, quiet)
+    assert 0.0018 < other.truncation_errors.rms <= 0.002 < trained.truncation_errors.rms
+    assert trained.truncation_errors.rms <= 0.01 * small_recipe.size.rms_budget_cm
 
 
 def test_progress_is_told_step_by_step(small_recipe, few):

@@ -1,10 +1,13 @@
-"""Tests of the tuning of scales and nugget by leave-one-out."""
+"""Tests of the tuning of kriging parameters by leave-one-out with a prior."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
-from posefield_train.kriging.kriging_tuning import LABEL_BOUNDS, NUGGET_BOUNDS, SCALE_BOUNDS
+from posefield_train.kriging import kriging_tuning, universal_kriging
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_tuning import PRIORS, SCALE_PRIOR, TuningProblem
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 
@@ -20,18 +23,13 @@ def wave(samples):
     return np.stack([np.sin(4.0 * x) + 0.3 * y**2, np.cos(3.0 * x)], axis=1)
 
 
-def guess(samples, values, covariance="matern52"):
-    experimental = variogram.residual_variogram(samples, values, 1)
-    return kriging_tuning.initial_guess(experimental, samples.shape[1], covariance, (1,))
-
-
 def alone(samples):
     """Return samples, each its own group, without performer labels."""
     return SamplePoints(samples, samples.shape[1], np.arange(len(samples)))
 
 
-def tuned_at(samples, values, nugget=None):
-    return kriging_tuning.tune(guess(samples, values), alone(samples), values, nugget)
+def tuned_at(samples, values, nugget=None, degree=None):
+    return kriging_tuning.tune(TuningProblem(alone(samples), values, nugget), "matern52", degree)
 
 
 def left_out(hyper, samples, values):
@@ -44,16 +42,9 @@ def left_out(hyper, samples, values):
     return total
 
 
-def test_first_guess_keeps_within_the_bounds(samples, rng):
-    for values in (wave(samples), samples.copy(), rng.normal(size=(50, 3)), np.zeros((50, 2))):
-        hyper = guess(samples, values)
-        assert np.all((hyper.scales >= SCALE_BOUNDS[0]) & (hyper.scales <= SCALE_BOUNDS[1]))
-        assert NUGGET_BOUNDS[0] <= hyper.nugget <= NUGGET_BOUNDS[1]
-
-
 def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
     values = wave(samples) + 0.2 * rng.normal(size=(50, 2))
-    hyper = Hyper("matern52", (1,), np.array([1.0, 0.5]), 0.1, 0.0)
+    hyper = Hyper("matern52", (0,), np.array([1.0, 0.5]), 0.1, 1.0, 0.0, 2.0)
     found = kriging_tuning.evaluate_fixed(hyper, alone(samples), values)
     mean_of_others = (values.sum(axis=0) - values) / 49
     share = left_out(hyper, samples, values) / np.sum((values - mean_of_others) ** 2)
@@ -65,7 +56,7 @@ def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
 
 def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
     samples = rng.uniform(-1.0, 1.0, size=(400, 2))
-    hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1, 0.0)
+    hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1, 1.0, 0.0, 0.0)
     root = np.linalg.cholesky(
         universal_kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400)
     )
@@ -75,71 +66,6 @@ def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
     assert abs(found.sill / (6 * 2.5) - 1.0) < 0.1
     unscaled = np.mean(np.sum(np.square(found.residuals), axis=1))
     assert abs(unscaled / (6 * 2.5) - 1.0) > 0.1
-
-
-def test_tuning_leaves_less_than_any_start(samples, rng):
-    values = wave(samples) + 0.05 * rng.normal(size=(50, 2))
-    own = guess(samples, values)
-    tuned = tuned_at(samples, values)
-    best = np.sum(np.square(tuned.residuals))
-    for scale in (0.2, 0.5, 1.2):
-        for nugget in (0.02, 0.3, 2.0):
-            start = Hyper("matern52", (1,), np.full(2, scale), nugget, 0.0)
-            assert best <= np.sum(
-                np.square(kriging_tuning.evaluate_fixed(start, alone(samples), values).residuals)
-            )
-    assert best <= np.sum(
-        np.square(kriging_tuning.evaluate_fixed(own, alone(samples), values).residuals)
-    )
-
-
-def test_tuned_parameters_keep_within_the_bounds(samples, rng):
-    for values in (wave(samples), samples @ np.ones((2, 1)), rng.normal(size=(50, 2))):
-        hyper = tuned_at(samples, values).hyper
-        assert np.all(
-            (hyper.scales >= SCALE_BOUNDS[0] - 1e-12) & (hyper.scales <= SCALE_BOUNDS[1] + 1e-12)
-        )
-        assert NUGGET_BOUNDS[0] * (1 - 1e-9) <= hyper.nugget <= NUGGET_BOUNDS[1] * (1 + 1e-9)
-
-
-def test_control_that_matters_more_gets_the_larger_scale(samples):
-    values = wave(samples)
-    x, y = tuned_at(samples, values).hyper.scales
-    assert x > 2.0 * y
-    swapped = samples[:, ::-1]
-    x, y = tuned_at(swapped, values).hyper.scales
-    assert y > 2.0 * x
-
-
-def test_nugget_is_worth_the_variance_of_the_noise(samples, rng):
-    smooth = tuned_at(samples, wave(samples))
-    noisy = wave(samples) + 0.5 * rng.normal(size=(50, 2))
-    rough = tuned_at(samples, noisy)
-    expected = 2 * 0.5**2
-    assert 0.5 * expected < rough.hyper.nugget * rough.sill < 2.0 * expected
-    assert smooth.hyper.nugget * smooth.sill < 0.1 * expected
-
-
-def test_given_nugget_is_kept(samples):
-    values = wave(samples)
-    tuned = tuned_at(samples, values, 0.037)
-    assert tuned.hyper.nugget == 0.037
-    free = tuned_at(samples, values)
-    assert free.hyper.nugget != 0.037
-    assert free.unexplained <= tuned.unexplained
-
-
-def test_controls_explain_a_smooth_field_and_no_noise(samples, rng):
-    noise = rng.normal(size=(50, 4))
-    assert tuned_at(samples, wave(samples)).unexplained < 0.05
-    assert tuned_at(samples, noise).unexplained > 0.9
-
-
-def test_values_that_never_change_count_as_unexplained(samples):
-    hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 0.0)
-    assert (
-        kriging_tuning.evaluate_fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
-    )
 
 
 PEOPLE, TAKES = 4, 20
@@ -158,24 +84,184 @@ def labelled(samples, people):
 
 
 def own_ways(samples, people, rng, apart):
-    """Everybody's own wave on top of the common one."""
+    """Everybody's own offset on top of the common wave."""
     offsets = apart * rng.normal(size=(PEOPLE, 2))
     return wave(samples) + offsets[people[0]] + 0.05 * rng.normal(size=(50, 2))
 
 
-def tuned_for(samples, people, values, nugget=None):
-    return kriging_tuning.tune(guess(samples, values), labelled(samples, people), values, nugget)
+def tuned_for(samples, people, values):
+    problem = TuningProblem(labelled(samples, people), values)
+    return kriging_tuning.tune(problem, "matern52", None)
+
+
+LABELLED = Hyper("matern52", (0,), np.array([1.0, 0.5]), 0.1, 0.7, 0.6, 2.0)
+
+
+def in_search_units(hyper, names=tuple(PRIORS)):
+    """Return the point of the search at parameters: scales, then those named."""
+    own = [
+        np.log(hyper.correlation / (1.0 - hyper.correlation))
+        if name == "correlation"
+        else np.log(getattr(hyper, name))
+        for name in names
+    ]
+    return np.array([*np.log(hyper.scales), *own])
+
+
+def loss_of(problem, hyper, names=tuple(PRIORS), own_scales=True):
+    return kriging_tuning.LeaveOneOutLoss(problem, hyper, names, own_scales)
+
+
+@pytest.mark.parametrize("effector", [False, True])
+def test_loss_is_that_of_leaving_takes_out_one_by_one(samples, people, rng, effector):
+    values, laid = rng.normal(size=(50, 4)), labelled(samples, people)
+    maps = 0.5 * rng.normal(size=(50, 3, 2)) if effector else None
+    problem = TuningProblem(laid, values, effector=maps)
+    squares = 0.0
+    for take in range(TAKES):
+        own = people[1] == take
+        field = universal_kriging.solve(LABELLED, laid.points[~own], values[~own])
+        missed = values[own] - field.predict(laid.points[own])
+        squares += np.sum(missed**2)
+        if effector:
+            squares += np.sum(np.einsum("nkm,nm->nk", maps[own], missed[:, :2]) ** 2)
+    x = in_search_units(LABELLED)
+    priors = [SCALE_PRIOR, SCALE_PRIOR, *PRIORS.values()]
+    apart = [(value - p.mean) / p.deviation for value, p in zip(x, priors, strict=True)]
+    expected = 0.5 * TAKES * np.log(squares) + 0.5 * problem.strength * np.sum(np.square(apart))
+    found = loss_of(problem, LABELLED).value_and_slope(x)[0]
+    assert found == pytest.approx(expected, rel=1e-10)
+    single = replace(problem, samples=replace(laid, groups=np.arange(50)))
+    assert abs(loss_of(single, LABELLED).value_and_slope(x)[0] - expected) > 0.1
+
+
+@pytest.mark.parametrize("degree", [0, 1])
+@pytest.mark.parametrize("covariance", COVARIANCES)
+def test_gradient_of_the_loss_is_that_of_finite_differences(
+    samples, people, rng, covariance, degree
+):
+    """All parameters of the pose; nugget, offset and trend of quantities that share the rest."""
+    maps = rng.normal(size=(50, 3, 4))
+    problem = TuningProblem(labelled(samples, people), rng.normal(size=(50, 6)), effector=maps)
+    hyper = replace(LABELLED, covariance=covariance, drifts=(degree,))
+    for names, own_scales in ((tuple(PRIORS), True), (("nugget", "offset", "trend"), False)):
+        loss = loss_of(problem, hyper, names, own_scales)
+        x = in_search_units(hyper, names)[0 if own_scales else 2 :]
+        steps = 1e-5 * np.eye(len(x))
+        values = [[loss.value_and_slope(x + s * step)[0] for s in (1, -1)] for step in steps]
+        expected = np.array([(after - before) / 2e-5 for after, before in values])
+        slope = loss.value_and_slope(x)[1]
+        assert np.abs(slope - expected).max() < 1e-6 * np.abs(expected).max()
+        # Negative control: a little beside, the slope is another.
+        assert np.abs(loss.value_and_slope(x + 0.05)[1] - expected).max() > 1e-3
+
+
+@pytest.mark.parametrize("covariance", COVARIANCES)
+def test_slope_of_a_covariance_is_that_of_finite_differences(covariance):
+    squared, own = np.array([0.01, 0.2, 0.7, 0.95, 1.3]), COVARIANCES[covariance]
+    expected = (own.numpy(squared + 1e-6) - own.numpy(squared - 1e-6)) / 2e-6
+    assert np.abs(own.slope(squared) - expected).max() < 1e-6
+    assert np.abs(own.slope(1.05 * squared) - expected).max() > 1e-3
+    assert np.isfinite(own.slope(np.zeros(1))).all()
+
+
+def test_the_tuned_loss_is_no_greater_than_around_it_and_at_other_starts(samples, people, rng):
+    values = own_ways(samples, people, rng, 0.5)
+    problem = TuningProblem(labelled(samples, people), values)
+    found = in_search_units(tuned_for(samples, people, values).hyper)
+    loss = loss_of(problem, LABELLED)
+    least = loss.value_and_slope(found)[0]
+    bounds = np.array([(p.low, p.high) for p in loss.priors]).T
+    for _ in range(40):
+        near = np.clip(found + 0.3 * rng.normal(size=len(found)), *bounds)
+        assert loss.value_and_slope(near)[0] > least - 1e-6
+    for scale in (0.15, 0.7, 2.5):
+        for nugget in (0.005, 0.3, 5.0):
+            start = replace(LABELLED, scales=np.full(2, scale), nugget=nugget)
+            assert loss.value_and_slope(in_search_units(start))[0] > least
+
+
+def test_tuned_parameters_keep_within_the_bounds(samples, people, rng):
+    tuned = [
+        tuned_at(samples, own).hyper for own in (wave(samples), samples, rng.normal(size=(50, 2)))
+    ]
+    tuned += [
+        tuned_for(samples, people, own_ways(samples, people, rng, apart)).hyper
+        for apart in (0.0, 100.0)
+    ]
+    for hyper in tuned:
+        logs = np.log(hyper.scales)
+        assert np.all((logs > SCALE_PRIOR.low - 1e-9) & (logs < SCALE_PRIOR.high + 1e-9))
+        for name in ("nugget", "trend"):
+            assert (
+                PRIORS[name].low - 1e-9 <= np.log(getattr(hyper, name)) <= PRIORS[name].high + 1e-9
+            )
+    assert [hyper.correlation for hyper in tuned[:3]] == [1.0] * 3
+    assert [hyper.offset for hyper in tuned[:3]] == [0.0] * 3
+
+
+def test_the_prior_decides_where_data_do_not(samples, rng):
+    """Of a control that changes nothing the scale is small; of few samples it is the prior's."""
+    problem = TuningProblem(alone(samples[:4]), rng.normal(size=(4, 1)))
+    few = kriging_tuning.tune(problem, "matern52", None).hyper
+    strong = kriging_tuning.tune(replace(problem, strength=1e6), "matern52", None).hyper
+    expected = [SCALE_PRIOR.mean] * 2 + [PRIORS[name].mean for name in ("nugget", "trend")]
+    at = in_search_units(strong, ("nugget", "trend"))
+    assert np.abs(at - expected).max() < 1e-3
+    deviations = [SCALE_PRIOR.deviation] * 2 + [PRIORS[n].deviation for n in ("nugget", "trend")]
+    near = np.abs(in_search_units(few, ("nugget", "trend")) - expected) / deviations
+    assert near.max() < 1.5
+    # Negative control: fifty samples of a fast wave decide against the prior.
+    many = tuned_at(samples, wave(samples)).hyper
+    assert np.log(many.nugget) < PRIORS["nugget"].mean - 1.5 * PRIORS["nugget"].deviation
+
+
+def test_control_that_matters_more_gets_the_larger_scale(samples):
+    values = wave(samples)
+    x, y = tuned_at(samples, values).hyper.scales
+    assert x > 1.5 * y
+    swapped = samples[:, ::-1]
+    x, y = tuned_at(swapped, values).hyper.scales
+    assert y > 1.5 * x
+
+
+def test_nugget_is_worth_the_variance_of_the_noise(samples, rng):
+    smooth = tuned_at(samples, wave(samples))
+    noisy = wave(samples) + 0.5 * rng.normal(size=(50, 2))
+    rough = tuned_at(samples, noisy)
+    expected = 2 * 0.5**2
+    assert 0.5 * expected < rough.hyper.nugget * rough.sill < 2.0 * expected
+    assert smooth.hyper.nugget * smooth.sill < 0.1 * expected
+
+
+def test_given_nugget_is_kept(samples):
+    values = wave(samples)
+    tuned = tuned_at(samples, values, 0.037)
+    assert tuned.hyper.nugget == 0.037
+    assert tuned_at(samples, values).hyper.nugget != 0.037
+
+
+def test_controls_explain_a_smooth_field_and_no_noise(samples, rng):
+    noise = rng.normal(size=(50, 4))
+    assert tuned_at(samples, wave(samples)).unexplained < 0.05
+    assert tuned_at(samples, noise).unexplained > 0.9
+
+
+def test_values_that_never_change_count_as_unexplained(samples):
+    hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 1.0, 0.0, 0.0)
+    assert (
+        kriging_tuning.evaluate_fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
+    )
 
 
 def test_groups_are_left_out_together(samples, people, rng):
     values = own_ways(samples, people, rng, 1.0)
-    hyper = Hyper("matern52", (0, 1), np.array([1.0, 0.5]), 0.1, 0.8)
     laid = labelled(samples, people)
-    found = kriging_tuning.evaluate_fixed(hyper, laid, values)
+    found = kriging_tuning.evaluate_fixed(LABELLED, laid, values)
     residuals, from_mean, variances = np.empty((50, 2)), np.empty((50, 2)), np.empty(50)
     for take in range(TAKES):
         own = people[1] == take
-        field = universal_kriging.solve(hyper, laid.points[~own], values[~own])
+        field = universal_kriging.solve(LABELLED, laid.points[~own], values[~own])
         residuals[own] = values[own] - field.predict(laid.points[own])
         variances[own] = field.variance(laid.points[own]) + 0.1
         from_mean[own] = values[own] - values[~own].mean(axis=0)
@@ -183,57 +269,41 @@ def test_groups_are_left_out_together(samples, people, rng):
     assert np.max(np.abs(found.variances - variances)) < 1e-9
     assert abs(found.unexplained - np.sum(residuals**2) / np.sum(from_mean**2)) < 1e-9
     single = kriging_tuning.evaluate_fixed(
-        hyper, SamplePoints(laid.points, 2, np.arange(50)), values
+        LABELLED, SamplePoints(laid.points, 2, np.arange(50)), values
     )
     assert np.max(np.abs(single.residuals - residuals)) > 1e-2
     assert abs(single.unexplained - found.unexplained) > 1e-3
 
 
-def test_performers_who_move_differently_are_told_apart(samples, people, rng):
+def test_performers_who_move_differently_get_offsets(samples, people, rng):
     values = own_ways(samples, people, rng, 1.0)
     apart = tuned_for(samples, people, values)
-    # What counts is the label beside the nugget: this one is far above what alike ones get.
-    assert apart.hyper.label > 4.0 * LABEL_BOUNDS[0]
-    blind = kriging_tuning.tune(
-        guess(samples, values), SamplePoints(samples, 2, people[1]), values, None
-    )
+    alike = tuned_for(samples, people, own_ways(samples, people, rng, 0.0))
+    assert apart.hyper.offset > 3.0 * alike.hyper.offset
+    unlabelled = TuningProblem(SamplePoints(samples, 2, people[1]), values)
+    blind = kriging_tuning.tune(unlabelled, "matern52", None)
     assert apart.unexplained < 0.5 * blind.unexplained
 
 
-def test_performers_who_move_alike_are_not_told_apart(samples, people, rng):
-    alike = tuned_for(samples, people, own_ways(samples, people, rng, 0.0))
-    # At the bound, to which the simplex is clipped.
-    assert alike.hyper.label < 1.2 * LABEL_BOUNDS[0]
-
-
-def test_label_keeps_within_its_bounds(samples, people, rng):
-    for apart in (0.0, 0.3, 100.0):
-        label = tuned_for(samples, people, own_ways(samples, people, rng, apart)).hyper.label
-        assert LABEL_BOUNDS[0] * (1 - 1e-9) <= label <= LABEL_BOUNDS[1] * (1 + 1e-9)
-    assert tuned_at(samples, wave(samples)).hyper.label == 0.0
-
-
-def test_tuning_with_labels_leaves_less_than_any_start(samples, people, rng):
-    values = own_ways(samples, people, rng, 0.5)
-    best = np.sum(np.square(tuned_for(samples, people, values).residuals))
-    for scale in (0.2, 1.2):
-        for label in (0.5, 2.0):
-            start = Hyper("matern52", (1,), np.full(2, scale), 0.02, label)
-            found = kriging_tuning.evaluate_fixed(
-                start, labelled(samples, people), values
-            ).residuals
-            assert best <= np.sum(np.square(found))
+def test_quantities_beside_share_scales_and_correlation(samples, people, rng):
+    problem = TuningProblem(labelled(samples, people), own_ways(samples, people, rng, 0.5))
+    found = kriging_tuning.tune_beside(problem, LABELLED).hyper
+    own = {name: getattr(found, name) for name in ("nugget", "offset", "trend")}
+    assert found == replace(LABELLED, **own)
+    assert all(own[name] != getattr(LABELLED, name) for name in own)
+    without = kriging_tuning.tune_beside(problem, replace(LABELLED, drifts=(1,), trend=0.0)).hyper
+    assert without.trend == 0.0 and without.drifts == (1,)
 
 
 def test_tuning_twice_gives_the_same_bits(samples, people, rng):
     values = own_ways(samples, people, rng, 0.5)
     a, b = (tuned_for(samples, people, values) for _ in range(2))
     assert np.array_equal(a.residuals, b.residuals)
-    assert (a.hyper.label, a.hyper.nugget) == (b.hyper.label, b.hyper.nugget)
+    assert (a.hyper.offset, a.hyper.nugget) == (b.hyper.offset, b.hyper.nugget)
 
 
 def alike(a, b):
-    """Compare two fields: the simplex stops when its corners lie within a per cent."""
+    """Compare two fields: the search stops when the loss hardly falls."""
     near = np.max(np.abs(np.log(a.hyper.scales / b.hyper.scales))) < 0.05
     return near and abs(a.unexplained - b.unexplained) < 1e-4
 
@@ -253,9 +323,8 @@ def test_order_of_labelled_and_grouped_samples_does_not_matter(samples, people, 
     first = tuned_for(samples, people, values)
     second = tuned_for(samples[order], (who[order], takes[order]), values[order])
     assert alike(first, second)
-    assert abs(np.log(first.hyper.label / second.hyper.label)) < 0.05
+    assert abs(np.log(first.hyper.offset / second.hyper.offset)) < 0.05
     # Who is called first, and which take, is nothing either.
     renamed = (who + 1) % PEOPLE, (7 * takes) % TAKES
-    third = tuned_for(samples, renamed, values)
-    assert alike(first, third)
+    assert alike(first, tuned_for(samples, renamed, values))
     assert not alike(first, tuned_for(samples, (who[order], takes[order]), values))

@@ -255,7 +255,9 @@ class ModelCardKriging(Struct, frozen=True, kw_only=True):
     drifts: tuple[int, ...]
     scales: tuple[float, ...]
     nugget: float
-    label: float
+    correlation: float
+    offset: float
+    trend: float
 
 
 class ModelCardEvent(Struct, frozen=True, kw_only=True):

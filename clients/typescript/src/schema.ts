@@ -1234,8 +1234,12 @@ export interface components {
                 scales: number[];
                 /** @description Nugget as a share of the sill. */
                 nugget: number;
-                /** @description Distance between two performers in the model's metric. */
-                label: number;
+                /** @description Correlation of the motions of two performers, beside their offsets. */
+                correlation: number;
+                /** @description Variance of a performer's own offset, in sills. */
+                offset: number;
+                /** @description Variance of the slope along each control, in sills per squared half-range. */
+                trend: number;
             };
             /** @description Leave-one-out error of each captured clip: its distance from the prediction of the other clips, root mean square over joints and frames, in metres. */
             left_out?: number[];

@@ -55,12 +55,13 @@ def solve(known: AdaptableModel, moved: CanonicalClips, performer: str) -> Adapt
         laid = extended_models.extend_samples(
             known.model.bank, known.groups, moved.examples, performer
         )
-        return _solve(known.model, moved, extended, laid)
+        return _solve(known, moved, extended, laid)
 
 
 def _solve(
-    model: FloatModel, moved: CanonicalClips, extended: ExtendedTensor, laid: ExtendedSamples
+    known: AdaptableModel, moved: CanonicalClips, extended: ExtendedTensor, laid: ExtendedSamples
 ) -> AdaptedModel:
+    model, law = known.model, known.model.bank.power_law
     reduced = extended.full.truncated(extended.ranks)
     pose = universal_kriging.solve(
         laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2]
@@ -69,6 +70,8 @@ def _solve(
         laid, model.bank, model.proportions, moved.offsets
     )
     durations = np.log(moved.aligned.durations)[:, None]
+    if law:
+        durations -= law.logarithms(np.stack([example.controls for example in moved.examples]))
     new = {**moved.travels, "duration": durations, "warp": moved.aligned.logs}
     solved = {
         name: extended_models.solve_extended(laid, model.bank, name, values)
@@ -76,8 +79,9 @@ def _solve(
     }
     # Keep the model's order of quantities.
     others = {name: solved.get(name, bones) for name in model.bank.others}
-    missed, sill = _left_out_errors(model.bank, laid, moved, extended)
-    bank = KrigingBank(laid.low, laid.high, laid.performers, pose, others, sill)
+    missed, sill = _left_out_errors(known, laid, moved, extended)
+    ends = laid.low, laid.high
+    bank = KrigingBank(*ends, laid.performers, pose, others, sill, power_law=law)
     own = extended.tensor
     decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means)
     adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel)
@@ -85,12 +89,13 @@ def _solve(
 
 
 def _left_out_errors(
-    old: KrigingBank, laid: ExtendedSamples, moved: CanonicalClips, extended: ExtendedTensor
+    known: AdaptableModel, laid: ExtendedSamples, moved: CanonicalClips, extended: ExtendedTensor
 ) -> tuple[Floats, float]:
     """Return leave-one-out errors of the new clips, and the sill updated with them.
 
-    The errors are mean squared joint distances (k,), m²; the sill is in m².
+    The errors are mean squared joint distances (k,), m², on canonical time; the sill is in m².
     """
+    old = known.model.bank
     hyper, points, k = laid.hyper(old.pose.hyper), laid.samples.points, len(moved.examples)
     left_out = universal_kriging.leave_out(hyper, points, laid.samples.groups)
     variances = universal_kriging.left_out_variances(hyper, points, left_out)[-k:]
@@ -100,7 +105,8 @@ def _left_out_errors(
     for values in moved.travels.values():
         missed += travels.mean_squared_distance(_travel_residuals(old, laid, values))
     n = len(points) - k
-    return missed, float((n * old.sill + np.sum(missed / variances)) / (n + k))
+    squares = np.sum(missed / variances) / known.canonical_excess
+    return missed, float((n * old.sill + squares) / (n + k))
 
 
 def _travel_residuals(old: KrigingBank, laid: ExtendedSamples, new: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from posefield_train.align import travel as travels
 from posefield_train.align.time_alignment import FINE, AlignedClips, CanonicalTime
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.parallel import single_thread
 from posefield_train.source import bone_lengths, half_turns
@@ -36,7 +38,8 @@ class AdaptableModel:
     skeleton: of the family. landmarks: their canonical times (M,). joint_weights: (J,). in_phase:
     True if cycles were shifted to a common phase. in_place: True if the root does not travel.
     truncation: root mean square error of the truncated tensor, m. groups: group (n,) of each
-    sample; a group is left out together.
+    sample; a group is left out together. left_out: leave-one-out errors (n,) of the samples, m, on
+    canonical time.
     """
 
     model: FloatModel
@@ -47,6 +50,18 @@ class AdaptableModel:
     in_place: bool
     truncation: float
     groups: Indices
+    left_out: Floats
+
+    @cached_property
+    def canonical_excess(self) -> float:
+        """Return the ratio of mean squared errors on canonical time to those that sigma counts.
+
+        Sigma compares motions after time warping, which leaves less of an error.
+        """
+        pose, sill = self.model.bank.pose, self.model.bank.sill
+        left_out = universal_kriging.leave_out(pose.hyper, pose.samples, self.groups)
+        variances = universal_kriging.left_out_variances(pose.hyper, pose.samples, left_out)
+        return float(np.mean(np.square(self.left_out) / variances)) / sill if sill else 1.0
 
     @property
     def canonical_time(self) -> CanonicalTime:
@@ -67,6 +82,7 @@ def adaptable(recipe: Recipe, trained: TrainedModel) -> AdaptableModel:
         recipe.motion.root == "in_place",
         trained.truncation_errors.rms,
         trained.samples.groups,
+        np.sqrt(trained.left_out_errors),
     )
 
 
@@ -159,12 +175,12 @@ def _distances(
 def refuse_outliers(adaptable: AdaptableModel, moved: CanonicalClips) -> None:
     """Raise TrainingError for the first clip that does not fit the family.
 
-    Checked are the size of the bones, and the distance from the prediction, at most STRANGE times
-    sigma.
+    Checked are the size of the bones, and the distance from the prediction, at most OUTLIER_SIGMAS
+    times sigma on canonical time.
     """
     _refuse_other_sizes(adaptable.model, moved.examples)
     for example, distance, sigma in zip(
-        moved.examples, moved.distances, _sigmas(adaptable.model, moved.examples), strict=True
+        moved.examples, moved.distances, _sigmas(adaptable, moved.examples), strict=True
     ):
         if distance > OUTLIER_SIGMAS * sigma:
             raise TrainingError(
@@ -192,12 +208,12 @@ def _refuse_other_sizes(model: FloatModel, examples: Sequence[Example]) -> None:
             )
 
 
-def _sigmas(model: FloatModel, examples: Sequence[Example]) -> Floats:
-    """Return sigma (k,), m, of an unseen performer at the nearest sampled controls.
+def _sigmas(adaptable: AdaptableModel, examples: Sequence[Example]) -> Floats:
+    """Return sigma (k,), m, of an unseen performer on canonical time, at the nearest controls.
 
     Controls are clipped to the sampled range because sigma grows without bound outside it.
     """
-    bank, asked = model.bank, np.stack([example.controls for example in examples])
+    bank, asked = adaptable.model.bank, np.stack([example.controls for example in examples])
     nobody = np.zeros((len(asked), len(bank.performers)))
     points = bank.points(np.clip(asked, bank.low, bank.high), nobody)
-    return bank.sigma(bank.numpy(points)[VARIANCE])
+    return np.sqrt(adaptable.canonical_excess) * bank.sigma(bank.numpy(points)[VARIANCE])

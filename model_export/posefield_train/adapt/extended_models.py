@@ -14,7 +14,6 @@ from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging import coefficient_models, sample_points, universal_kriging
 from posefield_train.kriging.coefficient_models import SAME_BONE
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel, KrigingBank
-from posefield_train.kriging.kriging_tuning import LABEL_BOUNDS, NUGGET_BOUNDS, SCALE_BOUNDS
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.ingest import Example
@@ -37,7 +36,9 @@ class ExtendedSamples:
 
     def hyper(self, old: Hyper) -> Hyper:
         """Return parameters rescaled to the new ranges."""
-        return replace(old, scales=old.scales * self.growth)
+        # One trend serves all controls, so that the most extended one decides.
+        trend = old.trend * float(np.max(self.growth)) ** 2
+        return replace(old, scales=old.scales * self.growth, trend=trend)
 
 
 def extend_samples(
@@ -92,10 +93,17 @@ def solve_bones(
     ), longer
 
 
+# Bounds of the search for parameters: bones hardly vary between the clips of a performer.
+SMALLEST_NUGGET, LARGEST_OFFSET = 1e-3, 30.0
+
+
 def _performer_parameters(laid: ExtendedSamples, bank: KrigingBank) -> Hyper:
-    """Return parameters of a model that is constant for each performer."""
-    scales = SCALE_BOUNDS[0] * laid.growth
-    return Hyper(bank.pose.hyper.covariance, (0,), scales, NUGGET_BOUNDS[0], LABEL_BOUNDS[1])
+    """Return parameters of a model that is nearly constant for each performer.
+
+    The offset outweighs what remains of the stationary covariance.
+    """
+    shared = laid.hyper(bank.pose.hyper)
+    return replace(shared, nugget=SMALLEST_NUGGET, offset=LARGEST_OFFSET, trend=0.0)
 
 
 def _extend_proportions(

@@ -2,12 +2,11 @@
 
 The graph holds dual weights, not sample values. These are recovered from the dual weights and the
 kriging system, which depends on controls, performers and the parameters of each model. The card
-holds the pose's parameters, the graph the scales and labels of all, and `TrainingParameters` the
-rest.
+holds the pose's parameters, and `TrainingParameters` those of the other quantities.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from posefield_train.align.warp import WarpBasis
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import POSE, CoefficientModel, ConstantModel, KrigingBank
+from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor.decoder import Decoder, Proportions
 from posefield_train.tensor.hosvd import TuckerTensor
@@ -98,6 +98,7 @@ def _adaptable(file: _ModelFile) -> AdaptableModel:
         card.root == "in_place",
         float(card.diagnostics["truncation_rms_m"]),
         residual_covariance.leave_out_groups(card, bank.pose.samples),
+        np.array(card.left_out),
     )
 
 
@@ -124,14 +125,21 @@ def _bank(file: _ModelFile) -> KrigingBank:
     order = _order(file, points)
     others = {name: _coefficient_model(file, name, points, order) for name in _widths(file)}
     pose = _solve_kriging(file, POSE, (card.kriging, points, order))
-    return KrigingBank(low, high, card.performers, pose, others, float(file["sill"]))
+    sill, law = file["sill"].item(), _power_law(file)
+    return KrigingBank(low, high, card.performers, pose, others, sill, power_law=law)
+
+
+def _power_law(file: _ModelFile) -> PowerLaw | None:
+    if "duration_exponents" not in file:
+        return None
+    return PowerLaw(file["duration_exponents"][:, 0], file["duration_floor"])
 
 
 def _order(file: _ModelFile, points: Floats) -> Indices:
     """Return the index (n,) on the card of each sample of the graph."""
     order, held = (
         residual_covariance.importance_order(file.card, file.numbers, points),
-        file["samples"][0].T,
+        file["samples"].T,
     )
     if np.abs(points[order, : len(file.card.controls)] - held).max() > SAMPLE_TOLERANCE:
         raise ModelError(file.source, "its card lists other samples than its graph holds")
@@ -146,7 +154,7 @@ def _widths(file: _ModelFile) -> dict[str, int]:
 
 
 def _columns(file: _ModelFile, name: str) -> slice:
-    """Return the columns of a quantity in the drift weights; the variance takes the first two."""
+    """Return the columns of a quantity in the linear weights; the variance takes the first two."""
     start = 2
     for other, width in _widths(file).items():
         if other == name:
@@ -159,16 +167,12 @@ def _coefficient_model(
     file: _ModelFile, name: str, points: Floats, order: Indices
 ) -> CoefficientModel:
     if f"{name}_weights" not in file:
-        return ConstantModel(file["drift_weights"][0, _columns(file, name)])
+        one = len(file.card.performers)
+        return ConstantModel(file["linear_weights"][one, _columns(file, name)])
     if name not in file.making.fields:
         raise ModelError(file.source, f"its card does not say what its field {name!r} is made with")
-    nugget, *drifts = file.making.fields[name]
-    fields = [POSE, *(other for other in _widths(file) if f"{other}_weights" in file)]
-    place, own = fields.index(name), file.card.kriging
-    assert own is not None
-    label = np.sqrt(file["squared_labels"][place].item()) if file.card.performers else 0.0
-    scales = np.sqrt(file["squared_scales"][place, :, 0])
-    hyper = Hyper(own.covariance, tuple(map(int, drifts)), scales, nugget, label)
+    nugget, offset, trend = file.making.fields[name]
+    hyper = replace(file.card.kriging, nugget=nugget, offset=offset, trend=trend)
     return _solve_kriging(file, name, (hyper, points, order))
 
 
@@ -179,9 +183,11 @@ def _solve_kriging(
     hyper, points, order = laid
     near = np.empty_like(file[f"{name}_weights"])
     near[order] = file[f"{name}_weights"]
-    functions = 1 + max(hyper.drifts) * len(hyper.scales)
-    dual = np.vstack([near, file["drift_weights"][:functions, _columns(file, name)]])
-    return universal_kriging.solve(hyper, points, universal_kriging.values(hyper, points, dual))
+    covariances = kriging_model.stationary_covariances(hyper, points, points)
+    covariances += hyper.nugget * np.eye(len(points))
+    linear = kriging_model.linear_functions(hyper, points)
+    values = covariances @ near + linear @ file["linear_weights"][:, _columns(file, name)]
+    return universal_kriging.solve(hyper, points, values)
 
 
 def _decoder(file: _ModelFile, bank: KrigingBank) -> Decoder:

@@ -1,20 +1,23 @@
 """Predictions of every method for the same queries, from the same training."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
+from posefield.kriging import kriging_model
 from posefield.motion import skeleton
 from posefield_train.align import time_alignment, travel
 from posefield_train.evaluate import compared_motion
 from posefield_train.evaluate.compared_motion import UNIFORM_SHARES, ComparedMotion, MotionEvent
 from posefield_train.evaluate.interpolation_peers import INTERPOLATORS, Interpolator
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import naive_kriging, sample_points, variogram
+from posefield_train.kriging import naive_kriging, sample_points, universal_kriging, variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 
@@ -141,7 +144,7 @@ def _synthesised_event(
 
 def _methods(trained: TrainedModel) -> dict[str, Callable[[Floats], _PredictedValues]]:
     """Return functions from points (Q, d + p) to predicted values, by method."""
-    laid = trained.samples
+    laid = _groups_for_lines(trained.samples)
 
     def of_peer(peer: Interpolator) -> Callable[[Floats], _PredictedValues]:
         def predict(points: Floats) -> _PredictedValues:
@@ -153,6 +156,31 @@ def _methods(trained: TrainedModel) -> dict[str, Callable[[Floats], _PredictedVa
     left = () if laid.labelled else PERFORMER_METHODS
     peers = {name: of_peer(peer) for name, (peer, _) in INTERPOLATORS.items() if name not in left}
     return {NAIVE: lambda points: _predict_naive(trained, laid, points), **peers}
+
+
+def _groups_for_lines(laid: SamplePoints) -> SamplePoints:
+    """Return samples of which a line can be fitted without any group; single ones if need be."""
+    functions = kriging_model.drift(laid.half_ranges, laid.controls, 1)
+    if kriging_model.find_required_group(laid.groups, functions) is None:
+        return laid
+    return replace(laid, groups=np.arange(len(laid.points)))
+
+
+def check_lines(examples: Sequence[Example], names: tuple[str, ...]) -> None:
+    """Raise TrainingError if the peers, which fit lines, could not leave out each example.
+
+    names: of the controls.
+    """
+    controls = np.stack([example.controls for example in examples])
+    universal_kriging.check_samples(controls, names, 1, nugget_is_zero=False)
+    functions = kriging_model.drift(controls, len(names), 1)
+    needed = kriging_model.find_required_group(np.arange(len(controls)), functions)
+    if needed is not None:
+        raise TrainingError(
+            f"without the clip of line {examples[needed].row.line} the controls of all others "
+            "follow linearly from one another; expected at least two clips that differ there, "
+            "since methods that fit a line are compared"
+        )
 
 
 def _pose_vectors(trained: TrainedModel, coefficients: Floats) -> Floats:

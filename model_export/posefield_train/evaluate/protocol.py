@@ -201,6 +201,7 @@ def _run_truth_batch(made: _EvaluatedModel, points: Floats, start: int) -> _Part
 
 
 def _evaluated_model(recipe: Recipe, examples: Sequence[Example]) -> _EvaluatedModel:
+    methods.check_lines(examples, tuple(control.name for control in recipe.controls))
     trained = train(recipe, examples, lambda _: None)
     return _EvaluatedModel(recipe, trained, onnx_export.export_finest(recipe, trained))
 

@@ -70,8 +70,7 @@ class FloatModel:
 
     def durations(self, controls: Floats, labels: Floats) -> Floats:
         """Return the durations (B,), s, at the finest level."""
-        logs = self.bank.others["duration"].predict(self.bank.points(controls, labels))
-        return np.exp(logs[:, 0])
+        return self.bank.durations(self.bank.points(controls, labels))
 
     def outputs_at_frames(
         self, controls: Floats, place: Floats, labels: Floats, level: int

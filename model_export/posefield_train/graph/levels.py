@@ -91,7 +91,7 @@ class LevelBuilder:
         effector = answers.effector
         return Level(
             rung.ranks,
-            model.bank.samples(level),
+            model.bank.columns(level),
             rung.joints,
             numbers,
             4 * numbers,
@@ -191,5 +191,5 @@ def _covariance_counts(model: FloatModel) -> list[int]:
     They cover some samples of the pose's model, or whole models.
     """
     bank, n = model.bank, len(model.bank.pose.samples)
-    some = [*(m for m in SAMPLE_COUNTS if m < n), *(n * (f + 1) for f in range(len(bank.kriged)))]
+    some = [*(m for m in SAMPLE_COUNTS if m < n), n]
     return [m for m in some if m <= bank.columns(len(bank.coarse))]

@@ -243,9 +243,10 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
     )
 
 
-def kriging_settings(hyper: Hyper) -> tuple[float, ...]:
-    """Return nugget and drifts; the nugget is rounded to six digits, as adaptation reads it."""
-    return (float(f"{hyper.nugget:.6g}"), *hyper.drifts)
+def kriging_settings(hyper: Hyper) -> tuple[float, float, float]:
+    """Return nugget, offset and trend with six digits, as adaptation reads them."""
+    nugget, offset, trend = (float(f"{x:.6g}") for x in (hyper.nugget, hyper.offset, hyper.trend))
+    return nugget, offset, trend
 
 
 def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
@@ -295,6 +296,9 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         "drift": list(hyper.drifts),
         "scales": [_rounded(scale) for scale in hyper.scales],
         "nugget": _rounded(hyper.nugget),
+        "correlation": _rounded(hyper.correlation),
+        "offset": _rounded(hyper.offset),
+        "trend": _rounded(hyper.trend),
         "tensor": list(trained.tensor.values.shape),
         "parity_m": float(f"{parity:.1e}"),
         "notes": [
@@ -308,7 +312,13 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
 
 def plain_parameters(hyper: Hyper) -> Hyper:
     """Return the parameters with Python floats, which a model card can hold."""
-    return replace(hyper, nugget=float(hyper.nugget), label=float(hyper.label))
+    return replace(
+        hyper,
+        nugget=float(hyper.nugget),
+        correlation=float(hyper.correlation),
+        offset=float(hyper.offset),
+        trend=float(hyper.trend),
+    )
 
 
 def _rounded(value: Any) -> float:

@@ -1,6 +1,6 @@
 """Choice of the ranks of the core tensor."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,17 +40,28 @@ class ParetoFront:
 
 
 def choose_ranks(
-    size: Size, full: TuckerTensor, price: RankCost, judge: TruncationReference
+    size: Size,
+    full: TuckerTensor,
+    price: RankCost,
+    judge: TruncationReference,
+    limits: Mapping[str, float],
 ) -> RankTriple:
-    """Return the ranks of a recipe, or the cheapest whose true errors stay within its budgets."""
+    """Return the ranks of a recipe, or the cheapest whose true errors stay within its budgets.
+
+    limits: m, errors of the truncation beside those of the prediction; the smaller of a budget and
+    its limit applies.
+    """
     if size.ranks is not None:
         return recipe_ranks(full.core, size.ranks)
+    budgets = dict(limits)
+    for name, budget in size.budgets.items():
+        budgets[name] = min(budget, limits.get(name, budget))
 
     def strain(triple: RankTriple) -> float:
-        return judge.strain(full.truncated(triple), size.budgets)
+        return judge.strain(full.truncated(triple), budgets)
 
     places = judge.own_tensor.weight * np.prod(judge.whole.shape[:2])
-    aim = min(size.budgets.values()) ** 2 * float(places)
+    aim = min(budgets.values()) ** 2 * float(places)
     return cheapest_within(pareto_front(full.core, price), strain, aim)
 
 

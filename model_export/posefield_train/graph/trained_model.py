@@ -33,13 +33,14 @@ class TrainedModel:
 
     examples: sorted by their content, so that the model does not depend on the order of the table.
     samples: sample points. pose: tuned kriging model of the pose. values: sample values (N, m) of
-    each quantity, the pose's full motions in the coordinates of the sample mode. missed: mean
-    squared joint distance (N,), m², of each clip from its leave-one-out prediction. explained:
-    share of the variation between clips that leave-one-out predicts from the controls, by quantity;
-    without a significant gain the quantity is constant. residuals: leave-one-out residuals (N, m)
-    of each quantity but the pose. fidelity: truncation errors. joints: leave-one-out error (J,) of
-    each joint as a share of the root mean square of all. outliers: evidence against clips that do
-    not fit.
+    each quantity, the pose's full motions in the coordinates of the sample mode. left_out_errors:
+    mean squared joint distance (N,), m², of each clip from its leave-one-out prediction on
+    canonical time. warped_errors: the same of whole motions after time warping, by which sigma is
+    scaled. explained: share of the variation between clips that leave-one-out predicts from the
+    controls, by quantity; without a significant gain the quantity is constant. residuals:
+    leave-one-out residuals (N, m) of each quantity but the pose. truncation_errors: of the reduced
+    tensor. joints: leave-one-out error (J,) of each joint as a share of the root mean square of
+    all. outliers: evidence against clips that do not fit.
     """
 
     model: FloatModel
@@ -52,6 +53,7 @@ class TrainedModel:
     pose: TunedKriging
     values: dict[str, Floats]
     left_out_errors: Floats
+    warped_errors: Floats
     explained: dict[str, float]
     findings: list[Finding]
     residuals: dict[str, Floats]

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from posefield_train.graph.float_model import FloatModel
+from posefield_train.kriging import kriging_bank
 from posefield_train.kriging.kriging_bank import KrigingBank
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.tensor.motion_tensor import MotionTensor
 
 
@@ -59,7 +61,7 @@ def count_numbers(model: FloatModel, level: int) -> int:
     bank, rung = model.bank, model.decoder.level_sizes[level]
     r1, r2, r3 = rung.ranks
     samples, varies = (
-        bank.samples(level),
+        bank.columns(level),
         np.any(model.decoder.at_level(level).unwhiten != 0.0, axis=1),
     )
     bases = r1 * np.count_nonzero(varies) + r2 * len(model.decoder.reduced.bases[1])
@@ -68,13 +70,17 @@ def count_numbers(model: FloatModel, level: int) -> int:
 
 
 def _precision_size(bank: KrigingBank, level: int) -> int:
-    return 0 if level else (bank.drift + len(bank.pose.samples)) ** 2
+    return 0 if level else (bank.linear + len(bank.pose.samples)) ** 2
 
 
 def _weights_size(bank: KrigingBank, level: int) -> int:
     if level:
         return bank.coarse[level - 1].size
-    return sum(field.dual.size for field in bank.kriged)
+    fields = [*bank.others.values(), bank.pose]
+    near = [field.dual for field in fields if isinstance(field, UniversalKriging)]
+    return bank.linear * sum(map(kriging_bank.width, fields)) + sum(
+        len(bank.pose.samples) * dual.shape[1] for dual in near
+    )
 
 
 def count_operations(model: FloatModel, level: int) -> int:

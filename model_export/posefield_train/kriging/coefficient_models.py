@@ -5,13 +5,14 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipBones, SampleValues
+from posefield.common.array_shapes import ClipBones, SampleControls, SampleValues
 from posefield.common.units import Floats
-from posefield_train.kriging import kriging_tuning, universal_kriging, variogram
+from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel
-from posefield_train.kriging.kriging_tuning import TunedKriging
+from posefield_train.kriging.kriging_tuning import OTHER_STRENGTH, TunedKriging, TuningProblem
+from posefield_train.kriging.power_law import PowerLawFit
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.variogram import ExperimentalVariogram
+from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe import Kriging
 from posefield_train.tensor.decoder import Proportions
 
@@ -36,65 +37,33 @@ class FittedModel:
 
 
 def choose_covariance(
-    settings: Kriging, samples: SamplePoints, values: SampleValues
+    settings: Kriging,
+    samples: SamplePoints,
+    values: SampleValues,
+    effector: Annotated[Floats, "samples _ _"] | None = None,
 ) -> TunedKriging:
     """Return the model of values (N, m) with the first covariance, or a clearly better one.
 
-    A covariance is clearly better if its leave-one-out error is below CLEARLY times the first's.
+    A covariance is clearly better if its leave-one-out error is below CLEAR_IMPROVEMENT times the
+    first's. effector: as in `TuningProblem`.
     """
-    seen = _variograms(settings, samples, values)
+    problem = TuningProblem(samples, values, settings.nugget, effector)
     first, *others = (
-        _best_drift(settings, name, samples, values, seen) for name in settings.covariances
+        kriging_tuning.tune(problem, name, settings.fixed_degree) for name in settings.covariances
     )
     best = min(others, key=lambda field: field.unexplained, default=first)
     return best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
 
 
-def tune_drift(
-    settings: Kriging, covariance: str, samples: SamplePoints, values: SampleValues
-) -> TunedKriging:
-    """Return the model of values (N, m) with the drift of the least leave-one-out error."""
-    return _best_drift(
-        settings, covariance, samples, values, _variograms(settings, samples, values)
-    )
-
-
-def _variograms(
-    settings: Kriging, samples: SamplePoints, values: SampleValues
-) -> dict[int, ExperimentalVariogram]:
-    """Return the variogram of the residuals for each degree of drift; covariances share it."""
-    degrees = {max(drifts) for drifts in settings.drifts}
-    return {
-        degree: variogram.residual_variogram(samples.half_ranges, values, degree)
-        for degree in degrees
-    }
-
-
-def _best_drift(
-    settings: Kriging,
-    covariance: str,
-    samples: SamplePoints,
-    values: SampleValues,
-    seen: dict[int, ExperimentalVariogram],
-) -> TunedKriging:
-    guesses = [
-        kriging_tuning.initial_guess(seen[max(drifts)], samples.controls, covariance, drifts)
-        for drifts in settings.drifts
-    ]
-    found = [kriging_tuning.tune(guess, samples, values, settings.nugget) for guess in guesses]
-    return min(found, key=lambda field: field.unexplained)
-
-
-def fit(
-    settings: Kriging, covariance: str, samples: SamplePoints, values: SampleValues
-) -> FittedModel:
-    """Return a model of values (N, m) in the controls.
+def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleValues) -> FittedModel:
+    """Return a model of values (N, m) with the scales of the pose's model.
 
     It is their mean if the controls do not explain them.
     """
     if np.ptp(values, axis=0).max() == 0.0:
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
-    found = tune_drift(settings, covariance, samples, values)
+    problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
+    found = kriging_tuning.tune_beside(problem, pose)
     explained = 1.0 - found.unexplained
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.
     if not _is_significant(found, samples, values) and settings.nugget is None:
@@ -104,8 +73,22 @@ def fit(
     )
 
 
+def factor_of(
+    found: PowerLawFit,
+    samples: SamplePoints,
+    controls: SampleControls,
+    logs: Annotated[Floats, "samples 1"],
+) -> FittedModel:
+    """Return the model of what a power law of controls (N, d) leaves of logarithms (N, 1)."""
+    left = logs - found.law.logarithms(controls)
+    total = float(np.sum(np.square(samples.from_mean(logs))))
+    explained = 1.0 - float(np.sum(np.square(found.residuals))) / total
+    solved = universal_kriging.solve(found.hyper, samples.points, left)
+    return FittedModel(solved, explained, found.residuals)
+
+
 def _is_significant(found: TunedKriging, samples: SamplePoints, values: SampleValues) -> bool:
-    """Return True if the gain over the mean of the other samples exceeds SURE standard errors.
+    """Return True if the gain over the mean of the other samples exceeds SIGNIFICANCE errors.
 
     Scales and nugget were chosen to maximize this gain, so that a small one can be chance.
     """

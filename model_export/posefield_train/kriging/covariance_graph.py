@@ -6,6 +6,8 @@ Each takes the squared distance. The variogram is one minus the covariance.
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from posefield.common.units import Floats
 from posefield.kriging.covariance import COVARIANCE_MODELS, RATE32, RATE52
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
@@ -13,9 +15,13 @@ from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 @dataclass(frozen=True)
 class Covariance:
-    """A covariance of squared distances: a NumPy function, and a builder of its ONNX nodes."""
+    """A covariance of squared distances: a NumPy function, its slope, and a builder of ONNX nodes.
+
+    slope: derivative by the squared distance; zero at distance zero where it is infinite there.
+    """
 
     numpy: Callable[[Floats], Floats]
+    slope: Callable[[Floats], Floats]
     onnx: Callable[[GraphBuilder, str], str]
 
 
@@ -46,13 +52,38 @@ def _matern52_onnx(net: GraphBuilder, squared: str) -> str:
     return net("Mul", growing, net("Exp", net("Neg", a)))
 
 
+def _exponential_slope(squared: Floats) -> Floats:
+    h = np.sqrt(squared)
+    with np.errstate(divide="ignore"):
+        return np.where(h > 0.0, -1.5 * np.exp(-3.0 * h) / h, 0.0)
+
+
+def _gaussian_slope(squared: Floats) -> Floats:
+    return -3.0 * np.exp(-3.0 * squared)
+
+
+def _spherical_slope(squared: Floats) -> Floats:
+    h = np.sqrt(squared)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where((h > 0.0) & (h < 1.0), 0.75 * (h - 1.0 / h), 0.0)
+
+
+def _matern32_slope(squared: Floats) -> Floats:
+    return -0.5 * RATE32**2 * np.exp(-RATE32 * np.sqrt(squared))
+
+
+def _matern52_slope(squared: Floats) -> Floats:
+    a = RATE52 * np.sqrt(squared)
+    return -(RATE52**2) / 6.0 * (1.0 + a) * np.exp(-a)
+
+
 _GRAPHS = {
-    "exponential": _exponential_onnx,
-    "gaussian": _gaussian_onnx,
-    "spherical": _spherical_onnx,
-    "matern32": _matern32_onnx,
-    "matern52": _matern52_onnx,
+    "exponential": (_exponential_slope, _exponential_onnx),
+    "gaussian": (_gaussian_slope, _gaussian_onnx),
+    "spherical": (_spherical_slope, _spherical_onnx),
+    "matern32": (_matern32_slope, _matern32_onnx),
+    "matern52": (_matern52_slope, _matern52_onnx),
 }
 COVARIANCES = {
-    name: Covariance(formula, _GRAPHS[name]) for name, formula in COVARIANCE_MODELS.items()
+    name: Covariance(formula, *_GRAPHS[name]) for name, formula in COVARIANCE_MODELS.items()
 }

@@ -1,12 +1,12 @@
 """Kriging models of all quantities over the same samples, evaluated in one pass.
 
-Pose coefficients, bone offsets, duration and time warp each have scales and a nugget of their own.
-A quantity that the controls do not explain is constant. Coarser levels of detail use only the first
-covariances, those of the pose at the most informative samples, with separate weights for all
-quantities.
+Pose coefficients, bone offsets, duration and time warp share the stationary part of their
+covariances, so that a query computes one covariance for each sample. Each has a nugget, an offset
+and a trend of its own. A quantity that the controls do not explain is constant. Coarser levels of
+detail use only the first covariances, at the most informative samples, with separate weights for
+all quantities.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated
@@ -24,8 +24,9 @@ from posefield.common.array_shapes import (
     Values,
 )
 from posefield.common.units import Floats
+from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import half_ranges
-from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.universal_kriging import UniversalKriging
 
 
@@ -42,7 +43,7 @@ class ConstantModel:
 
 CoefficientModel = UniversalKriging | ConstantModel
 
-VARIANCE, POSE = "variance", "pose"
+VARIANCE, POSE, DURATION = "variance", "pose", "duration"
 
 
 def width(field: CoefficientModel) -> int:
@@ -57,7 +58,7 @@ class KrigingBank:
     performers: names, in the order of their labels. sill: of the pose model, m² per joint and
     frame. coarse: weights (p + 1 + d + m, M) of each coarser level. Rows: labels, one, controls and
     the first m covariances. Columns: the logarithm of the variance, the other quantities, the
-    pose's leading coefficients.
+    pose's leading coefficients. power_law: of the duration, beside its model.
     """
 
     low: PerControl
@@ -67,34 +68,16 @@ class KrigingBank:
     others: dict[str, CoefficientModel]
     sill: float
     coarse: tuple[Annotated[Floats, "rows columns"], ...] = ()
-
-    @property
-    def kriged(self) -> list[UniversalKriging]:
-        """Return the models that depend on the controls, the pose's first."""
-        fields = [self.pose, *self.others.values()]
-        return [field for field in fields if isinstance(field, UniversalKriging)]
+    power_law: PowerLaw | None = None
 
     @property
     def linear(self) -> int:
         """Return the number of labels, one and controls, which precede the covariances."""
         return len(self.performers) + 1 + len(self.low)
 
-    @property
-    def drift(self) -> int:
-        """Return the number of controls in the drift of the variance."""
-        return max(self.pose.hyper.drifts) * len(self.low)
-
     def columns(self, level: int) -> int:
-        """Return the number of covariances of a level.
-
-        The order is by model, the pose's first, then by sample.
-        """
-        whole = len(self.kriged) * len(self.pose.samples)
-        return len(self.coarse[level - 1]) - self.linear if level else whole
-
-    def samples(self, level: int) -> int:
-        """Return the number of samples that a level evaluates."""
-        return min(self.columns(level), len(self.pose.samples))
+        """Return the number of samples, and so of covariances, that a level evaluates."""
+        return len(self.coarse[level - 1]) - self.linear if level else len(self.pose.samples)
 
     def sample_values(self, name: str) -> SampleValues:
         """Return the values (n, m) that a model interpolates, or its mean in every row."""
@@ -116,8 +99,23 @@ class KrigingBank:
 
     def numpy(self, points: Points, level: int = 0) -> dict[str, Annotated[Floats, "points _"]]:
         """Return values (B, m) of each quantity at points (B, d + p), the variance as a share."""
-        if level:
-            return self._thinned(points, self.coarse[level - 1])
+        thinned = self._thinned(points, self.coarse[level - 1]) if level else self.kriged(points)
+        return {**thinned, DURATION: thinned[DURATION] + self.power_logarithms(points)}
+
+    def durations(self, points: Points) -> PerPoint:
+        """Return the durations (B,), s, at points (B, d + p), at the finest level."""
+        logs = self.others[DURATION].predict(points) + self.power_logarithms(points)
+        return np.asarray(np.exp(logs[:, 0]))
+
+    def power_logarithms(self, points: Points) -> Annotated[Floats, "points 1"]:
+        """Return the part (B, 1) of the logarithm of the duration that the power law gives."""
+        if self.power_law is None:
+            return np.zeros((len(points), 1))
+        middle, half = 0.5 * (self.high + self.low), 0.5 * (self.high - self.low)
+        return self.power_law.logarithms(middle + half * points[:, : len(self.low)])
+
+    def kriged(self, points: Points) -> dict[str, Annotated[Floats, "points _"]]:
+        """Return values (B, m) of each quantity's kriging model, the variance as a share."""
         own = self.pose.variance(points)[:, None] + self.pose.hyper.nugget
         values = {name: field.predict(points) for name, field in self.others.items()}
         return {VARIANCE: own, **values, POSE: self.pose.predict(points)}
@@ -133,31 +131,30 @@ class KrigingBank:
 
     def basis(self, points: Points, columns: int) -> Annotated[Floats, "points rows"]:
         """Return labels, one, controls and the first covariances (B, p + 1 + d + m)."""
-        d, n = len(self.low), len(self.pose.samples)
-        fields = self.kriged[: -(-columns // n)]
-        near = [
-            universal_kriging.covariances(field.hyper, points, field.samples) for field in fields
-        ]
-        one = np.ones((len(points), 1))
-        return np.hstack([points[:, d:], one, points[:, :d], np.hstack(near)[:, :columns]])
+        hyper, samples = self.pose.hyper, self.pose.samples[:columns]
+        near = kriging_model.stationary_covariances(hyper, points, samples)
+        return np.hstack([kriging_model.linear_functions(hyper, points), near])
+
+    def linear_weights(self, field: CoefficientModel) -> Annotated[Floats, "linear values"]:
+        """Return a model's weights (p + 1 + d, m) of labels, one and controls."""
+        if isinstance(field, ConstantModel):
+            found = np.zeros((self.linear, len(field.mean)))
+            found[len(self.performers)] = field.mean
+            return found
+        return kriging_model.linear_terms(field.hyper, field.samples) @ field.dual
 
     @property
-    def precision(self) -> Annotated[Floats, "system system"]:
-        """Return the variance's quadratic form (drift + n, drift + n) in controls, covariances."""
-        order = self._order
-        return self.pose.form[np.ix_(order, order)]
-
-    @property
-    def slope(self) -> tuple[Annotated[Floats, "system"], float]:
-        """Return the linear part (drift + n,) and the constant part of the variance."""
-        n, nugget = len(self.pose.samples), self.pose.hyper.nugget
-        return -2.0 * self.pose.form[n, self._order], 1.0 + nugget - float(self.pose.form[n, n])
-
-    @property
-    def _order(self) -> Sequence[int]:
-        # The kriging system's order is [covariances, 1, controls].
-        n = len(self.pose.samples)
-        return [*range(n + 1, n + 1 + self.drift), *range(n)]
+    def variance_form(self) -> Annotated[Floats, "rows rows"]:
+        """Return the quadratic form (p + 1 + d + n, p + 1 + d + n) of the variance in the basis."""
+        hyper, p = self.pose.hyper, len(self.performers)
+        terms = kriging_model.linear_terms(hyper, self.pose.samples)
+        near = np.eye(len(self.pose.samples), terms.shape[1])
+        both = np.vstack([terms, near])
+        found = -both @ self.pose.form @ both.T
+        found[p, p] += 1.0 + hyper.offset + hyper.nugget
+        controls = np.arange(p + 1, self.linear)
+        found[controls, controls] += hyper.trend
+        return found
 
     def sigma(self, variance: Annotated[Floats, "points 1"]) -> PerPoint:
         """Return the standard deviation (B,), m, of a captured clip from the prediction.

@@ -1,30 +1,60 @@
-"""Tuning of scales and nugget of a kriging model by closed-form leave-one-out."""
+"""Tuning of a kriging model's parameters by closed-form leave-one-out, with a prior on them.
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+The loss is the logarithm of the squared leave-one-out residuals, which is the negative logarithm of
+their likelihood with an unknown variance, less the logarithm of the parameters' prior. Few samples
+leave the parameters undetermined; the prior decides between those that fit alike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.special import expit
 
 from posefield.common.array_shapes import PerSample, SampleValues
-from posefield.common.units import Floats
-from posefield_train.kriging import universal_kriging, variogram
+from posefield.common.units import Floats, Indices
+from posefield.kriging import leave_one_out
+from posefield_train.kriging import universal_kriging
+from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.universal_kriging import Hyper, LeaveOneOut
-from posefield_train.kriging.variogram import ExperimentalVariogram
+from posefield_train.kriging.universal_kriging import Hyper
 
-# Bounds of scales, per half-range of a control. The lower bound means "linear in this control"; in
-# float32 samples would coincide beyond the bounds.
-SCALE_BOUNDS = (0.15, 3.0)
-# Bounds of the nugget, as a share of the sill. Repeated trials can differ by several sills.
-NUGGET_BOUNDS = (1e-4, 10.0)
-# Bounds of label distances: from similar performers to independent ones.
-LABEL_BOUNDS = (0.05, 4.0)
-DESCENT_COUNT = 2
-SIMPLEX_STEP = 0.7
-# Stopping criteria: size of the simplex in logarithms, relative difference of losses, evaluations.
-SIMPLEX_TOLERANCE, EVEN, MOST = 1e-2, 1e-5, 400
+
+@dataclass(frozen=True)
+class ParameterPrior:
+    """Bounds of a parameter, and the mean and deviation of its normal prior, in search units.
+
+    Search units are logarithms, and log odds for the correlation.
+    """
+
+    low: float
+    high: float
+    mean: float
+    deviation: float
+
+
+def _in_logarithms(low: float, high: float, mean: float, deviation: float) -> ParameterPrior:
+    return ParameterPrior(np.log(low), np.log(high), np.log(mean), deviation)
+
+
+# In float32 samples would coincide beyond the bounds of scales, per half-range of a control.
+SCALE_PRIOR = _in_logarithms(0.1, 3.0, 0.45, 0.7)
+PRIORS = {
+    "nugget": _in_logarithms(1e-3, 10.0, 0.1, 1.5),
+    "correlation": ParameterPrior(-6.0, 5.0, 0.0, 2.0),
+    "offset": _in_logarithms(1e-3, 30.0, 0.3, 2.0),
+    "trend": _in_logarithms(1e-3, 300.0, 1.0, 2.5),
+}
+"""Priors of the parameters besides the scales, in the order of the search."""
+# The loss has several minima, between a smooth field and one of independent samples.
+STARTS = ((0.5, 0.1), (0.25, 0.03), (1.0, 0.3))
+"""Scale and nugget at which searches start."""
+ITERATIONS = 80
+POSE_STRENGTH, OTHER_STRENGTH = 2.0, 1.0
+"""Weight of the prior for the pose, and for the few values of other quantities."""
 
 
 @dataclass(frozen=True)
@@ -43,20 +73,6 @@ class TunedKriging:
     sill: float
 
 
-def initial_guess(
-    experimental: ExperimentalVariogram, controls: int, covariance: str, drifts: tuple[int, ...]
-) -> Hyper:
-    """Return parameters of the isotropic variogram fit, within the bounds.
-
-    experimental: variogram of the residuals from the highest degree in `drifts`. controls:
-    their number.
-    """
-    fit = variogram.fit_by_grid(experimental, covariance)
-    share = fit.nugget / fit.sill if fit.sill > 0 else NUGGET_BOUNDS[1]
-    scales = np.full(controls, np.clip(1.0 / fit.range, *SCALE_BOUNDS))
-    return Hyper(covariance, drifts, scales, float(np.clip(share, *NUGGET_BOUNDS)), 0.0)
-
-
 def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) -> TunedKriging:
     """Return the model of given parameters with its leave-one-out residuals."""
     left_out = universal_kriging.leave_out(hyper, samples.points, samples.groups)
@@ -72,70 +88,224 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) ->
     )
 
 
-def tune(
-    guess: Hyper, samples: SamplePoints, values: SampleValues, nugget: float | None
-) -> TunedKriging:
-    """Return the model with scales, label distance and nugget that minimize the squared residuals.
+@dataclass(frozen=True)
+class TuningProblem:
+    """Values (n, m) in a Euclidean metric, and what is known of their kriging model.
 
-    values: (n, m), in a Euclidean metric. nugget: fixed value; None to tune it. Nelder and Mead's
-    simplex starts from the best points of the guess and a coarse grid, because the loss has several
-    minima, between a smooth model and one of independent samples.
+    nugget: fixed value; None to tune it. effector: matrices (n, k, m') that map the first m'
+    residuals of each sample to weighted displacements of the event's joint, or None.
     """
-    d, labelled = samples.controls, samples.labelled
-    bounds = [SCALE_BOUNDS] * d + [LABEL_BOUNDS] * labelled + [NUGGET_BOUNDS]
-    low, high = np.log(bounds).T
 
-    def read(x: Floats) -> Hyper:
-        found = np.exp(x)
+    samples: SamplePoints
+    values: SampleValues
+    nugget: float | None = None
+    effector: Annotated[Floats, "samples _ _"] | None = None
+    strength: float = POSE_STRENGTH
+
+
+def tune(problem: TuningProblem, covariance: str, degree: int | None) -> TunedKriging:
+    """Return the model whose parameters minimize the leave-one-out loss.
+
+    degree: of the drift; None for a constant and a trend within the covariance.
+    """
+    hyper = Hyper(covariance, (degree or 0,), np.ones(problem.samples.controls), 0.0, 1.0, 0.0, 0.0)
+    names = _free(problem, trend=degree is None)
+    starts = [(np.log(scale), np.log(nugget)) for scale, nugget in STARTS]
+    loss = LeaveOneOutLoss(problem, hyper, names, own_scales=True)
+    return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts])
+
+
+def tune_beside(problem: TuningProblem, pose: Hyper) -> TunedKriging:
+    """Return a model with the scales and correlation of the pose's, and other parameters tuned."""
+    trend = pose.drifts == (0,) and pose.trend > 0.0
+    names = tuple(name for name in _free(problem, trend) if name != "correlation")
+    loss = LeaveOneOutLoss(problem, pose, names, own_scales=False)
+    return _best(loss, [loss.start(0.0, np.log(nugget)) for _, nugget in STARTS])
+
+
+def _free(problem: TuningProblem, trend: bool) -> tuple[str, ...]:
+    """Return the names of the parameters besides the scales that a problem leaves open."""
+    fixed = set() if problem.samples.labelled else {"correlation", "offset"}
+    fixed |= set() if trend else {"trend"}
+    fixed |= set() if problem.nugget is None else {"nugget"}
+    return tuple(name for name in PRIORS if name not in fixed)
+
+
+def _best(loss: "LeaveOneOutLoss", starts: Sequence[Floats]) -> TunedKriging:
+    """Return the model at the least loss that searches from the starts find."""
+    if not len(starts[0]):
+        return evaluate_fixed(loss.read(starts[0]), loss.problem.samples, loss.problem.values)
+    bounds = [(prior.low, prior.high) for prior in loss.priors]
+    found = [
+        minimize(
+            loss.value_and_slope,
+            start,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"maxiter": ITERATIONS},
+        )
+        for start in starts
+    ]
+    best = min(found, key=lambda result: float(result.fun))
+    return evaluate_fixed(loss.read(best.x), loss.problem.samples, loss.problem.values)
+
+
+@dataclass(frozen=True)
+class LeaveOneOutLoss:
+    """Loss of parameters in search units: scales if own, then those named."""
+
+    problem: TuningProblem
+    hyper: Hyper
+    names: tuple[str, ...]
+    own_scales: bool
+    priors: list[ParameterPrior] = field(init=False)
+
+    def __post_init__(self) -> None:
+        scales = [SCALE_PRIOR] * (self.problem.samples.controls if self.own_scales else 0)
+        object.__setattr__(self, "priors", scales + [PRIORS[name] for name in self.names])
+
+    def start(self, scale: float, nugget: float) -> Annotated[Floats, "units"]:
+        """Return a start of the search from the logarithms of a scale and a nugget."""
+        means = np.array([prior.mean for prior in self.priors])
+        if self.own_scales:
+            means[: self.problem.samples.controls] = scale
+        if "nugget" in self.names:
+            means[self._place("nugget")] = nugget
+        return means
+
+    def _place(self, name: str) -> int:
+        return len(self.priors) - len(self.names) + self.names.index(name)
+
+    def read(self, x: Annotated[Floats, "units"]) -> Hyper:
+        """Return the parameters at a point of the search."""
+        scales = len(self.priors) - len(self.names)
+        found = {name: float(np.exp(x[self._place(name)])) for name in self.names}
+        if "correlation" in found:
+            found["correlation"] = float(expit(x[self._place("correlation")]))
+        if self.problem.nugget is not None:
+            found["nugget"] = self.problem.nugget
+        own = self.hyper if self.own_scales else replace(self.hyper, offset=0.0, trend=0.0)
         return replace(
-            guess,
-            scales=found[:d],
-            label=float(found[d]) if labelled else 0.0,
-            nugget=float(found[-1]) if nugget is None else nugget,
+            own,
+            scales=np.exp(x[:scales]) if self.own_scales else own.scales,
+            nugget=found.get("nugget", own.nugget),
+            correlation=found.get("correlation", own.correlation),
+            offset=found.get("offset", own.offset),
+            trend=found.get("trend", own.trend),
         )
 
-    # The residuals depend on the values only through their inner products.
-    products = values @ values.T
-    leave_one_out = LeaveOneOut(samples.points, samples.controls, samples.groups)
+    def value_and_slope(
+        self, x: Annotated[Floats, "units"]
+    ) -> tuple[float, Annotated[Floats, "units"]]:
+        """Return the loss and its gradient in search units."""
+        hyper = self.read(x)
+        squares, slope = self._squares(hyper)
+        groups = self._count
+        apart = (x - [prior.mean for prior in self.priors]) / [p.deviation for p in self.priors]
+        deviations = np.array([prior.deviation for prior in self.priors])
+        strength = self.problem.strength
+        value = 0.5 * groups * np.log(squares) + 0.5 * strength * float(apart @ apart)
+        changes = np.array([np.sum(slope * change) for change in self._changes(hyper)])
+        return value, 0.5 * groups / squares * changes + strength * apart / deviations
 
-    def loss(x: Floats) -> float:
-        left_out = leave_one_out.residual_matrix(read(x))
-        return float(np.sum((left_out @ products) * left_out))
+    def _squares(self, hyper: Hyper) -> tuple[float, Floats]:
+        """Return the weighted squared residuals, and their derivative (n, n) by the covariances.
 
-    starts = [np.clip(x, low, high) for x in _starts(guess, labelled)]
-    best = min(_descend(loss, x, low, high) for x in sorted(starts, key=loss)[:DESCENT_COUNT])
-    return evaluate_fixed(read(np.array(best[1])), samples, values)
+        With the inverse B of the kriging system's sample block and U = B values, the residuals of a
+        group g are R_g = B_gg⁻¹ U_g; see the closed form of `leave_one_out`.
+        """
+        block = self._inverse(hyper)
+        product = block @ self._values
+        residuals = self._divided(block, product)
+        weighted = self._weighted(residuals)
+        backward = self._divided(block, weighted)
+        paired = np.where(self._together, backward @ residuals.T, 0.0)
+        slope = block @ (paired @ block - backward @ product.T)
+        return float(np.sum(weighted * residuals)), slope + slope.T
 
+    def _divided(self, block: Floats, rows: Floats) -> Floats:
+        """Return rows (n, m), each group's multiplied by the inverse of its part of a block."""
+        found = rows / np.diagonal(block)[:, None]
+        for own in self._takes:
+            among = block[own[:, :, None], own[:, None, :]]
+            found[own] = np.linalg.solve(among, rows[own])
+        return found
 
-def _starts(guess: Hyper, labelled: bool) -> list[Annotated[Floats, "parameters"]]:
-    """Return logarithms of scales, label and nugget: the guess and an isotropic grid."""
-    even = np.ones_like(guess.scales)
-    pairs = [(guess.scales, guess.nugget)]
-    pairs += [(s * even, n) for s in (0.2, 0.5, 1.2) for n in (0.02, 0.3, 2.0)]
-    labels = ([0.5], [2.0]) if labelled else ([],)
-    return [np.log([*scales, *label, nugget]) for scales, nugget in pairs for label in labels]
+    def _inverse(self, hyper: Hyper) -> Floats:
+        """Return the sample block (n, n) of the inverse of the kriging system."""
+        points, degree = self.problem.samples.points, max(hyper.drifts)
+        inverse: Floats = np.asarray(
+            np.linalg.inv(universal_kriging.noisy(hyper, points)), dtype=np.float64
+        )
+        functions = universal_kriging.drift(points, len(hyper.scales), degree)
+        weighed = inverse @ functions
+        block: Floats = inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
+        return block
 
+    def _weighted(self, residuals: Floats) -> Floats:
+        """Return the residuals (n, m) with the weight of the event's joint added."""
+        effector = self.problem.effector
+        if effector is None:
+            return residuals
+        found, first = residuals.copy(), effector.shape[2]
+        moved = np.einsum("nkm,nm->nk", effector, residuals[:, :first])
+        found[:, :first] += np.einsum("nkm,nk->nm", effector, moved)
+        return found
 
-def _descend(
-    loss: Callable[[Floats], float],
-    start: Annotated[Floats, "parameters"],
-    low: Annotated[Floats, "parameters"],
-    high: Annotated[Floats, "parameters"],
-) -> tuple[float, list[float]]:
-    """Return the least loss found from a start within bounds, and its location."""
-    # Steps of a factor of two: SciPy's default simplex is degenerate if a logarithm is near zero.
-    inward = np.where(start + SIMPLEX_STEP > high, -SIMPLEX_STEP, SIMPLEX_STEP)
-    simplex = np.vstack([start, start + np.diag(inward)])
-    found = minimize(
-        loss,
-        start,
-        method="Nelder-Mead",
-        bounds=list(zip(low, high, strict=True)),
-        options={
-            "initial_simplex": simplex,
-            "xatol": SIMPLEX_TOLERANCE,
-            "fatol": EVEN * loss(start),
-            "maxfev": MOST,
-        },
-    )
-    return float(found.fun), [float(value) for value in found.x]
+    @cached_property
+    def _values(self) -> Floats:
+        """Values (n, m) in at most n coordinates, which keep their inner products."""
+        values = self.problem.values
+        if values.shape[1] <= len(values):
+            return values
+        left, lengths, _ = np.linalg.svd(values, full_matrices=False)
+        return np.asarray(left * lengths)
+
+    @cached_property
+    def _takes(self) -> list[Indices]:
+        """Sample indices (groups, size) of the groups of each size above one."""
+        return leave_one_out.equal_sized_groups(self.problem.samples.groups)
+
+    @cached_property
+    def _together(self) -> Floats:
+        """Matrix (n, n) of truth values: two samples are left out together."""
+        groups = self.problem.samples.groups
+        return np.asarray(groups[:, None] == groups[None])
+
+    @cached_property
+    def _count(self) -> int:
+        return len(np.unique(self.problem.samples.groups))
+
+    @cached_property
+    def _gaps(self) -> Floats:
+        """Squared differences (d, n, n) of each control."""
+        planes = self.problem.samples.half_ranges.T
+        return np.square(np.subtract(planes[:, :, None], planes[:, None, :]))
+
+    @cached_property
+    def _same(self) -> Floats:
+        """Matrix (n, n): one where two samples have one performer."""
+        labels = self.problem.samples.points[:, self.problem.samples.controls :]
+        return labels @ labels.T
+
+    def _changes(self, hyper: Hyper) -> list[Floats]:
+        """Return the derivatives (n, n) of the covariances by each search unit."""
+        controls, same = self.problem.samples.half_ranges, self._same
+        model = COVARIANCES[hyper.covariance]
+        share = hyper.correlation + (1.0 - hyper.correlation) * same
+        found: list[Floats] = []
+        squared = np.tensordot(np.square(hyper.scales), self._gaps, axes=1)
+        if self.own_scales:
+            slope = 2.0 * model.slope(squared) * (share if self.problem.samples.labelled else 1.0)
+            pairs = zip(hyper.scales, self._gaps, strict=True)
+            found += [scale**2 * gaps * slope for scale, gaps in pairs]
+        by_name = {
+            "nugget": lambda: hyper.nugget * np.eye(len(controls)),
+            "correlation": lambda: (
+                hyper.correlation * (1.0 - hyper.correlation) * model.numpy(squared) * (1.0 - same)
+            ),
+            "offset": lambda: hyper.offset * same,
+            "trend": lambda: hyper.trend * (controls @ controls.T),
+        }
+        return found + [by_name[name]() for name in self.names]

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Indices
-from posefield_train.kriging import universal_kriging
+from posefield.kriging import kriging_model
 from posefield_train.kriging.kriging_bank import (
     VARIANCE,
     CoefficientModel,
@@ -37,7 +37,7 @@ def sort_samples(bank: KrigingBank) -> KrigingBank:
 
 def pivoted_order(pose: UniversalKriging) -> Annotated[Indices, "samples"]:
     """Return samples (n,), each the least determined by the previous ones (pivoted Cholesky)."""
-    left = universal_kriging.covariances(pose.hyper, pose.samples, pose.samples)
+    left = kriging_model.stationary_covariances(pose.hyper, pose.samples, pose.samples)
     taken: list[int] = []
     for _ in range(len(left)):
         unknown = np.diagonal(left).copy()
@@ -109,4 +109,4 @@ class ThinningData:
 def thinning_data(bank: KrigingBank) -> ThinningData:
     """Return the fit data of a bank of one level."""
     points = np.vstack([random_points(bank, FIT_RANGE, FIT_POINTS), bank.pose.samples])
-    return ThinningData(bank.basis(points, bank.columns(0)), bank.numpy(points), bank)
+    return ThinningData(bank.basis(points, bank.columns(0)), bank.kriged(points), bank)

@@ -30,7 +30,6 @@ from posefield.kriging.kriging_model import drift as drift
 from posefield.kriging.kriging_model import noisy as noisy
 
 # Shared with the service; training imports them from here.
-from posefield.kriging.leave_one_out import LeaveOneOut as LeaveOneOut
 from posefield.kriging.leave_one_out import leave_out as leave_out
 from posefield.kriging.leave_one_out import left_out_variances as left_out_variances
 
@@ -61,8 +60,8 @@ class UniversalKriging:
 
     def variance(self, points: Points) -> PerPoint:
         """Return the kriging variance (B,) of the filtered model, as a share of the sill."""
-        basis = self._basis(points)
-        return 1.0 - np.sum(basis @ self.form * basis, axis=1)
+        basis, prior = self._basis(points), kriging_model.prior_variances(self.hyper, points)
+        return prior - np.sum(basis @ self.form * basis, axis=1)
 
     @property
     def values(self) -> SampleValues:

@@ -1,4 +1,4 @@
-"""Experimental variogram of reduced motions and its fit, for diagnosis and as a first guess.
+"""Experimental variogram of reduced motions and its fit, for diagnosis and naive kriging.
 
 The dissimilarity of two motions is the distance between their slices of the core tensor (Mukai &
 Kuriyama 2006, section 2), which equals that of their rows of the sample basis scaled by the

@@ -52,7 +52,8 @@ class Calibration:
         found = self.measures
         paragraphs = (
             "Sigma is the standard deviation that the model predicts for its own error. It is "
-            "scaled so that the mean of error² / sigma² over all left-out clips is 1. The rank "
+            "scaled so that the mean of error² / sigma² over all left-out clips is 1, with motions "
+            "compared after time warping. The rank "
             "correlation shows whether sigma also tells difficult motions from easy ones: near 0, "
             "sigma is right only on average.",
         )
@@ -100,4 +101,4 @@ def _rank_correlation(a: Floats, b: Floats) -> float:
 def measure_calibration(trained: TrainedModel) -> Calibration:
     """Return the calibration of a trained model's sigma."""
     predicted = np.sqrt(trained.model.bank.sill * trained.pose.variances)
-    return Calibration(predicted, np.sqrt(trained.left_out_errors))
+    return Calibration(predicted, np.sqrt(trained.warped_errors))

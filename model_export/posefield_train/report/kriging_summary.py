@@ -5,7 +5,6 @@ from typing import Any
 
 from posefield.model_file.model_card import Control
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import kriging_tuning
 from posefield_train.kriging.kriging_bank import POSE
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.report.drawing import significant_digits
@@ -18,6 +17,10 @@ _MEANING = {
     "warp": "timing within the clip",
     "travel": "distance and turn of a cycle",
 }
+
+
+PARAMETERS = ("correlation", "offset", "trend")
+"""Parameters of a quantity beside its scales and nugget."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,10 @@ class KrigingSummary:
                 "nugget": significant_digits.round_number(quantity.hyper.nugget),
                 "scales": scales,
             }
-            own |= {"performers": significant_digits.round_number(quantity.hyper.label)}
+            own |= {
+                name: significant_digits.round_number(getattr(quantity.hyper, name))
+                for name in PARAMETERS
+            }
             own |= {"drifts": list(quantity.hyper.drifts)}
         return own
 
@@ -68,25 +74,25 @@ class KrigingSummary:
             "controls, with each clip left out in turn. A quantity that is not predicted better "
             "than by the mean of the clips (by two standard errors) gets that mean.",
             "The scale of a control is its weight in the distance between clips, per half-range. "
-            f"At the lower bound of {kriging_tuning.SCALE_BOUNDS[0]:g} the "
-            "quantity is nearly linear in "
-            "the control. The nugget is the share of the variance that remains between clips with "
-            "equal controls. The performer distance is the distance between two performers with "
-            "equal controls; it is 0 where the model does not distinguish performers.",
+            "All quantities share the scales. The nugget is the share of the variance that remains "
+            "between clips with equal controls. The correlation is that of the motions of two "
+            "performers with equal controls, the offset the variance of a performer's own offset, "
+            "and the trend that of the slope along a control.",
         )
         heading = ("quantity", "meaning", "explained", "predicted by", "nugget")
         scales = tuple(f"scale of {name}" for name in self.controls)
-        titles = (*heading, "performer distance", *scales)
+        titles = (*heading, *PARAMETERS, *scales)
         table = Table("UniversalKriging models", titles, tuple(map(self._row, self.quantities)))
         return Section("fields", "What the controls explain", paragraphs, (table,))
 
     def _row(self, quantity: KrigedQuantity) -> tuple[str, ...]:
         meaning, share = _MEANING.get(quantity.name, ""), f"{100 * quantity.explained:.0f} %"
         if quantity.hyper is None:
-            return (quantity.name, meaning, share, "mean", "", "", *("" for _ in self.controls))
+            blank = ("" for _ in (*PARAMETERS, *self.controls))
+            return (quantity.name, meaning, share, "mean", "", *blank)
         scales = (f"{scale:.3g}" for scale in quantity.hyper.scales)
-        two = f"{quantity.hyper.nugget:.3g}", f"{quantity.hyper.label:.3g}"
-        return (quantity.name, meaning, share, "kriging", *two, *scales)
+        own = (f"{getattr(quantity.hyper, name):.3g}" for name in ("nugget", *PARAMETERS))
+        return (quantity.name, meaning, share, "kriging", *own, *scales)
 
 
 def summarize_kriging(trained: TrainedModel, controls: tuple[Control, ...]) -> KrigingSummary:

@@ -22,7 +22,6 @@ from posefield.model_file import model_card
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import ModelCard
 from posefield_train.graph import levels
-from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.report.drawing import significant_digits, svg_chart
@@ -238,25 +237,17 @@ class AlternativeLevels:
 def build_alternatives(
     recipe: Recipe, trained: TrainedModel, own_card: ModelCard
 ) -> AlternativeLevels:
-    """Build each alternative level on its own, and combine all of them in one graph."""
+    """Build alternative levels, each within the ranks of the finer one, in one graph."""
     shop = levels.level_builder(recipe, trained)
     farthest = max([FARTHEST, *(detail.times for detail in recipe.size.details)])
     times = tuple(float(f"{times:.3g}") for times in np.geomspace(1.0, farthest, TIMED_POINTS))
     joints = shop.model.decoder.level_sizes[0].joints
-    model = _combine_levels([shop.with_coarser_level(shop.model, joints, one) for one in times])
+    model = shop.model
+    for one in times:
+        model = shop.with_coarser_level(model, joints, one)
     found = tuple(shop.level(model, number) for number in range(len(times) + 1))
     content = model.onnx(model_card.dump(replace(own_card, levels=found)), {})
     return AlternativeLevels(times, found[1:], session.open_bytes(content, "alternative levels"))
-
-
-def _combine_levels(models: list[FloatModel]) -> FloatModel:
-    """Return the model with the levels of several models of one size."""
-    bank, decoder = models[0].bank, models[0].decoder
-    return replace(
-        models[0],
-        bank=replace(bank, coarse=tuple(model.bank.coarse[0] for model in models)),
-        decoder=replace(decoder, coarse=tuple(model.decoder.coarse[0] for model in models)),
-    )
 
 
 def time_levels(exported: ExportedModel, others: AlternativeLevels) -> LevelCosts:

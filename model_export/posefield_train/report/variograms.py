@@ -153,9 +153,7 @@ def measure_variograms(trained: TrainedModel, controls: tuple[Control, ...]) -> 
         fit = _fit(mean, hyper.covariance)
         own = DirectionalVariogram(control.name, "half-ranges", *pairs, mean, fit, float(scale))
         directions.append(own)
-    performers = np.array([example.row.performer for example in trained.examples])
-    others = performers[first] != performers[second]
-    scaled = np.sqrt(np.sum(np.square(gaps * hyper.scales), axis=1) + hyper.label**2 * others)
+    scaled = np.sqrt(np.sum(np.square(gaps * hyper.scales), axis=1))
     mean = by_lag(scaled, halves)
     fit = _fit(mean, hyper.covariance)
     every = DirectionalVariogram("all controls", "scaled distance", scaled, halves, mean, fit, 1.0)

@@ -116,10 +116,6 @@ class Alignment(RecipePart):
     )
 
 
-# Degree one extrapolates to targets, degree zero keeps the common part of the clips.
-MIXED_DRIFTS = (0, 1, 1)
-
-
 class Kriging(RecipePart):
     """Kriging model of the control coefficients."""
 
@@ -130,36 +126,35 @@ class Kriging(RecipePart):
         description="covariance of motions as a function of distance; chosen selects gaussian if "
         "its leave-one-out error is more than 5 % below that of matern52, else matern52",
     )
-    drift: Literal[0, 1, "mixed", "chosen"] = Field(
+    drift: Literal[0, 1, "chosen"] = Field(
         default="chosen",
-        description="polynomial degree; mixed averages one part of the prediction of degree 0 and "
-        "two parts of that of degree 1; chosen selects mixed or 1 by the leave-one-out error",
+        description="polynomial degree of the drift; chosen puts a linear trend into the "
+        "covariance, as strong as the leave-one-out error finds best: from none, as degree 0, to "
+        "free, as degree 1",
     )
     nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
         default=None, description="nugget as a share of the sill; default: fitted by leave-one-out"
     )
     label: Literal["performer"] | None = Field(
         default=None,
-        description="label of clips besides their controls; it enters the distance between clips "
-        "but not the drift",
+        description="label of clips besides their controls: performers have offsets of their own, "
+        "and their motions a correlation",
     )
 
     @property
     def degree(self) -> int:
-        """Return the highest degree of drift that is tried."""
-        return max(map(max, self.drifts))
+        """Return the degree of the drift; a trend within the covariance needs a constant only."""
+        return self.fixed_degree or 0
+
+    @property
+    def fixed_degree(self) -> Literal[0, 1] | None:
+        """Return the degree that the recipe asks for; None for a trend in the covariance."""
+        return None if self.drift == "chosen" else self.drift
 
     @property
     def covariances(self) -> tuple[str, ...]:
         """Return the covariances that are tried."""
         return ("matern52", "gaussian") if self.covariance == "chosen" else (self.covariance,)
-
-    @property
-    def drifts(self) -> tuple[tuple[int, ...], ...]:
-        """Return the sets of drift degrees to try; predictions are averaged within a set."""
-        if self.drift == "chosen":
-            return (1,), MIXED_DRIFTS
-        return (MIXED_DRIFTS,) if self.drift == "mixed" else ((self.drift,),)
 
 
 class Event(RecipePart):

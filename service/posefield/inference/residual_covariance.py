@@ -64,12 +64,12 @@ def estimate(
     hyper = card.kriging
     left_out = leave_one_out.leave_out(hyper, samples, leave_out_groups(card, samples))
     variances = leave_one_out.left_out_variances(hyper, samples, left_out)
-    sill = np.mean(np.square(card.left_out) / variances)
+    sill = weights["sill"].item()
     r3 = reduced.core.shape[2]
     held = sample_coefficients(card, weights, samples)[:, :r3]
     missed = left_out @ held
     sigmas = np.sqrt(sill * variances * len(samples))
-    # Standardised residuals, of a kriging model whose sill is one square metre.
+    # Residuals for a sigma of one metre: times the sigma of a point they are those of the point.
     strays = missed / sigmas[:, None]
     root = np.linalg.cholesky(strays.T @ strays + 1e-12 * np.eye(r3))
     spread = reduced.core @ root
@@ -91,10 +91,11 @@ def sample_coefficients(
     order = importance_order(card, weights, samples)
     held = samples[order]
     dual = weights["pose_weights"].astype(np.float64)
-    trend = weights["drift_weights"][:, -r3:].astype(np.float64)
-    functions = kriging_model.drift(held, len(card.controls), 1)
+    linear = weights["linear_weights"][:, -r3:].astype(np.float64)
     found = np.empty((len(samples), r3))
-    found[order] = kriging_model.noisy(hyper, held) @ dual + functions @ trend
+    near = kriging_model.stationary_covariances(hyper, held, held)
+    near += hyper.nugget * np.eye(len(held))
+    found[order] = near @ dual + kriging_model.linear_functions(hyper, held) @ linear
     return found
 
 
@@ -102,7 +103,7 @@ def importance_order(
     card: ModelCard, weights: GraphConstants, samples: Samples
 ) -> Annotated[Indices, "samples"]:
     """Return the index on the card (n,) of each sample, in the file's order of importance."""
-    held = weights["samples"][0].T
+    held = weights["samples"].T
     listed = samples[:, : len(card.controls)].astype(np.float32)
     whose = weights["whose"] if card.performers else np.zeros(len(held), dtype=np.int64)
     moved = np.array(card.moved_by or [0] * len(listed))

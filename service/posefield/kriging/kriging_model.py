@@ -13,6 +13,7 @@ import numpy as np
 
 from posefield.common.array_shapes import (
     PerControl,
+    PerPoint,
     Points,
     PointSamples,
     SampleMatrix,
@@ -27,16 +28,24 @@ from posefield.kriging.covariance import COVARIANCE_MODELS
 class Hyper:
     """Parameters of a kriged field.
 
+    The covariance of two points is f(h) (correlation + (1 - correlation) same) + offset same
+    + trend x·x', with the covariance model f at their scaled distance h, same = 1 for one performer
+    and 0 for different ones, and their controls x and x' in half-ranges.
+
     covariance: name in `COVARIANCE_MODELS`. drifts: polynomial degrees, 0 or 1, whose predictions
-    are averaged. scales (d,): distance per unit of each control, one over the range. nugget: share
-    of the sill. label: distance between two different performers; performers never enter the drift.
+    are averaged; performers never enter it. scales (d,): distance per unit of each control, one
+    over the range. nugget: share of the sill. correlation: of the motions of two performers.
+    offset: variance of a performer's own offset, in sills. trend: variance of the slope along each
+    control, in sills per squared half-range.
     """
 
     covariance: str
     drifts: tuple[Degree, ...]
     scales: PerControl
     nugget: NonNegative
-    label: NonNegative
+    correlation: NonNegative
+    offset: NonNegative
+    trend: NonNegative
 
 
 @dataclass(frozen=True)
@@ -77,24 +86,44 @@ def half_ranges(
 def squared_distances(
     hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
 ) -> Annotated[Floats, "a b"]:
-    """Return the squared distances (A, B) between points (A, d + p) and (B, d + p).
-
-    Any two different performers are `label` apart: the product of their labels is 0, and 1 for the
-    same performer.
-    """
+    """Return the squared distances (A, B) between the controls of points (A, d + p), (B, d + p)."""
     d = len(hyper.scales)
     # One plane (A, B) per control: a sum over a short last axis takes ten times as long.
     gaps = np.subtract(a.T[:d, :, None], b.T[:d, None, :], order="C")
     gaps *= hyper.scales[:, None, None]
-    others = 1.0 - a[:, d:] @ b[:, d:].T
-    return np.sum(np.square(gaps, out=gaps), axis=0) + hyper.label**2 * others
+    return np.asarray(np.sum(np.square(gaps, out=gaps), axis=0))
+
+
+def stationary_covariances(
+    hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
+) -> Annotated[Floats, "a b"]:
+    """Return the part (A, B) of the covariances that depends on the points' distance."""
+    found = COVARIANCE_MODELS[hyper.covariance](squared_distances(hyper, a, b))
+    if hyper.correlation == 1.0:
+        return found
+    d = len(hyper.scales)
+    return found * (hyper.correlation + (1.0 - hyper.correlation) * (a[:, d:] @ b[:, d:].T))
 
 
 def covariances(
     hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
 ) -> Annotated[Floats, "a b"]:
     """Return the covariances (A, B) between points (A, d + p) and (B, d + p)."""
-    return COVARIANCE_MODELS[hyper.covariance](squared_distances(hyper, a, b))
+    found, d = stationary_covariances(hyper, a, b), len(hyper.scales)
+    if hyper.offset:
+        found = found + hyper.offset * (a[:, d:] @ b[:, d:].T)
+    if hyper.trend:
+        found = found + hyper.trend * (a[:, :d] @ b[:, :d].T)
+    return found
+
+
+def prior_variances(hyper: Hyper, points: Points) -> PerPoint:
+    """Return the variance (B,) of the field at points (B, d + p) before any sample, in sills.
+
+    A performer without samples has an offset as unknown as any.
+    """
+    controls = points[:, : len(hyper.scales)]
+    return 1.0 + hyper.offset + hyper.trend * np.sum(np.square(controls), axis=1)
 
 
 def drift(points: Points, controls: int, degree: int) -> Annotated[Floats, "points functions"]:
@@ -104,6 +133,30 @@ def drift(points: Points, controls: int, degree: int) -> Annotated[Floats, "poin
     """
     one = np.ones((len(points), 1))
     return np.hstack([one, points[:, :controls]]) if degree else one
+
+
+def linear_functions(hyper: Hyper, points: Points) -> Annotated[Floats, "points linear"]:
+    """Return labels, one and controls (B, p + 1 + d) of points (B, d + p).
+
+    In them and the stationary covariances every kriging prediction is linear.
+    """
+    d = len(hyper.scales)
+    return np.hstack([points[:, d:], np.ones((len(points), 1)), points[:, :d]])
+
+
+def linear_terms(hyper: Hyper, samples: Samples) -> Annotated[Floats, "linear system"]:
+    """Return the map (p + 1 + d, n + k) from `linear_functions` to `basis_functions`.
+
+    With the stationary covariances added to its first n columns, it gives the whole of these.
+    """
+    (n, width), d, degree = samples.shape, len(hyper.scales), max(hyper.drifts)
+    p = width - d
+    found = np.zeros((p + 1 + d, n + 1 + degree * d))
+    found[:p, :n] = hyper.offset * samples[:, d:].T
+    found[p + 1 :, :n] = hyper.trend * samples[:, :d].T
+    found[p, n] = 1.0
+    found[p + 1 :, n + 1 :] = np.eye(d) if degree else found[p + 1 :, n + 1 :]
+    return found
 
 
 def find_required_group(

@@ -170,6 +170,7 @@ def _check_kriging(card: ModelCard) -> None:
         f"of {[*COVARIANCE_MODELS]}",
     )
     _expect(len(own.drifts) > 0, "kriging.drifts", [], "degrees")
+    _expect(own.correlation <= 1.0, "kriging.correlation", own.correlation, "at most 1")
     right = own.scales.ndim == 1 and bool((own.scales > 0.0).all())
     _expect(right, "kriging.scales", own.scales.tolist(), "numbers above 0")
     for index, row in enumerate(card.beside):
@@ -206,8 +207,8 @@ def _check_levels(card: ModelCard) -> None:
 
 def _check_training_parameters(card: ModelCard) -> None:
     for name, own in card.making.fields.items():
-        right = len(own) > 1 and {*own[1:]} <= {0, 1}
-        _expect(right, f"making.fields.{name}", list(own), "a nugget, and degrees 0 or 1")
+        expected = "a nugget, an offset and a trend"
+        _expect(len(own) == 3, f"making.fields.{name}", list(own), expected)
     for joint in card.making.joint_weights:
         _expect(joint in card.skeleton.names, "making.joint_weights", joint, "a joint")
 
@@ -233,9 +234,10 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     r1, r2, r3 = card.levels[0].ranks
     shapes = {
         "ladder": (len(card.levels), ANY_SIZE),
-        "samples": (1, controls, card.samples),
+        "samples": (controls, card.samples),
+        "sill": (1,),
         "pose_weights": (card.samples, r3),
-        "drift_weights": (1 + controls, ANY_SIZE),
+        "linear_weights": (performers + 1 + controls, ANY_SIZE),
         "core": (r2, r1, r3),
         "time_basis": (r2, card.frames),
         "root_mean": (3,),
@@ -247,4 +249,5 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     }
     # Without performers the graph has no such constants.
     labelled = {"performer": (1, performers), "whose": (card.samples,)}
-    return shapes | (labelled if performers else dict.fromkeys(labelled, ()))
+    # They come first, since other shapes follow from the number of performers.
+    return (labelled if performers else dict.fromkeys(labelled, ())) | shapes

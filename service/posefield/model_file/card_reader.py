@@ -42,6 +42,9 @@ class Diagnostics(TypedDict):
     drift: tuple[Degree, ...]
     scales: tuple[NonNegative, ...]
     nugget: NonNegative
+    correlation: NonNegative
+    offset: NonNegative
+    trend: NonNegative
     tensor: tuple[Count, Count, Count]
     parity_m: NonNegative
     notes: tuple[Text, ...]

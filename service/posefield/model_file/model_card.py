@@ -14,7 +14,6 @@ import numpy as np
 
 from posefield.common.bounded_types import (
     Count,
-    Degree,
     Index,
     Key,
     Name,
@@ -33,7 +32,7 @@ from posefield.motion import measures
 from posefield.motion.measures import Measure
 from posefield.motion.skeleton import Skeleton
 
-FORMAT = 2
+FORMAT = 3
 PREFIX = "posefield."
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
@@ -85,12 +84,14 @@ class Preset:
 class TrainingParameters:
     """Parameters of training that the graph does not hold and that adapting a model needs.
 
-    fields: nugget and degrees of the drifts of each kriged quantity but the pose. landmarks:
-    columns of the table that name them, and their canonical times. joint_weights: of joints whose
-    weight in the metric is not one. in_phase: whether cycles were shifted to begin in phase.
+    fields: nugget, offset and trend of each kriged quantity but the pose. landmarks: columns of the
+    table that name them, and their canonical times. joint_weights: of joints whose weight in the
+    metric is not one. in_phase: whether cycles were shifted to begin in phase.
     """
 
-    fields: Mapping[Name, tuple[Degree | NonNegative, ...]] = field(default_factory=dict)
+    fields: Mapping[Name, tuple[NonNegative, NonNegative, NonNegative]] = field(
+        default_factory=dict
+    )
     landmarks: Mapping[Name, Share] = field(default_factory=dict)
     joint_weights: Mapping[Name, Positive] = field(default_factory=dict)
     in_phase: bool = False

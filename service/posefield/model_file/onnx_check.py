@@ -12,8 +12,8 @@ from typing import Any
 from posefield.model_file import protobuf_wire, subgraph
 
 OPERATORS = frozenset(
-    "Add Cast Clip Concat Cos Div Exp Expand Floor Gather Gemm Identity MatMul Min Mul Neg OneHot"
-    " Pad ReduceSum Relu Reshape Shape Sin Slice Softmax Split Sqrt Squeeze Sub Transpose"
+    "Add Cast Clip Concat Cos Div Exp Expand Floor Gather Gemm Identity Log MatMul Max Min Mul Neg"
+    " OneHot Pad ReduceSum Relu Reshape Shape Sin Slice Softmax Split Sqrt Squeeze Sub Transpose"
     " Unsqueeze".split()
 )
 

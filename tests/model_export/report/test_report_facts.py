@@ -114,7 +114,7 @@ def test_nothing_lies_below_the_front(trained, rng):
     assert found.error(found.chosen) < errors[marks >= numbers / 1.5][0]
 
 
-def test_the_isotropic_variogram_is_that_of_the_first_guess(trained, controls):
+def test_the_isotropic_variogram_is_that_of_scaled_controls(trained, controls):
     found = variograms.measure_variograms(trained, controls).directions[-1]
     hyper, points = trained.pose.hyper, trained.samples.half_ranges
     left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
@@ -214,6 +214,8 @@ def test_warps_lead_from_start_to_end(trained):
 def test_sigma_is_right_on_average_by_construction(trained):
     found = calibration.measure_calibration(trained)
     assert found.measures["mean_squared_ratio"] == pytest.approx(1.0)
+    on_canonical_time = replace(found, actual=np.sqrt(trained.left_out_errors))
+    assert on_canonical_time.measures["mean_squared_ratio"] > 1.2
     half = replace(found, predicted=0.5 * found.predicted)
     assert half.measures["mean_squared_ratio"] == pytest.approx(4.0)
 
