@@ -20,6 +20,7 @@ from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import (
     coefficient_models,
+    event_kriging,
     kriging_tuning,
     power_law,
     sample_points,
@@ -35,8 +36,16 @@ from posefield_train.parallel import single_thread
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import event_jacobian, hosvd, motion_tensor, truncation_error
+from posefield_train.tensor import (
+    event_blend,
+    event_jacobian,
+    hosvd,
+    motion_tensor,
+    truncation_error,
+)
 from posefield_train.tensor.decoder import Decoder, Proportions
+from posefield_train.tensor.event_blend import EventBlend
+from posefield_train.tensor.event_jacobian import COEFFICIENTS
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
 from posefield_train.tensor.pose_vectors import PoseChart
@@ -157,6 +166,7 @@ class _FittedModels:
     left_out_errors: Floats
     warped_errors: Floats
     power_law: PowerLaw | None
+    event: TunedKriging | None
 
 
 def _fit_models(
@@ -194,7 +204,24 @@ def _fit_models(
     warped = warped_errors.mean_squared_errors(
         warped_errors.captured_positions(examples), predicted
     )
-    return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law)
+    event = _fit_event(recipe, laid, judge, full, pose)
+    return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law, event)
+
+
+def _fit_event(
+    recipe: Recipe,
+    laid: SamplePoints,
+    judge: TruncationReference,
+    full: TuckerTensor,
+    pose: TunedKriging,
+) -> TunedKriging | None:
+    """Return the second model of the pose for the time around the event, where it is better."""
+    effector = event_jacobian.effector_weights(judge, full)
+    if effector is None or judge.event_frame is None or recipe.kriging.fixed_degree is not None:
+        return None
+    second = event_kriging.tune_event(recipe.kriging.nugget, pose, laid, full.motions, effector)
+    errors = event_kriging.event_errors(judge, full, judge.event_frame, (pose, second))
+    return second if errors.is_used else None
 
 
 # Shares of the leave-one-out errors that a truncation may add: squared, it adds 3 % to the mean
@@ -210,7 +237,8 @@ def _truncation_limits(
     rms = float(np.sqrt(np.mean(fits.left_out_errors)))
     limits = {"rms": max(ALL_JOINTS_SHARE * rms, SMALLEST_LIMIT)}
     if judge.event_frame is not None:
-        missed = event_jacobian.event_errors(judge, full, judge.event_frame, fits.pose.residuals)
+        residuals = (fits.event or fits.pose).residuals
+        missed = event_jacobian.event_errors(judge, full, judge.event_frame, residuals)
         effector = float(np.sqrt(np.mean(np.square(missed))))
         limits["effector"] = max(EFFECTOR_SHARE * effector, SMALLEST_LIMIT)
     return limits
@@ -220,23 +248,39 @@ def _assemble(
     recipe: Recipe,
     controls: Floats,
     moved: _VectorizedClips,
-    own_tensor: MotionTensor,
+    judge: TruncationReference,
     fits: _FittedModels,
     reduced: TuckerTensor,
 ) -> FloatModel:
     """Assemble the model of controls (N, d) from the tuned models and the truncated tensor."""
-    solved = universal_kriging.solve(fits.pose.hyper, moved.samples.points, reduced.bases[2])
+    points = moved.samples.points
+    solved = universal_kriging.solve(fits.pose.hyper, points, reduced.bases[2])
+    event, blend = None, _event_blend(recipe, judge, fits, reduced)
+    if fits.event and blend:
+        values = reduced.bases[2][:, : blend.count]
+        event = universal_kriging.solve(fits.event.hyper, points, values)
     others = {name: found.field for name, found in fits.beside.items()}
-    ends = controls.min(axis=0), controls.max(axis=0)
+    ends, own_tensor = (controls.min(axis=0), controls.max(axis=0)), judge.own_tensor
     timing = CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames)
     sill = float(np.mean(fits.warped_errors / fits.pose.variances))
     return FloatModel(
-        KrigingBank(*ends, moved.performers, solved, others, sill, power_law=fits.power_law),
+        KrigingBank(*ends, moved.performers, solved, others, sill, (), fits.power_law, event),
         timing,
-        Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means),
+        Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means, event=blend),
         fits.proportions,
         Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
     )
+
+
+def _event_blend(
+    recipe: Recipe, judge: TruncationReference, fits: _FittedModels, reduced: TuckerTensor
+) -> EventBlend | None:
+    if fits.event is None or judge.event_frame is None:
+        return None
+    weights = event_blend.event_weights(
+        recipe.motion.frames, judge.event_frame.frame, recipe.motion.cyclic
+    )
+    return event_blend.build_blend(COEFFICIENTS, weights, reduced.core, reduced.bases[1])
 
 
 def _fit_and_truncate(
@@ -256,7 +300,7 @@ def _fit_and_truncate(
     explained = {name: found.explained for name, found in fits.beside.items()}
     residuals = {name: found.residuals for name, found in fits.beside.items()}
     return TrainedModel(
-        _assemble(recipe, controls, moved, own_tensor, fits, reduced),
+        _assemble(recipe, controls, moved, judge, fits, reduced),
         tuple(examples),
         moved.samples,
         _mean_skeleton(examples, moved.offsets),

@@ -22,7 +22,10 @@ from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
 from posefield_train.source.ingest import Example
+from posefield_train.tensor import event_blend
 from posefield_train.tensor.decoder import Decoder
+from posefield_train.tensor.event_blend import EventBlend
+from posefield_train.tensor.hosvd import TuckerTensor
 
 
 @dataclass(frozen=True)
@@ -81,11 +84,26 @@ def _solve(
     others = {name: solved.get(name, bones) for name in model.bank.others}
     missed, sill = _left_out_errors(known, laid, moved, extended)
     ends = laid.low, laid.high
-    bank = KrigingBank(*ends, laid.performers, pose, others, sill, power_law=law)
+    event, blend = _event(laid, model, reduced)
+    bank = KrigingBank(*ends, laid.performers, pose, others, sill, (), law, event)
     own = extended.tensor
-    decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means)
+    decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means, event=blend)
     adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel)
     return AdaptedModel(adapted, moved, extended, missed)
+
+
+def _event(
+    laid: ExtendedSamples, model: FloatModel, reduced: TuckerTensor
+) -> tuple[UniversalKriging | None, EventBlend | None]:
+    """Return the event's model and blend for the extended tensor, if the model has them."""
+    old, blend = model.bank.event, model.decoder.event
+    if old is None or blend is None:
+        return None, None
+    count = min(blend.count, reduced.core.shape[2])
+    values = reduced.bases[2][:, :count]
+    solved = universal_kriging.solve(laid.hyper(old.hyper), laid.samples.points, values)
+    first, second = reduced.core, reduced.bases[1]
+    return solved, event_blend.build_blend(count, blend.weights, first, second)
 
 
 def _left_out_errors(

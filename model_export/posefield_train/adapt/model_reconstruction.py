@@ -24,10 +24,18 @@ from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.kriging_bank import POSE, CoefficientModel, ConstantModel, KrigingBank
+from posefield_train.kriging.kriging_bank import (
+    EVENT,
+    POSE,
+    CoefficientModel,
+    ConstantModel,
+    KrigingBank,
+)
 from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
+from posefield_train.tensor import event_blend
 from posefield_train.tensor.decoder import Decoder, Proportions
+from posefield_train.tensor.event_blend import EventBlend
 from posefield_train.tensor.hosvd import TuckerTensor
 
 # Largest rounding error of sample controls in float32, in half-ranges.
@@ -125,8 +133,20 @@ def _bank(file: _ModelFile) -> KrigingBank:
     order = _order(file, points)
     others = {name: _coefficient_model(file, name, points, order) for name in _widths(file)}
     pose = _solve_kriging(file, POSE, (card.kriging, points, order))
-    sill, law = file["sill"].item(), _power_law(file)
-    return KrigingBank(low, high, card.performers, pose, others, sill, power_law=law)
+    sill, law, event = file["sill"].item(), _power_law(file), _event_model(file, pose)
+    return KrigingBank(low, high, card.performers, pose, others, sill, (), law, event)
+
+
+def _event_model(file: _ModelFile, pose: UniversalKriging) -> UniversalKriging | None:
+    """Return the model of the pose's leading coefficients around the event, if there is one."""
+    count = file.card.levels[0].event
+    if not count:
+        return None
+    if EVENT not in file.making.fields:
+        raise ModelError(file.source, "its card does not say what its event's model is made with")
+    nugget, offset, trend = file.making.fields[EVENT]
+    hyper = replace(file.card.kriging, nugget=nugget, offset=offset, trend=trend)
+    return universal_kriging.solve(hyper, pose.samples, pose.values[:, :count])
 
 
 def _power_law(file: _ModelFile) -> PowerLaw | None:
@@ -156,11 +176,11 @@ def _widths(file: _ModelFile) -> dict[str, int]:
 def _columns(file: _ModelFile, name: str) -> slice:
     """Return the columns of a quantity in the linear weights; the variance takes the first two."""
     start = 2
-    for other, width in _widths(file).items():
+    for other, width in {**_widths(file), POSE: file.card.levels[0].ranks[2]}.items():
         if other == name:
             return slice(start, start + width)
         start += width
-    return slice(start, None)
+    raise KeyError(name)
 
 
 def _coefficient_model(
@@ -181,18 +201,32 @@ def _solve_kriging(
 ) -> UniversalKriging:
     """Return one kriging model, solved for the sample values recovered from its dual weights."""
     hyper, points, order = laid
-    near = np.empty_like(file[f"{name}_weights"])
-    near[order] = file[f"{name}_weights"]
+    columns = _columns(file, name)
+    stored = file[f"{name}_weights"][:, : columns.stop - columns.start]
+    near = np.empty_like(stored)
+    near[order] = stored
     covariances = kriging_model.stationary_covariances(hyper, points, points)
     covariances += hyper.nugget * np.eye(len(points))
     linear = kriging_model.linear_functions(hyper, points)
-    values = covariances @ near + linear @ file["linear_weights"][:, _columns(file, name)]
+    values = covariances @ near + linear @ file["linear_weights"][:, columns]
     return universal_kriging.solve(hyper, points, values)
 
 
 def _decoder(file: _ModelFile, bank: KrigingBank) -> Decoder:
     """Return a decoder with the core's coordinates for the first mode."""
-    held = reduced_motion.read(file.numbers, file.card.levels[0])
+    finest = file.card.levels[0]
+    held = reduced_motion.read(file.numbers, replace(finest, event=0))
     core = held.core.transpose(1, 0, 2)
     bases = np.eye(len(core)), held.time, bank.pose.values
-    return Decoder(TuckerTensor(core, bases), held.mean, held.directions.T, held.rotations)
+    blend = _event_blend(file.card, core, held.time) if finest.event else None
+    return Decoder(
+        TuckerTensor(core, bases), held.mean, held.directions.T, held.rotations, event=blend
+    )
+
+
+def _event_blend(card: ModelCard, core: Floats, basis: Floats) -> EventBlend | None:
+    if card.event is None:
+        return None
+    event = round((card.frames - 1) * card.event.share)
+    weights = event_blend.event_weights(card.frames, event, card.cyclic)
+    return event_blend.build_blend(card.levels[0].event, weights, core, basis)

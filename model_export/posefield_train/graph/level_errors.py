@@ -12,7 +12,7 @@ from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import truncation_error
+from posefield_train.tensor import event_blend, truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.truncation_error import EventFrame
 
@@ -159,6 +159,10 @@ def untruncated(model: FloatModel, full: TuckerTensor) -> FloatModel:
     """Return the model with the tensor before truncation."""
     bank = model.bank
     pose = universal_kriging.solve(bank.pose.hyper, bank.pose.samples, full.bases[2])
-    return replace(
-        model, bank=replace(bank, pose=pose), decoder=replace(model.decoder, reduced=full)
-    )
+    decoder = replace(model.decoder, reduced=full)
+    event, blend = bank.event, model.decoder.event
+    if event and blend:
+        whole = event_blend.build_blend(blend.count, blend.weights, full.core, full.bases[1])
+        decoder = replace(decoder, event=whole)
+        event = universal_kriging.solve(event.hyper, event.samples, full.bases[2][:, : whole.count])
+    return replace(model, bank=replace(bank, pose=pose, event=event), decoder=decoder)

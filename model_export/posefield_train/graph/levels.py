@@ -101,6 +101,7 @@ class LevelBuilder:
             max=_rounded(found.max),
             pose=_rounded(found.pose),
             effector=None if effector is None else _rounded(effector),
+            event=0 if level else model.bank.event_columns,
         )
 
     def _with_level_error(self, model: FloatModel) -> FloatModel:

@@ -28,6 +28,7 @@ from posefield_train.graph import levels, truncation_cost
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
+from posefield_train.kriging.kriging_bank import EVENT
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
 from posefield_train.source import measured_controls
@@ -230,7 +231,8 @@ def _covariance_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
 def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
     marks = [example.landmarks for example in trained.examples]
     times = np.array(marks).reshape(len(marks), -1).mean(axis=0)
-    fields = trained.model.bank.others.items()
+    bank = trained.model.bank
+    fields = {**bank.others, EVENT: bank.event}.items()
     return TrainingParameters(
         {
             name: kriging_settings(field.hyper)

@@ -65,18 +65,23 @@ def count_numbers(model: FloatModel, level: int) -> int:
         np.any(model.decoder.at_level(level).unwhiten != 0.0, axis=1),
     )
     bases = r1 * np.count_nonzero(varies) + r2 * len(model.decoder.reduced.bases[1])
-    asked = samples * len(bank.low) + _precision_size(bank, level)
+    blend = model.decoder.event
+    if blend and not level:
+        bases += blend.times.size + blend.mixing.size
+    rows = _form_rows(bank, level)
+    asked = samples * len(bank.low) + rows * (rows + 1) // 2
     return int(r1 * r2 * r3 + bases + asked + _weights_size(bank, level))
 
 
-def _precision_size(bank: KrigingBank, level: int) -> int:
-    return 0 if level else (bank.linear + len(bank.pose.samples)) ** 2
+def _form_rows(bank: KrigingBank, level: int) -> int:
+    """Return the number of rows of the variance's quadratic form, of which half is stored."""
+    return 0 if level else bank.linear + len(bank.pose.samples)
 
 
 def _weights_size(bank: KrigingBank, level: int) -> int:
     if level:
         return bank.coarse[level - 1].size
-    fields = [*bank.others.values(), bank.pose]
+    fields = [*bank.others.values(), bank.pose, *([bank.event] if bank.event else [])]
     near = [field.dual for field in fields if isinstance(field, UniversalKriging)]
     return bank.linear * sum(map(kriging_bank.width, fields)) + sum(
         len(bank.pose.samples) * dual.shape[1] for dual in near
@@ -86,11 +91,12 @@ def _weights_size(bank: KrigingBank, level: int) -> int:
 def count_operations(model: FloatModel, level: int) -> int:
     """Return the multiply-adds of one pose of a level, from controls to quaternions."""
     bank, rung = model.bank, model.decoder.level_sizes[level]
-    (r1, r2, r3), columns = rung.ranks, bank.columns(level)
+    columns = bank.columns(level)
+    r1, r2, r3 = rung.ranks if level else model.decoder.blended[0].shape
     distances = columns * (2 + 2 * len(bank.low) + len(bank.performers))
     values = (bank.linear + columns) * sum(bank.sizes(r3))
     decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3)
-    return distances + values + _precision_size(bank, level) + decoding
+    return distances + values + _form_rows(bank, level) ** 2 + decoding
 
 
 RANK_COSTS = {"numbers": storage_cost, "operations": operation_cost}

@@ -43,7 +43,7 @@ class ConstantModel:
 
 CoefficientModel = UniversalKriging | ConstantModel
 
-VARIANCE, POSE, DURATION = "variance", "pose", "duration"
+VARIANCE, POSE, DURATION, EVENT = "variance", "pose", "duration", "event"
 
 
 def width(field: CoefficientModel) -> int:
@@ -58,7 +58,8 @@ class KrigingBank:
     performers: names, in the order of their labels. sill: of the pose model, m² per joint and
     frame. coarse: weights (p + 1 + d + m, M) of each coarser level. Rows: labels, one, controls and
     the first m covariances. Columns: the logarithm of the variance, the other quantities, the
-    pose's leading coefficients. power_law: of the duration, beside its model.
+    pose's leading coefficients. power_law: of the duration, beside its model. event: second model
+    of the pose's leading coefficients, for the time around the event, at the finest level.
     """
 
     low: PerControl
@@ -69,6 +70,12 @@ class KrigingBank:
     sill: float
     coarse: tuple[Annotated[Floats, "rows columns"], ...] = ()
     power_law: PowerLaw | None = None
+    event: UniversalKriging | None = None
+
+    @property
+    def event_columns(self) -> int:
+        """Return the number of pose coefficients with a second model for the event."""
+        return width(self.event) if self.event else 0
 
     @property
     def linear(self) -> int:
@@ -115,10 +122,17 @@ class KrigingBank:
         return self.power_law.logarithms(middle + half * points[:, : len(self.low)])
 
     def kriged(self, points: Points) -> dict[str, Annotated[Floats, "points _"]]:
-        """Return values (B, m) of each quantity's kriging model, the variance as a share."""
+        """Return values (B, m) of each quantity's kriging model, the variance as a share.
+
+        The pose's coefficients are followed by what the event's model adds to the leading ones.
+        """
         own = self.pose.variance(points)[:, None] + self.pose.hyper.nugget
         values = {name: field.predict(points) for name, field in self.others.items()}
-        return {VARIANCE: own, **values, POSE: self.pose.predict(points)}
+        pose = self.pose.predict(points)
+        if self.event:
+            shifts = self.event.predict(points) - pose[:, : self.event_columns]
+            pose = np.hstack([pose, shifts])
+        return {VARIANCE: own, **values, POSE: pose}
 
     def _thinned(
         self, points: Points, weights: Annotated[Floats, "rows columns"]
@@ -142,6 +156,22 @@ class KrigingBank:
             found[len(self.performers)] = field.mean
             return found
         return kriging_model.linear_terms(field.hyper, field.samples) @ field.dual
+
+    def pose_weights(self) -> tuple[Annotated[Floats, "linear _"], Annotated[Floats, "samples _"]]:
+        """Return the weights of labels, one and controls, and of the covariances, of the pose.
+
+        Columns: its coefficients, then what the event's model adds to the leading ones.
+        """
+        linear, n = self.linear_weights(self.pose), len(self.pose.samples)
+        dual = self.pose.dual[:n]
+        if self.event is None:
+            return linear, dual
+        first = slice(self.event_columns)
+        linear_shift = self.linear_weights(self.event) - linear[:, first]
+        return (
+            np.hstack([linear, linear_shift]),
+            np.hstack([dual, self.event.dual[:n] - dual[:, first]]),
+        )
 
     @property
     def variance_form(self) -> Annotated[Floats, "rows rows"]:

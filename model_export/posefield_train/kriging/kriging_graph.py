@@ -1,7 +1,10 @@
 """ONNX graph of the bank of coefficient models; `kriging_bank` is its NumPy counterpart."""
 
+from typing import Annotated
+
 import numpy as np
 
+from posefield.common.units import Floats
 from posefield_train.kriging import kriging_bank
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import (
@@ -21,7 +24,8 @@ def entries(bank: KrigingBank, ranks: list[int]) -> dict[str, list[Integers]]:
     ranks: number of pose coefficients of each level.
     """
     samples = len(bank.pose.samples)
-    sizes = [[1, *bank.sizes(rank)] for rank in ranks]
+    own = [ranks[0] + bank.event_columns, *ranks[1:]]
+    sizes = [[1, *bank.sizes(rank)] for rank in own]
     columns = [bank.columns(level) for level in range(len(ranks))]
     shapes = [(bank.linear + n, sum(size)) for n, size in zip(columns, sizes, strict=True)]
     curved = [1 + bank.linear + samples, *(1 for _ in ranks[1:])]
@@ -33,8 +37,8 @@ def entries(bank: KrigingBank, ranks: list[int]) -> dict[str, list[Integers]]:
         "weighing": list(shapes),
         "sizes": list(sizes),
         # Coarser levels have no quadratic form; its slice keeps a single zero.
-        "curved": [[own, own] for own in curved],
-        "own": [[own] for own in curved],
+        "curved": [[size, size] for size in curved],
+        "own": [[size] for size in curved],
     }
 
 
@@ -142,9 +146,8 @@ def _weights(bank: KrigingBank, net: GraphBuilder) -> str:
 
     Columns of the finest: one of zeros, the logarithm of one, the other quantities, the pose.
     """
-    fields = [*bank.others.values(), bank.pose]
-    linear = np.hstack([bank.linear_weights(field) for field in fields])
-    linear = np.hstack([np.zeros((bank.linear, 2)), linear])
+    others = [bank.linear_weights(field) for field in bank.others.values()]
+    linear = np.hstack([np.zeros((bank.linear, 2)), *others, bank.pose_weights()[0]])
     finest = net("Concat", net.weights("linear_weights", linear), _duals(bank, net), axis=0)
     flat = net("Reshape", finest, net.indices(-1))
     coarse = [_coarse_weights(bank, net, level + 1) for level in range(len(bank.coarse))]
@@ -165,12 +168,13 @@ def _duals(bank: KrigingBank, net: GraphBuilder) -> str:
     n = len(bank.pose.samples)
     nothing = net("Expand", net.number(0.0), net.indices(n, 2))
     blocks = [nothing]
-    for name, field in (*bank.others.items(), (POSE, bank.pose)):
+    for name, field in bank.others.items():
         if isinstance(field, ConstantModel):
             shape = net.indices(n, kriging_bank.width(field))
             blocks.append(net("Expand", net.number(0.0), shape))
         else:
             blocks.append(net.weights(f"{name}_weights", field.dual[:n]))
+    blocks.append(net.weights("pose_weights", bank.pose_weights()[1]))
     return net("Concat", *blocks, axis=1)
 
 
@@ -183,9 +187,19 @@ def _variance(bank: KrigingBank, net: GraphBuilder, basis: str, ends: dict[str, 
     linear = len(bank.performers)
     constant = net("Slice", basis, net.indices(linear), net.indices(linear + 1), one)
     own = net("Slice", net("Concat", constant, basis, axis=1), zero, ends["own"], one)
-    stored = net.weights("precision", bank.variance_form)
-    form = net("Pad", stored, net.indices(1, 1, 0, 0))
+    whole = bank.variance_form
+    form = net("Pad", _symmetric(net, "precision", whole), net.indices(1, 1, 0, 0))
     form = net("Slice", form, net.indices(0, 0), ends["curved"], net.indices(0, 1))
-    ones = net.weights("pairs", np.ones((1 + len(bank.variance_form), 2)))
+    ones = net.weights("pairs", np.ones((1 + len(whole), 2)))
     pairs = net("Slice", ones, net.indices(0, 0), ends["curved"], net.indices(0, 1))
     return net.row_sums(net("Mul", net("MatMul", own, form), own), pairs)
+
+
+def _symmetric(net: GraphBuilder, name: str, matrix: Annotated[Floats, "rows rows"]) -> str:
+    """Build a symmetric matrix (n, n), stored as the rows of its lower triangle."""
+    packed = net.weights(name, matrix[np.tril_indices(len(matrix))])
+    row = net.weights(f"{name}_rows", np.arange(len(matrix)))
+    column = net("Unsqueeze", row, net.indices(1))
+    later, sooner = net("Max", row, column), net("Min", row, column)
+    before = net("Div", net("Mul", later, net("Add", later, net.indices(1))), net.indices(2))
+    return net("Gather", packed, net("Add", before, sooner))

@@ -118,8 +118,17 @@ def tune(problem: TuningProblem, covariance: str, degree: int | None) -> TunedKr
 def tune_beside(problem: TuningProblem, pose: Hyper) -> TunedKriging:
     """Return a model with the scales and correlation of the pose's, and other parameters tuned."""
     trend = pose.drifts == (0,) and pose.trend > 0.0
+    return _tune_at_scales(problem, replace(pose, trend=0.0), trend)
+
+
+def tune_with_trend(problem: TuningProblem, hyper: Hyper) -> TunedKriging:
+    """Return a model with the scales, correlation and trend of `hyper`, and the others tuned."""
+    return _tune_at_scales(problem, hyper, trend=False)
+
+
+def _tune_at_scales(problem: TuningProblem, hyper: Hyper, trend: bool) -> TunedKriging:
     names = tuple(name for name in _free(problem, trend) if name != "correlation")
-    loss = LeaveOneOutLoss(problem, pose, names, own_scales=False)
+    loss = LeaveOneOutLoss(problem, replace(hyper, offset=0.0), names, own_scales=False)
     return _best(loss, [loss.start(0.0, np.log(nugget)) for _, nugget in STARTS])
 
 
@@ -185,7 +194,7 @@ class LeaveOneOutLoss:
             found["correlation"] = float(expit(x[self._place("correlation")]))
         if self.problem.nugget is not None:
             found["nugget"] = self.problem.nugget
-        own = self.hyper if self.own_scales else replace(self.hyper, offset=0.0, trend=0.0)
+        own = self.hyper
         return replace(
             own,
             scales=np.exp(x[:scales]) if self.own_scales else own.scales,

@@ -13,6 +13,7 @@ import numpy as np
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
 from posefield_train.kriging.kriging_bank import (
+    POSE,
     VARIANCE,
     CoefficientModel,
     ConstantModel,
@@ -32,7 +33,8 @@ def sort_samples(bank: KrigingBank) -> KrigingBank:
     """Return the bank with its samples sorted by how much they explain of the pose."""
     order = pivoted_order(bank.pose)
     others = {name: _permute(field, order) for name, field in bank.others.items()}
-    return replace(bank, pose=_permute_kriging(bank.pose, order), others=others)
+    event = _permute_kriging(bank.event, order) if bank.event else None
+    return replace(bank, pose=_permute_kriging(bank.pose, order), others=others, event=event)
 
 
 def pivoted_order(pose: UniversalKriging) -> Annotated[Indices, "samples"]:
@@ -100,7 +102,7 @@ class ThinningData:
         """
         own = np.log(self.values[VARIANCE] + error**2 / self.bank.sill)
         values = np.hstack(list({**self.values, VARIANCE: own}.values()))
-        kept = values.shape[1] - (self.bank.pose.dual.shape[1] - rank)
+        kept = values.shape[1] - (self.values[POSE].shape[1] - rank)
         known = self.basis[:, : self.bank.linear + columns]
         found = np.linalg.lstsq(known, values[:, :kept], rcond=RELATIVE_CUTOFF)
         return np.asarray(found[0], np.float64)

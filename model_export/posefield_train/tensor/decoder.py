@@ -19,6 +19,7 @@ from posefield.common.units import Floats, Indices
 from posefield.motion import blend, quat
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.onnx_graph.level_tables import Integers
+from posefield_train.tensor.event_blend import EventBlend
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.pose_vectors import PoseChart
 
@@ -48,7 +49,8 @@ class Decoder:
     coordinates. mean: pose vector (D,) on which the tensor is centred. unwhiten: map (D, D') from
     the metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. means:
     rotations (J, 4) about which the rotation vectors are taken. coarse: ranks and joints of each
-    coarser level.
+    coarser level. event: blend into a second prediction around the event, at the finest level; its
+    coefficients follow those of the core.
     """
 
     reduced: TuckerTensor
@@ -56,6 +58,17 @@ class Decoder:
     unwhiten: Annotated[Floats, "dof varying"]
     means: JointRotations
     coarse: tuple[LevelSize, ...] = ()
+    event: EventBlend | None = None
+
+    @property
+    def blended(
+        self,
+    ) -> tuple[Annotated[Floats, "freedoms times modes"], Annotated[Floats, "frames times"]]:
+        """Return core and time basis with the event's blend."""
+        core, times = self.reduced.core, self.reduced.bases[1]
+        if self.event is None:
+            return core, times
+        return self.event.core(core), np.hstack([times, self.event.times])
 
     @property
     def level_sizes(self) -> tuple[LevelSize, ...]:
@@ -68,9 +81,12 @@ class Decoder:
         rung = self.level_sizes[level]
         moves = np.zeros((1 + len(self.means), 3))
         moves[[0, *(1 + joint for joint in rung.joints)]] = 1.0
-        unwhiten = self.unwhiten * moves.reshape(-1, 1)
         return replace(
-            self, reduced=self.reduced.truncated(rung.ranks), unwhiten=unwhiten, coarse=()
+            self,
+            reduced=self.reduced.truncated(rung.ranks),
+            unwhiten=self.unwhiten * moves.reshape(-1, 1),
+            coarse=(),
+            event=None if level else self.event,
         )
 
     @property
@@ -96,7 +112,8 @@ class Decoder:
 
         The core is contracted with that frame first, which saves nearly all of the work of `numpy`.
         """
-        core = np.tensordot(self.reduced.bases[1][frame], self.reduced.core, axes=(0, 1))
+        whole, times = self.blended
+        core = np.tensordot(times[frame], whole, axes=(0, 1))
         numbers = self.mean + coefficients @ (core.T @ self.directions)
         return PoseChart(self.means).poses(numbers)
 
@@ -116,10 +133,11 @@ class Decoder:
         self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
     ) -> Annotated[Floats, "clips frames freedoms"]:
         """Return coefficients (B, S, r1) of the first mode."""
-        table, (r1, r2, r3) = self.reduced.bases[1], self.reduced.core.shape
+        whole, table = self.blended
+        r1, r2, r3 = whole.shape
         time = blend.interpolate_rows(table, place)
         # Contracting the core first as a matrix product is 17 times as fast as one einsum.
-        core = self.reduced.core.transpose(2, 0, 1).reshape(r3, -1)
+        core = whole.transpose(2, 0, 1).reshape(r3, -1)
         poses = np.empty((*place.shape, r1))
         step = max(1, BLOCK_NUMBERS // core.shape[1])
         for start in range(0, len(place), step):
@@ -131,7 +149,7 @@ class Decoder:
     def entries(self) -> dict[str, list[Integers]]:
         """Return the level-dependent slice ends and shapes of the decoder's graph, by name."""
         ranks, joints = (
-            [rung.ranks for rung in self.level_sizes],
+            [self.blended[0].shape, *(rung.ranks for rung in self.coarse)],
             [len(r.joints) for r in self.level_sizes],
         )
         return {
@@ -176,8 +194,7 @@ class Decoder:
         Poses lie innermost: one small matrix product per pose would cost more in calls than in
         arithmetic.
         """
-        whole = net.weights("core", self.reduced.core.transpose(1, 0, 2))
-        core = net("Slice", whole, net.indices(0, 0, 0), ends["core"])
+        core = net("Slice", self._core(net), net.indices(0, 0, 0), ends["core"])
         rows = net("Reshape", core, ends["core_rows"])
         motion = net("Reshape", net("Gemm", rows, coefficients, transB=1), ends["motion"])
         time = net("Unsqueeze", self._time(net, place, ends["time"]), net.indices(1))
@@ -185,9 +202,28 @@ class Decoder:
         poses = net("ReduceSum", terms, net.indices(0), keepdims=0)
         return net("Reshape", poses, ends["flat"])
 
+    def _core(self, net: GraphBuilder) -> str:
+        """Build the core (r2, r1, r3); the event's block is made when the session loads."""
+        whole = net.weights("core", self.reduced.core.transpose(1, 0, 2))
+        if self.event is None:
+            return whole
+        (r1, r2, r3), count = self.reduced.core.shape, self.event.count
+        columns = self.event.mixing.shape[1]
+        zero, two = net.indices(0), net.indices(2)
+        leading = net("Slice", whole, zero, net.indices(count), two)
+        flat = net("Reshape", leading, net.indices(r2, r1 * count))
+        mixed = net("MatMul", net.weights("event_mixing", self.event.mixing.T), flat)
+        block = net("Reshape", mixed, net.indices(columns, r1, count))
+        before = net("Expand", net.number(0.0), net.indices(columns, r1, r3))
+        beside = net("Expand", net.number(0.0), net.indices(r2, r1, count))
+        upper = net("Concat", whole, beside, axis=2)
+        return net("Concat", upper, net("Concat", before, block, axis=2), axis=0)
+
     def _time(self, net: GraphBuilder, place: str, end: str) -> str:
         """Build time coefficients (r2, B, S), linearly interpolated between frames."""
         table = net.weights("time_basis", self.reduced.bases[1].T)
+        if self.event:
+            table = net("Concat", table, net.weights("event_times", self.event.times.T), axis=0)
         last = len(self.reduced.bases[1]) - 1
         zero, one = net.indices(0), net.indices(1)
         kept = net("Slice", table, zero, end, zero)

@@ -69,13 +69,30 @@ def read(weights: GraphConstants, level: Level) -> ReducedTensor:
     moves = np.zeros((1 + len(rotations), 1))
     moves[[0, *(1 + joint for joint in level.joints)]] = 1.0
     directions = _directions(weights)[:, :r1] * np.repeat(moves, 3, axis=0)
+    core = weights["core"][:r2, :r1, :r3].astype(np.float64)
+    time = weights["time_basis"][:r2].T.astype(np.float64)
+    if level.event:
+        core = _with_event(core, weights["event_mixing"].astype(np.float64), level.event)
+        time = np.hstack([time, weights["event_times"].T.astype(np.float64)])
     return ReducedTensor(
-        weights["core"][:r2, :r1, :r3].astype(np.float64),
-        weights["time_basis"][:r2].T.astype(np.float64),
+        core,
+        time,
         directions.T.copy(),
         np.concatenate([weights["root_mean"], _mean_vectors(weights, rotations).ravel()]),
         rotations,
     )
+
+
+def _with_event(
+    core: Annotated[Floats, "times freedoms modes"],
+    mixing: Annotated[Floats, "columns times"],
+    count: int,
+) -> Annotated[Floats, "more_times freedoms more_modes"]:
+    """Return the core with the block that the event's second prediction multiplies."""
+    columns, (r2, _, r3) = len(mixing), core.shape
+    found = np.pad(core, ((0, columns), (0, 0), (0, count)))
+    found[r2:, :, r3:] = np.tensordot(mixing, core[:, :, :count], axes=1)
+    return found
 
 
 def _directions(weights: GraphConstants) -> Annotated[Floats, "dof freedoms"]:

@@ -65,19 +65,21 @@ def estimate(
     left_out = leave_one_out.leave_out(hyper, samples, leave_out_groups(card, samples))
     variances = leave_one_out.left_out_variances(hyper, samples, left_out)
     sill = weights["sill"].item()
-    r3 = reduced.core.shape[2]
+    # What the second prediction around the event adds is given, and is no part of a correction.
+    core = reduced.core[..., : card.levels[0].ranks[2]]
+    r3 = core.shape[2]
     held = sample_coefficients(card, weights, samples)[:, :r3]
     missed = left_out @ held
     sigmas = np.sqrt(sill * variances * len(samples))
     # Residuals for a sigma of one metre: times the sigma of a point they are those of the point.
     strays = missed / sigmas[:, None]
     root = np.linalg.cholesky(strays.T @ strays + 1e-12 * np.eye(r3))
-    spread = reduced.core @ root
+    spread = core @ root
     time = np.einsum("tdk,sdk->ts", spread, spread)
     freedoms = np.einsum("tdk,tek->de", spread, spread)
     own = np.array(card.beside, dtype=float).reshape(len(card.beside), len(card.beside))
     marginals = time / np.trace(time), freedoms
-    flat = reduced.core.reshape(-1, r3).T
+    flat = core.reshape(-1, r3).T
     motions = held @ flat, (held - missed) @ flat
     return ResidualCovariance(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
 
@@ -90,8 +92,10 @@ def sample_coefficients(
     r3 = weights["core"].shape[2]
     order = importance_order(card, weights, samples)
     held = samples[order]
-    dual = weights["pose_weights"].astype(np.float64)
-    linear = weights["linear_weights"][:, -r3:].astype(np.float64)
+    dual = weights["pose_weights"][:, :r3].astype(np.float64)
+    # The event's columns come last.
+    first = weights["linear_weights"].shape[1] - r3 - card.levels[0].event
+    linear = weights["linear_weights"][:, first : first + r3].astype(np.float64)
     found = np.empty((len(samples), r3))
     near = kriging_model.stationary_covariances(hyper, held, held)
     near += hyper.nugget * np.eye(len(held))

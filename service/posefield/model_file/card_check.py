@@ -236,7 +236,7 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
         "ladder": (len(card.levels), ANY_SIZE),
         "samples": (controls, card.samples),
         "sill": (1,),
-        "pose_weights": (card.samples, r3),
+        "pose_weights": (card.samples, r3 + card.levels[0].event),
         "linear_weights": (performers + 1 + controls, ANY_SIZE),
         "core": (r2, r1, r3),
         "time_basis": (r2, card.frames),
@@ -249,5 +249,7 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     }
     # Without performers the graph has no such constants.
     labelled = {"performer": (1, performers), "whose": (card.samples,)}
+    blended = {"event_mixing": (ANY_SIZE, r2), "event_times": (ANY_SIZE, card.frames)}
     # They come first, since other shapes follow from the number of performers.
-    return (labelled if performers else dict.fromkeys(labelled, ())) | shapes
+    labelled = labelled if performers else dict.fromkeys(labelled, ())
+    return labelled | shapes | (blended if card.levels[0].event else dict.fromkeys(blended, ()))

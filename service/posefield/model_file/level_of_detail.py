@@ -15,7 +15,7 @@ class Level:
     multiply-adds of one pose. rms, p99, max: of the distances, m, between its joints and those of
     the untruncated model, over random controls, performers and times. pose: the largest root mean
     square over the joints of one pose, m. effector: root mean square of the event's joint at its
-    event, m.
+    event, m. event: number of leading coefficients with a second prediction around the event.
     """
 
     ranks: tuple[Count, Count, Count]
@@ -29,3 +29,4 @@ class Level:
     pose: NonNegative
     max: NonNegative
     effector: NonNegative | None
+    event: Index = 0
