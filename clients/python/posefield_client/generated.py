@@ -238,6 +238,7 @@ class Level(Struct, frozen=True, kw_only=True):
     pose: float
     max: float
     effector: float | None
+    event: int | None = None
 
 
 class Preset(Struct, frozen=True, kw_only=True):
