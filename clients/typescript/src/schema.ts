@@ -1175,6 +1175,8 @@ export interface components {
             max: number;
             /** @description Root mean square error of the event's joint at its event, in metres; null without an event. */
             effector: number | null;
+            /** @description Number of leading coefficients that have a second prediction for the time around the event; 0 without one. */
+            event?: number;
         };
         /** @description Description of a model for clients, without its weights. */
         ModelCard: {
