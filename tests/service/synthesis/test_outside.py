@@ -69,7 +69,7 @@ def test_the_graph_alone_would_run_away(walk):
     feed = {"controls": point, "time": np.zeros((1, 1), np.float32)}
     raw = walk.session.runtimes[0].run(["duration"], feed)[0][0]
     least = walk.session.bounds.duration_limits[0]
-    assert raw < 0.5 * least <= walk.session.durations(point)[0] * (1 + NEAR)
+    assert raw < 0.6 * least <= walk.session.durations(point)[0] * (1 + NEAR)
 
 
 def test_a_measured_control_is_given_monotonically_and_never_passed(model):
