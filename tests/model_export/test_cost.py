@@ -37,7 +37,9 @@ def held(exported):
 
 def test_numbers_are_those_that_the_file_holds(held, trained):
     ranks = trained.model.decoder.reduced.core.shape
-    motion = sum(held[name].size for name in ("core", "directions", "time_basis", "pose_weights"))
+    motion = sum(held[name].size for name in ("core", "directions", "time_basis"))
+    # What the event's prediction adds stands behind the coefficients of the core.
+    motion += held["pose_weights"][:, : ranks[2]].size
     # Those of one and of the controls stand side by side for all quantities.
     drift = ranks[2] * len(held["linear_weights"])
     assert motion + drift == truncation_cost.storage_cost(trained.tensor, 4).evaluate(*ranks)
@@ -49,7 +51,9 @@ def test_levels_read_what_the_file_holds_for_them(held, exported):
     finest = ("core", "directions", "time_basis", "samples", "precision")
     duals = [f"{name}_weights" for name in ("pose", *model.bank.others)]
     drift = held["linear_weights"][:, 2:].size
-    whole = sum(held[name].size for name in (*finest, *(n for n in duals if n in held)))
+    assert levels[0].event, "the family has an event, and its prediction pays"
+    blend = ("event_mixing", "event_times")
+    whole = sum(held[name].size for name in (*finest, *blend, *(n for n in duals if n in held)))
     assert levels[0].numbers == whole + drift
     for number, level in enumerate(levels[1:], start=1):
         r1, r2, r3 = level.ranks

@@ -133,7 +133,7 @@ def test_the_order_of_samples_changes_no_answer(trained, rng):
 def test_as_many_covariances_as_there_are_answer_exactly(trained, rng):
     """Least squares over the whole basis finds the weights of kriging again."""
     bank = thinning.sort_samples(trained.model.bank)
-    rank = bank.pose.dual.shape[1]
+    rank = bank.pose.dual.shape[1] + bank.event_columns
     points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
     exact = bank.numpy(points)
 
