@@ -8,12 +8,12 @@ import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import InvalidField
+from posefield.common.units import UpAxis
 from posefield.console.arguments import Json, ModelPath
 from posefield.console.question_options import with_option_groups
 from posefield_train.cli import output_files
 from posefield_train.cli.progress_messages import ProgressPrinter
 
-Up = Literal["y", "z"]
 RootOffset = Literal["replace", "add"]
 
 
@@ -24,7 +24,7 @@ class ClipArguments:
     unit: Annotated[
         float, typer.Option(help="length of the files' unit in metres", metavar="METRES")
     ]
-    up: Annotated[Up, typer.Option(help="up axis of the files")]
+    up: Annotated[UpAxis, typer.Option(help="up axis of the files")]
     clips: Annotated[
         list[Path] | None,
         typer.Argument(

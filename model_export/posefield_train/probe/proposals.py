@@ -6,12 +6,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat
 from posefield_train.probe.figure import Figure
 from posefield_train.source.bone_lengths import UNITS
 from posefield_train.source.bvh import bvh_conversion
-from posefield_train.source.bvh.bvh_conversion import Up
 
 Confidence = Literal["certain", "high", "medium", "low", "none"]
 
@@ -140,7 +139,7 @@ def _floor_axis(figures: Sequence[Figure]) -> Vote:
     return name, f"{said}other axis by {others:.1%} or more"
 
 
-def propose_feet(figures: Sequence[Figure], up: Up | None) -> Proposal:
+def propose_feet(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:
     """Return the joints of the feet: the lowest of the joints that are named as feet or toes."""
     first = figures[0]
     roles = [role for role in ("Toes", "Foot") if first.pair(role)]
@@ -165,7 +164,7 @@ def _alike(figure: Figure, other: Figure) -> bool:
     return figure.names == other.names
 
 
-def propose_facing(figures: Sequence[Figure], up: Up | None) -> Proposal:
+def propose_facing(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:
     """Return the angle from the root's forward axis to the body's, degrees to the left.
 
     Training takes +z of the root (after conversion to y up) as forward.
@@ -187,7 +186,7 @@ def propose_facing(figures: Sequence[Figure], up: Up | None) -> Proposal:
     return Proposal(value, "high" if agree > 0.9 and abs(mean) < 45.0 else "low", tuple(said))
 
 
-def _facing(figure: Figure, up: Up) -> float | None:
+def _facing(figure: Figure, up: UpAxis) -> float | None:
     """Return the mean angle of the body's forward direction to the root's +z, rad, or None."""
     pair = figure.pair("UpperLeg") or figure.pair("UpperArm")
     if pair is None:

@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field, ValidationError, field_validator, model_
 
 from posefield.common.errors import RecipeError
 from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import UpAxis
 from posefield.motion import measures
 from posefield.motion.joint_roles import Role
 from posefield_train.source import data_folder, recipe_errors
@@ -38,7 +39,7 @@ class Source(RecipePart):
     """Unit and axes of the motion files; a BVH file states neither its unit nor its up axis."""
 
     metres_per_unit: Positive = Field(description="length of one unit of the files, m")
-    up: Literal["y", "z"] = Field(description="the files' up axis; their frame is right-handed")
+    up: UpAxis = Field(description="the files' up axis; their frame is right-handed")
     root_offset: Literal["replace", "add"] | None = Field(
         default=None,
         description="whether root position channels replace the root's OFFSET or add to it; "

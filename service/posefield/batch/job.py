@@ -10,7 +10,7 @@ import orjson
 
 from posefield import __version__
 from posefield.common.errors import InvalidField
-from posefield.encode.files.file_convention import Unit, Up
+from posefield.common.units import LengthUnit, UpAxis
 from posefield.inference import session
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import BodyKind
@@ -35,8 +35,8 @@ class ExportJob:
     queries: str
     layout: str
     chunk: int
-    unit: Unit | None = None
-    up: Up | None = None
+    unit: LengthUnit | None = None
+    up: UpAxis | None = None
     names: NamingConvention = "own"
     body: BodyKind | None = None
 

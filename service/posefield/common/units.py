@@ -7,6 +7,8 @@ exist only where a file or a wire format is read or written, and the functions t
 for them.
 """
 
+from typing import Literal
+
 import numpy as np
 import numpy.typing as npt
 
@@ -19,5 +21,11 @@ Singles = npt.NDArray[np.float32]
 Indices = npt.NDArray[np.int64]
 
 Booleans = npt.NDArray[np.bool_]
+
+LengthUnit = Literal["m", "cm"]
+"""Unit of length of a file."""
+
+UpAxis = Literal["y", "z"]
+"""Up axis of a file."""
 
 UP = np.array([0.0, 1.0, 0.0])

@@ -18,7 +18,7 @@ from posefield.constraints.motion_variables import CYCLE_VARIABLES, MotionVariab
 from posefield.constraints.targets import ConstraintSet
 from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import Control
-from posefield.question.results import ConstraintResult
+from posefield.question.results import ConstraintResult, split_results
 
 # Speed depends on the travel, so it is last.
 ORDER = ("turn", "stride_length", "speed")
@@ -47,9 +47,9 @@ def bring_back(
                     numbers = _without_overshoot(held.scene, numbers, aim, control)
     found = replace(held, numbers=numbers)
     measured = bench.measured(found)
-    first = len(held.results) - len(goals.targets)
-    controls = [_result(met, asked, measured) for met in held.results[:first]]
-    return replace(found, results=(*controls, *held.results[first:]))
+    controls, targets = split_results(held.results, len(goals.targets))
+    judged = [_result(met, asked, measured) for met in controls]
+    return replace(found, results=(*judged, *targets))
 
 
 def _limit_duration(held: ConstrainedMotion, bounds: AnswerBounds) -> Floats:

@@ -10,10 +10,11 @@ from typing import Any, Generic, TypeVar
 
 from posefield.common import cancellation
 from posefield.common.errors import InvalidField
+from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import glb
 from posefield.encode.files import axis_conversion
 from posefield.encode.files import file_convention as conventions
-from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention, Unit, Up
+from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention
 from posefield.encode.files.media_types import ARROW, JSON, MSGPACK, NPZ, Format, by_extension
 from posefield.encode.tables import clip_tables, crowd_tables, model_tables
 from posefield.encode.tables import table as tables
@@ -55,7 +56,7 @@ class ClipEncoder(Format):
     has_body: bool = False
 
     def convention(
-        self, unit: Unit | None, up: Up | None, body: BodyKind | None = None
+        self, unit: LengthUnit | None, up: UpAxis | None, body: BodyKind | None = None
     ) -> Convention:
         """Return the requested convention; None is the format's default.
 

@@ -7,6 +7,7 @@ captured ones. Within the sampled ranges nothing is bounded.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -21,6 +22,8 @@ captured clip; paths of walking crowds need controls up to 0.2 of a range outsid
 """
 SLACK = 1e-6
 """Share of the range that a control inside it may lie outside by rounding."""
+
+Bound = TypeVar("Bound", float, Floats)
 
 
 @dataclass(frozen=True)
@@ -42,8 +45,7 @@ class AnswerBounds:
     @cached_property
     def limits(self) -> tuple[Floats, Floats]:
         """Smallest and largest value (d,) at which each control acts."""
-        room = MARGIN * (self.high - self.low)
-        return self.low - room, self.high + room
+        return _with_margin(self.low, self.high)
 
     @property
     def duration_limits(self) -> tuple[float, float]:
@@ -93,5 +95,11 @@ def of_card(card: ModelCard) -> AnswerBounds:
 
 def limit_control(control: Control, value: float) -> float:
     """Return the value at which a control acts: at most the margin outside its sampled range."""
-    room = MARGIN * (control.maximum - control.minimum)
-    return min(max(value, control.minimum - room), control.maximum + room)
+    least, most = _with_margin(control.minimum, control.maximum)
+    return min(max(value, least), most)
+
+
+def _with_margin(low: Bound, high: Bound) -> tuple[Bound, Bound]:
+    """Return the limits that lie the margin outside sampled ranges."""
+    room = MARGIN * (high - low)
+    return low - room, high + room

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, cast
 import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
+from posefield.common.units import LengthUnit, UpAxis
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import Body
 
@@ -16,8 +17,6 @@ Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
 TargetTime = float | Moment
 """Time of a target: seconds from the start of the clip, or a moment of the motion."""
 ExactControls = Literal["auto", "none"] | Annotated[tuple[str, ...], Meta(min_length=1)]
-LengthUnit = Literal["m", "cm"]
-UpAxis = Literal["y", "z"]
 LEGAL_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,99}", re.ASCII)
 """Names that are legal as file names on all systems."""
 Name = Annotated[str, Meta(pattern=rf"^{LEGAL_NAME.pattern}\Z")]

@@ -1,6 +1,6 @@
 """Results of a query: poses or clips with provenance and uncertainty, sigma grids, reasons."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Generic, Literal, TypeVar
 
@@ -43,6 +43,17 @@ class ConstraintResult:
     miss: float
     unit: str
     reached: bool
+
+
+def split_results(
+    results: Sequence[ConstraintResult], targets: int
+) -> tuple[tuple[ConstraintResult, ...], tuple[ConstraintResult, ...]]:
+    """Return the results of measured controls, which come first, and those of the targets.
+
+    targets: number of targets.
+    """
+    first = len(results) - targets
+    return tuple(results[:first]), tuple(results[first:])
 
 
 @dataclass(frozen=True)

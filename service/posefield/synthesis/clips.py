@@ -13,7 +13,7 @@ from posefield.locomotion.stride import Strides
 from posefield.motion.clip import assemble
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion
-from posefield.question.results import ClipAnswer, PoseAnswer
+from posefield.question.results import ClipAnswer, PoseAnswer, split_results
 from posefield.synthesis import frame_times
 from posefield.synthesis.poses import POSE_OUTPUTS
 from posefield.synthesis.synthesizer import Synthesizer
@@ -145,7 +145,7 @@ def _duration_and_misses(
     if not (goals.targets or (goals and strict)):
         return _duration(model, question), False
     held = model.solve_constraints(question, goals, asked.extrapolate)
-    targets = held.results[len(held.results) - len(goals.targets) :]
+    _, targets = split_results(held.results, len(goals.targets))
     misses = asked.extrapolate != "ok" and not all(met.reached for met in targets)
     return model.check_duration(held.duration), misses
 

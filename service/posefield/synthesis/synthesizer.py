@@ -10,7 +10,7 @@ from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
 from posefield.inference.named_model import NamedModel
 from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion
-from posefield.question.results import ConstraintResult, Deviation, Trust
+from posefield.question.results import ConstraintResult, Deviation, Trust, split_results
 from posefield.validation import input_limits, question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
@@ -105,9 +105,7 @@ class Synthesizer(NamedModel):
     ) -> Trust:
         """Return the trust of a constrained answer, with the errors of its targets."""
         measured = self.solver.measured(question, held)
-        # Results of controls precede those of targets.
-        first = len(held.results) - len(asked.targets)
-        controls, targets = held.results[:first], held.results[first:]
+        controls, targets = split_results(held.results, len(asked.targets))
         apart = self._deviations(question, measured, controls)
         question = replace(question, deviations=apart)
         own = self.trust(asked, question, held.duration, held.state.asked_sigma)
@@ -151,9 +149,9 @@ def check_targets(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> None
 
 def _constraint_fields(goals: ConstraintSet, met: Sequence[ConstraintResult]) -> Iterator[str]:
     """Yield the field of each constraint in the question; controls precede targets."""
-    first = len(met) - len(goals.targets)
-    for index, each in enumerate(met):
-        yield f"controls/{each.what}" if index < first else f"targets/{index - first}"
+    controls, targets = split_results(met, len(goals.targets))
+    yield from (f"controls/{each.what}" for each in controls)
+    yield from (f"targets/{index}" for index in range(len(targets)))
 
 
 def _miss_warning(met: ConstraintResult) -> str:

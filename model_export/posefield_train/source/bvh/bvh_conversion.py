@@ -4,20 +4,19 @@ from typing import Literal
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source.bvh.bvh_content import BvhFile, BvhJoint
 
-Up = Literal["y", "z"]
 RootOffset = Literal["replace", "add"]
 
 BLOCK_JOINTS = 50_000
 """Rotations per block."""
 
 
-def to_clip(file: BvhFile, *, metres_per_unit: float, up: Up, root_offset: RootOffset) -> Clip:
+def to_clip(file: BvhFile, *, metres_per_unit: float, up: UpAxis, root_offset: RootOffset) -> Clip:
     """Return the file's motion in metres with Y up.
 
     A position channel replaces its component of the OFFSET; without a channel the OFFSET stays.
@@ -42,12 +41,12 @@ def to_clip(file: BvhFile, *, metres_per_unit: float, up: Up, root_offset: RootO
     return Clip(skeleton(file, metres_per_unit, up), rotations, lengths, file.rate)
 
 
-def to_y_up(vectors: Floats, up: Up) -> Floats:
+def to_y_up(vectors: Floats, up: UpAxis) -> Floats:
     """Return vectors (..., 3) with Y up; the last three components of a quaternion turn alike."""
     return vectors if up == "y" else vectors[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
 
 
-def skeleton(file: BvhFile, metres_per_unit: float, up: Up) -> Skeleton:
+def skeleton(file: BvhFile, metres_per_unit: float, up: UpAxis) -> Skeleton:
     """Return the joints and end sites at rest, m."""
     offsets = np.array([joint.offset for joint in file.joints])
     tips = np.array([offset for _, offset in file.tips]).reshape(-1, 3)

@@ -1,15 +1,12 @@
 """Conventions of files: unit of length, up axis and body."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 from posefield.common.errors import InvalidField
+from posefield.common.units import LengthUnit, UpAxis
 from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 
-Up = Literal["y", "z"]
-Unit = Literal["m", "cm"]
-
-METRES_PER_UNIT: dict[Unit, float] = {"m": 1.0, "cm": 0.01}
+METRES_PER_UNIT: dict[LengthUnit, float] = {"m": 1.0, "cm": 0.01}
 
 
 @dataclass(frozen=True)
@@ -21,7 +18,7 @@ class Convention:
     """
 
     metres_per_unit: float
-    up: Up
+    up: UpAxis
     body: BodyKind = DEFAULT_BODY
 
 
@@ -30,7 +27,7 @@ CENTIMETRES = Convention(0.01, "y")
 
 
 def requested_convention(
-    unit: Unit | None, up: Up | None, body: BodyKind | None, usual: Convention
+    unit: LengthUnit | None, up: UpAxis | None, body: BodyKind | None, usual: Convention
 ) -> Convention:
     """Return the requested convention; None is the default of the format."""
     length = usual.metres_per_unit if unit is None else METRES_PER_UNIT[unit]

@@ -28,11 +28,6 @@ class CrateParts:
     values: bytes
     sections: tuple[CrateSection, ...]
 
-    @property
-    def token_section(self) -> bytes:
-        """Return the section of tokens."""
-        return self.sections[0].content
-
     def alike(self, other: "CrateParts") -> bool:
         """Return whether both are equal except for the text of their tokens."""
         return self.values == other.values and self.sections[1:] == other.sections[1:]
