@@ -6,7 +6,7 @@ It fails if a reader differs from the kinematics of this project, finds no anima
 number of frames, and if a deliberately damaged or known unsupported file passes. glTF files must
 pass the Khronos validator without errors and warnings, and the contract must pass Redocly. Then it
 builds and queries the image, and checks a cache before the service, the model in other engines, the
-page in a browser and the Blender add-on.
+page in a browser, glTF files in Godot and the Blender add-on.
 """
 
 import json
@@ -24,6 +24,7 @@ import crowds
 import engines
 import environment
 import exports
+import godot
 import lint
 import numpy as np
 import page
@@ -89,6 +90,7 @@ def main() -> int:
     others = blender_bvh.faults(python) + lint.faults(node) + container.faults() + cache.faults()
     others += slow_clients.faults()
     others += engines.faults(*environment.node()) + page.faults(node) + addon.faults()
+    others += godot.faults()
     print("\n".join(others) or "no fault in what runs elsewhere")
     return wrong or bool(faults + others)
 
