@@ -45,7 +45,7 @@ class ClipArguments:
     ] = None
 
 
-STEPS = 4
+STEPS = 3
 """Steps of an adaptation."""
 
 
@@ -75,7 +75,7 @@ def adapt(
         raise InvalidField("unit", f"{files.unit}, expected a length in metres")
     if not licence.strip():
         raise InvalidField("licence", "blank, expected a text")
-    with ProgressPrinter(STEPS) as progress:
+    with ProgressPrinter("adapting", STEPS) as progress:
         progress(f"reading {model}")
         known = model_reconstruction.load(model)
         adapted_file.check_name(known.card, performer)

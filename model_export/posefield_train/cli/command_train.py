@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from posefield_train.source.recipe import Recipe
 
 
-STEPS, REPORT_STEPS = 6, 8
+STEPS, REPORT_STEPS = 5, 7
 """Steps of a training, without and with its report."""
 
 
@@ -71,7 +71,7 @@ def _train(
 
     output_files.expect_onnx(output)
     own = recipe.read(recipe_file)
-    with ProgressPrinter(REPORT_STEPS if report else STEPS) as progress:
+    with ProgressPrinter("training", REPORT_STEPS if report else STEPS) as progress:
         progress(f"reading {recipe_file}")
         examples, notes = ingest.ingest(own, data or recipe_file.parent)
         preset_check.check_presets(own, examples)

@@ -5,6 +5,7 @@ from typing import Any
 import typer
 
 from posefield.console.arguments import Json, ModelPath
+from posefield.console.late_progress import LateProgress
 from posefield.console.output import as_json
 from posefield.inference import cost_model, session
 from posefield.model_file import model_card as cards
@@ -17,10 +18,12 @@ def inspect(model: ModelPath, json: Json = False) -> None:
     The time per pose is measured on this machine.
     """
     opened = session.load(model)
+    with LateProgress("rounds of timing") as bar:
+        seconds = cost_model.seconds_per_pose(opened, bar.update)
     plain = {
         "identity": f"{model.stem}@{opened.digest}",
         **cards.plain_values(opened.card),
-        "seconds_per_pose": cost_model.seconds_per_pose(opened),
+        "seconds_per_pose": seconds,
     }
     typer.echo(as_json(plain) if json else _summary(plain))
 

@@ -15,6 +15,7 @@ import typer
 from posefield.common import atomic_files
 from posefield.common.errors import FileError
 from posefield.console.arguments import Json, ModelPath
+from posefield.console.late_progress import LateProgress
 from posefield.console.output import as_json
 from posefield.inference import session
 from posefield.inference.session import Session
@@ -37,7 +38,8 @@ def page(
     content = checked_file.read(model)
     opened = session.load_bytes(content, str(model))
     identity = f"{model.stem}@{opened.digest}"
-    model_files = dict(browser_files(content, opened, identity))
+    with LateProgress("files", len(opened.card.levels) + 1) as bar:
+        model_files = dict(bar.count(browser_files(content, opened, identity)))
     written = write_files(page_files(model_files, identity), output)
     if json:
         plain = {"folder": str(output), "model": identity, "files": written}

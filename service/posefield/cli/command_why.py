@@ -7,6 +7,7 @@ import typer
 
 from posefield.batch.rows import row_sources
 from posefield.console.arguments import Json, ModelPath, open_model
+from posefield.console.late_progress import LateProgress
 from posefield.console.output import as_json, print_warnings
 from posefield.console.question_options import with_question_options
 from posefield.encode.tables import model_tables
@@ -44,6 +45,7 @@ def suggest(
     """List the clips to capture next, the most useful first."""
     synthesizer = open_model(model)
     given = row_sources.points(candidates, synthesizer) if candidates else None
-    found = find_suggestions(synthesizer, question, given)
+    with LateProgress("points", question.count) as bar:
+        found = find_suggestions(synthesizer, question, given, bar.update)
     as_text = model_tables.suggestions_text
     typer.echo(as_json(model_tables.suggestions(found)) if json else as_text(found))

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import PointControls, PointLabels
+from posefield.common.progress_callback import ProgressCallback, ignore_progress
 from posefield.common.units import Floats
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.session import Session
@@ -17,31 +18,35 @@ ROUNDS = 7
 """Rounds of the benchmark: few, as it runs whenever a model is opened."""
 
 
-def seconds_per_pose(session: Session) -> tuple[float, ...]:
+def seconds_per_pose(
+    session: Session, progress: ProgressCallback = ignore_progress
+) -> tuple[float, ...]:
     """Return the seconds per pose of each level, in batches on one thread.
 
     Each is the median of the rounds. The costs never increase from a level to the next coarser one,
     since a finer level that is cheaper can be used instead.
     """
-    return monotone_costs(
-        benchmark_levels([(session, level) for level in range(len(session.runtimes))], ROUNDS)
-    )
+    levels = [(session, level) for level in range(len(session.runtimes))]
+    return monotone_costs(benchmark_levels(levels, ROUNDS, progress))
 
 
 def benchmark_levels(
-    asked: Sequence[tuple[Session, int]], rounds: int
+    asked: Sequence[tuple[Session, int]],
+    rounds: int,
+    progress: ProgressCallback = ignore_progress,
 ) -> Annotated[Floats, "{len(asked)}"]:
     """Return the seconds per pose (N,) of levels of sessions: the median of the rounds.
 
     rounds: an odd number. Every round measures each level once, so that a slowdown of the machine
-    affects all of them.
+    affects all of them. progress: called after each round, and after the one that warms up.
     """
     calls = [(session, _sample_inputs(session), level) for session, level in asked]
-    for call in calls:
-        _time_call(*call)
-    taken = [[_time_call(*call) for call in calls] for _ in range(rounds)]
+    taken = []
+    for done in range(rounds + 1):
+        taken.append([_time_call(*call) for call in calls])
+        progress(done + 1, rounds + 1)
     # np.median imports masked arrays on first use, which takes longer than this measurement.
-    return np.sort(taken, axis=0)[rounds // 2] / BATCH
+    return np.sort(taken[1:], axis=0)[rounds // 2] / BATCH
 
 
 def monotone_costs(costs: Annotated[Floats, "levels"]) -> tuple[float, ...]:

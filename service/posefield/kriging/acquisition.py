@@ -12,6 +12,7 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.array_shapes import SampleControls
+from posefield.common.progress_callback import ProgressCallback, ignore_progress
 from posefield.common.units import Floats, Indices
 from posefield.kriging.support import NUGGET, covariances
 
@@ -28,7 +29,10 @@ class VarianceReduction:
 
 
 def rank_candidates(
-    candidates: Annotated[Floats, "candidates controls"], samples: SampleControls, count: int
+    candidates: Annotated[Floats, "candidates controls"],
+    samples: SampleControls,
+    count: int,
+    progress: ProgressCallback = ignore_progress,
 ) -> list[tuple[int, VarianceReduction]]:
     """Return the candidates (C, d) of the largest gains, by index, in greedy order.
 
@@ -37,13 +41,15 @@ def rank_candidates(
     """
     known = _ConditionedField.conditioned_on(candidates, samples)
     found: list[tuple[int, VarianceReduction]] = []
-    for _ in range(min(count, len(candidates))):
+    most = min(count, len(candidates))
+    for done in range(most):
         cancellation.check()
         gains = known.gains()
         gains[[at for at, _ in found]] = -1.0
         at = int(np.argmax(gains))
         found.append((at, VarianceReduction(float(gains[at]), float(known.variances[at]))))
         known.condition_on(at)
+        progress(done + 1, most)
     return found
 
 

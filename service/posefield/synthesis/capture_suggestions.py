@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from posefield.common.errors import InvalidField
+from posefield.common.progress_callback import ProgressCallback, ignore_progress
 from posefield.common.units import Floats, Indices
 from posefield.kriging import acquisition
 from posefield.kriging.acquisition import VarianceReduction
@@ -24,6 +25,7 @@ def suggest(
     model: Synthesizer,
     asked: SuggestQuestion,
     candidates: Sequence[Mapping[str, float]] | None = None,
+    progress: ProgressCallback = ignore_progress,
 ) -> Suggestions:
     """Return points to capture in order of their expected variance reduction.
 
@@ -35,7 +37,8 @@ def suggest(
     question_validation.labels(card.performers, asked.performer)
     points = _drawn_points(own) if candidates is None else _given_points(model, candidates)
     captured = _captured_indices(card, asked.performer)
-    ranked = acquisition.rank_candidates(own.scaled(points), own.samples[captured], asked.count)
+    scaled, known = own.scaled(points), own.samples[captured]
+    ranked = acquisition.rank_candidates(scaled, known, asked.count, progress)
     found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)
     return Suggestions(model.identity, asked.performer, len(points), found)
 

@@ -1,6 +1,12 @@
 """Tests of progress without a terminal: plain lines on standard error only."""
 
+from inspect import signature
+
+import pytest
+
+from posefield.console.late_progress import LateProgress
 from posefield.console.progress import ProgressBar
+from posefield_train.cli.progress_messages import ProgressPrinter
 
 
 def test_a_line_says_how_much_is_finished(capsys):
@@ -36,3 +42,42 @@ def test_no_control_sequences_are_written_for_colours(capsys, monkeypatch):
         bar.print("[a] note at 7 of 10")
         bar.update(5)
     assert capsys.readouterr().err.splitlines() == ["[a] note at 7 of 10", "clips: 5 of 10"]
+
+
+def test_progress_of_short_work_shows_nothing(capsys):
+    with LateProgress("points") as bar:
+        assert [*bar.count("abc")] == ["a", "b", "c"]
+        bar.update(3, 3)
+    assert capsys.readouterr().err == ""
+
+
+def test_late_progress_begins_with_the_work_so_far(capsys):
+    with LateProgress("points", 9, delay=0.0, interval=0.0) as bar:
+        bar.update(4)
+        bar.update(5, 10)
+    first, second = capsys.readouterr().err.splitlines()
+    assert first == "points: 4 of 9"
+    assert second.startswith("points: 5 of 10")
+
+
+def test_each_item_counts_when_the_next_is_taken(capsys):
+    with LateProgress("files", 3, delay=0.0, interval=0.0) as bar:
+        list(bar.count("abc"))
+    assert [line[:13] for line in capsys.readouterr().err.splitlines()] == [
+        "files: 0 of 3",
+        "files: 1 of 3",
+        "files: 2 of 3",
+    ]
+
+
+def test_progress_of_steps_names_work_and_step(capsys):
+    with ProgressPrinter("training", 2) as progress:
+        progress("reading")
+        progress("done")
+    assert [line[10:] for line in capsys.readouterr().err.splitlines()] == ["reading", "done"]
+    assert [name for name, _ in progress.finished] == ["reading"]
+
+
+@pytest.mark.parametrize("kind", [ProgressBar, LateProgress, ProgressPrinter])
+def test_all_kinds_of_progress_begin_with_label_and_total(kind):
+    assert [*signature(kind).parameters][:2] == ["label", "total"]

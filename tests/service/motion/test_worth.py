@@ -46,6 +46,12 @@ def test_none_is_ranked_twice_and_all_there_are_at_most(samples, candidates):
     assert sorted(at for at, _ in found) == [0, 1, 2, 3, 4]
 
 
+def test_progress_counts_the_ranked_candidates(samples, candidates):
+    ranked = []
+    acquisition.rank_candidates(candidates, samples, 3, lambda *done: ranked.append(done))
+    assert ranked == [(1, 3), (2, 3), (3, 3)]
+
+
 def test_what_is_far_from_all_that_was_captured_comes_first(samples):
     gap = np.array([[0.9, 0.9, 0.9]])
     known = samples[np.max(samples, axis=1) < 0.3]

@@ -83,6 +83,12 @@ def test_levels_of_several_files_are_told_as_they_are_found(paced):
     assert found == pytest.approx([600 / 512e3, 64 / 512e3, 1e-3])
 
 
+def test_progress_counts_the_rounds_and_the_one_that_warms_up(paced):
+    rounds = []
+    cost_model.benchmark_levels([(paced(512), 0)], 3, lambda *done: rounds.append(done))
+    assert rounds == [(1, 4), (2, 4), (3, 4), (4, 4)]
+
+
 def test_costs_never_grow(rng):
     costs = rng.uniform(1.0, 2.0, 20)
     found = np.array(cost_model.monotone_costs(costs))
