@@ -44,6 +44,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.system)
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup() -> None:
+    """Check array shapes in the first calls of each function of the test that begins."""
+    shape_checks.begin_test()
+
+
 @pytest.fixture(scope="module")
 def store(tmp_path_factory) -> Iterator[str]:
     """Yield the address of an object store's server."""

@@ -4,6 +4,9 @@ A signature gives a shape as `Annotated[Floats, "frames joints 3"]`, in the lang
 (posefield/common/array_shapes.py). The hook wraps each function with such an annotation in the
 checks of jaxtyping and beartype, and checks the fields of a dataclass after its `__init__`. Only
 arrays are checked. The service has neither the hook nor the two libraries.
+
+A check takes as long as many of the functions, so that only the first calls of each function in
+each test are checked.
 """
 
 import dataclasses
@@ -18,12 +21,25 @@ from types import FunctionType, ModuleType, UnionType
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 PACKAGES = ("posefield", "posefield_train")
+CHECKED_CALLS = 10
+"""Calls of each function that are checked in each test."""
 METHODS = (FunctionType, classmethod, staticmethod, property, cached_property)
 
 
 def install() -> None:
     """Check the shapes of the project's modules that this process imports from now on."""
     sys.meta_path.insert(0, _CheckingFinder())
+
+
+class _RunningTest:
+    """Number of the test that runs: checks begin anew with each."""
+
+    number = 0
+
+
+def begin_test() -> None:
+    """Check the first calls of each function again."""
+    _RunningTest.number += 1
 
 
 class _CheckingFinder(MetaPathFinder):
@@ -76,7 +92,7 @@ def _checked_function(function: FunctionType) -> Callable[..., Any]:
     from jaxtyping import jaxtyped
 
     function.__annotations__ = hints
-    return jaxtyped(beartype(function), typechecker=None)
+    return _first_calls(jaxtyped(beartype(function), typechecker=None), function)
 
 
 def _checked_init(init: Callable[..., None], hints: dict[str, Any]) -> Callable[..., None]:
@@ -91,7 +107,24 @@ def _checked_init(init: Callable[..., None], hints: dict[str, Any]) -> Callable[
                 said = f"{type(self).__name__}.{name} "
                 die_if_unbearable(getattr(self, name), hint, exception_prefix=said)
 
-    return checked
+    return _first_calls(checked, init)
+
+
+def _first_calls(checked: Callable[..., Any], plain: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function that is checked in the first calls of each test only."""
+    number, left = -1, 0
+
+    @wraps(plain)
+    def called(*args: Any, **options: Any) -> Any:
+        nonlocal number, left
+        if number != _RunningTest.number:
+            number, left = _RunningTest.number, CHECKED_CALLS
+        if not left:
+            return plain(*args, **options)
+        left -= 1
+        return checked(*args, **options)
+
+    return called
 
 
 def _array_hints(owner: Any) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shape_checks
 from beartype.roar import BeartypeCallHintViolation, BeartypeDoorHintViolation
 
 from posefield.common import array_shapes
@@ -111,6 +112,18 @@ def test_a_wrong_shape_is_refused(call):
 def test_a_field_of_a_wrong_shape_is_refused(name, build):
     with pytest.raises(BeartypeDoorHintViolation, match=rf"(?s)\.{name} .*violates"):
         build()
+
+
+def test_the_first_calls_of_a_test_are_checked():
+    """Negative control: later calls are not, as they take long."""
+    call, refused = WRONG["integers"], pytest.raises(BeartypeCallHintViolation)
+    for _ in range(shape_checks.CHECKED_CALLS):
+        with refused:
+            call()
+    assert len(call()) == 4
+    shape_checks.begin_test()
+    with refused:
+        call()
 
 
 def test_replaced_fields_are_checked_too():
