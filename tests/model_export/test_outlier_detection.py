@@ -81,6 +81,15 @@ PLANTS = {
 }
 
 
+@pytest.fixture(scope="module")
+def quick_recipe(small_recipe):
+    """The small recipe with one kriging model to fit instead of four to choose from."""
+    plain = {"covariance": "matern52", "drift": 1}
+    return small_recipe.model_copy(
+        update={"kriging": small_recipe.kriging.model_copy(update=plain)}
+    )
+
+
 def planted(recipe, examples, clip):
     own = list(examples)
     own[PLANTED] = replace(own[PLANTED], clip=clip)
@@ -105,19 +114,19 @@ QUICK = (mirrored, in_centimetres, kicking)
         for each in PLANTS
     ],
 )
-def test_a_stranger_is_named_with_the_right_evidence(small_recipe, examples, plant):
+def test_a_stranger_is_named_with_the_right_evidence(quick_recipe, examples, plant):
     kinds, said = PLANTS[plant]
-    trained = planted(small_recipe, examples, plant(examples[PLANTED].clip))
+    trained = planted(quick_recipe, examples, plant(examples[PLANTED].clip))
     note = only_note(trained, examples[PLANTED])
     assert {one.kind for one in trained.outliers} == kinds
     for part in said:
         assert part in note
 
 
-def test_a_clip_of_another_performer_is_named_with_whose_it_is(small_recipe, examples):
+def test_a_clip_of_another_performer_is_named_with_whose_it_is(quick_recipe, examples):
     own, other = examples[PLANTED], examples[OTHER]
     assert own.row.performer != other.row.performer
-    trained = planted(small_recipe, examples, other.clip)
+    trained = planted(quick_recipe, examples, other.clip)
     note = only_note(trained, own)
     assert f"from those of {own.row.performer} elsewhere (" in note
     assert f"and by 0.0 cm from those of {other.row.performer}" in note
@@ -128,20 +137,20 @@ def test_a_clean_family_has_no_strangers(trained):
     assert trained.outlier_notes() == []
 
 
-def test_strangers_stand_on_the_card_and_train_on(small_recipe, examples):
-    trained = planted(small_recipe, examples, kicking(examples[PLANTED].clip))
+def test_strangers_stand_on_the_card_and_train_on(quick_recipe, examples):
+    trained = planted(quick_recipe, examples, kicking(examples[PLANTED].clip))
     assert len(trained.examples) == len(examples)
-    notes = onnx_export.export_model(small_recipe, trained, ["said before"]).card.diagnostics[
+    notes = onnx_export.export_model(quick_recipe, trained, ["said before"]).card.diagnostics[
         "notes"
     ]
     assert notes[0] == "said before"
     assert notes[1] == trained.outlier_notes()[0]
 
 
-def test_two_strangers_are_told_apart_from_those_whom_they_mislead(small_recipe, examples):
+def test_two_strangers_are_told_apart_from_those_whom_they_mislead(quick_recipe, examples):
     own = list(examples)
     for index, plant in ((PLANTED, kicking), (PLANTED + 2, mirrored)):
         own[index] = replace(own[index], clip=plant(own[index].clip))
-    notes = train.train(small_recipe, own, lambda _: None).outlier_notes()
+    notes = train.train(quick_recipe, own, lambda _: None).outlier_notes()
     lines = {f"line {examples[i].row.line}" for i in (PLANTED, PLANTED + 2)}
     assert {note.partition(",")[0] for note in notes} == lines
