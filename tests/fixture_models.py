@@ -32,7 +32,7 @@ def small_recipe() -> Recipe:
 @functools.cache
 def labelled_recipe() -> Recipe:
     """Return the small recipe with its three performers told apart, and one kernel to fit."""
-    told = {"label": "performer", "covariance": "matern52", "drift": 1}
+    told = {"label": ["performer"], "covariance": "matern52", "drift": 1}
     kriging = small_recipe().kriging.model_copy(update=told)
     return small_recipe().model_copy(update={"kriging": kriging})
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from posefield.kriging.kriging_model import Hyper
+from posefield.kriging.kriging_model import Hyper, LabelKernel
 from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import Control, Event, ModelCard, TrainingParameters
+from posefield.model_file.model_card import Control, Event, LabelSet, ModelCard, TrainingParameters
 from posefield.motion.measures import Measure
 from posefield.motion.skeleton import Skeleton
 
@@ -32,9 +32,8 @@ CARD = ModelCard(
         Level((9, 3, 8), 2, (0,), 900, 3600, 700, 0.02, 0.05, 0.06, 0.2, None),
     ),
     durations=(0.8, 1.9),
-    performers=("ada", "bob"),
+    labels=(LabelSet("performer", ("ada", "bob"), (0, 1, 0)),),
     examples=((1.6, -60.0), (1.75, 0.1), (1.9, 60.0)),
-    moved_by=(0, 1, 0),
     feet=(1,),
     diagnostics={
         "truncation_rms_m": 0.005,
@@ -47,9 +46,8 @@ CARD = ModelCard(
         "drift": [0, 1],
         "scales": [0.3, 0.3],
         "nugget": 0.001,
-        "correlation": 0.7,
-        "offset": 0.4,
         "trend": 2.5,
+        "labels": {"performer": {"correlation": 0.7, "offset": 0.4}},
         "tensor": [9, 100, 3],
         "parity_m": 2e-06,
         "notes": ["one"],
@@ -62,11 +60,13 @@ CARD = ModelCard(
         "versions": {"numpy": "2.4.6"},
     },
     sources=("a.bvh", "b.bvh, frames 3 to 90", "c.bvh"),
-    kriging=Hyper("matern52", (0,), np.array([0.3, 0.1 + 0.2]), 1e-3, 0.7, 0.4, 2.5),
+    kriging=Hyper(
+        "matern52", (0,), np.array([0.3, 0.1 + 0.2]), 1e-3, 2.5, (LabelKernel(2, 0.7, 0.4),)
+    ),
     left_out=(0.01, 0.02, 0.5),
     joint_sigma=(0.5, 1.32),
     making=TrainingParameters(
-        {"warp": (0.25, 0.0, 1.0)}, {"peak": 0.4}, {"chest": 2.0}, in_phase=True
+        {"warp": (0.25, 1.0, 0.0)}, {"peak": 0.4}, {"chest": 2.0}, in_phase=True
     ),
     roles={"hips": "hips", "upperChest": "chest"},
     event=Event(1, 0.75),

@@ -154,11 +154,11 @@ def test_the_card_says_how_controls_are_measured(made):
 def test_performers_are_told_apart(made):
     own, examples, trained, _ = made
     who = sorted({example.row.performer for example in examples})
-    assert trained.model.bank.performers == tuple(who)
+    assert trained.model.bank.labels == {"performer": tuple(who)}
     assert len(who) == PERFORMERS.get(own.name, len(who)) > 1
     # They move differently in every family; alike they would be with one and nothing.
     hyper = trained.pose.hyper
-    assert hyper.correlation < 0.6 and hyper.offset > 0.2
+    assert hyper.labels[0].correlation < 0.6 and hyper.labels[0].offset > 0.2
 
 
 @pytest.mark.parametrize("made", ["cmu_walk"], indirect=True)
@@ -201,9 +201,7 @@ def test_samples_are_met_better_than_by_the_mean_motion(made):
     own, examples, trained, _ = made
     aligned, model = trained.aligned, trained.model
     frames = np.tile(np.arange(float(own.motion.frames)), (len(examples), 1))
-    labels = sample_points.performer_labels(
-        [e.row.performer for e in examples], model.bank.performers
-    )
+    labels = sample_points.label_weights([e.row.labels for e in examples], model.bank.labels)
     controls = np.stack([example.controls for example in examples])
     fields = model.bank.numpy(model.bank.points(controls, labels))
     rotations, root = model.decoder.numpy(fields["pose"], frames)

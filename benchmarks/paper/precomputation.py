@@ -44,7 +44,7 @@ def guess(made: Family, reduced: TuckerTensor) -> Hyper:
     fitted = variogram.fit_by_grid(experimental, "matern52")
     nugget = fitted.nugget / fitted.sill if fitted.sill > 0.0 else NUGGETS[1]
     scales = np.full(made.samples.shape[1], 1.0 / fitted.range)
-    return Hyper("matern52", (1,), scales, float(np.clip(nugget, *NUGGETS)), 1.0, 0.0, 0.0)
+    return Hyper("matern52", (1,), scales, float(np.clip(nugget, *NUGGETS)), 0.0)
 
 
 def naive(made: Family, fitter: VariogramFitter) -> NaiveKriging:

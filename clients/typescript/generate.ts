@@ -105,7 +105,9 @@ function queryOf({ paths, components }: Contract, path: string): readonly unknow
     const name = each.$ref?.split("/").at(-1);
     return name === undefined ? each : components.parameters[name];
   });
-  return given.filter((each) => each?.in === "query").map((each) => each?.name);
+  // In a URL each label set is a parameter of its own; in a question they are one field.
+  const plural = (name?: string) => (name === "label" ? "labels" : name);
+  return given.filter((each) => each?.in === "query").map((each) => plural(each?.name));
 }
 
 function listsOf({ required = [], properties = {} }: Schema): readonly string[] {

@@ -30,7 +30,7 @@ from posefield_train.kriging.coefficient_models import FittedModel
 from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.kriging_tuning import TunedKriging, TuningProblem
 from posefield_train.kriging.power_law import PowerLaw
-from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.outliers import outlier_detection
 from posefield_train.parallel import single_thread
 from posefield_train.source.half_turns import Finding
@@ -64,7 +64,7 @@ class _VectorizedClips:
     """
 
     samples: SamplePoints
-    performers: tuple[str, ...]
+    labels: LabelNames
     aligned: AlignedClips
     offsets: Floats
     numbers: Floats
@@ -116,7 +116,7 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
 def _vectorize(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _VectorizedClips:
     """Align clips and convert them to pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
-    laid, performers = sample_points.make_samples(recipe, examples)
+    laid, labels = sample_points.make_samples(recipe, examples)
     predict = _predictor(recipe, laid)
     aligned = time_alignment.align(
         examples, recipe.motion.frames, basis, settings.rounds, weights, predict
@@ -131,7 +131,7 @@ def _vectorize(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> 
     findings = jumps + noticed
     controls = np.stack([example.controls for example in examples])
     return _VectorizedClips(
-        laid, performers, aligned, offsets, numbers, chart, travels, findings, controls
+        laid, labels, aligned, offsets, numbers, chart, travels, findings, controls
     )
 
 
@@ -264,7 +264,7 @@ def _assemble(
     timing = CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames)
     sill = float(np.mean(fits.warped_errors / fits.pose.variances))
     return FloatModel(
-        KrigingBank(*ends, moved.performers, solved, others, sill, (), fits.power_law, event),
+        KrigingBank(*ends, moved.labels, solved, others, sill, (), fits.power_law, event),
         timing,
         Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means, event=blend),
         fits.proportions,

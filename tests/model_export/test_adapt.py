@@ -68,7 +68,7 @@ def adapted(trained, known):
 def misses(recipe, trained, model, name, whose="cy"):
     """Mean distance of a model's answers from a performer's own clips that it was not shown, m."""
     asked = examples(trained, whose, ASKED)
-    said = Queries(np.stack([e.controls for e in asked]), [name] * len(asked))
+    said = Queries(np.stack([e.controls for e in asked]), [{"performer": name}] * len(asked))
     made = methods.predict_posefield(recipe, replace(trained, model=model), said)
     pairs = zip(made, asked, strict=True)
     return np.mean(
@@ -98,7 +98,7 @@ def test_more_clips_are_nearer(recipe, trained, known, adapted):
 
 
 def test_the_newcomer_has_bones_of_their_own(trained, adapted):
-    labels = np.eye(4)[[adapted.model.bank.performers.index(who) for who in ("cy", "a")]]
+    labels = np.eye(4)[[adapted.model.bank.labels["performer"].index(who) for who in ("cy", "a")]]
     found = adapted.model.evaluate(np.array([[6.0]] * 2), np.zeros((2, 1)), labels).bone_offsets
     expected = examples(trained, "cy", SHOWN)[0].offsets
     assert np.abs(found[0] - expected).max() < 0.002
@@ -117,14 +117,14 @@ def test_those_who_were_known_are_met_as_before(recipe, trained, known, adapted)
     assert after < 0.006 and after < 1.2 * before
     assert misses(recipe, trained, adapted.model, "a", "b") > 0.02
     old, new = trained.model, adapted.model
-    assert new.bank.performers == ("a", "b", "cy", "d")
-    assert old.bank.performers == ("a", "b", "d")
+    assert new.bank.labels["performer"] == ("a", "b", "cy", "d")
+    assert old.bank.labels["performer"] == ("a", "b", "d")
     controls, times = trained.samples.half_ranges * 7.0 + 7.0, np.full((newcomers.CLIPS, 1), 0.5)
-    whose = [old.bank.performers[i] for i in trained.samples.moved_by]
+    whose = [old.bank.labels["performer"][i] for i in trained.samples.label_indices[0]]
 
     def joints(model, names):
-        order = [model.bank.performers.index(name) for name in names]
-        labels = np.eye(len(model.bank.performers))[order]
+        order = [model.bank.labels["performer"].index(name) for name in names]
+        labels = np.eye(model.bank.label_count)[order]
         return model.evaluate(controls, times, labels).positions(known.skeleton.parents)
 
     gaps = np.linalg.norm(joints(new, whose) - joints(old, whose), axis=-1).mean()
@@ -201,7 +201,7 @@ def test_a_range_that_grows_moves_no_field(trained, known):
     n, values = len(bank.pose.samples), bank.pose.values
     rng = np.random.Generator(np.random.PCG64(1))
     controls = rng.uniform(-5.0, 20.0, (50, 1))
-    nobody = np.zeros((50, len(bank.performers)))
+    nobody = np.zeros((50, bank.label_count))
     before = bank.pose.predict(bank.points(controls, nobody))
 
     def after(hyper):
@@ -244,7 +244,7 @@ def flat(trained):
 
 
 def test_sigma_says_that_the_newcomer_is_known(adapted):
-    model, who = adapted.model, adapted.model.bank.performers.index("cy")
+    model, who = adapted.model, adapted.model.bank.labels["performer"].index("cy")
     point, time = np.array([[7.0]]), np.zeros((1, 1))
     own = model.evaluate(point, time, np.eye(4)[[who]]).sigma
     nobody = model.evaluate(point, time, np.zeros((1, 4))).sigma
@@ -302,7 +302,7 @@ def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, 
 def walkers(strides):
     """A walk of two walkers who are told apart, and strides that a third shows."""
     plain = sample_walk.recipe()
-    told = plain.kriging.model_copy(update={"label": "performer"})
+    told = plain.kriging.model_copy(update={"label": ["performer"]})
     recipe = plain.model_copy(update={"kriging": told})
     named = [
         replace(e, row=replace(e.row, performer="ab"[i % 2])) for i, e in enumerate(strides[3:])
@@ -314,7 +314,7 @@ def walkers(strides):
 def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
     recipe, trained, shown = walkers
     model = adaptation.adapt(canonical_clips.adaptable(recipe, trained), shown, "new").model
-    who = np.eye(3)[[model.bank.performers.index("new")]]
+    who = np.eye(3)[[model.bank.labels["performer"].index("new")]]
     for example in shown:
         seconds = model.evaluate(example.controls[None], np.zeros((1, 1)), who).duration[0]
         found = model.evaluate(example.controls[None], np.array([[0.0, seconds]]), who)

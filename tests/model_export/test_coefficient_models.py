@@ -14,7 +14,7 @@ from posefield_train.kriging.universal_kriging import UniversalKriging as Field
 from posefield_train.source.recipe import Kriging
 
 BOTH = ("matern52", "gaussian")
-POSE = Hyper("matern52", (0,), np.array([0.5, 0.5]), 0.1, 1.0, 0.0, 1.0)
+POSE = Hyper("matern52", (0,), np.array([0.5, 0.5]), 0.1, 1.0)
 
 
 @pytest.fixture

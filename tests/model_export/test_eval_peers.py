@@ -13,7 +13,8 @@ EXACT = 1e-8
 
 def laid(points, labels=None):
     labels = np.zeros((len(points), 0)) if labels is None else labels
-    return SamplePoints(np.hstack([points, labels]), points.shape[1], np.arange(len(points)))
+    both = np.hstack([points, labels])
+    return SamplePoints(both, points.shape[1], np.arange(len(points)), (labels.shape[1],))
 
 
 @pytest.fixture

@@ -128,7 +128,7 @@ def answers(recipe, family, held):
     trained = train(recipe, rest, lambda _: None)
     example = family[held]
     found = methods.predict_all(
-        recipe, trained, Queries(example.controls[None], [example.row.performer])
+        recipe, trained, Queries(example.controls[None], [example.row.labels])
     )
     return {name: motions[0].points for name, motions in found.motions.items()}
 
@@ -146,7 +146,7 @@ def test_a_clip_held_out_has_no_say_in_what_is_predicted_for_it(recipe, family, 
         assert results[0][0].errors[name][held].relative.mean == pytest.approx(expected, abs=1e-9)
     # Negative control: a model that saw it comes nearer.
     trained = train(recipe, family, lambda _: None)
-    asked = Queries(family[held].controls[None], [family[held].row.performer])
+    asked = Queries(family[held].controls[None], [family[held].row.labels])
     seen = methods.predict_all(recipe, trained, asked).motions["thin_plate"][0]
     told = motion_errors.compare_motions(seen, true, feet).relative.mean
     assert told < 0.5 * results[0][0].errors["thin_plate"][held].relative.mean
@@ -159,7 +159,7 @@ def recipe_joint(family):
 def test_an_interpolator_restores_the_samples_with_their_timing(recipe, family):
     trained = train(recipe, family, lambda _: None)
     ordered = trained.examples
-    asked = Queries(np.stack([e.controls for e in ordered]), [e.row.performer for e in ordered])
+    asked = Queries(np.stack([e.controls for e in ordered]), [e.row.labels for e in ordered])
     found = methods.predict_all(recipe, trained, asked).motions["thin_plate"]
     event = compared_motion.MotionEvent(recipe_joint(family), 1.0)
     captured = [compared_motion.motion_of_clip(example.clip, event) for example in ordered]
@@ -364,9 +364,9 @@ def test_the_order_in_which_jobs_finish_changes_nothing(recipe, family):
 
 
 def test_without_labels_rows_that_would_repeat_others_are_left_out(recipe, family):
-    plain = recipe.model_copy(update={"kriging": recipe.kriging.model_copy(update={"label": None})})
+    plain = recipe.model_copy(update={"kriging": recipe.kriging.model_copy(update={"label": []})})
     trained = train(plain, family, lambda _: None)
-    found = methods.predict_all(plain, trained, Queries(family[0].controls[None], [""])).motions
+    found = methods.predict_all(plain, trained, Queries(family[0].controls[None], [{}])).motions
     assert not set(methods.PERFORMER_METHODS) & set(found)
     assert {"gp", "nearest"} <= set(found)
 

@@ -12,7 +12,7 @@ from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.outliers import mirrored_clips, outlier_detection, outlier_distances
 from posefield_train.source import bone_lengths
 
-HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 1.0, 0.0, 0.0)
+HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 0.0)
 NAMES = ("Hips", "LeftHand", "RightHand", "lfoot", "rfoot", "Neck")
 
 

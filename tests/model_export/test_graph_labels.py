@@ -1,4 +1,4 @@
-"""Tests of the graph's optional performer input against the reference implementation."""
+"""Tests of the graph's optional input of labels against the reference implementation."""
 
 from dataclasses import replace
 
@@ -6,6 +6,7 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
+from label_kernels import performers, vary
 from model_files import written
 from numpy.random import PCG64, Generator
 from running import outputs
@@ -14,6 +15,7 @@ from posefield.common.errors import ExportRefused, ModelError
 from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.model_file import model_card
+from posefield.model_file.model_card import LabelSet
 from posefield_train.graph import onnx_export
 from posefield_train.graph.float_model import ModelOutputs
 from posefield_train.kriging import kriging_graph, universal_kriging
@@ -46,11 +48,13 @@ def labelled_bank(covariance="matern52", drifts=(0, 1), names=NAMES, constant=()
     fields, scales = {}, own.uniform(0.3, 1.5, CONTROLS)
     for name, size, offset in (("pose", 6, 0.6), ("offsets", 2, 9.0), ("duration", 1, 0.1)):
         nugget, trend = own.uniform(0.01, 0.3), own.uniform(0.1, 3.0)
-        hyper = Hyper(covariance, drifts, scales, nugget, correlation, offset, trend)
+        kernels = performers(len(names), correlation, offset)
+        hyper = Hyper(covariance, drifts, scales, nugget, trend, kernels)
         values = own.normal(size=(SAMPLES, size))
         solved = universal_kriging.solve(hyper, samples, values)
         fields[name] = ConstantModel(values.mean(axis=0)) if name in constant else solved
-    return KrigingBank(LOW, HIGH, names, fields.pop("pose"), fields, 0.04)
+    labels = {"performer": names}
+    return KrigingBank(LOW, HIGH, labels, fields.pop("pose"), fields, 0.04)
 
 
 def asked():
@@ -97,8 +101,8 @@ CASES = {
 @pytest.mark.parametrize("given", CASES.values(), ids=CASES)
 def test_the_graph_tells_performers_apart_as_the_reference_does(given):
     bank, controls = labelled_bank(**given), asked()
-    labels = mixed(len(bank.performers))
-    found = graph_of(bank)(controls, performer=labels)
+    labels = mixed(bank.label_count)
+    found = graph_of(bank)(controls, labels=labels)
     # At a sample the distance is a root of what rounding leaves, where these have their kink.
     allowed = 5e-3 if given.get("covariance") in ("exponential", "spherical") else 2e-4
     assert apart(found, reference_of(bank, controls, labels)) < allowed
@@ -112,23 +116,23 @@ def test_who_is_not_said_is_nobody_that_was_seen():
     bank, controls = labelled_bank(), asked()
     nobody = np.zeros((BATCH, len(NAMES)))
     silent = graph_of(bank)(controls)
-    assert apart(silent, graph_of(bank)(controls, performer=nobody)) == 0.0
+    assert apart(silent, graph_of(bank)(controls, labels=nobody)) == 0.0
     assert apart(silent, reference_of(bank, controls, nobody)) < 2e-4
-    assert apart(silent, graph_of(bank)(controls, performer=mixed(len(NAMES)))) > 0.1
+    assert apart(silent, graph_of(bank)(controls, labels=mixed(len(NAMES)))) > 0.1
 
 
 def test_one_row_of_labels_is_for_the_whole_batch():
     run, controls, bob = graph_of(labelled_bank()), asked(), np.eye(4)[[1]]
-    whole = run(controls, performer=bob)
-    assert apart(whole, run(controls, performer=np.repeat(bob, BATCH, axis=0))) < 1e-6
-    assert apart(whole, run(controls, performer=np.eye(4)[[2]])) > 0.1
+    whole = run(controls, labels=bob)
+    assert apart(whole, run(controls, labels=np.repeat(bob, BATCH, axis=0))) < 1e-6
+    assert apart(whole, run(controls, labels=np.eye(4)[[2]])) > 0.1
 
 
 def test_a_batch_of_several_performers_is_each_of_them_alone():
     run, controls, labels = graph_of(labelled_bank()), asked(), mixed(len(NAMES))
-    whole = run(controls, performer=labels)
+    whole = run(controls, labels=labels)
     for row in range(0, BATCH, 7):
-        alone = run(controls[row : row + 1], performer=labels[row : row + 1])
+        alone = run(controls[row : row + 1], labels=labels[row : row + 1])
         # Float32 sums a batch in another order than a row.
         assert apart([value[row : row + 1] for value in whole], alone) < 2e-5
     assert apart([value[:1] for value in whole], [value[1:2] for value in whole]) > 0.1
@@ -137,10 +141,10 @@ def test_a_batch_of_several_performers_is_each_of_them_alone():
 def test_performers_without_offsets_who_move_alike_are_not_told_apart():
     bank = labelled_bank()
     pose = universal_kriging.solve(
-        replace(bank.pose.hyper, correlation=1.0, offset=0.0), bank.pose.samples, np.eye(SAMPLES)
+        vary(bank.pose.hyper, correlation=1.0, offset=0.0), bank.pose.samples, np.eye(SAMPLES)
     )
     run = graph_of(replace(bank, pose=pose, others=dict.fromkeys(bank.others, pose)), SAMPLES)
-    assert apart(run(asked()), run(asked(), performer=mixed(len(NAMES)))) < 1e-6
+    assert apart(run(asked()), run(asked(), labels=mixed(len(NAMES)))) < 1e-6
 
 
 # --- a whole model --------------------------------------------------------------------------------
@@ -227,7 +231,7 @@ def test_the_port_is_optional_and_only_there_where_it_is_needed(labelled_path, m
 
     both = ["controls", "time"]
     level = ("level", [])
-    assert ports(labelled_path) == (both, [("performer", ["batch_or_one", 3]), level])
+    assert ports(labelled_path) == (both, [("labels", ["batch_or_one", 3]), level])
     assert ports(model_path) == (both, [level])
     plain = onnx.load(model_path).graph
     assert "OneHot" not in {node.op_type for node in plain.node}
@@ -243,7 +247,7 @@ def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_pat
             "controls": np.tile(np.array(middle, "f4"), (batch, 1)),
             "time": np.zeros((batch, 4), "f4"),
         }
-        given = {**feed, "performer": np.zeros((batch, 3), "f4")}
+        given = {**feed, "labels": np.zeros((batch, 3), "f4")}
         assert apart(runtime.run(None, feed), runtime.run(None, given)) == 0.0
     assert capfd.readouterr().err == ""
 
@@ -251,8 +255,8 @@ def test_controls_and_time_alone_are_enough_for_a_plain_onnxruntime(labelled_pat
 def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, labelled_path):
     again = onnx_export.export_model(labelled_recipe, labelled, []).content
     assert again == labelled_path.read_bytes()
-    others = ("anna", *labelled.model.bank.performers[1:])
-    renamed = replace(labelled.model, bank=replace(labelled.model.bank, performers=others))
+    others = {"performer": ("anna", *labelled.model.bank.labels["performer"][1:])}
+    renamed = replace(labelled.model, bank=replace(labelled.model.bank, labels=others))
     assert (
         onnx_export.export_model(labelled_recipe, replace(labelled, model=renamed), []).content
         != again
@@ -261,7 +265,7 @@ def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, la
 
 def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, labelled_exported):
     weights = {w.name: w for w in onnx.load(labelled_path).graph.initializer}
-    whose = onnx.numpy_helper.to_array(weights["whose"])
+    whose = onnx.numpy_helper.to_array(weights["whose_0"])
     assert whose.dtype == np.int64
     told = labelled_exported.model.bank.pose.samples
     d = len(labelled.model.bank.low)
@@ -269,7 +273,7 @@ def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, label
     assert np.array_equal(np.argmax(told[:, d:], axis=1), whose)
     points = labelled.samples.points.tolist()
     names = [labelled.examples[points.index(own)].row.performer for own in told.tolist()]
-    assert names == [labelled.model.bank.performers[i] for i in whose]
+    assert names == [labelled.model.bank.labels["performer"][i] for i in whose]
 
 
 # --- files that do not fit ------------------------------------------------------------------------
@@ -277,22 +281,31 @@ def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, label
 
 @pytest.mark.parametrize("names", [("ada", "bob"), ("ada", "bob", "cyd", "dee")])
 def test_a_card_of_other_performers_than_the_graph_takes_is_refused(labelled_path, opened, names):
-    entries = model_card.dump(replace(opened.card, performers=names, moved_by=(0,) * 46))
+    kernels = (replace(opened.card.kriging.labels[0], count=len(names)),)
+    entries = model_card.dump(
+        replace(
+            opened.card,
+            labels=(LabelSet("performer", names, (0,) * 46),),
+            kriging=replace(opened.card.kriging, labels=kernels),
+        )
+    )
     graph = onnx.load(labelled_path)
     for entry in graph.metadata_props:
         entry.value = entries.get(entry.key, entry.value)
-    said = f"constant 'performer' has shape .1, 3., expected .1, {len(names)}. by its card"
+    said = f"constant 'labels' has shape .1, 3., expected .1, {len(names)}. by its card"
     with pytest.raises(ModelError, match=said):
         session.open_bytes(written(graph), "damaged")
 
 
 def test_a_card_without_the_performers_that_the_graph_takes_is_refused(labelled_path, opened):
-    entries = model_card.dump(replace(opened.card, performers=(), moved_by=()))
+    making = replace(opened.card.making, fields={})
+    plain = replace(opened.card.kriging, labels=())
+    entries = model_card.dump(replace(opened.card, labels=(), kriging=plain, making=making))
     graph = onnx.load(labelled_path)
     for entry in graph.metadata_props:
         entry.value = entries.get(entry.key, entry.value)
     with pytest.raises(ModelError) as caught:
         session.open_bytes(written(graph), "damaged")
     assert caught.value.message == (
-        "its graph's constant 'performer' has shape (1, 3), expected () by its card"
+        "its graph's constant 'labels' has shape (1, 3), expected () by its card"
     )

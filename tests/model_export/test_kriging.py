@@ -22,7 +22,7 @@ def covariance(request):
 
 @pytest.fixture(params=[(0,), (1,), (0, 1), (0, 1, 1)], ids=["constant", "linear", "both", "mixed"])
 def hyper(request, covariance):
-    return Hyper(covariance, request.param, np.array([0.5, 0.9, 1.4]), 0.1, 1.0, 0.0, 0.0)
+    return Hyper(covariance, request.param, np.array([0.5, 0.9, 1.4]), 0.1, 0.0)
 
 
 def each_drift(hyper):

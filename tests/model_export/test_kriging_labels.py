@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from label_kernels import performers, vary
 
 from posefield.kriging import kriging_model
 from posefield_train.kriging import sample_points, universal_kriging
@@ -17,11 +18,13 @@ CORRELATION, OFFSET, TREND = 0.6, 0.4, 1.5
 
 @pytest.fixture(params=COVARIANCES)
 def hyper(request):
-    return Hyper(request.param, (0, 1), np.array([0.5, 0.9]), 0.1, CORRELATION, OFFSET, TREND)
+    kernels = performers(3, CORRELATION, OFFSET)
+    return Hyper(request.param, (0, 1), np.array([0.5, 0.9]), 0.1, TREND, kernels)
 
 
 def who(*names):
-    return sample_points.performer_labels(names, PERFORMERS)
+    named = [{"performer": name} for name in names]
+    return sample_points.label_weights(named, {"performer": PERFORMERS})
 
 
 @pytest.fixture
@@ -51,7 +54,7 @@ def far(a, b):
 def test_labels_are_ones_own_and_none_for_a_stranger():
     expected = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
     assert np.array_equal(who("bob", "ann", "eve"), expected)
-    assert sample_points.performer_labels(("ann", "bob"), ()).shape == (2, 0)
+    assert sample_points.label_weights([{"performer": "ann"}, {}], {}).shape == (2, 0)
 
 
 def test_a_performer_varies_with_an_offset_and_correlates_with_all_others(hyper):
@@ -71,7 +74,8 @@ def test_covariance_is_stationary_with_an_offset_and_a_trend(hyper, laid):
     assert far(universal_kriging.covariances(hyper, laid, laid), expected) < 1e-12
     assert far(np.diagonal(expected), kriging_model.prior_variances(hyper, laid)) < 1e-12
     for name in ("correlation", "offset", "trend"):
-        other = replace(hyper, **{name: 0.9 * getattr(hyper, name)})
+        values = {"correlation": CORRELATION, "offset": OFFSET, "trend": TREND}
+        other = vary(hyper, **{name: 0.9 * values[name]})
         assert far(universal_kriging.covariances(other, laid, laid), expected) > 1e-2
 
 
@@ -91,10 +95,10 @@ def test_linear_functions_and_stationary_covariances_hold_every_covariance(hyper
 def test_covariances_of_labelled_samples_are_positive_definite(
     hyper, laid, correlation, offset, trend
 ):
-    own = replace(hyper, correlation=correlation, offset=offset, trend=trend)
+    own = vary(hyper, correlation=correlation, offset=offset, trend=trend)
     assert np.linalg.eigvalsh(universal_kriging.covariances(own, laid, laid))[0] > -1e-10
     # Negative control: performers who are further from one another than opposites.
-    beyond = replace(hyper, correlation=-1.0, offset=0.0, trend=0.0)
+    beyond = vary(hyper, correlation=-1.0, offset=0.0, trend=0.0)
     three = np.hstack([np.zeros((3, 2)), who(*PERFORMERS)])
     assert np.linalg.eigvalsh(universal_kriging.covariances(beyond, three, three))[0] < -0.5
 
@@ -117,20 +121,23 @@ def test_far_outside_only_linear_functions_are_left(hyper, laid, values):
         expected = linear @ kriging_model.linear_terms(own, laid) @ field.dual
         assert far(field.predict(asked), expected) < TOLERANCE
         assert far(expected[:1], expected) > 1e-3
-        alike = universal_kriging.solve(replace(own, offset=0.0), laid, values).predict(asked)
+        alike = universal_kriging.solve(vary(own, offset=0.0), laid, values).predict(asked)
         assert far(alike, alike[:1]) < TOLERANCE
         assert far(field.predict(0.5 * asked), expected) > 1e-2
 
 
 def test_performers_alike_without_offsets_are_the_field_without(hyper, laid, controls, values):
     groups = np.arange(24) // 2
-    own = replace(hyper, correlation=1.0, offset=0.0)
-    with_labels, without = (
-        universal_kriging.solve(own, where, values) for where in (laid, controls)
-    )
+    own = vary(hyper, correlation=1.0, offset=0.0)
+    with_labels = universal_kriging.solve(own, laid, values)
+    unlabelled = replace(own, labels=())
+    without = universal_kriging.solve(unlabelled, controls, values)
     assert far(with_labels.predict(laid), without.predict(controls)) < 1e-12
     assert far(with_labels.variance(laid), without.variance(controls)) < 1e-12
-    both = [universal_kriging.leave_out(own, where, groups) for where in (laid, controls)]
+    both = [
+        universal_kriging.leave_out(own, laid, groups),
+        universal_kriging.leave_out(unlabelled, controls, groups),
+    ]
     assert far(*both) < 1e-12
     apart = universal_kriging.solve(hyper, laid, values)
     assert far(apart.predict(laid), without.predict(controls)) > 1e-2
@@ -141,7 +148,7 @@ def test_a_stranger_is_answered_with_less_certainty(hyper, laid, controls, names
     field = universal_kriging.solve(hyper, laid, values)
     stranger = np.hstack([controls, who(*["eve"] * 24)])
     assert np.all(field.variance(stranger) > field.variance(laid))
-    alike = replace(hyper, correlation=1.0, offset=0.0)
+    alike = vary(hyper, correlation=1.0, offset=0.0)
     same = universal_kriging.solve(alike, laid, values)
     assert far(same.variance(stranger), same.variance(laid)) < 1e-12
 

@@ -31,7 +31,7 @@ def asked(model, count=200):
     """Return controls, times and labels within the samples' ranges; some without a performer."""
     rng = np.random.Generator(np.random.PCG64(8))
     controls = rng.uniform(model.bank.low, model.bank.high, (count, len(model.bank.low)))
-    performers = len(model.bank.performers)
+    performers = model.bank.label_count
     labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, count)]
     return controls, rng.uniform(0.0, 1.2, (count, 3)), labels
 

@@ -14,6 +14,7 @@ from posefield_train.graph import onnx_export
 from posefield_train.source import bvh, ingest
 from posefield_train.source.recipe import Source
 
+CY = {"performer": "cy"}
 METRES = Source(metres_per_unit=1.0, up="y")
 
 
@@ -40,7 +41,7 @@ def with_measure(reopened, measure):
 
 
 def test_a_tables_clips_are_those_that_training_would_have_seen(reopened, table):
-    found, notes = new_clips.examples_of_table(reopened, table, METRES, "cy")
+    found, notes = new_clips.examples_of_table(reopened, table, METRES, CY)
     assert notes == [] and [e.controls.tolist() for e in found] == [[2.0], [7.0]]
     (table.parent / "clips.csv").write_text("file,v,who\n0.bvh,2,cy\n1.bvh,7,cy\n")
     expected, _ = ingest.ingest(newcomers.recipe(), table.parent)
@@ -52,10 +53,10 @@ def test_a_tables_clips_are_those_that_training_would_have_seen(reopened, table)
 
 def test_frames_and_units_are_followed(reopened, table):
     table.write_text("file,speed,first_frame,last_frame\n0.bvh,2,3,20\n")
-    (cut,), _ = new_clips.examples_of_table(reopened, table, METRES, "cy")
+    (cut,), _ = new_clips.examples_of_table(reopened, table, METRES, CY)
     assert len(cut.clip) == 18 and cut.row.source == "0.bvh, frames 3 to 20"
     centimetres = Source(metres_per_unit=0.01, up="y")
-    (small,), _ = new_clips.examples_of_table(reopened, table, centimetres, "cy")
+    (small,), _ = new_clips.examples_of_table(reopened, table, centimetres, CY)
     assert small.offsets == pytest.approx(0.01 * cut.offsets)
 
 
@@ -63,23 +64,21 @@ def test_what_can_be_measured_is_measured(reopened, table):
     hand = reopened.card.skeleton.names.index("LeftHand")
     own = with_measure(reopened, Measure("height", (hand,), "end"))
     paths = [table.parent / "0.bvh", table.parent / "1.bvh"]
-    found, _ = new_clips.examples_of_files(own, paths, METRES, "cy")
+    found, _ = new_clips.examples_of_files(own, paths, METRES, CY)
     for example in found:
         assert example.controls[0] == pytest.approx(example.clip.positions()[-1, hand, 1], abs=1e-6)
     # Negative control: another moment has another value.
     other = with_measure(reopened, Measure("height", (hand,), "start"))
-    assert (
-        new_clips.examples_of_files(other, paths, METRES, "cy")[0][0].controls != found[0].controls
-    )
+    assert new_clips.examples_of_files(other, paths, METRES, CY)[0][0].controls != found[0].controls
     # What a table says counts.
-    said, _ = new_clips.examples_of_table(own, table, METRES, "cy")
+    said, _ = new_clips.examples_of_table(own, table, METRES, CY)
     assert [e.controls[0] for e in said] == [2.0, 7.0]
 
 
 def test_what_was_measured_is_measured_again_where_a_clip_begins_elsewhere(reopened, table):
     hand = reopened.card.skeleton.names.index("LeftHand")
     own = with_measure(reopened, Measure("height", (hand,), "start"))
-    (example,), _ = new_clips.examples_of_files(own, [table.parent / "0.bvh"], METRES, "cy")
+    (example,), _ = new_clips.examples_of_files(own, [table.parent / "0.bvh"], METRES, CY)
     clip = example.clip
     later = replace(clip, rotations=clip.rotations[9:], translations=clip.translations[9:])
     (again,) = new_clips.remeasure(own, [example], [replace(example, clip=later)])
@@ -94,7 +93,7 @@ def test_what_was_measured_is_measured_again_where_a_clip_begins_elsewhere(reope
 
 def test_a_control_that_nobody_can_measure_is_asked_for(reopened, table):
     with pytest.raises(RecipeError, match="nothing says 'speed', which cannot be measured"):
-        new_clips.examples_of_files(reopened, [table.parent / "0.bvh"], METRES, "cy")
+        new_clips.examples_of_files(reopened, [table.parent / "0.bvh"], METRES, CY)
 
 
 @pytest.mark.parametrize(
@@ -113,13 +112,13 @@ def test_a_control_that_nobody_can_measure_is_asked_for(reopened, table):
 def test_tables_that_cannot_be_meant(reopened, table, text, said):
     table.write_text(text)
     with pytest.raises(RecipeError, match=said):
-        new_clips.examples_of_table(reopened, table, METRES, "cy")
+        new_clips.examples_of_table(reopened, table, METRES, CY)
 
 
 def test_the_same_file_twice_is_refused(reopened, table):
     own = with_measure(reopened, Measure("height", (0,), "end"))
     with pytest.raises(RecipeError, match="same frames of the same file as before"):
-        new_clips.examples_of_files(own, [table.parent / "0.bvh"] * 2, METRES, "cy")
+        new_clips.examples_of_files(own, [table.parent / "0.bvh"] * 2, METRES, CY)
 
 
 def rewritten(table, change):
@@ -131,7 +130,7 @@ def rewritten(table, change):
 def test_a_clip_without_the_models_joints_is_refused(reopened, table):
     rewritten(table, lambda text: text.replace("LeftHand", "LeftFist"))
     with pytest.raises(RecipeError, match=r"0\.bvh has no joints \['LeftHand'\]"):
-        new_clips.examples_of_table(reopened, table, METRES, "cy")
+        new_clips.examples_of_table(reopened, table, METRES, CY)
 
 
 def test_joints_in_another_order_are_refused(reopened, table):
@@ -140,7 +139,7 @@ def test_joints_in_another_order_are_refused(reopened, table):
         lambda text: text.replace("Head", "?").replace("LeftArm", "Head").replace("?", "LeftArm"),
     )
     with pytest.raises(RecipeError, match="in another order or hierarchy"):
-        new_clips.examples_of_table(reopened, table, METRES, "cy")
+        new_clips.examples_of_table(reopened, table, METRES, CY)
 
 
 def test_joints_that_the_model_does_not_have_are_left_out_and_said(reopened, table):
@@ -156,9 +155,9 @@ def test_joints_that_the_model_does_not_have_are_left_out_and_said(reopened, tab
         longer = [*lines[:2], *(f"{line} 1 2 3" for line in lines[2:])]
         return head[:cut] + tail + head[cut:] + "MOTION\n" + "\n".join(longer) + "\n"
 
-    plain, _ = new_clips.examples_of_table(reopened, table, METRES, "cy")
+    plain, _ = new_clips.examples_of_table(reopened, table, METRES, CY)
     rewritten(table, grown)
-    found, notes = new_clips.examples_of_table(reopened, table, METRES, "cy")
+    found, notes = new_clips.examples_of_table(reopened, table, METRES, CY)
     assert notes == [
         f"{table.parent / '0.bvh'}: joints ['Tail'], which the model does not have, were left out"
     ]
@@ -170,11 +169,11 @@ def test_a_root_offset_that_nobody_explained_is_noted(reopened, table):
     text = path.read_text().replace("0 0.00000000 0", "0 1.00000000 0", 1)
     assert bvh.loads(text.encode(), str(path)).joints[0].offset[1] == 1.0
     path.write_text(text)
-    _, notes = new_clips.examples_of_table(reopened, table, METRES, "cy")
+    _, notes = new_clips.examples_of_table(reopened, table, METRES, CY)
     assert len(notes) == 1 and "taken to replace it" in notes[0]
     said = Source(metres_per_unit=1.0, up="y", root_offset="add")
-    moved, notes = new_clips.examples_of_table(reopened, table, said, "cy")
+    moved, notes = new_clips.examples_of_table(reopened, table, said, CY)
     assert notes == []
-    plain, _ = new_clips.examples_of_table(reopened, table, METRES, "cy")
+    plain, _ = new_clips.examples_of_table(reopened, table, METRES, CY)
     gap = moved[0].clip.root_path[:, 1] - plain[0].clip.root_path[:, 1]
     assert gap == pytest.approx(1.0)

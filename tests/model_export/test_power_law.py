@@ -13,7 +13,7 @@ from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.onnx_graph.level_tables import LevelTables
 
-POSE = Hyper("matern52", (0,), np.array([0.5, 0.5, 0.5]), 0.1, 1.0, 0.0, 1.0)
+POSE = Hyper("matern52", (0,), np.array([0.5, 0.5, 0.5]), 0.1, 1.0)
 LAW = PowerLaw(np.array([0.8, 0.0, -0.6]), np.array([0.75, 1.0, 0.1]))
 
 
@@ -98,7 +98,7 @@ def levelled(law):
 def test_the_graph_multiplies_the_duration_by_the_law_at_every_level(level):
     """Controls of both signs and of performers, inside and outside of the samples."""
     own, controls = levelled(LAW), asked()
-    labels = mixed(len(own.performers))
+    labels = mixed(own.label_count)
     assert LOW[1] < 0.0 < HIGH[1]
 
     def build(net, controls, *_):

@@ -85,7 +85,7 @@ def test_the_card_carries_the_presets_of_the_recipe():
     card = card_reader.decode(onnx_check.check(content).metadata)
     own = fixture_models.small_recipe().presets
     assert list(own) == ["high_shelf", "to_the_side", "seated"]
-    expected = [Preset(name, preset.values, None) for name, preset in own.items()]
+    expected = [Preset(name, preset.values, {}) for name, preset in own.items()]
     assert list(card.presets) == expected
 
 

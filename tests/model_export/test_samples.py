@@ -33,19 +33,19 @@ def recipe(label="performer", **kriging):
 
 
 def test_controls_come_first_in_half_ranges_and_labels_after_them():
-    laid, performers = sample_points.make_samples(recipe(), examples())
-    assert performers == ("ann", "bob", "cy")
-    assert (laid.controls, laid.labelled) == (1, True)
+    laid, labels = sample_points.make_samples(recipe(), examples())
+    assert labels == {"performer": ("ann", "bob", "cy")}
+    assert (laid.controls, laid.labels) == (1, (3,))
     assert laid.points[:, 0].tolist() == [-1.0, 0.0, -0.5, 1.0, 0.5, -0.25]
     assert laid.points[:, 1:].tolist() == [
-        [float(name == performer) for performer in performers] for name in WHO
+        [float(name == performer) for performer in labels["performer"]] for name in WHO
     ]
 
 
 def test_without_a_label_nobody_is_told_apart():
-    laid, performers = sample_points.make_samples(recipe(label=None), examples())
-    assert performers == ()
-    assert (laid.points.shape, laid.labelled) == ((6, 1), False)
+    laid, labels = sample_points.make_samples(recipe(label=None), examples())
+    assert labels == {}
+    assert (laid.points.shape, laid.labels) == ((6, 1), ())
 
 
 def test_clips_of_one_file_are_one_group():
@@ -68,7 +68,7 @@ def test_samples_lie_in_the_order_of_their_examples(rng):
 
 def test_one_performer_is_told_apart_from_nobody_and_it_is_noted():
     laid, performers = sample_points.make_samples(recipe(), examples(who=["ann"] * 6))
-    assert (performers, laid.labelled) == ((), False)
+    assert (performers, laid.labels) == ({}, ())
     said = sample_points.data_notes(recipe(), examples(who=["ann"] * 6))
     assert said == ["all clips are of one performer, 'ann': kriging.label has no effect"]
     assert sample_points.data_notes(recipe(), examples()) == []

@@ -52,7 +52,7 @@ def bank(covariance="matern52", drifts=(1,), constant=(), offsets=None):
     fields = {}
     for name, size in {"pose": 6, "offsets": 2, "duration": 1, "warp": 4}.items():
         nugget, trend = own.uniform(0.01, 0.3), own.uniform(0.1, 3.0)
-        hyper = Hyper(covariance, drifts, scales, nugget, 1.0, 0.0, trend)
+        hyper = Hyper(covariance, drifts, scales, nugget, trend)
         if name == "offsets" and offsets is not None:
             hyper = replace(hyper, drifts=offsets)
         values = own.normal(size=(SAMPLES, size))

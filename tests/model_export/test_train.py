@@ -60,7 +60,7 @@ def at_samples(trained, examples):
     """Fields at the samples' own controls."""
     bank = trained.model.bank
     controls = np.stack([example.controls for example in examples])
-    return bank.numpy(bank.points(controls, np.zeros((len(controls), len(bank.performers)))))
+    return bank.numpy(bank.points(controls, np.zeros((len(controls), bank.label_count))))
 
 
 def miss(trained, examples):
@@ -220,7 +220,7 @@ def test_clips_aligned_to_what_others_predict_make_the_better_model(
     ]
 
     def error(made):
-        found = methods.predict_all(small_recipe, made, Queries(points, [""] * 40)).motions[
+        found = methods.predict_all(small_recipe, made, Queries(points, [{}] * 40)).motions[
             "posefield"
         ]
         pairs = zip(found, captured, strict=True)

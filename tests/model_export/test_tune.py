@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from label_kernels import performers, vary
 
 from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -44,7 +45,7 @@ def left_out(hyper, samples, values):
 
 def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
     values = wave(samples) + 0.2 * rng.normal(size=(50, 2))
-    hyper = Hyper("matern52", (0,), np.array([1.0, 0.5]), 0.1, 1.0, 0.0, 2.0)
+    hyper = Hyper("matern52", (0,), np.array([1.0, 0.5]), 0.1, 2.0)
     found = kriging_tuning.evaluate_fixed(hyper, alone(samples), values)
     mean_of_others = (values.sum(axis=0) - values) / 49
     share = left_out(hyper, samples, values) / np.sum((values - mean_of_others) ** 2)
@@ -56,7 +57,7 @@ def test_residuals_and_their_share_are_those_of_leaving_out(samples, rng):
 
 def test_sill_makes_the_residuals_as_large_as_their_variances_say(rng):
     samples = rng.uniform(-1.0, 1.0, size=(400, 2))
-    hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1, 1.0, 0.0, 0.0)
+    hyper = Hyper("matern52", (0,), np.array([1.0, 1.0]), 0.1, 0.0)
     root = np.linalg.cholesky(
         universal_kriging.covariances(hyper, samples, samples) + 0.1 * np.eye(400)
     )
@@ -80,7 +81,7 @@ def people():
 
 def labelled(samples, people):
     who, takes = people
-    return SamplePoints(np.hstack([samples, np.eye(PEOPLE)[who]]), 2, takes)
+    return SamplePoints(np.hstack([samples, np.eye(PEOPLE)[who]]), 2, takes, (PEOPLE,))
 
 
 def own_ways(samples, people, rng, apart):
@@ -94,21 +95,29 @@ def tuned_for(samples, people, values):
     return kriging_tuning.tune(problem, "matern52", None)
 
 
-LABELLED = Hyper("matern52", (0,), np.array([1.0, 0.5]), 0.1, 0.7, 0.6, 2.0)
+LABELLED = Hyper("matern52", (0,), np.array([1.0, 0.5]), 0.1, 2.0, performers(PEOPLE, 0.7, 0.6))
+ALL = tuple((name, 0) for name in PRIORS)
+NO_LABELS = (("nugget", 0), ("trend", 0))
+BESIDE = tuple(name for name in ALL if name[0] != "correlation")
 
 
-def in_search_units(hyper, names=tuple(PRIORS)):
+def value_of(hyper, name):
+    """Return the value of a parameter, which is a name and the index of a label set."""
+    kernel = name[0] in ("correlation", "offset")
+    return getattr(hyper.labels[name[1]] if kernel else hyper, name[0])
+
+
+def in_search_units(hyper, names=ALL):
     """Return the point of the search at parameters: scales, then those named."""
+    values = [(name, value_of(hyper, name)) for name in names]
     own = [
-        np.log(hyper.correlation / (1.0 - hyper.correlation))
-        if name == "correlation"
-        else np.log(getattr(hyper, name))
-        for name in names
+        np.log(value / (1.0 - value)) if name[0] == "correlation" else np.log(value)
+        for name, value in values
     ]
     return np.array([*np.log(hyper.scales), *own])
 
 
-def loss_of(problem, hyper, names=tuple(PRIORS), own_scales=True):
+def loss_of(problem, hyper, names=ALL, own_scales=True):
     return kriging_tuning.LeaveOneOutLoss(problem, hyper, names, own_scales)
 
 
@@ -144,7 +153,7 @@ def test_gradient_of_the_loss_is_that_of_finite_differences(
     maps = rng.normal(size=(50, 3, 4))
     problem = TuningProblem(labelled(samples, people), rng.normal(size=(50, 6)), effector=maps)
     hyper = replace(LABELLED, covariance=covariance, drifts=(degree,))
-    for names, own_scales in ((tuple(PRIORS), True), (("nugget", "offset", "trend"), False)):
+    for names, own_scales in ((ALL, True), (BESIDE, False)):
         loss = loss_of(problem, hyper, names, own_scales)
         x = in_search_units(hyper, names)[0 if own_scales else 2 :]
         steps = 1e-5 * np.eye(len(x))
@@ -196,8 +205,7 @@ def test_tuned_parameters_keep_within_the_bounds(samples, people, rng):
             assert (
                 PRIORS[name].low - 1e-9 <= np.log(getattr(hyper, name)) <= PRIORS[name].high + 1e-9
             )
-    assert [hyper.correlation for hyper in tuned[:3]] == [1.0] * 3
-    assert [hyper.offset for hyper in tuned[:3]] == [0.0] * 3
+    assert [hyper.labels for hyper in tuned[:3]] == [()] * 3
 
 
 def test_the_prior_decides_where_data_do_not(samples, rng):
@@ -206,10 +214,10 @@ def test_the_prior_decides_where_data_do_not(samples, rng):
     few = kriging_tuning.tune(problem, "matern52", None).hyper
     strong = kriging_tuning.tune(replace(problem, strength=1e6), "matern52", None).hyper
     expected = [SCALE_PRIOR.mean] * 2 + [PRIORS[name].mean for name in ("nugget", "trend")]
-    at = in_search_units(strong, ("nugget", "trend"))
+    at = in_search_units(strong, NO_LABELS)
     assert np.abs(at - expected).max() < 1e-3
     deviations = [SCALE_PRIOR.deviation] * 2 + [PRIORS[n].deviation for n in ("nugget", "trend")]
-    near = np.abs(in_search_units(few, ("nugget", "trend")) - expected) / deviations
+    near = np.abs(in_search_units(few, NO_LABELS) - expected) / deviations
     assert near.max() < 1.5
     # Negative control: fifty samples of a fast wave decide against the prior.
     many = tuned_at(samples, wave(samples)).hyper
@@ -248,7 +256,7 @@ def test_controls_explain_a_smooth_field_and_no_noise(samples, rng):
 
 
 def test_values_that_never_change_count_as_unexplained(samples):
-    hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 1.0, 0.0, 0.0)
+    hyper = Hyper("matern52", (1,), np.ones(2), 0.1, 0.0)
     assert (
         kriging_tuning.evaluate_fixed(hyper, alone(samples), np.zeros((50, 2))).unexplained == 1.0
     )
@@ -269,7 +277,7 @@ def test_groups_are_left_out_together(samples, people, rng):
     assert np.max(np.abs(found.variances - variances)) < 1e-9
     assert abs(found.unexplained - np.sum(residuals**2) / np.sum(from_mean**2)) < 1e-9
     single = kriging_tuning.evaluate_fixed(
-        LABELLED, SamplePoints(laid.points, 2, np.arange(50)), values
+        LABELLED, SamplePoints(laid.points, 2, np.arange(50), (PEOPLE,)), values
     )
     assert np.max(np.abs(single.residuals - residuals)) > 1e-2
     assert abs(single.unexplained - found.unexplained) > 1e-3
@@ -279,7 +287,7 @@ def test_performers_who_move_differently_get_offsets(samples, people, rng):
     values = own_ways(samples, people, rng, 1.0)
     apart = tuned_for(samples, people, values)
     alike = tuned_for(samples, people, own_ways(samples, people, rng, 0.0))
-    assert apart.hyper.offset > 3.0 * alike.hyper.offset
+    assert apart.hyper.labels[0].offset > 3.0 * alike.hyper.labels[0].offset
     unlabelled = TuningProblem(SamplePoints(samples, 2, people[1]), values)
     blind = kriging_tuning.tune(unlabelled, "matern52", None)
     assert apart.unexplained < 0.5 * blind.unexplained
@@ -288,9 +296,9 @@ def test_performers_who_move_differently_get_offsets(samples, people, rng):
 def test_quantities_beside_share_scales_and_correlation(samples, people, rng):
     problem = TuningProblem(labelled(samples, people), own_ways(samples, people, rng, 0.5))
     found = kriging_tuning.tune_beside(problem, LABELLED).hyper
-    own = {name: getattr(found, name) for name in ("nugget", "offset", "trend")}
-    assert found == replace(LABELLED, **own)
-    assert all(own[name] != getattr(LABELLED, name) for name in own)
+    own = {name[0]: value_of(found, name) for name in BESIDE}
+    assert found == vary(LABELLED, **own)
+    assert all(own[name[0]] != value_of(LABELLED, name) for name in BESIDE)
     without = kriging_tuning.tune_beside(problem, replace(LABELLED, drifts=(1,), trend=0.0)).hyper
     assert without.trend == 0.0 and without.drifts == (1,)
 
@@ -299,7 +307,7 @@ def test_tuning_twice_gives_the_same_bits(samples, people, rng):
     values = own_ways(samples, people, rng, 0.5)
     a, b = (tuned_for(samples, people, values) for _ in range(2))
     assert np.array_equal(a.residuals, b.residuals)
-    assert (a.hyper.offset, a.hyper.nugget) == (b.hyper.offset, b.hyper.nugget)
+    assert (a.hyper.labels, a.hyper.nugget) == (b.hyper.labels, b.hyper.nugget)
 
 
 def alike(a, b):
@@ -323,7 +331,7 @@ def test_order_of_labelled_and_grouped_samples_does_not_matter(samples, people, 
     first = tuned_for(samples, people, values)
     second = tuned_for(samples[order], (who[order], takes[order]), values[order])
     assert alike(first, second)
-    assert abs(np.log(first.hyper.offset / second.hyper.offset)) < 0.05
+    assert abs(np.log(first.hyper.labels[0].offset / second.hyper.labels[0].offset)) < 0.05
     # Who is called first, and which take, is nothing either.
     renamed = (who + 1) % PEOPLE, (7 * takes) % TAKES
     assert alike(first, tuned_for(samples, renamed, values))

@@ -34,7 +34,7 @@ def points(rng):
 def test_gaussian_field_is_scipys(samples, values, points, degree, nugget):
     scales = np.array([0.8, 1.1, 0.9, 1.4])
     own = universal_kriging.solve(
-        Hyper("gaussian", (degree,), scales, nugget, 1.0, 0.0, 0.0), samples, values
+        Hyper("gaussian", (degree,), scales, nugget, 0.0), samples, values
     )
     found = own.predict(points)
 
@@ -77,7 +77,7 @@ def test_value_and_variance_are_those_of_gstools(name, samples, values, points):
         # It is no covariance in four dimensions, and GSTools says so.
         samples, points = samples[:, :3], points[:, :3]
     scales = np.full(samples.shape[1], 1.0 / 1.6)
-    own = universal_kriging.solve(Hyper(name, (1,), scales, NUGGET, 1.0, 0.0, 0.0), samples, values)
+    own = universal_kriging.solve(Hyper(name, (1,), scales, NUGGET, 0.0), samples, values)
     found, variance = own.predict(points), own.variance(points)
     for component in (0, 3):
         value, error = theirs(name, 1.6, samples, values[:, component], points)
@@ -94,9 +94,7 @@ def test_value_and_variance_are_those_of_gstools(name, samples, values, points):
 @pytest.mark.parametrize("nugget", [0.0, NUGGET])
 def test_two_drifts_are_the_mean_of_scipys_two_degrees(samples, values, points, nugget):
     scales = np.array([0.8, 1.1, 0.9, 1.4])
-    found = universal_kriging.solve(
-        Hyper("gaussian", (0, 1), scales, nugget, 1.0, 0.0, 0.0), samples, values
-    )
+    found = universal_kriging.solve(Hyper("gaussian", (0, 1), scales, nugget, 0.0), samples, values)
     given = {"kernel": "gaussian", "epsilon": np.sqrt(3.0), "smoothing": nugget}
     both = [
         RBFInterpolator(samples * scales, values, degree=degree, **given)(points * scales)
@@ -110,7 +108,7 @@ def test_two_drifts_are_the_mean_of_scipys_two_degrees(samples, values, points, 
 def test_groups_left_out_are_what_scipy_predicts_from_the_rest(samples, values, drifts):
     scales = np.array([0.8, 1.1, 0.9, 1.4])
     groups = np.repeat(np.arange(10), 4)
-    hyper = Hyper("gaussian", drifts, scales, NUGGET, 1.0, 0.0, 0.0)
+    hyper = Hyper("gaussian", drifts, scales, NUGGET, 0.0)
     found = universal_kriging.leave_out(hyper, samples, groups) @ values
     given = {"kernel": "gaussian", "epsilon": np.sqrt(3.0), "smoothing": NUGGET}
     for group in range(10):

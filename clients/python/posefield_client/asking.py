@@ -80,9 +80,23 @@ def _words(question: Struct) -> dict[str, Any]:
             words[key] = ",".join(value)
         elif key == "targets" and value is not UNSET:
             words["target"] = tuple(map(_spelt, value))
+        elif key == "labels" and value is not UNSET:
+            words.update(label_words(value))
         elif value is not UNSET:
             words[_SAID_OTHERWISE.get(key, key)] = value
     return words
+
+
+def label_words(labels: Mapping[str, str | Mapping[str, float]]) -> dict[str, Any]:
+    """Return labels as query parameters: SET=NAME, or SET=NAME:WEIGHT,NAME:WEIGHT."""
+    texts = (f"{name}={_label_text(value)}" for name, value in labels.items())
+    return {"label": tuple(texts)} if labels else {}
+
+
+def _label_text(value: str | Mapping[str, float]) -> str:
+    if isinstance(value, str):
+        return value
+    return ",".join(f"{name}:{digits(float(weight))}" for name, weight in value.items())
 
 
 def _spelt(target: Target) -> str:

@@ -19,7 +19,7 @@ from posefield_client.generated import (
     NamedClipQuestion,
 )
 from posefield_client.holding import Exact, Targets
-from posefield_client.questions import Controls, Extrapolate
+from posefield_client.questions import Controls, Extrapolate, Labels
 from posefield_client.wire import Request
 
 Root = Literal["travelling", "in_place"]
@@ -76,6 +76,7 @@ def clip(
     root: Root | None = None,
     level: int | None = None,
     performer: str | None = None,
+    labels: Labels | None = None,
     names: Names | None = None,
     joint_sigma: bool | None = None,
     unit: Literal["m", "cm"] | None = None,
@@ -93,7 +94,7 @@ def clip(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
-        **asking.said(body=body, joint_sigma=joint_sigma, pin_feet=pin_feet),
+        **asking.said(body=body, joint_sigma=joint_sigma, pin_feet=pin_feet, labels=labels),
         **holding.said(exact, targets),
     )
     ask = partial(asking.either, "ClipInFormat", model, question)
@@ -142,6 +143,7 @@ def crowd(
     position: Any = None,
     heading: Any = None,
     performer: str | Sequence[str | None] | None = None,
+    labels: Mapping[str, Any] | None = None,
     level: int | Sequence[int] | Literal["auto"] | None = None,
     previous_level: Sequence[int] | None = None,
     from_level: Sequence[int] | None = None,
@@ -165,7 +167,7 @@ def crowd(
         **asking.columns(position=position, heading=heading, level=level, blend=blend),
         **asking.columns(previous_level=previous_level, from_level=from_level),
         **asking.said(performer=performer, camera=camera, pixels=pixels, budget_ms=budget_ms),
-        **asking.said(root=root, extrapolate=extrapolate),
+        **asking.said(root=root, extrapolate=extrapolate, labels=labels),
     )
     ask = partial(asking.body, "queryCrowdInFormat", model, question)
     return Files(CROWD, ask, about=asking.about(model, question))

@@ -55,6 +55,7 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     times: tuple[float, ...]
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
     level: int | UnsetType = UNSET
     joint_sigma: bool | UnsetType = UNSET
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
@@ -71,6 +72,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     end: float | UnsetType | None = UNSET
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
     level: int | UnsetType = UNSET
     joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
@@ -94,6 +96,7 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     end: float | UnsetType | None = UNSET
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
     level: int | UnsetType = UNSET
     joint_sigma: bool | UnsetType = UNSET
     names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
@@ -139,6 +142,7 @@ class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     position: tuple[tuple[float, float, float], ...] | UnsetType | None = UNSET
     heading: float | tuple[float, ...] | UnsetType = UNSET
     performer: str | tuple[str | None, ...] | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float] | tuple[str | None, ...]] | UnsetType = UNSET
     level: int | tuple[int, ...] | Literal["auto"] | UnsetType = UNSET
     previous_level: tuple[int, ...] | UnsetType | None = UNSET
     from_level: tuple[int, ...] | UnsetType | None = UNSET
@@ -160,6 +164,7 @@ class SigmaQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     margin: float | UnsetType = UNSET
     controls: dict[str, float] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
 
 
 class WhyQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -169,6 +174,7 @@ class WhyQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     nearest: int | UnsetType = UNSET
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
 
 
 class ModelSummary(Struct, frozen=True, kw_only=True):
@@ -241,12 +247,29 @@ class Level(Struct, frozen=True, kw_only=True):
     event: int | None = None
 
 
+class LabelSet(Struct, frozen=True, kw_only=True):
+    """Names by which clips differ besides their controls."""
+
+    name: str
+    names: tuple[str, ...]
+    clips: tuple[int, ...]
+
+
+class LabelKernel(Struct, frozen=True, kw_only=True):
+    """Schema LabelKernel of the contract."""
+
+    count: int
+    correlation: float
+    offset: float
+
+
 class Preset(Struct, frozen=True, kw_only=True):
     """Named point of the controls, within the sampled ranges."""
 
     name: str
     controls: dict[str, float]
     performer: str | None
+    labels: dict[str, str] = {}
 
 
 class ModelCardKriging(Struct, frozen=True, kw_only=True):
@@ -256,9 +279,8 @@ class ModelCardKriging(Struct, frozen=True, kw_only=True):
     drifts: tuple[int, ...]
     scales: tuple[float, ...]
     nugget: float
-    correlation: float
-    offset: float
     trend: float
+    labels: tuple[LabelKernel, ...]
 
 
 class ModelCardEvent(Struct, frozen=True, kw_only=True):
@@ -284,6 +306,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     samples: int
     levels: tuple[Level, ...]
     durations: tuple[float, float]
+    labels: tuple[LabelSet, ...]
     performers: tuple[str, ...]
     examples: tuple[tuple[float, ...], ...]
     moved_by: tuple[int, ...]
@@ -325,6 +348,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     model: str
     controls: dict[str, float]
     performer: str | None
+    labels: dict[str, str | dict[str, float]] = {}
     level: int
     duration: float
     sigma: float
@@ -355,6 +379,7 @@ class CapturedClip(Struct, frozen=True, kw_only=True):
     source: str
     controls: dict[str, float]
     performer: str | None
+    labels: dict[str, str] = {}
     distance: float
     weight: float
     share: float | None = None
@@ -378,6 +403,7 @@ class Reasons(Struct, frozen=True, kw_only=True):
     model: str
     controls: dict[str, float]
     performer: str | None
+    labels: dict[str, str | dict[str, float]] = {}
     warnings: tuple[str, ...]
     inferred: tuple[str, ...] = ()
     support: Backing | None = None
@@ -403,6 +429,7 @@ class Suggestions(Struct, frozen=True, kw_only=True):
 
     model: str
     performer: str | None
+    labels: dict[str, str | dict[str, float]] = {}
     candidates: int
     suggestions: tuple[Suggestion, ...]
 
@@ -419,6 +446,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     model: str
     controls: dict[str, float]
     performer: str | None
+    labels: dict[str, str | dict[str, float]] = {}
     level: int
     duration: float
     sigma: float

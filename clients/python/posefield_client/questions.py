@@ -32,6 +32,8 @@ T = TypeVar("T")
 
 Extrapolate = Literal["ok", "warn", "refuse"]
 Controls = Mapping[str, float]
+Labels = Mapping[str, str | Mapping[str, float]]
+"""Name, or weights of names, by label set: {"style": {"angry": 0.7, "happy": 0.3}}."""
 Times = float | Sequence[float] | npt.NDArray[Any]
 
 
@@ -61,6 +63,7 @@ def pose(
     times: Times,
     *,
     performer: str | None = None,
+    labels: Labels | None = None,
     level: int | None = None,
     joint_sigma: bool | None = None,
     extrapolate: Extrapolate | None = None,
@@ -75,7 +78,7 @@ def pose(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
-        **asking.said(joint_sigma=joint_sigma, pin_feet=pin_feet),
+        **asking.said(joint_sigma=joint_sigma, pin_feet=pin_feet, labels=labels),
         **holding.said(exact, targets),
     )
     return Call(asking.either("PoseInFormat", model, question, "msgpack"), numbers.pose)
@@ -87,6 +90,7 @@ def why(
     *,
     nearest: int | None = None,
     performer: str | None = None,
+    labels: Labels | None = None,
     extrapolate: Extrapolate | None = None,
     controls: Controls | None = None,
     **named: float,
@@ -94,16 +98,22 @@ def why(
     """Return the captured clips nearest to these controls, and their weights."""
     question = WhyQuestion(
         controls=asking.controls(controls, named),
-        **asking.said(nearest=nearest, extrapolate=extrapolate, performer=performer),
+        **asking.said(nearest=nearest, extrapolate=extrapolate),
+        **asking.said(performer=performer, labels=labels),
     )
     return Call(asking.either("Why", model, question), _REASONS)
 
 
 def suggest(
-    model: str, /, *, count: int | None = None, performer: str | None = None
+    model: str,
+    /,
+    *,
+    count: int | None = None,
+    performer: str | None = None,
+    labels: Labels | None = None,
 ) -> Call[Suggestions]:
-    """Return the clips to capture next. performer: the one whose clips count as captured."""
-    words = asking.said(count=count, performer=performer)
+    """Return the clips to capture next. performer, labels: whose clips count as captured."""
+    words = asking.said(count=count, performer=performer) | asking.label_words(labels or {})
     return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
 
 
@@ -117,6 +127,7 @@ def sigma(
     rows: int | None = None,
     margin: float | None = None,
     performer: str | None = None,
+    labels: Labels | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Call[SigmaGrid]:
@@ -125,7 +136,8 @@ def sigma(
         across=across,
         along=along,
         controls=asking.controls(controls, named),
-        **asking.said(columns=columns, rows=rows, margin=margin, performer=performer),
+        **asking.said(columns=columns, rows=rows, margin=margin),
+        **asking.said(performer=performer, labels=labels),
     )
     return Call(asking.either("SigmaInFormat", model, question, "msgpack"), numbers.grid)
 

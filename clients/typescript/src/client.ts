@@ -144,7 +144,10 @@ export class Client {
   /** Which clips to capture next, and of whom. */
   async suggestions(
     model: string,
-    asked: { readonly count?: number; readonly performer?: string } = {},
+    asked: Pick<WhyQuestion, "labels"> & {
+      readonly count?: number;
+      readonly performer?: string;
+    } = {},
     signal?: AbortSignal,
   ): Promise<Suggestions> {
     const wanted = this.#request(model, "/suggestions", "SuggestQuestion", asked);

@@ -14,6 +14,7 @@ export interface Request {
 }
 
 type Value = string | number | boolean | readonly string[] | null | undefined;
+type Labels = Readonly<Record<string, string | Readonly<Record<string, number>>>>;
 type Question = Readonly<Record<string, unknown>>;
 
 /**
@@ -59,14 +60,22 @@ export function under(model: string, rest: string): string {
  * Each control is a parameter, lists of times and of targets are `time` and `target` again and
  * again, a place is one text.
  */
-function pairs({ controls, times, targets, camera, ...rest }: Question): string[][] {
+function pairs({ controls, times, targets, labels, camera, ...rest }: Question): string[][] {
   return [
     ...spelt((controls ?? {}) as Record<string, Value>),
     ...((times ?? []) as number[]).map((time) => ["time", text("time", time)]),
     ...((targets ?? []) as Target[]).map((target) => ["target", words(target)]),
+    ...Object.entries((labels ?? {}) as Labels).map((entry) => ["label", labelled(...entry)]),
     ...spelt(rest as Record<string, Value>),
     ...(camera ? [["camera", place("camera", camera as number[])]] : []),
   ];
+}
+
+/** SET=NAME, or SET=NAME:WEIGHT,NAME:WEIGHT. */
+function labelled(name: string, value: Labels[string]): string {
+  if (typeof value === "string") return `${name}=${value}`;
+  const weights = Object.entries(value).map(([each, weight]) => `${each}:${plain(name, weight)}`);
+  return `${name}=${weights.join(",")}`;
 }
 
 /** JOINT@MOMENT:X,Y,Z. */

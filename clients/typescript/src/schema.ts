@@ -705,6 +705,23 @@ export interface components {
          * @example tall
          */
         Performer: string | null;
+        /** @description One name of a label set, or a weight for each of several names. */
+        Label: string | {
+            [key: string]: number;
+        };
+        /**
+         * @description Name or weights by label set, one of `labels` on the model's card: `{"style": "angry"}` or
+         *     `{"style": {"angry": 0.7, "happy": 0.3}}`. Weights sum to at most 1; what is left to 1 stays
+         *     open, as do sets that are not given. `performer` is short for the label set of that name;
+         *     only one of both may be given. Since 3.1.0.
+         * @default {}
+         * @example {
+         *       "performer": "tall"
+         *     }
+         */
+        Labels: {
+            [key: string]: components["schemas"]["Label"];
+        };
         /**
          * @description Level of detail, an index into `levels` on the model's card; 0 is the finest.
          * @default 0
@@ -737,6 +754,7 @@ export interface components {
             times: number[];
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
+            labels?: components["schemas"]["Labels"];
             level?: components["schemas"]["LevelNumber"];
             joint_sigma?: components["schemas"]["JointSigma"];
             exact?: components["schemas"]["Exact"];
@@ -762,6 +780,7 @@ export interface components {
             end: number | null;
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
+            labels?: components["schemas"]["Labels"];
             level?: components["schemas"]["LevelNumber"];
             joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
@@ -781,6 +800,7 @@ export interface components {
             nearest?: components["schemas"]["Nearest"];
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
+            labels?: components["schemas"]["Labels"];
         };
         /**
          * @description At any time, the poses are a weighted sum of the captured clips, in the coordinates of the
@@ -793,6 +813,7 @@ export interface components {
             controls: components["schemas"]["Controls"];
             /** @description Requested performer; null for an unseen performer. */
             performer: string | null;
+            labels?: components["schemas"]["RequestedLabels"];
             /** @description As in Trust. */
             warnings: string[];
             inferred?: components["schemas"]["Inferred"];
@@ -826,6 +847,7 @@ export interface components {
             model: components["schemas"]["Identity"];
             /** @description Performer whose clips alone counted as captured; null if all clips counted. */
             performer: string | null;
+            labels?: components["schemas"]["RequestedLabels"];
             /** @description Number of candidate points. */
             candidates: number;
             /** @description Suggested points, the most useful first. */
@@ -849,6 +871,10 @@ export interface components {
             controls: components["schemas"]["Controls"];
             /** @description Performer of the clip; null if the model does not distinguish performers. */
             performer: string | null;
+            /** @description Names of the clip in the label sets besides `performer`. Absent if there are none. Since 3.1.0. */
+            labels?: {
+                [key: string]: string;
+            };
             /** @description Distance from the requested controls in the model's metric. At distance 1 the clips are almost uncorrelated. */
             distance: number;
             /** @description Weight of the clip. */
@@ -886,6 +912,7 @@ export interface components {
             margin?: components["schemas"]["Margin"];
             controls?: components["schemas"]["FixedControls"];
             performer?: components["schemas"]["Performer"];
+            labels?: components["schemas"]["Labels"];
         };
         /** @description Sigma and support over all values of two controls. */
         SigmaGrid: {
@@ -898,6 +925,7 @@ export interface components {
             };
             /** @description Requested performer; null for an unseen performer. */
             performer: string | null;
+            labels?: components["schemas"]["RequestedLabels"];
             units: {
                 [key: string]: string;
             };
@@ -950,6 +978,7 @@ export interface components {
             end: number | null;
             extrapolate?: components["schemas"]["Extrapolate"];
             performer?: components["schemas"]["Performer"];
+            labels?: components["schemas"]["Labels"];
             level?: components["schemas"]["LevelNumber"];
             joint_sigma?: components["schemas"]["JointSigma"];
             names?: components["schemas"]["Names"];
@@ -972,6 +1001,7 @@ export interface components {
             model: components["schemas"]["Identity"];
             controls: components["schemas"]["Controls"];
             performer: string | null;
+            labels?: components["schemas"]["RequestedLabels"];
             level: number;
             /** @description As in Trust, in seconds. */
             duration: number;
@@ -998,6 +1028,7 @@ export interface components {
             controls: components["schemas"]["Controls"];
             /** @description Requested performer; null for an unseen performer. */
             performer: string | null;
+            labels?: components["schemas"]["RequestedLabels"];
             /** @description Level of detail, an index into the card's levels; 0 is the finest. */
             level: number;
             /** @description Natural duration of the whole clip at these controls, in seconds. */
@@ -1052,6 +1083,10 @@ export interface components {
         Supported: boolean;
         /** @description Sigma of each joint of the card, in metres. Absent unless requested. */
         SigmaByJoint: number[];
+        /** @description The `labels` of the request. Absent if there are none. Since 3.1.0. */
+        RequestedLabels: {
+            [key: string]: components["schemas"]["Label"];
+        };
         /** @description True if the request names a captured performer. Absent if the model does not distinguish performers. */
         PerformerSeen: boolean;
         /** @description Residual of one constraint. */
@@ -1206,6 +1241,8 @@ export interface components {
             levels: components["schemas"]["Level"][];
             /** @description Durations of the shortest and the longest captured clip, in seconds. */
             durations: number[];
+            /** @description Label sets of the captured clips, such as performers and styles, in the order of the weights that the graph takes. Since 3.1.0. */
+            labels: components["schemas"]["LabelSet"][];
             /** @description Names of the performers that a request may name; empty if the model does not distinguish performers. */
             performers: string[];
             /** @description Control values of each captured clip. */
@@ -1236,12 +1273,10 @@ export interface components {
                 scales: number[];
                 /** @description Nugget as a share of the sill. */
                 nugget: number;
-                /** @description Correlation of the motions of two performers, beside their offsets. */
-                correlation: number;
-                /** @description Variance of a performer's own offset, in sills. */
-                offset: number;
                 /** @description Variance of the slope along each control, in sills per squared half-range. */
                 trend: number;
+                /** @description Parameters of each of `labels` on the card, in its order. */
+                labels: components["schemas"]["LabelKernel"][];
             };
             /** @description Leave-one-out error of each captured clip: its distance from the prediction of the other clips, root mean square over joints and frames, in metres. */
             left_out?: number[];
@@ -1255,6 +1290,23 @@ export interface components {
             /** @description Points of the controls that the recipe names, such as stroll and hurry; empty if it names none. */
             presets?: components["schemas"]["Preset"][];
         };
+        /** @description Names by which clips differ besides their controls. */
+        LabelSet: {
+            /** @description Name of the set; performer for the people who move. */
+            name: string;
+            /** @description Names that a request may give, in the order of their weights. */
+            names: string[];
+            /** @description Name of each captured clip, as an index into `names`. */
+            clips: number[];
+        };
+        LabelKernel: {
+            /** @description Number of names in the label set. */
+            count: number;
+            /** @description Correlation of the motions of two names, beside their offsets. */
+            correlation: number;
+            /** @description Variance of a name's own offset, in sills. */
+            offset: number;
+        };
         /** @description Named point of the controls, within the sampled ranges. */
         Preset: {
             name: string;
@@ -1264,6 +1316,10 @@ export interface components {
             };
             /** @description Performer of the motion; null for an unseen performer. */
             performer: string | null;
+            /** @description Names of the motion in label sets besides `performer`. Since 3.1.0. */
+            labels?: {
+                [key: string]: string;
+            };
         };
         /** @description A number for each character, or one number for all. */
         Column: number | number[];
@@ -1349,6 +1405,13 @@ export interface components {
              * @default null
              */
             performer: (string | null) | (string | null)[];
+            /**
+             * @description Label of each character by label set, one of `labels` on the model's card; null where the set is left open. Since 3.1.0.
+             * @default {}
+             */
+            labels: {
+                [key: string]: components["schemas"]["Label"] | (components["schemas"]["Label"] | null)[];
+            };
             /**
              * @description Level of detail of each character, or `auto`: the coarsest level whose error covers at
              *     most `pixels` pixels of the `camera`, or the finest level if all errors are larger.
@@ -1928,7 +1991,7 @@ export interface components {
          *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
          *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
          *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
-         *     near the other controls, the performer if one is named, and the targets; with targets, also
+         *     near the other controls, the labels that are named, and the targets; with targets, also
          *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
          *     `exact` set to the measured controls given before (`none` if there are none), gets the same
          *     response. The names of the other parameters are reserved.
@@ -2017,6 +2080,13 @@ export interface components {
          */
         whose: string;
         /**
+         * @description Name of a label set whose clips alone count as captured, `label=style=angry`, as for other requests. Since 3.1.0.
+         * @example [
+         *       "performer=tall"
+         *     ]
+         */
+        whoseLabel: string[];
+        /**
          * @description Control that varies from column to column.
          * @example turn
          */
@@ -2052,6 +2122,16 @@ export interface components {
          * @example tall
          */
         performer: string;
+        /**
+         * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+         *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+         *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+         *     short for the label set of that name. Since 3.1.0.
+         * @example [
+         *       "performer=tall"
+         *     ]
+         */
+        label: string[];
     };
     requestBodies: {
         /** @description Default limits: 32 MiB and 100,000 characters. */
@@ -2215,7 +2295,7 @@ export interface operations {
                  *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
                  *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
                  *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
-                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     near the other controls, the labels that are named, and the targets; with targets, also
                  *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
@@ -2243,6 +2323,16 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /**
+                 * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+                 *     short for the label set of that name. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["label"];
                 /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
@@ -2342,7 +2432,7 @@ export interface operations {
                  *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
                  *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
                  *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
-                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     near the other controls, the labels that are named, and the targets; with targets, also
                  *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
@@ -2370,6 +2460,16 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /**
+                 * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+                 *     short for the label set of that name. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["label"];
                 /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
@@ -2477,7 +2577,7 @@ export interface operations {
                  *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
                  *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
                  *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
-                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     near the other controls, the labels that are named, and the targets; with targets, also
                  *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
@@ -2503,6 +2603,16 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /**
+                 * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+                 *     short for the label set of that name. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["label"];
                 /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
@@ -2610,7 +2720,7 @@ export interface operations {
                  *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
                  *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
                  *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
-                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     near the other controls, the labels that are named, and the targets; with targets, also
                  *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
@@ -2636,6 +2746,16 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /**
+                 * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+                 *     short for the label set of that name. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["label"];
                 /** @description Whether the trust includes sigma for each joint. */
                 joint_sigma?: components["parameters"]["jointSigma"];
                 /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
@@ -3015,7 +3135,7 @@ export interface operations {
                  *     outside, and with controls outside a clip is at most a quarter shorter or longer than the
                  *     captured ones, or as at the nearest sampled controls (since 3.1.0; see `deviations` of
                  *     Trust). Omitted controls (since 2.2.0) are set to those of a captured clip that is typical
-                 *     near the other controls, the performer if one is named, and the targets; with targets, also
+                 *     near the other controls, the labels that are named, and the targets; with targets, also
                  *     between such clips. The trust lists the omitted controls as `inferred`. A request with the inferred values, and with
                  *     `exact` set to the measured controls given before (`none` if there are none), gets the same
                  *     response. The names of the other parameters are reserved.
@@ -3037,6 +3157,16 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /**
+                 * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+                 *     short for the label set of that name. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["label"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -3113,6 +3243,13 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["whose"];
+                /**
+                 * @description Name of a label set whose clips alone count as captured, `label=style=angry`, as for other requests. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["whoseLabel"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -3171,6 +3308,16 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /**
+                 * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+                 *     short for the label set of that name. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["label"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -3266,6 +3413,16 @@ export interface operations {
                  * @example tall
                  */
                 performer?: components["parameters"]["performer"];
+                /**
+                 * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
+                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
+                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
+                 *     short for the label set of that name. Since 3.1.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["label"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -3574,6 +3731,7 @@ export const REQUIRED = {
     "samples",
     "levels",
     "durations",
+    "labels",
     "performers",
     "examples",
     "moved_by",
@@ -3646,6 +3804,7 @@ export const LISTS = {
     "controls",
     "levels",
     "durations",
+    "labels",
     "performers",
     "examples",
     "moved_by",
@@ -3686,6 +3845,7 @@ export const KEYS = {
     "times",
     "extrapolate",
     "performer",
+    "labels",
     "level",
     "joint_sigma",
     "exact",
@@ -3699,6 +3859,7 @@ export const KEYS = {
     "end",
     "extrapolate",
     "performer",
+    "labels",
     "level",
     "joint_sigma",
     "names",
@@ -3719,6 +3880,7 @@ export const KEYS = {
     "end",
     "extrapolate",
     "performer",
+    "labels",
     "level",
     "joint_sigma",
     "names",
@@ -3734,6 +3896,7 @@ export const KEYS = {
     "position",
     "heading",
     "performer",
+    "labels",
     "level",
     "previous_level",
     "from_level",
@@ -3751,13 +3914,15 @@ export const KEYS = {
     "rows",
     "margin",
     "controls",
-    "performer"
+    "performer",
+    "labels"
   ],
   "WhyQuestion": [
     "controls",
     "nearest",
     "extrapolate",
-    "performer"
+    "performer",
+    "labels"
   ],
   "Target": [
     "joint",
@@ -3781,7 +3946,8 @@ export const KEYS = {
   ],
   "SuggestQuestion": [
     "count",
-    "performer"
+    "performer",
+    "labels"
   ]
 } as const;
 

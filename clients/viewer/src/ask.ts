@@ -22,8 +22,9 @@ export function clip(
   state: State,
   signal: AbortSignal,
 ): Promise<Motion> {
-  const { controls, performer, level, loop, model, root } = state;
-  const question = { controls, performer, level, root, fps: RATE, loop: card.cyclic && loop };
+  const { controls, performer, labels, level, loop, model, root } = state;
+  const whole = { root, fps: RATE, loop: card.cyclic && loop };
+  const question = { controls, performer, labels, level, ...whole };
   return source.clip(model, question, signal);
 }
 
@@ -61,8 +62,8 @@ function detail(fault: PosefieldError): string {
 }
 
 function travelling(source: Source, state: State, time: number, signal: AbortSignal) {
-  const { controls, performer, level, model } = state;
-  return source.pose(model, { controls, performer, level, times: [time] }, signal);
+  const { controls, performer, labels, level, model } = state;
+  return source.pose(model, { controls, performer, labels, level, times: [time] }, signal);
 }
 
 /** A crowd of one: crowds alone may be asked for poses that stay where they are. */
@@ -73,8 +74,8 @@ async function inPlace(
   time: number,
   signal: AbortSignal,
 ): Promise<Poses> {
-  const { controls, performer, level, model } = state;
-  const question = { controls, performer, level, time: [time], root: "in_place" as const };
+  const { controls, performer, labels, level, model } = state;
+  const question = { controls, performer, labels, level, time: [time], root: "in_place" as const };
   const answer = await source.crowd(model, question, signal);
   return { ...answer, times: Float64Array.of(time), trust: trust(answer, card, state) };
 }

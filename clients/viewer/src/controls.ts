@@ -1,10 +1,11 @@
 /** What is asked: a slider for each control, who moves, and back to where it began. */
 
-import { button, el, id } from "./dom.ts";
+import { button, chooser, el, labelled } from "./dom.ts";
+import { otherSets } from "./examples.ts";
 import type { Mount } from "./page.ts";
 import { presets } from "./presets.ts";
 import type { Session } from "./session.ts";
-import { Slider } from "./slider.ts";
+import { Slider, title } from "./slider.ts";
 
 export function mount(host: HTMLElement, page: Session): void {
   const { card, player, signal, store } = page;
@@ -27,6 +28,7 @@ export function mount(host: HTMLElement, page: Session): void {
     ...sliders.map(([, slider]) => slider.element),
   );
   if (card.performers.length) host.append(performers(card.performers, store, signal));
+  for (const set of otherSets(card)) host.append(labels(set, store, signal));
   show();
   const leave = store.listen((_, changed) => {
     if (changed.has("controls")) show();
@@ -39,21 +41,43 @@ export function mount(host: HTMLElement, page: Session): void {
   });
 }
 
-const NOBODY = "Unknown performer";
+type Store = Parameters<Mount>[1]["store"];
 
-function performers(
-  names: readonly string[],
-  store: Parameters<Mount>[1]["store"],
+function performers(names: readonly string[], store: Store, signal: AbortSignal): HTMLElement {
+  const set = (name: string) => store.set({ performer: name || null });
+  const select = names_of("performer", names, set);
+  return shown("Performer", select, () => store.state.performer ?? "", { store, signal });
+}
+
+/** A selector of one name of a label set, such as a style. */
+function labels(
+  { name, names }: { readonly name: string; readonly names: readonly string[] },
+  store: Store,
   signal: AbortSignal,
 ): HTMLElement {
-  const label = id();
-  const options = names.map((name) => el("option", { value: name }, name));
-  const select = el("select", { id: label }, el("option", { value: "" }, NOBODY), ...options);
+  const select = names_of(name, names, (label) => {
+    const { [name]: _, ...others } = store.state.labels;
+    store.set({ labels: label ? { ...others, [name]: label } : others });
+  });
+  return shown(title(name), select, () => store.state.labels[name] ?? "", { store, signal });
+}
+
+function names_of(set: string, names: readonly string[], taken: (name: string) => void) {
+  const open = ["", `Unknown ${set}`] as const;
+  return chooser([open, ...names.map((name) => [name, name] as const)], "", taken);
+}
+
+/** A select with a word, which follows the state. */
+function shown(
+  word: string,
+  select: HTMLSelectElement,
+  value: () => string,
+  { store, signal }: { readonly store: Store; readonly signal: AbortSignal },
+): HTMLElement {
   const show = () => {
-    select.value = store.state.performer ?? "";
+    select.value = value();
   };
-  select.addEventListener("change", () => store.set({ performer: select.value || null }));
   show();
   signal.addEventListener("abort", store.listen(show));
-  return el("div", { class: "field" }, el("label", { for: label }, "Performer"), select);
+  return labelled(word, select);
 }

@@ -2,7 +2,7 @@
 
 import type { CrowdPoses, CrowdQuestion, ModelCard } from "@posefield/client";
 
-import { mover } from "./examples.ts";
+import { labelsOf, mover, otherSets } from "./examples.ts";
 import type { Source } from "./page.ts";
 import { Rig, SIZE } from "./rig.ts";
 import { place, placed } from "./skeleton.ts";
@@ -30,6 +30,7 @@ export interface Library {
 interface Row {
   readonly controls: readonly number[];
   readonly performer: string | null;
+  readonly labels: Readonly<Record<string, string>>;
 }
 
 /**
@@ -92,7 +93,11 @@ export async function library(
 }
 
 function rows(card: ModelCard): Row[] {
-  const all = card.examples.map((controls, i) => ({ controls, performer: mover(card, i) }));
+  const all = card.examples.map((controls, i) => ({
+    controls,
+    performer: mover(card, i),
+    labels: labelsOf(card, i),
+  }));
   return spread(all, TRIED);
 }
 
@@ -110,7 +115,10 @@ function asked(
     card.controls.map(({ name }, i) => [name, rows.map((row) => row.controls[i]!)]),
   );
   const performer = card.performers.length ? rows.map((row) => row.performer) : null;
-  return { controls, performer };
+  const labels = Object.fromEntries(
+    otherSets(card).map(({ name }) => [name, rows.map((row) => row.labels[name]!)]),
+  );
+  return { controls, performer, labels };
 }
 
 type Ask = (

@@ -11,6 +11,17 @@ export function mover({ moved_by, performers }: ModelCard, index: number): strin
   return performers[moved_by[index] ?? -1] ?? null;
 }
 
+/** Label sets besides performers, who are asked for in a field of their own. */
+export function otherSets({ labels = [] }: ModelCard): NonNullable<ModelCard["labels"]> {
+  return labels.filter(({ name }) => name !== "performer");
+}
+
+/** Names of a captured clip in the label sets besides performers. */
+export function labelsOf(card: ModelCard, index: number): Record<string, string> {
+  const named = otherSets(card).map(({ name, names, clips }) => [name, names[clips[index]!]!]);
+  return Object.fromEntries(named) as Record<string, string>;
+}
+
 /** Values of the controls that are none of those. */
 export function others(controls: Controls, axes: readonly Control[]): Record<string, number> {
   const names = new Set(axes.map(({ name }) => name));

@@ -152,7 +152,7 @@ class Files {
 
   /** What differs from what is usual, so that texts stay short. */
   get #question(): ClipQuestion {
-    const { controls, performer, level, root } = this.#page.store.state;
+    const { controls, labels, performer, level, root } = this.#page.store.state;
     const { fps, loop, names, unit, up, format, pinFeet, exact } = this.#choice;
     const targets = this.#targets;
     const measured = format === "glb" ? {} : { ...(unit && { unit }), ...(up && { up }) };
@@ -160,6 +160,7 @@ class Files {
       controls,
       fps,
       ...(performer !== null && { performer }),
+      ...(Object.keys(labels).length && { labels }),
       ...(level && { level }),
       ...(root === "in_place" && { root }),
       ...(loop && { loop }),
@@ -183,7 +184,8 @@ class Files {
 
   #changed(changed: ReadonlySet<keyof State>): void {
     if (["root", "level", "target"].some((key) => changed.has(key as "root"))) this.#draw();
-    else if (changed.has("controls") || changed.has("performer")) this.#tell();
+    else if (["controls", "performer", "labels"].some((key) => changed.has(key as "labels")))
+      this.#tell();
   }
 
   #take(part: Partial<Choice>): void {

@@ -74,15 +74,20 @@ class Ghost {
   /** The clip of the nearest example, where that has become another. */
   async #find(): Promise<void> {
     const { card, notice, signal, source, store } = this.#session;
-    const { controls, performer, model } = store.state;
+    const { controls, labels, performer, model } = store.state;
     try {
-      const { nearest } = await source.why(model, { controls, performer, nearest: 1 }, signal);
+      const { nearest } = await source.why(
+        model,
+        { controls, performer, labels, nearest: 1 },
+        signal,
+      );
       const [first] = nearest;
       if (!first || signal.aborted) return;
       this.label.textContent = says(first);
       const of = `${first.source} ${store.state.level} ${store.state.root} ${store.state.loop}`;
       if (of === this.#of) return;
-      const there = { ...store.state, controls: first.controls, performer: first.performer };
+      const own = { performer: first.performer, labels: first.labels ?? {} };
+      const there = { ...store.state, controls: first.controls, ...own };
       this.#clip = await ask.clip(source, card, there, signal);
       this.#of = of;
       this.#figure.group.visible = this.#wanted;

@@ -6,6 +6,7 @@
 
 import type { ModelCard } from "@posefield/client";
 
+import { otherSets } from "./examples.ts";
 import type { State } from "./state.ts";
 import { read as number } from "./written.ts";
 
@@ -52,6 +53,7 @@ export function initial(model: string, card: ModelCard): State {
     model,
     controls: Object.fromEntries(card.controls.map(({ name, default: value }) => [name, value])),
     performer: null,
+    labels: {},
     level: 0,
     time: 0,
     playing: true,
@@ -94,9 +96,14 @@ export function written(state: State, card: ModelCard): string {
     ([name, value]) => `${safe(name)}=${rounded(value)}`,
   );
   const rest = (Object.keys(FIELDS) as Key[])
-    .filter((key) => state[key] !== start[key])
-    .map((key) => `~${key}=${safe((FIELDS[key] as Field<unknown>).write(state[key]))}`);
+    .map((key) => [key, spelt(state, key)] as const)
+    .filter(([key, text]) => text !== spelt(start, key))
+    .map(([key, text]) => `~${key}=${safe(text)}`);
   return `#${safe(state.model)}?${[...controls, ...rest].join("&")}`;
+}
+
+function spelt(state: State, key: Key): string {
+  return (FIELDS[key] as Field<unknown>).write(state[key]);
 }
 
 function steer(controls: Record<string, number>, name: string, text: string): string | null {
@@ -126,6 +133,17 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
     expected: (card) => card.performers.join(", ") || "nobody: performers are not told apart",
     read: (text, card) => (card.performers.includes(text) ? text : undefined),
     write: (value) => value ?? "",
+  },
+  labels: {
+    expected: (card) =>
+      otherSets(card)
+        .map(({ name, names }) => `${name}:${names.join(" or ")}`)
+        .join(", ") || "nothing: there are no label sets",
+    read: readLabels,
+    write: (value) =>
+      Object.entries(value)
+        .map(([name, label]) => `${name}:${label}`)
+        .join(","),
   },
   level: between((card) => [0, card.levels.length - 1], Number.isInteger),
   time: between(() => [0, 3600]),
@@ -162,6 +180,16 @@ function between(
     },
     write: rounded,
   };
+}
+
+/** A name for each of some label sets, commas between. */
+function readLabels(text: string, card: ModelCard): State["labels"] | undefined {
+  const pairs = text.split(",").map((part) => part.split(/:(.*)/s));
+  const known = otherSets(card);
+  const good = pairs.every(([name, label]) =>
+    known.some((own) => own.name === name && own.names.includes(label ?? "")),
+  );
+  return good ? (Object.fromEntries(pairs) as Record<string, string>) : undefined;
 }
 
 /** Three numbers between commas. */

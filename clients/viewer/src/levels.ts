@@ -114,7 +114,7 @@ class Levels {
   }
 
   #changed(state: State, changed: ReadonlySet<keyof State>): void {
-    const asked = ["controls", "performer", "root", "view"] as const;
+    const asked = ["controls", "performer", "labels", "root", "view"] as const;
     if (asked.some((key) => changed.has(key))) this.#show(state);
     if (changed.has("time") && this.#group.visible) this.#page.scene.redraw();
   }
@@ -128,8 +128,8 @@ class Levels {
     const { card } = this.#page;
     // Who walks away would not stay side by side.
     const root = card.cyclic ? "in_place" : state.root;
-    const { controls, performer } = state;
-    this.#asking.ask({ controls, performer, root, fps: RATE });
+    const { controls, labels, performer } = state;
+    this.#asking.ask({ controls, performer, labels, root, fps: RATE });
   }
 
   async #ask(question: ClipQuestion): Promise<void> {

@@ -5,7 +5,7 @@ import type { SigmaGrid } from "@posefield/client";
 import "./map.css";
 import { type Control, type Dot, draw, Frame, heat, MARGIN, rounded } from "./chart.ts";
 import { chooser, el, labelled } from "./dom.ts";
-import { clips, distance, mover, nearestTo, others } from "./examples.ts";
+import { clips, distance, labelsOf, mover, nearestTo, others } from "./examples.ts";
 import { Latest } from "./latest.ts";
 import { legend, said, table } from "./map-words.ts";
 import type { Mount, Page } from "./page.ts";
@@ -137,7 +137,7 @@ class Map2 {
 
   #changed(changed: ReadonlySet<keyof State>): void {
     if (changed.has("across") || changed.has("along")) this.#choosers();
-    const asked = ["across", "along", "controls", "performer"] as const;
+    const asked = ["across", "along", "controls", "performer", "labels"] as const;
     if (!asked.some((key) => changed.has(key))) return;
     this.#chosen = null;
     this.#tell();
@@ -166,6 +166,7 @@ class Map2 {
       ...this.#pair.map(({ name }) => name),
       others(this.#state.controls, this.#pair),
       this.#state.performer,
+      this.#state.labels,
     ]);
     clearTimeout(this.#waiting);
     if (key === this.#asked) {
@@ -189,6 +190,7 @@ class Map2 {
       margin: MARGIN,
       controls: others(this.#state.controls, this.#pair),
       performer: this.#state.performer,
+      labels: this.#state.labels,
     };
     try {
       const grid = await source.sigma(this.#state.model || card.name, question, signal);
@@ -353,7 +355,7 @@ class Map2 {
     const { card, store } = this.#page;
     const values = card.examples[index]!;
     const controls = Object.fromEntries(card.controls.map(({ name }, i) => [name, values[i]!]));
-    store.set({ controls, performer: mover(card, index) });
+    store.set({ controls, performer: mover(card, index), labels: labelsOf(card, index) });
     this.#point_out(index);
   }
 

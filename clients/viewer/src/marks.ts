@@ -20,7 +20,9 @@ export function marks({ supported, performer_seen: seen, performer }: Told): Mar
     found.push({ of: "support", held: supported, words });
   }
   if (seen !== undefined) {
-    const words = seen ? `${performer} was captured` : "Moves as an unseen performer";
+    const words = seen
+      ? `${performer ?? "The performer"} was captured`
+      : "Moves as an unseen performer";
     found.push({ of: "performer", held: seen, words });
   }
   return found;

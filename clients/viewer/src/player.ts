@@ -217,7 +217,7 @@ export class Player {
   }
 }
 
-const ASKED_ANEW = ["controls", "performer", "level"] as const;
+const ASKED_ANEW = ["controls", "performer", "labels", "level"] as const;
 
 /** No joint turned, and as high as the legs are long. */
 function atRest(card: ModelCard): Pose {

@@ -16,7 +16,9 @@ export function presets({ card, store, signal }: Page): HTMLElement | null {
   const buttons = all.map((preset) => {
     const made = el("button", { type: "button" }, title(preset.name));
     const { controls, performer } = preset;
-    made.addEventListener("click", () => store.set({ controls: { ...controls }, performer }));
+    const labels = { ...preset.labels };
+    const set = () => store.set({ controls: { ...controls }, performer, labels });
+    made.addEventListener("click", set);
     return made;
   });
   const show = () => {
@@ -29,7 +31,11 @@ export function presets({ card, store, signal }: Page): HTMLElement | null {
 }
 
 /** Whether a state is at a preset's point. */
-export function holds({ controls, performer }: State, preset: Preset): boolean {
+export function holds({ controls, labels, performer }: State, preset: Preset): boolean {
   const same = Object.entries(preset.controls).every(([name, value]) => controls[name] === value);
-  return same && performer === (preset.performer ?? null);
+  const named = preset.labels ?? {};
+  const alike = [...Object.keys(named), ...Object.keys(labels)].every(
+    (name) => named[name] === labels[name],
+  );
+  return same && alike && performer === (preset.performer ?? null);
 }

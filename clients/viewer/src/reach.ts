@@ -90,15 +90,16 @@ export class Reach {
   /** A crowd of as many as there are settings, all at the moment of the event. */
   async #places(settings: readonly (readonly number[])[]): Promise<readonly Point[]> {
     const { card, player, signal, source, store } = this.#session;
-    const { controls, level, model, performer } = store.state;
+    const { controls, labels, level, model, performer } = store.state;
     const columns = Object.fromEntries(
       card.controls.map(({ name }) => {
         const free = this.#free.indexOf(name);
         return [name, settings.map((row) => (free < 0 ? controls[name]! : row[free]!))];
       }),
     );
+    const who = { labels, level, performer };
     const ask = (time: readonly number[]) =>
-      source.crowd(model, { controls: columns, time: [...time], level, performer }, signal);
+      source.crowd(model, { controls: columns, time: [...time], ...who }, signal);
     const share = Math.min(END, this.#event.share);
     if (share > LATE) this.#durations = [...(await ask(settings.map(() => 0))).duration];
     const crowd = await ask(

@@ -7,6 +7,8 @@ export interface State {
   /** A number for each control, in its unit. */
   readonly controls: Readonly<Record<string, number>>;
   readonly performer: string | null;
+  /** A name for each label set besides performers; those that are not named are left open. */
+  readonly labels: Readonly<Record<string, string>>;
   readonly level: number;
   /** Seconds from the start of the clip. */
   readonly time: number;

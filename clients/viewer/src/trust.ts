@@ -45,8 +45,8 @@ export function mount(host: HTMLElement, session: Session): void {
   );
   if (served(source)) host.append(el("h3", {}, "Made of these captured clips"), list, others);
   const why = new Latest<null>(async () => {
-    const { controls, model, performer } = store.state;
-    const question = { controls, performer, nearest: NEAREST };
+    const { controls, labels, model, performer } = store.state;
+    const question = { controls, performer, labels, nearest: NEAREST };
     const reasons = await source.why(model, question, signal).catch(() => null);
     if (!reasons || signal.aborted) return;
     list.replaceChildren(...reasons.nearest.map((clip) => item(clip, card, session)));
@@ -92,13 +92,18 @@ function item(clip: Captured, card: ModelCard, { store }: Session): HTMLElement 
     el("span", { class: "about" }, `distance ${clip.distance.toFixed(2)}${who(clip)}`),
   );
   go.addEventListener("click", () =>
-    store.set({ controls: { ...clip.controls }, performer: clip.performer }),
+    store.set({
+      controls: { ...clip.controls },
+      performer: clip.performer,
+      labels: { ...clip.labels },
+    }),
   );
   return el("li", {}, go);
 }
 
-function who({ performer }: Captured): string {
-  return performer ? ` · ${performer}` : "";
+function who({ performer, labels = {} }: Captured): string {
+  const names = [...(performer ? [performer] : []), ...Object.values(labels)];
+  return names.map((name) => ` · ${name}`).join("");
 }
 
 /** Part of the clip in the positive weights; services older than 3.1.0 say the weight alone. */

@@ -21,7 +21,7 @@ export const mount: Mount = (host, { signal, store }) => {
     ),
   );
   const leave = store.listen((_, changed) => {
-    if (changed.has("controls") || changed.has("performer")) close();
+    if (["controls", "performer", "labels"].some((key) => changed.has(key as "labels"))) close();
   });
   signal.addEventListener("abort", leave);
 };

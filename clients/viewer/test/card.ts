@@ -46,6 +46,11 @@ export const CARD = {
   samples: 3,
   levels: [{}, {}, {}, {}],
   durations: [1, 2],
+  labels: [
+    { name: "performer", names: ["ann", "bob & co"], clips: [] },
+    { name: "style", names: ["calm", "in a hurry"], clips: [] },
+    { name: "mood", names: ["glad", "sad"], clips: [] },
+  ],
   performers: ["ann", "bob & co"],
   examples: [],
   moved_by: [],

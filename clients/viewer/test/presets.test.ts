@@ -17,4 +17,8 @@ test("all values and the performer count", () => {
   assert.ok(!holds({ ...there, controls: { speed: 0.7, time: 5.001 } }, PRESET));
   assert.ok(!holds({ ...there, performer: "ann" }, PRESET));
   assert.ok(holds({ ...there, performer: "ann" }, { ...PRESET, performer: "ann" }));
+  const calm = { style: "calm" };
+  assert.ok(!holds({ ...there, labels: calm }, PRESET));
+  assert.ok(!holds(there, { ...PRESET, labels: calm }));
+  assert.ok(holds({ ...there, labels: calm }, { ...PRESET, labels: calm }));
 });

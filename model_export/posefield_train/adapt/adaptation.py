@@ -85,7 +85,7 @@ def _solve(
     missed, sill = _left_out_errors(known, laid, moved, extended)
     ends = laid.low, laid.high
     event, blend = _event(laid, model, reduced)
-    bank = KrigingBank(*ends, laid.performers, pose, others, sill, (), law, event)
+    bank = KrigingBank(*ends, laid.labels, pose, others, sill, (), law, event)
     own = extended.tensor
     decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means, event=blend)
     adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel)

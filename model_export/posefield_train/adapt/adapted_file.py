@@ -1,6 +1,6 @@
 """Model file of an adapted model: levels of detail, model card and parity check."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
 from typing import Any
@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import Control, ModelCard
+from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard
 from posefield_train.adapt import adaptation, canonical_clips, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
@@ -19,8 +20,10 @@ from posefield_train.graph.level_errors import LevelTest
 from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, ModelLevels
 from posefield_train.graph.onnx_export import MAX_LISTED_VALUES, ExportedModel
 from posefield_train.kriging import thinning
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
+from posefield_train.source import clip_table
 from posefield_train.source.ingest import Example
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.truncation_error import EventFrame, TruncationReference
@@ -48,11 +51,27 @@ def check_name(card: ModelCard, performer: str) -> None:
     if performer in card.performers:
         known = ", ".join(card.performers)
         raise InvalidField("performer", f"{performer!r} is known already, as are: {known}")
-    if not performer or performer != performer.strip() or not performer.isprintable():
-        raise InvalidField(
-            "performer",
-            f"{performer!r}, expected a name of printable characters, without blanks at its ends",
-        )
+    if not clip_table.is_label(performer):
+        raise InvalidField("performer", f"{performer!r}, expected {clip_table.LABEL_FORM}")
+
+
+def check_labels(card: ModelCard, labels: Mapping[str, str]) -> None:
+    """Raise InvalidField for names of other label sets than the model's, or unknown ones.
+
+    Names of further label sets have to be known: only the performer is new.
+    """
+    known = {own.name: own.names for own in card.labels if own.name != PERFORMER}
+    for name, label in labels.items():
+        if name not in known:
+            found = f"{name!r}{did_you_mean(name, known)}"
+            raise InvalidField("label", f"{found}, expected {_one_of(known)}")
+        if label not in known[name]:
+            found = f"{name}={label}{did_you_mean(label, known[name])}"
+            raise InvalidField("label", f"{found}, expected {_one_of(known[name])}")
+
+
+def _one_of(names: Collection[str]) -> str:
+    return f"one of {', '.join(names)}" if names else "none: there are no label sets but performers"
 
 
 def export_adapted(reopened: ReconstructedModel, newcomer: NewPerformer) -> ExportedModel:
@@ -163,9 +182,8 @@ def _card(
         samples=len(bank.pose.samples),
         levels=levels,
         durations=(min(seconds), max(seconds)),
-        performers=bank.performers,
         examples=(*old.examples, *own),
-        moved_by=tuple(np.argmax(bank.pose.samples[:, len(bank.low) :], axis=1).tolist()),
+        labels=_labels(adapted),
         sources=(*old.sources, *(clip.row.source for clip in clips)),
         left_out=left_out,
         kriging=onnx_export.plain_parameters(bank.pose.hyper),
@@ -173,6 +191,13 @@ def _card(
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
     )
+
+
+def _labels(adapted: AdaptedModel) -> tuple[LabelSet, ...]:
+    bank = adapted.model.bank
+    counts, every = tuple(map(len, bank.labels.values())), np.arange(len(bank.pose.samples))
+    samples = SamplePoints(bank.pose.samples, len(bank.low), every, counts)
+    return onnx_export.card_labels(bank.labels, samples)
 
 
 def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:

@@ -15,7 +15,7 @@ from posefield_train.align import travel as travels
 from posefield_train.align.time_alignment import FINE, AlignedClips, CanonicalTime
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import universal_kriging
+from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.parallel import single_thread
 from posefield_train.source import bone_lengths, half_turns
@@ -149,8 +149,8 @@ def _predicted_trace(adaptable: AdaptableModel, example: Example) -> Floats:
     """Return the trace (FINE, features) of the model's prediction with the example's bones."""
     model = adaptable.model
     place = np.linspace(0.0, model.timing.frames - 1.0, FINE)[None]
-    nobody = np.zeros((1, len(model.bank.performers)))
-    answer = model.outputs_at_frames(example.controls[None], place, nobody, 0)
+    labels = sample_points.label_weights([example.row.labels], model.bank.labels)
+    answer = model.outputs_at_frames(example.controls[None], place, labels, 0)
     motion = answer.rotations[0], answer.root_position[0], example.offsets
     clip = assemble(adaptable.skeleton, *motion, (FINE - 1) / example.clip.duration)
     return time_alignment.trace(clip, np.sqrt(adaptable.joint_weights))
@@ -214,6 +214,6 @@ def _sigmas(adaptable: AdaptableModel, examples: Sequence[Example]) -> Floats:
     Controls are clipped to the sampled range because sigma grows without bound outside it.
     """
     bank, asked = adaptable.model.bank, np.stack([example.controls for example in examples])
-    nobody = np.zeros((len(asked), len(bank.performers)))
-    points = bank.points(np.clip(asked, bank.low, bank.high), nobody)
+    labels = sample_points.label_weights([e.row.labels for e in examples], bank.labels)
+    points = bank.points(np.clip(asked, bank.low, bank.high), labels)
     return np.sqrt(adaptable.canonical_excess) * bank.sigma(bank.numpy(points)[VARIANCE])

@@ -10,11 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from posefield.common.units import Floats, Indices
+from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import half_ranges
+from posefield.model_file.model_card import PERFORMER
 from posefield_train.kriging import coefficient_models, sample_points, universal_kriging
 from posefield_train.kriging.coefficient_models import SAME_BONE
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel, KrigingBank
-from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.ingest import Example
 from posefield_train.tensor.decoder import Proportions
@@ -24,21 +26,23 @@ from posefield_train.tensor.decoder import Proportions
 class ExtendedSamples:
     """Samples of a model followed by new ones.
 
-    low, high: ends of the sampled ranges (d,). performers: names, in the order of their labels.
-    growth: ratio (d,) of new to old ranges.
+    low, high: ends of the sampled ranges (d,). labels: names of each label set. growth: ratio (d,)
+    of new to old ranges.
     """
 
     low: Floats
     high: Floats
-    performers: tuple[str, ...]
+    labels: LabelNames
     samples: SamplePoints
     growth: Floats
 
     def hyper(self, old: Hyper) -> Hyper:
-        """Return parameters rescaled to the new ranges."""
+        """Return parameters rescaled to the new ranges, with the new number of names."""
         # One trend serves all controls, so that the most extended one decides.
         trend = old.trend * float(np.max(self.growth)) ** 2
-        return replace(old, scales=old.scales * self.growth, trend=trend)
+        pairs = zip(old.labels, self.samples.labels, strict=True)
+        labels = tuple(replace(kernel, count=count) for kernel, count in pairs)
+        return replace(old, scales=old.scales * self.growth, trend=trend, labels=labels)
 
 
 def extend_samples(
@@ -46,21 +50,36 @@ def extend_samples(
 ) -> ExtendedSamples:
     """Return the samples of a bank, with groups (n,), followed by examples of a new performer.
 
-    New examples are grouped by take for leave-one-out.
+    New examples are grouped by take for leave-one-out. Their other labels are those of their rows.
     """
     d = len(bank.low)
     old = (bank.pose.samples[:, :d] * (bank.high - bank.low) + bank.low + bank.high) / 2.0
     new = np.stack([example.controls for example in examples])
     low, high = np.minimum(bank.low, new.min(axis=0)), np.maximum(bank.high, new.max(axis=0))
-    performers = tuple(sorted((*bank.performers, performer)))
-    moved_by = [bank.performers[i] for i in np.argmax(bank.pose.samples[:, d:], axis=1)]
-    labels = sample_points.performer_labels([*moved_by, *([performer] * len(new))], performers)
-    points = np.hstack([half_ranges(np.vstack([old, new]), low, high), labels])
+    added = [{**example.row.labels, PERFORMER: performer} for example in examples]
+    given = [*_labels(bank), *added]
+    names = {name: tuple(sorted({labels[name] for labels in given})) for name in bank.labels}
+    weights = sample_points.label_weights(given, names)
+    points = np.hstack([half_ranges(np.vstack([old, new]), low, high), weights])
     groups = np.concatenate(
         [old_groups, 1 + old_groups.max() + sample_points.take_numbers(examples)]
     )
     growth = (high - low) / (bank.high - bank.low)
-    return ExtendedSamples(low, high, performers, SamplePoints(points, d, groups), growth)
+    samples = SamplePoints(points, d, groups, tuple(map(len, names.values())))
+    return ExtendedSamples(low, high, names, samples, growth)
+
+
+def _labels(bank: KrigingBank) -> list[dict[str, str]]:
+    """Return the name of each sample of a bank in each label set."""
+    counts = tuple(map(len, bank.labels.values()))
+    columns = kriging_model.label_columns(len(bank.low), counts)
+    return [
+        {
+            name: names[int(np.argmax(point[own]))]
+            for (name, names), own in zip(bank.labels.items(), columns, strict=True)
+        }
+        for point in bank.pose.samples
+    ]
 
 
 def solve_extended(
@@ -102,8 +121,10 @@ def _performer_parameters(laid: ExtendedSamples, bank: KrigingBank) -> Hyper:
 
     The offset outweighs what remains of the stationary covariance.
     """
-    shared = laid.hyper(bank.pose.hyper)
-    return replace(shared, nugget=SMALLEST_NUGGET, offset=LARGEST_OFFSET, trend=0.0)
+    shared = laid.hyper(bank.pose.hyper).with_offsets(
+        *(LARGEST_OFFSET if name == PERFORMER else 0.0 for name in bank.labels)
+    )
+    return replace(shared, nugget=SMALLEST_NUGGET, trend=0.0)
 
 
 def _extend_proportions(

@@ -129,12 +129,13 @@ def _bank(file: _ModelFile) -> KrigingBank:
     card = file.card
     low, high = card.sampled_ranges
     points = kriging_model.half_ranges(np.array(card.examples), low, high)
-    points = np.hstack([points, card.labels])
+    points = np.hstack([points, card.clip_labels])
     order = _order(file, points)
     others = {name: _coefficient_model(file, name, points, order) for name in _widths(file)}
     pose = _solve_kriging(file, POSE, (card.kriging, points, order))
     sill, law, event = file["sill"].item(), _power_law(file), _event_model(file, pose)
-    return KrigingBank(low, high, card.performers, pose, others, sill, (), law, event)
+    names = {own.name: own.names for own in card.labels}
+    return KrigingBank(low, high, names, pose, others, sill, (), law, event)
 
 
 def _event_model(file: _ModelFile, pose: UniversalKriging) -> UniversalKriging | None:
@@ -142,11 +143,15 @@ def _event_model(file: _ModelFile, pose: UniversalKriging) -> UniversalKriging |
     count = file.card.levels[0].event
     if not count:
         return None
-    if EVENT not in file.making.fields:
-        raise ModelError(file.source, "its card does not say what its event's model is made with")
-    nugget, offset, trend = file.making.fields[EVENT]
-    hyper = replace(file.card.kriging, nugget=nugget, offset=offset, trend=trend)
-    return universal_kriging.solve(hyper, pose.samples, pose.values[:, :count])
+    return universal_kriging.solve(_hyper(file, EVENT), pose.samples, pose.values[:, :count])
+
+
+def _hyper(file: _ModelFile, name: str) -> Hyper:
+    """Return the parameters of a quantity: the pose's, but for its own of the card."""
+    if name not in file.making.fields:
+        raise ModelError(file.source, f"its card does not say what its field {name!r} is made with")
+    nugget, trend, *offsets = file.making.fields[name]
+    return replace(file.card.kriging.with_offsets(*offsets), nugget=nugget, trend=trend)
 
 
 def _power_law(file: _ModelFile) -> PowerLaw | None:
@@ -187,13 +192,9 @@ def _coefficient_model(
     file: _ModelFile, name: str, points: Floats, order: Indices
 ) -> CoefficientModel:
     if f"{name}_weights" not in file:
-        one = len(file.card.performers)
+        one = sum(file.card.label_counts)
         return ConstantModel(file["linear_weights"][one, _columns(file, name)])
-    if name not in file.making.fields:
-        raise ModelError(file.source, f"its card does not say what its field {name!r} is made with")
-    nugget, offset, trend = file.making.fields[name]
-    hyper = replace(file.card.kriging, nugget=nugget, offset=offset, trend=trend)
-    return _solve_kriging(file, name, (hyper, points, order))
+    return _solve_kriging(file, name, (_hyper(file, name), points, order))
 
 
 def _solve_kriging(

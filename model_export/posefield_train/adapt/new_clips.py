@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from posefield.common.errors import RecipeError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
-from posefield.model_file.model_card import Control
+from posefield.model_file.model_card import PERFORMER, Control
 from posefield.motion import measures
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
@@ -28,63 +29,101 @@ from posefield_train.source.clip_table import ClipRow, ClipTable
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Source
 
+Labels = Mapping[str, str]
+"""Names of clips by label set."""
+
 
 def examples_of_files(
-    reopened: ReconstructedModel, paths: Sequence[Path], source: Source, performer: str
+    reopened: ReconstructedModel, paths: Sequence[Path], source: Source, labels: Labels
 ) -> tuple[list[Example], list[str]]:
     """Return examples of whole files, with all controls measured, and notes on assumptions.
+
+    labels: name of all clips in each label set; the performer's is required.
 
     Raises RecipeError for a control that cannot be measured, a file given twice, and a clip of
     another skeleton; BvhError for a file that cannot be read.
     """
     typed = [control.name for control in reopened.card.controls if control.measure is None]
-    needed = [*typed, *reopened.making.landmarks]
+    needed = [*typed, *_open_sets(reopened, labels), *reopened.making.landmarks]
     if needed:
         raise RecipeError(
             paths[0],
             f"nothing says {', '.join(map(repr, needed))}, which cannot be measured, expected a "
             "table with a column for each",
         )
-    rows = [_row(path, performer) for path in paths]
+    rows = [_row(path, labels) for path in paths]
     clip_table.refuse_repeats(rows)
     return _examples(reopened, rows, source, [{} for _ in rows])
 
 
 def examples_of_table(
-    reopened: ReconstructedModel, path: Path, source: Source, performer: str
+    reopened: ReconstructedModel, path: Path, source: Source, labels: Labels
 ) -> tuple[list[Example], list[str]]:
     """Return examples of a table's rows, and notes on assumptions.
 
     Columns: `file`, relative to the table; optionally `first_frame` and `last_frame`; landmarks;
-    controls by name, optional for those that can be measured. Raises RecipeError, naming line and
+    controls by name, optional for those that can be measured; label sets by name, if `labels` does
+    not give the name of all clips. Raises RecipeError, naming line and
     column, for an invalid cell, and as `examples_of_files`.
     """
     own = clip_table.open_table(path)
     landmarks, controls = reopened.making.landmarks, reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
+    sets = _open_sets(reopened, labels)
     own.require(
         {
             "file": "the motion file",
             **dict.fromkeys(landmarks, "a landmark"),
             **dict.fromkeys(typed, "a control that cannot be measured"),
+            **dict.fromkeys(sets, "a label set"),
         }
     )
-    own.expect_only({"file", "first_frame", "last_frame", *landmarks, *(c.name for c in controls)})
+    names = (*landmarks, *(control.name for control in controls), *sets)
+    own.expect_only({"file", "first_frame", "last_frame", *names})
     rows, given = [], []
     for line, record in own.records:
-        rows.append(_table_row(own, line, record, performer, tuple(landmarks)))
+        told = {**labels, **{name: _label(reopened, own, line, record, name) for name in sets}}
+        rows.append(_table_row(own, line, record, told, tuple(landmarks)))
         names = [control.name for control in controls if control.name in record]
         given.append({name: own.number(line, record, name) for name in names})
     clip_table.refuse_repeats(rows)
     return _examples(reopened, rows, source, given)
 
 
-def _row(path: Path, performer: str) -> ClipRow:
-    return ClipRow(path, str(path), None, performer, 0, None, np.zeros(0), ())
+def _open_sets(reopened: ReconstructedModel, labels: Mapping[str, str]) -> list[str]:
+    """Return the label sets of a model that labels do not name."""
+    return [own.name for own in reopened.card.labels if own.name not in labels]
+
+
+def _label(
+    reopened: ReconstructedModel, own: ClipTable, line: int, record: dict[str, str], name: str
+) -> str:
+    """Return the name of a row in a label set; RecipeError for one that the model lacks."""
+    known = next(one.names for one in reopened.card.labels if one.name == name)
+    if record[name] not in known:
+        found = f"{record[name]!r}{did_you_mean(record[name], known)}"
+        expected = f"expected one of {', '.join(known)}"
+        raise RecipeError(own.name, f"column {name!r}: {found}, {expected}", line)
+    return record[name]
+
+
+def _row(path: Path, labels: Mapping[str, str]) -> ClipRow:
+    who, others = _split(labels)
+    return ClipRow(path, str(path), None, who, 0, None, np.zeros(0), (), others)
+
+
+def _split(labels: Labels) -> tuple[str, dict[str, str]]:
+    """Return the performer and the names in further label sets."""
+    others = {name: label for name, label in labels.items() if name != PERFORMER}
+    return labels[PERFORMER], others
 
 
 def _table_row(
-    own: ClipTable, line: int, record: dict[str, str], performer: str, landmarks: tuple[str, ...]
+    own: ClipTable,
+    line: int,
+    record: dict[str, str],
+    labels: Mapping[str, str],
+    landmarks: tuple[str, ...],
 ) -> ClipRow:
     first = own.frame(line, record, "first_frame") if "first_frame" in record else 0
     last = own.frame(line, record, "last_frame") if "last_frame" in record else None
@@ -95,7 +134,8 @@ def _table_row(
     except RecipeError as fault:
         raise RecipeError(own.name, f"column 'file': {fault.message}", line) from fault
     marks = tuple(own.frame(line, record, column) for column in landmarks)
-    return ClipRow(place, own.name, line, performer, first, last, np.zeros(0), marks)
+    who, others = _split(labels)
+    return ClipRow(place, own.name, line, who, first, last, np.zeros(0), marks, others)
 
 
 def _examples(

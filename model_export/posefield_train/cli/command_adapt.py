@@ -11,6 +11,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import UpAxis
 from posefield.console.arguments import Json, ModelPath
 from posefield.console.question_options import with_option_groups
+from posefield.model_file.model_card import PERFORMER
 from posefield_train.cli import output_files
 from posefield_train.cli.progress_messages import ProgressPrinter
 
@@ -58,6 +59,13 @@ def adapt(
     licence: Annotated[
         str, typer.Option(help="licence of the new clips, with its required attribution")
     ],
+    label: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="name of all clips in a further label set of the model; may be repeated",
+            metavar="SET=NAME",
+        ),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Add a performer to a model from a few clips.
@@ -79,16 +87,30 @@ def adapt(
         progress(f"reading {model}")
         known = model_reconstruction.load(model)
         adapted_file.check_name(known.card, performer)
+        labels = _labels(label or [])
+        adapted_file.check_labels(known.card, labels)
+        labels[PERFORMER] = performer
         source = Source(metres_per_unit=files.unit, up=files.up, root_offset=files.root_offset)
         progress("reading clips")
         if files.table:
-            examples, notes = new_clips.examples_of_table(known, files.table, source, performer)
+            examples, notes = new_clips.examples_of_table(known, files.table, source, labels)
         else:
-            examples, notes = new_clips.examples_of_files(
-                known, files.clips or [], source, performer
-            )
+            examples, notes = new_clips.examples_of_files(known, files.clips or [], source, labels)
         progress("adapting, and comparing the graph with the reference")
         made = adapted_file.export_adapted(known, NewPerformer(performer, examples, licence, notes))
         atomic_files.write(made.content, output)
         progress("done")
     typer.echo(output_files.format_output(made, output, json))
+
+
+def _labels(given: list[str]) -> dict[str, str]:
+    """Return names by label set; InvalidField for another form, or a set that is named twice."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, mark, label = text.partition("=")
+        if not (name and mark and label):
+            raise InvalidField("label", f"{text!r}, expected SET=NAME")
+        if name in found:
+            raise InvalidField("label", f"{name!r} twice, expected once")
+        found[name] = label
+    return found

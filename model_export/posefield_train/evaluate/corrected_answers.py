@@ -134,7 +134,8 @@ def correct_motions(
     assert event is not None
     opened = session.open_bytes(file, recipe.name)
     desk = _MotionCorrector(opened, constrained_motion.build_corrector(opened, 0), event)
-    labels = sample_points.performer_labels(asked.performers, opened.card.performers)
+    known = {own.name: own.names for own in opened.card.labels}
+    labels = sample_points.label_weights(asked.labels, known)
     clips = zip(asked.controls[:, None], labels[:, None], wanted, strict=True)
     motions, corrections = zip(*(_correct(desk, *clip) for clip in clips), strict=True)
     return CorrectedMotions(list(motions), list(corrections))

@@ -126,11 +126,11 @@ def _inverse_square(distances: Floats) -> Floats:
 
 
 def nearest_of_performer(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-    """Return the nearest example of the same performer, or of any if that performer has none."""
+    """Return the nearest of the examples that share most labels, such as the performer."""
     found = np.empty((len(queries), values.shape[1]))
     for row, query in enumerate(queries):
-        same = samples.points[:, samples.controls :] @ query[samples.controls :] > 0.5
-        among = same if same.any() else np.ones(len(values), dtype=bool)
+        shared = samples.points[:, samples.controls :] @ query[samples.controls :]
+        among = shared > shared.max() - 0.5
         known = samples.half_ranges[among]
         model = KNeighborsRegressor(1).fit(known, values[among])
         found[row] = model.predict(query[None, : samples.controls])[0]

@@ -151,7 +151,7 @@ def _trained_error(
     with single_thread.single_threaded():
         trained = train(own, examples, lambda _: None)
         points = ground_truth.truth_points(ASKED)
-        found = methods.predict_posefield(own, trained, Queries(points, [""] * len(points)))
+        found = methods.predict_posefield(own, trained, Queries(points, [{}] * len(points)))
         pairs = zip(found, ground_truth.truth_motions(points, None), strict=True)
         mean = motion_errors.mean(
             [motion_errors.compare_motions(made, true, ()) for made, true in pairs]

@@ -44,10 +44,10 @@ DEFINITIONS = {
 
 @dataclass(frozen=True)
 class Queries:
-    """Queries. controls: (Q, d). performers: Q names; an empty name for no performer."""
+    """Queries. controls: (Q, d). labels: names of each query by label set; empty for none."""
 
     controls: Floats
-    performers: Sequence[str]
+    labels: Sequence[Mapping[str, str]]
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def captured_event(
 
 
 def _labels(trained: TrainedModel, asked: Queries) -> Floats:
-    return sample_points.performer_labels(asked.performers, trained.model.bank.performers)
+    return sample_points.label_weights(asked.labels, trained.model.bank.labels)
 
 
 def predict_posefield(
@@ -153,7 +153,7 @@ def _methods(trained: TrainedModel) -> dict[str, Callable[[Floats], _PredictedVa
 
         return predict
 
-    left = () if laid.labelled else PERFORMER_METHODS
+    left = () if laid.labels else PERFORMER_METHODS
     peers = {name: of_peer(peer) for name, (peer, _) in INTERPOLATORS.items() if name not in left}
     return {NAIVE: lambda points: _predict_naive(trained, laid, points), **peers}
 

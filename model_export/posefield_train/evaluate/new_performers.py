@@ -14,7 +14,7 @@ from posefield_train.evaluate.methods import Queries
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.source.ingest import Example
-from posefield_train.source.recipe import Recipe
+from posefield_train.source.recipe import PERFORMER, Recipe
 
 NO_PERFORMER = "posefield_no_performer"
 ADAPTATION_COUNTS = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
@@ -27,12 +27,13 @@ def predict_unnamed(
     recipe: Recipe, trained: TrainedModel, asked: Queries
 ) -> dict[str, list[ComparedMotion]]:
     """Return the answers without performers; empty if the model does not distinguish them."""
-    if not trained.model.bank.performers:
+    if PERFORMER not in trained.model.bank.labels:
         return {}
-    nobody = [""] * len(asked.performers)
-    return {
-        NO_PERFORMER: methods.predict_posefield(recipe, trained, replace(asked, performers=nobody))
-    }
+    others = [
+        {name: label for name, label in labels.items() if name != PERFORMER}
+        for labels in asked.labels
+    ]
+    return {NO_PERFORMER: methods.predict_posefield(recipe, trained, replace(asked, labels=others))}
 
 
 def predict_adapted(
@@ -42,7 +43,7 @@ def predict_adapted(
 
     None if there are too few others. Empty if the model does not distinguish performers.
     """
-    if not trained.model.bank.performers:
+    if PERFORMER not in trained.model.bank.labels:
         return {}
     if len(np.unique(sample_points.take_numbers(held))) <= MIN_OTHER_TAKES:
         return {name: [None] * len(held) for name in ADAPTATION_COUNTS}
@@ -67,7 +68,7 @@ def _motions(
         if shown not in models:
             own = adaptation.adapt(known, [held[i] for i in shown], example.row.performer)
             models[shown] = replace(trained, model=own.model)
-        asked = Queries(example.controls[None], [example.row.performer])
+        asked = Queries(example.controls[None], [example.row.labels])
         found += methods.predict_posefield(recipe, models[shown], asked)
     return found
 

@@ -165,7 +165,7 @@ def _run_fold(
     except TrainingError as error:
         named = ", ".join(sorted({example.row.place.name for example in held}))
         raise TrainingError(f"with {named} held out: {error}") from error
-    asked = Queries(np.stack([e.controls for e in held]), [e.row.performer for e in held])
+    asked = Queries(np.stack([e.controls for e in held]), [e.row.labels for e in held])
     events = [methods.captured_event(recipe, made.trained, e.landmarks) for e in held]
     pairs = zip(held, events, strict=True)
     captured = [compared_motion.motion_of_clip(example.clip, event) for example, event in pairs]
@@ -194,7 +194,7 @@ def _run_truth_batch(made: _EvaluatedModel, points: Floats, start: int) -> _Part
     event = methods.captured_event(made.recipe, made.trained, ())
     captured = ground_truth.truth_motions(points, event)
     places = tuple(range(start, start + len(points)))
-    asked = Queries(points, [""] * len(points))
+    asked = Queries(points, [{}] * len(points))
     return _compare_methods(
         made, places, asked, _ReferenceMotions(captured, [event] * len(points), {})
     )

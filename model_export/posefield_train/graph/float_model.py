@@ -53,10 +53,10 @@ class FloatModel:
     ) -> ModelOutputs:
         """Return outputs at controls (B, d) in their own units and times (B, S), s, of a level.
 
-        labels: performers (B, p), by default an unseen performer.
+        labels: weights (B, p) of names, by default none of any label set.
         """
-        nobody = np.zeros((len(controls), len(self.bank.performers)))
-        fields = self.fields(controls, nobody if labels is None else labels, level)
+        none = np.zeros((len(controls), self.bank.label_count))
+        fields = self.fields(controls, none if labels is None else labels, level)
         return self.outputs_at_times(fields, time, level)
 
     def fields(self, controls: Floats, labels: Floats, level: int) -> dict[str, Floats]:
@@ -129,9 +129,9 @@ class FloatModel:
         net.add_output("travel", gone)
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
-        if self.bank.performers:
+        if self.bank.labels:
             # Its default has one row, so its axis must not share the name "batch".
-            inputs["performer"] = ["batch_or_one", len(self.bank.performers)]
+            inputs["labels"] = ["batch_or_one", self.bank.label_count]
         inputs["level"] = []
         outputs: Shapes = {
             "rotations": ["batch", "steps", joints, 4],

@@ -19,16 +19,23 @@ from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.session import Session
 from posefield.kriging import typical_clip
-from posefield.kriging.kriging_model import Hyper, half_ranges
+from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
 from posefield.model_file import model_card
 from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import Control, ModelCard, Preset, TrainingParameters
+from posefield.model_file.model_card import (
+    Control,
+    LabelSet,
+    ModelCard,
+    Preset,
+    TrainingParameters,
+)
 from posefield_train.align import phase_alignment
 from posefield_train.graph import levels, truncation_cost
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import sample_points
+from posefield_train.kriging import sample_points, thinning
 from posefield_train.kriging.kriging_bank import EVENT
+from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
 from posefield_train.source import measured_controls
@@ -140,24 +147,24 @@ class _ParityInputs:
 
     def said(self, own_card: ModelCard, row: int) -> str:
         """Describe one of the inputs in words."""
-        names = (control.name for control in own_card.controls)
-        point = dict(zip(names, self.points[row].tolist(), strict=True))
-        own = np.flatnonzero(self.labels[row])
-        who = f"{own_card.performers[own[0]]}, " if len(own) else ""
+        controls = (control.name for control in own_card.controls)
+        point = dict(zip(controls, self.points[row].tolist(), strict=True))
+        names = [name for own in own_card.labels for name in own.names]
+        who = "".join(f"{names[i]}, " for i in np.flatnonzero(self.labels[row]))
         return f"{who}{point}, {self.times[row, 0]:.3f} s, level {self.level}"
 
 
 def _draw_inputs(
     rng: np.random.Generator, model: FloatModel, own_card: ModelCard, level: int
 ) -> _ParityInputs:
-    """Draw random controls, performers and times of their clips.
+    """Draw random controls, labels and times of their clips.
 
-    No performer is as likely as each of the performers.
+    In each label set no name is as likely as each of the names.
     """
     low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
     points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
-    performers = len(own_card.performers)
-    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, BATCH)]
+    drawn = thinning.random_labels(rng, model.bank.labels, BATCH)
+    labels = np.hstack([np.zeros((BATCH, 0)), *drawn])
     durations = model.durations(points, labels)
     times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
     return _ParityInputs(points, times.astype(np.float32).astype(np.float64), labels, level)
@@ -192,9 +199,8 @@ def _card(
         samples=len(examples),
         levels=ladder,
         durations=(float(durations.min()), float(durations.max())),
-        performers=trained.model.bank.performers,
         examples=tuple(tuple(map(float, example.controls)) for example in examples),
-        moved_by=tuple(map(int, trained.samples.moved_by)),
+        labels=card_labels(trained.model.bank.labels, trained.samples),
         feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
@@ -207,7 +213,7 @@ def _card(
         joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
         making=_making(recipe, trained),
         presets=tuple(
-            Preset(name, preset.values, preset.performer) for name, preset in recipe.presets.items()
+            Preset(name, preset.values, preset.labels) for name, preset in recipe.presets.items()
         ),
     )
 
@@ -245,10 +251,16 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
     )
 
 
-def kriging_settings(hyper: Hyper) -> tuple[float, float, float]:
-    """Return nugget, offset and trend with six digits, as adaptation reads them."""
-    nugget, offset, trend = (float(f"{x:.6g}") for x in (hyper.nugget, hyper.offset, hyper.trend))
-    return nugget, offset, trend
+def card_labels(known: LabelNames, samples: SamplePoints) -> tuple[LabelSet, ...]:
+    """Return the label sets of a card from their names and the samples."""
+    pairs = zip(known.items(), samples.label_indices, strict=True)
+    return tuple(LabelSet(name, names, tuple(own.tolist())) for (name, names), own in pairs)
+
+
+def kriging_settings(hyper: Hyper) -> tuple[float, ...]:
+    """Return nugget, trend and offsets with six digits, as adaptation reads them."""
+    offsets = (own.offset for own in hyper.labels)
+    return tuple(float(f"{x:.6g}") for x in (hyper.nugget, hyper.trend, *offsets))
 
 
 def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
@@ -298,9 +310,11 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         "drift": list(hyper.drifts),
         "scales": [_rounded(scale) for scale in hyper.scales],
         "nugget": _rounded(hyper.nugget),
-        "correlation": _rounded(hyper.correlation),
-        "offset": _rounded(hyper.offset),
         "trend": _rounded(hyper.trend),
+        "labels": {
+            name: {"correlation": _rounded(own.correlation), "offset": _rounded(own.offset)}
+            for name, own in zip(trained.model.bank.labels, hyper.labels, strict=True)
+        },
         "tensor": list(trained.tensor.values.shape),
         "parity_m": float(f"{parity:.1e}"),
         "notes": [
@@ -317,9 +331,11 @@ def plain_parameters(hyper: Hyper) -> Hyper:
     return replace(
         hyper,
         nugget=float(hyper.nugget),
-        correlation=float(hyper.correlation),
-        offset=float(hyper.offset),
         trend=float(hyper.trend),
+        labels=tuple(
+            LabelKernel(own.count, float(own.correlation), float(own.offset))
+            for own in hyper.labels
+        ),
     )
 
 

@@ -93,7 +93,7 @@ def count_operations(model: FloatModel, level: int) -> int:
     bank, rung = model.bank, model.decoder.level_sizes[level]
     columns = bank.columns(level)
     r1, r2, r3 = rung.ranks if level else model.decoder.blended[0].shape
-    distances = columns * (2 + 2 * len(bank.low) + len(bank.performers))
+    distances = columns * (2 + 2 * len(bank.low) + len(bank.labels) * bank.label_count)
     values = (bank.linear + columns) * sum(bank.sizes(r3))
     decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3)
     return distances + values + _form_rows(bank, level) ** 2 + decoding

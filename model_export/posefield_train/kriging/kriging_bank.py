@@ -27,6 +27,7 @@ from posefield.common.units import Floats
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging.power_law import PowerLaw
+from posefield_train.kriging.sample_points import LabelNames
 from posefield_train.kriging.universal_kriging import UniversalKriging
 
 
@@ -55,16 +56,16 @@ def width(field: CoefficientModel) -> int:
 class KrigingBank:
     """Coefficient models by name over controls sampled in the ranges low to high (d,).
 
-    performers: names, in the order of their labels. sill: of the pose model, m² per joint and
-    frame. coarse: weights (p + 1 + d + m, M) of each coarser level. Rows: labels, one, controls and
-    the first m covariances. Columns: the logarithm of the variance, the other quantities, the
-    pose's leading coefficients. power_law: of the duration, beside its model. event: second model
-    of the pose's leading coefficients, for the time around the event, at the finest level.
+    labels: names of each label set. sill: of the pose model, m² per joint and frame. coarse:
+    weights (p + 1 + d + m, M) of each coarser level. Rows: labels, one, controls and the first m
+    covariances. Columns: the logarithm of the variance, the other quantities, the pose's leading
+    coefficients. power_law: of the duration, beside its model. event: second model of the pose's
+    leading coefficients, for the time around the event, at the finest level.
     """
 
     low: PerControl
     high: PerControl
-    performers: tuple[str, ...]
+    labels: LabelNames
     pose: UniversalKriging
     others: dict[str, CoefficientModel]
     sill: float
@@ -80,7 +81,12 @@ class KrigingBank:
     @property
     def linear(self) -> int:
         """Return the number of labels, one and controls, which precede the covariances."""
-        return len(self.performers) + 1 + len(self.low)
+        return self.label_count + 1 + len(self.low)
+
+    @property
+    def label_count(self) -> int:
+        """Return the number of names of all label sets together."""
+        return sum(map(len, self.labels.values()))
 
     def columns(self, level: int) -> int:
         """Return the number of samples, and so of covariances, that a level evaluates."""
@@ -153,7 +159,7 @@ class KrigingBank:
         """Return a model's weights (p + 1 + d, m) of labels, one and controls."""
         if isinstance(field, ConstantModel):
             found = np.zeros((self.linear, len(field.mean)))
-            found[len(self.performers)] = field.mean
+            found[self.label_count] = field.mean
             return found
         return kriging_model.linear_terms(field.hyper, field.samples) @ field.dual
 
@@ -176,12 +182,12 @@ class KrigingBank:
     @property
     def variance_form(self) -> Annotated[Floats, "rows rows"]:
         """Return the quadratic form (p + 1 + d + n, p + 1 + d + n) of the variance in the basis."""
-        hyper, p = self.pose.hyper, len(self.performers)
+        hyper, p = self.pose.hyper, self.label_count
         terms = kriging_model.linear_terms(hyper, self.pose.samples)
         near = np.eye(len(self.pose.samples), terms.shape[1])
         both = np.vstack([terms, near])
         found = -both @ self.pose.form @ both.T
-        found[p, p] += 1.0 + hyper.offset + hyper.nugget
+        found[p, p] += 1.0 + sum(own.offset for own in hyper.labels) + hyper.nugget
         controls = np.arange(p + 1, self.linear)
         found[controls, controls] += hyper.trend
         return found

@@ -5,6 +5,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats
+from posefield.kriging import kriging_model
 from posefield_train.kriging import kriging_bank
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import (
@@ -47,8 +48,8 @@ def onnx(
 ) -> dict[str, str]:
     """Build values (B, m) of each quantity by name, with `sigma` (B,) in place of the variance.
 
-    With performers, the graph has the optional input `performer` (B or 1, p) of labels. Its default
-    is zeros, which stand for an unseen performer.
+    With label sets, the graph has the optional input `labels` (B or 1, p): a weight for each name
+    of each set. Its default is zeros, which leave all sets open.
     """
     points = _points(bank, net, controls)
     linear = _linear(bank, net, controls, points)
@@ -82,14 +83,14 @@ def _points(bank: KrigingBank, net: GraphBuilder, controls: str) -> str:
 
 
 def _linear(bank: KrigingBank, net: GraphBuilder, controls: str, points: str) -> str:
-    """Build the points with labels in front (B, p + 1 + d), if there are performers."""
-    if not bank.performers:
+    """Build the points with labels in front (B, p + 1 + d), if there are label sets."""
+    if not bank.labels:
         return points
-    performers = len(bank.performers)
-    performer = net.weights("performer", np.zeros((1, performers)))
+    count = bank.label_count
+    labels = net.weights("labels", np.zeros((1, count)))
     rows = net("Shape", controls, start=0, end=1)
-    shape = net("Concat", rows, net.indices(performers), axis=0)
-    return net("Concat", net("Expand", performer, shape), points, axis=1)
+    shape = net("Concat", rows, net.indices(count), axis=0)
+    return net("Concat", net("Expand", labels, shape), points, axis=1)
 
 
 def _covariances(
@@ -107,11 +108,13 @@ def _covariances(
     # Rounding can make a squared distance of zero negative, and its square root NaN.
     squared = net("Relu", net("MatMul", both, factors))
     near = COVARIANCES[bank.pose.hyper.covariance].onnx(net, squared)
-    if not bank.performers:
+    if not bank.labels:
         return near
-    shares = net("Slice", _performer_shares(bank, net), zero, columns, one)
-    kept = net("Slice", linear, zero, net.indices(len(bank.performers) + 1), one)
-    return net("Mul", near, net("MatMul", kept, shares))
+    kept = net("Slice", linear, zero, net.indices(bank.label_count + 1), one)
+    for every in _label_shares(bank, net):
+        shares = net("Slice", every, zero, columns, one)
+        near = net("Mul", near, net("MatMul", kept, shares))
+    return near
 
 
 def _factors(bank: KrigingBank, net: GraphBuilder) -> str:
@@ -127,18 +130,22 @@ def _factors(bank: KrigingBank, net: GraphBuilder) -> str:
     return net("Concat", nothing, everywhere, own, cross, axis=0)
 
 
-def _performer_shares(bank: KrigingBank, net: GraphBuilder) -> str:
-    """Build the shares (p + 1, n) of the covariances by a query's labels and one.
+def _label_shares(bank: KrigingBank, net: GraphBuilder) -> list[str]:
+    """Build the shares (p + 1, n) of the covariances by a query's labels and one, for each set.
 
-    Between two performers the correlation remains, and the whole of it for one performer.
+    Between two names of a set its correlation remains, and the whole of it for one name.
     """
-    p, correlation = len(bank.performers), bank.pose.hyper.correlation
-    whose = net.weights("whose", np.argmax(bank.pose.samples[:, len(bank.low) :], axis=1))
-    states = net.weights("states", np.array([0.0, 1.0 - correlation]))
-    same = net("OneHot", whose, net.indices(p), states, axis=0)
+    found, d, counts = [], len(bank.low), bank.pose.hyper.label_counts
     shape = net.indices(1, len(bank.pose.samples))
-    every = net("Expand", net.weights("correlation", np.array([[correlation]])), shape)
-    return net("Concat", same, every, axis=0)
+    for index, columns in enumerate(kriging_model.label_columns(d, counts)):
+        correlation = bank.pose.hyper.labels[index].correlation
+        own = np.argmax(bank.pose.samples[:, columns], axis=1) + columns.start - d
+        whose = net.weights(f"whose_{index}", own)
+        states = net.weights(f"states_{index}", np.array([0.0, 1.0 - correlation]))
+        same = net("OneHot", whose, net.indices(bank.label_count), states, axis=0)
+        kept = net.weights(f"correlation_{index}", np.array([[correlation]]))
+        found.append(net("Concat", same, net("Expand", kept, shape), axis=0))
+    return found
 
 
 def _weights(bank: KrigingBank, net: GraphBuilder) -> str:
@@ -158,7 +165,7 @@ def _coarse_weights(bank: KrigingBank, net: GraphBuilder, level: int) -> str:
     """Build the flat weights of a coarser level, preceded by those of a constant one."""
     stored = net.weights(f"weights_{level}", bank.coarse[level - 1])
     one = np.zeros((len(bank.coarse[level - 1]), 1))
-    one[len(bank.performers)] = 1.0
+    one[bank.label_count] = 1.0
     both = net("Concat", net.weights(f"one_{level}", one), stored, axis=1)
     return net("Reshape", both, net.indices(-1))
 
@@ -184,7 +191,7 @@ def _variance(bank: KrigingBank, net: GraphBuilder, basis: str, ends: dict[str, 
     Coarser levels use the constant alone, in front.
     """
     zero, one = net.indices(0), net.indices(1)
-    linear = len(bank.performers)
+    linear = bank.label_count
     constant = net("Slice", basis, net.indices(linear), net.indices(linear + 1), one)
     own = net("Slice", net("Concat", constant, basis, axis=1), zero, ends["own"], one)
     whole = bank.variance_form

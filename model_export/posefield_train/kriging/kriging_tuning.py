@@ -5,9 +5,9 @@ their likelihood with an unknown variance, less the logarithm of the parameters'
 leave the parameters undetermined; the prior decides between those that fit alike.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Annotated
 
 import numpy as np
@@ -16,7 +16,8 @@ from scipy.special import expit
 
 from posefield.common.array_shapes import PerSample, SampleValues
 from posefield.common.units import Floats, Indices
-from posefield.kriging import leave_one_out
+from posefield.kriging import kriging_model, leave_one_out
+from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
@@ -48,7 +49,12 @@ PRIORS = {
     "offset": _in_logarithms(1e-3, 30.0, 0.3, 2.0),
     "trend": _in_logarithms(1e-3, 300.0, 1.0, 2.5),
 }
-"""Priors of the parameters besides the scales, in the order of the search."""
+"""Priors of the parameters besides the scales, in the order of the search.
+
+Each label set has a correlation and an offset of its own with these priors.
+"""
+Parameter = tuple[str, int]
+"""Name of a parameter, and the index of its label set; 0 for the others."""
 # The loss has several minima, between a smooth field and one of independent samples.
 STARTS = ((0.5, 0.1), (0.25, 0.03), (1.0, 0.3))
 """Scale and nugget at which searches start."""
@@ -108,7 +114,9 @@ def tune(problem: TuningProblem, covariance: str, degree: int | None) -> TunedKr
 
     degree: of the drift; None for a constant and a trend within the covariance.
     """
-    hyper = Hyper(covariance, (degree or 0,), np.ones(problem.samples.controls), 0.0, 1.0, 0.0, 0.0)
+    labels = tuple(LabelKernel(count, 1.0, 0.0) for count in problem.samples.labels)
+    scales = np.ones(problem.samples.controls)
+    hyper = Hyper(covariance, (degree or 0,), scales, 0.0, 0.0, labels)
     names = _free(problem, trend=degree is None)
     starts = [(np.log(scale), np.log(nugget)) for scale, nugget in STARTS]
     loss = LeaveOneOutLoss(problem, hyper, names, own_scales=True)
@@ -127,17 +135,17 @@ def tune_with_trend(problem: TuningProblem, hyper: Hyper) -> TunedKriging:
 
 
 def _tune_at_scales(problem: TuningProblem, hyper: Hyper, trend: bool) -> TunedKriging:
-    names = tuple(name for name in _free(problem, trend) if name != "correlation")
-    loss = LeaveOneOutLoss(problem, replace(hyper, offset=0.0), names, own_scales=False)
+    names = tuple(own for own in _free(problem, trend) if own[0] != "correlation")
+    loss = LeaveOneOutLoss(problem, hyper.without_offsets(), names, own_scales=False)
     return _best(loss, [loss.start(0.0, np.log(nugget)) for _, nugget in STARTS])
 
 
-def _free(problem: TuningProblem, trend: bool) -> tuple[str, ...]:
-    """Return the names of the parameters besides the scales that a problem leaves open."""
-    fixed = set() if problem.samples.labelled else {"correlation", "offset"}
-    fixed |= set() if trend else {"trend"}
-    fixed |= set() if problem.nugget is None else {"nugget"}
-    return tuple(name for name in PRIORS if name not in fixed)
+def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
+    """Return the parameters besides the scales that a problem leaves open."""
+    sets = len(problem.samples.labels)
+    counts = {"correlation": sets, "offset": sets}
+    counts |= {"trend": int(trend), "nugget": int(problem.nugget is None)}
+    return tuple((name, index) for name in PRIORS for index in range(counts[name]))
 
 
 def _best(loss: "LeaveOneOutLoss", starts: Sequence[Floats]) -> TunedKriging:
@@ -166,42 +174,47 @@ class LeaveOneOutLoss:
 
     problem: TuningProblem
     hyper: Hyper
-    names: tuple[str, ...]
+    names: tuple[Parameter, ...]
     own_scales: bool
     priors: list[ParameterPrior] = field(init=False)
 
     def __post_init__(self) -> None:
         scales = [SCALE_PRIOR] * (self.problem.samples.controls if self.own_scales else 0)
-        object.__setattr__(self, "priors", scales + [PRIORS[name] for name in self.names])
+        object.__setattr__(self, "priors", scales + [PRIORS[name] for name, _ in self.names])
 
     def start(self, scale: float, nugget: float) -> Annotated[Floats, "units"]:
         """Return a start of the search from the logarithms of a scale and a nugget."""
         means = np.array([prior.mean for prior in self.priors])
         if self.own_scales:
             means[: self.problem.samples.controls] = scale
-        if "nugget" in self.names:
-            means[self._place("nugget")] = nugget
+        if NUGGET in self.names:
+            means[self._place(NUGGET)] = nugget
         return means
 
-    def _place(self, name: str) -> int:
+    def _place(self, name: Parameter) -> int:
         return len(self.priors) - len(self.names) + self.names.index(name)
 
     def read(self, x: Annotated[Floats, "units"]) -> Hyper:
         """Return the parameters at a point of the search."""
         scales = len(self.priors) - len(self.names)
-        found = {name: float(np.exp(x[self._place(name)])) for name in self.names}
-        if "correlation" in found:
-            found["correlation"] = float(expit(x[self._place("correlation")]))
+        found = {name: _value(name, x[self._place(name)]) for name in self.names}
         if self.problem.nugget is not None:
-            found["nugget"] = self.problem.nugget
+            found[NUGGET] = self.problem.nugget
         own = self.hyper
+        kernels = (
+            LabelKernel(
+                kernel.count,
+                found.get(("correlation", index), kernel.correlation),
+                found.get(("offset", index), kernel.offset),
+            )
+            for index, kernel in enumerate(own.labels)
+        )
         return replace(
             own,
             scales=np.exp(x[:scales]) if self.own_scales else own.scales,
-            nugget=found.get("nugget", own.nugget),
-            correlation=found.get("correlation", own.correlation),
-            offset=found.get("offset", own.offset),
-            trend=found.get("trend", own.trend),
+            nugget=found.get(NUGGET, own.nugget),
+            trend=found.get(TREND, own.trend),
+            labels=tuple(kernels),
         )
 
     def value_and_slope(
@@ -293,28 +306,49 @@ class LeaveOneOutLoss:
         return np.square(np.subtract(planes[:, :, None], planes[:, None, :]))
 
     @cached_property
-    def _same(self) -> Floats:
-        """Matrix (n, n): one where two samples have one performer."""
-        labels = self.problem.samples.points[:, self.problem.samples.controls :]
-        return labels @ labels.T
+    def _same(self) -> list[Floats]:
+        """Matrix (n, n) of each label set: one where two samples have one name."""
+        points = self.problem.samples.points
+        return kriging_model.label_products(self.hyper, points, points)
 
     def _changes(self, hyper: Hyper) -> list[Floats]:
         """Return the derivatives (n, n) of the covariances by each search unit."""
-        controls, same = self.problem.samples.half_ranges, self._same
-        model = COVARIANCES[hyper.covariance]
-        share = hyper.correlation + (1.0 - hyper.correlation) * same
-        found: list[Floats] = []
+        controls, model = self.problem.samples.half_ranges, COVARIANCES[hyper.covariance]
         squared = np.tensordot(np.square(hyper.scales), self._gaps, axes=1)
+        pairs = zip(hyper.labels, self._same, strict=True)
+        shares = [own.correlation + (1.0 - own.correlation) * same for own, same in pairs]
+        found: list[Floats] = []
         if self.own_scales:
-            slope = 2.0 * model.slope(squared) * (share if self.problem.samples.labelled else 1.0)
-            pairs = zip(hyper.scales, self._gaps, strict=True)
-            found += [scale**2 * gaps * slope for scale, gaps in pairs]
-        by_name = {
-            "nugget": lambda: hyper.nugget * np.eye(len(controls)),
-            "correlation": lambda: (
-                hyper.correlation * (1.0 - hyper.correlation) * model.numpy(squared) * (1.0 - same)
+            slope = 2.0 * model.slope(squared) * _product(shares)
+            scaled = zip(hyper.scales, self._gaps, strict=True)
+            found += [scale**2 * gaps * slope for scale, gaps in scaled]
+        by_name: dict[str, Callable[[int], Floats]] = {
+            "nugget": lambda _: hyper.nugget * np.eye(len(controls)),
+            "correlation": lambda index: (
+                _odds_slope(hyper.labels[index].correlation)
+                * model.numpy(squared)
+                * (1.0 - self._same[index])
+                * _product(shares[:index] + shares[index + 1 :])
             ),
-            "offset": lambda: hyper.offset * same,
-            "trend": lambda: hyper.trend * (controls @ controls.T),
+            "offset": lambda index: hyper.labels[index].offset * self._same[index],
+            "trend": lambda _: hyper.trend * (controls @ controls.T),
         }
-        return found + [by_name[name]() for name in self.names]
+        return found + [by_name[name](index) for name, index in self.names]
+
+
+NUGGET, TREND = ("nugget", 0), ("trend", 0)
+
+
+def _value(name: Parameter, unit: float) -> float:
+    """Return the value of a parameter at a search unit."""
+    return float(expit(unit) if name[0] == "correlation" else np.exp(unit))
+
+
+def _odds_slope(share: float) -> float:
+    """Return the derivative of a share by its log odds."""
+    return share * (1.0 - share)
+
+
+def _product(shares: Sequence[Floats]) -> Floats | float:
+    """Return the product of matrices, 1.0 for none."""
+    return reduce(np.multiply, shares, 1.0)

@@ -93,6 +93,6 @@ def fit_naive(
         found = fitter(variogram.experimental_variogram(points, left), covariance)
         nugget = np.clip(found.nugget / found.sill if found.sill > 0 else 10.0, 1e-4, 10.0)
         scales = np.full(points.shape[1], 1.0 / found.range)
-        hyper = Hyper(covariance, (1,), scales, float(nugget), 1.0, 0.0, 0.0)
+        hyper = Hyper(covariance, (1,), scales, float(nugget), 0.0)
         fields.append(universal_kriging.solve(hyper, points, values[:, frame]))
     return NaiveKriging(tuple(fields), values)

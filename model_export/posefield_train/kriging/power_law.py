@@ -74,7 +74,7 @@ def fit_power_law(
         return None
     fits = []
     for nugget in NUGGETS:
-        hyper = replace(pose, drifts=(0,), nugget=nugget, offset=0.0, trend=0.0)
+        hyper = replace(pose.without_offsets(), drifts=(0,), nugget=nugget, trend=0.0)
         inverse: Floats = np.asarray(
             np.linalg.inv(kriging_model.noisy(hyper, samples.points)), dtype=np.float64
         )

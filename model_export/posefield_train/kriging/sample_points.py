@@ -1,7 +1,8 @@
-"""Sample points: controls and performers of the examples."""
+"""Sample points: controls and labels of the examples."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Annotated
 
 import numpy as np
@@ -14,20 +15,28 @@ from posefield.kriging.kriging_model import half_ranges
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
-NO_SAMPLES = np.zeros(0, dtype=np.int64)
+LabelNames = Mapping[str, tuple[str, ...]]
+"""Names of each label set, in the order of their columns."""
 
 
 @dataclass(frozen=True)
 class SamplePoints:
     """Sample points of a kriging model.
 
-    points: (n, d + p), controls in half-ranges, then the performers' labels. controls: d. groups:
-    group (n,) of each sample; a group is left out together.
+    points: (n, d + p), controls in half-ranges, then the weights of labels. controls: d. groups:
+    group (n,) of each sample; a group is left out together. labels: number of names of each label
+    set, p together.
     """
 
     points: Samples
     controls: int
     groups: Annotated[Indices, "samples"]
+    labels: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.points.shape[1] != self.controls + sum(self.labels):
+            expected = f"{self.controls} controls and {self.labels} labels"
+            raise ValueError(f"points {self.points.shape}, expected {expected}")
 
     @property
     def half_ranges(self) -> SampleControls:
@@ -35,14 +44,10 @@ class SamplePoints:
         return self.points[:, : self.controls]
 
     @property
-    def labelled(self) -> bool:
-        """Return True if performers have labels."""
-        return self.points.shape[1] > self.controls
-
-    @property
-    def moved_by(self) -> Annotated[Indices, "samples"]:
-        """Return the index (n,) of each sample's performer; empty without labels."""
-        return np.argmax(self.points[:, self.controls :], axis=1) if self.labelled else NO_SAMPLES
+    def label_indices(self) -> list[Annotated[Indices, "samples"]]:
+        """Return the index (n,) of each sample's name in each label set."""
+        columns = kriging_model.label_columns(self.controls, self.labels)
+        return [np.argmax(self.points[:, own], axis=1) for own in columns]
 
     def from_mean(self, values: SampleValues) -> SampleValues:
         """Return the differences of values (n, m) from the mean of all other groups."""
@@ -54,43 +59,67 @@ class SamplePoints:
         return values - others
 
 
-def performer_labels(
-    names: Sequence[str], performers: Sequence[str]
-) -> Annotated[Floats, "{len(names)} {len(performers)}"]:
-    """Return one-hot labels (N, p) of performers, zeros for an unknown name."""
-    own = [[float(name == performer) for performer in performers] for name in names]
-    return np.array(own).reshape(len(names), len(performers))
+def label_weights(
+    asked: Sequence[Mapping[str, str]], known: LabelNames
+) -> Annotated[Floats, "{len(asked)} _"]:
+    """Return weights (N, p) of the labels of N clips: one for a clip's name in each label set.
+
+    Those of a set are zero for an unknown name, and for a set that a clip does not name.
+    """
+    own = [
+        [float(one.get(label_set) == name) for label_set, names in known.items() for name in names]
+        for one in asked
+    ]
+    return np.array(own).reshape(len(asked), sum(map(len, known.values())))
 
 
-def make_samples(
-    recipe: Recipe, examples: Sequence[Example]
-) -> tuple[SamplePoints, tuple[str, ...]]:
-    """Return the samples of a recipe's examples, and the labelled performers sorted by name.
+def make_samples(recipe: Recipe, examples: Sequence[Example]) -> tuple[SamplePoints, LabelNames]:
+    """Return the samples of a recipe's examples, and the sorted names of each label set.
 
-    Raises TrainingError if a drift depends on a single example.
+    A label set of which all examples have one name is left out. Raises TrainingError if a drift
+    depends on a single example.
     """
     points = _points(examples)
-    names = [example.row.performer for example in examples]
-    # A single performer needs no label.
-    apart = recipe.kriging.label is not None and len(set(names)) > 1
-    performers = tuple(sorted(set(names))) if apart else ()
-    both = np.hstack([points, performer_labels(names, performers)])
-    return SamplePoints(both, points.shape[1], _groups(recipe, examples, points)), performers
+    given = [example.row.labels for example in examples]
+    every = {
+        label_set: tuple(sorted({labels[label_set] for labels in given}))
+        for label_set in recipe.kriging.label
+    }
+    known = {label_set: names for label_set, names in every.items() if len(names) > 1}
+    both = np.hstack([points, label_weights(given, known)])
+    counts = tuple(map(len, known.values()))
+    return SamplePoints(both, points.shape[1], _groups(recipe, examples, points), counts), known
 
 
 def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     """Return one note per setting of the recipe that the examples are too few for."""
-    said = []
-    laid, performers = make_samples(recipe, examples)
-    if recipe.kriging.label and not performers:
-        name = examples[0].row.performer
-        said.append(f"all clips are of one performer, {name!r}: kriging.label has no effect")
+    laid, known = make_samples(recipe, examples)
+    said = [
+        f"all clips are of one {label_set}, {examples[0].row.labels[label_set]!r}: kriging.label "
+        "has no effect"
+        for label_set in recipe.kriging.label
+        if label_set not in known
+    ]
+    said += _repeated_sets(laid, tuple(known))
     if len(np.unique(laid.groups)) > len(np.unique(take_numbers(examples))):
         said.append(
             "clips of one file are not left out together: those of the other files alone could "
             "not carry the drift"
         )
     return said
+
+
+def _repeated_sets(laid: SamplePoints, names: Sequence[str]) -> list[str]:
+    """Return a note for each two label sets that divide the samples alike."""
+    indices = dict(zip(names, laid.label_indices, strict=True))
+    return [
+        f"label sets {one!r} and {other!r} divide the clips alike: nothing tells their effects "
+        "apart, expected clips of one name in several of the other"
+        for one, other in combinations(names, 2)
+        if len(set(zip(indices[one].tolist(), indices[other].tolist(), strict=True)))
+        == len(set(indices[one].tolist()))
+        == len(set(indices[other].tolist()))
+    ]
 
 
 def _points(examples: Sequence[Example]) -> SampleControls:

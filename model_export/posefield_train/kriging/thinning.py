@@ -19,6 +19,7 @@ from posefield_train.kriging.kriging_bank import (
     ConstantModel,
     KrigingBank,
 )
+from posefield_train.kriging.sample_points import LabelNames
 from posefield_train.kriging.universal_kriging import UniversalKriging
 
 FIT_POINTS = 2_000
@@ -74,13 +75,19 @@ def random_points(
 ) -> Annotated[Floats, "{count} coordinates"]:
     """Return random points (Q, d + p) within `reach` half-ranges.
 
-    No performer is as likely as each of the performers.
+    In each label set no name is as likely as each of the names.
     """
     rng = np.random.Generator(np.random.PCG64(count))
     controls = rng.uniform(-reach, reach, (count, len(bank.low)))
-    performers = len(bank.performers)
-    labels = np.eye(performers + 1, performers)[rng.integers(0, performers + 1, count)]
-    return np.hstack([controls, labels])
+    return np.hstack([controls, *random_labels(rng, bank.labels, count)])
+
+
+def random_labels(
+    rng: np.random.Generator, known: LabelNames, count: int
+) -> list[Annotated[Floats, "{count} _"]]:
+    """Return one-hot weights (Q, .) of random names for each label set; zeros for no name."""
+    sizes = map(len, known.values())
+    return [np.eye(size + 1, size)[rng.integers(0, size + 1, count)] for size in sizes]
 
 
 @dataclass(frozen=True)

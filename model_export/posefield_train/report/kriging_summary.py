@@ -19,10 +19,6 @@ _MEANING = {
 }
 
 
-PARAMETERS = ("correlation", "offset", "trend")
-"""Parameters of a quantity beside its scales and nugget."""
-
-
 @dataclass(frozen=True)
 class KrigedQuantity:
     """A kriged quantity. explained: share of its variation. hyper: None for a constant."""
@@ -34,10 +30,11 @@ class KrigedQuantity:
 
 @dataclass(frozen=True)
 class KrigingSummary:
-    """All quantities of a model. controls: names."""
+    """All quantities of a model. controls, label_sets: names."""
 
     quantities: tuple[KrigedQuantity, ...]
     controls: tuple[str, ...]
+    label_sets: tuple[str, ...]
 
     def facts(self) -> dict[str, Any]:
         """Return the explained share and the parameters of each quantity."""
@@ -61,11 +58,19 @@ class KrigingSummary:
                 "scales": scales,
             }
             own |= {
-                name: significant_digits.round_number(getattr(quantity.hyper, name))
-                for name in PARAMETERS
+                name: significant_digits.round_number(value)
+                for name, value in self._parameters(quantity.hyper).items()
             }
             own |= {"drifts": list(quantity.hyper.drifts)}
         return own
+
+    def _parameters(self, hyper: Hyper) -> dict[str, float]:
+        """Return the parameters of a quantity beside its scales and nugget, by name."""
+        found = {"trend": hyper.trend}
+        for name, own in zip(self.label_sets, hyper.labels, strict=True):
+            found[f"correlation of {name}s"] = own.correlation
+            found[f"offset of {name}s"] = own.offset
+        return found
 
     def section(self) -> Section:
         """Return a table with a row for each quantity."""
@@ -75,23 +80,26 @@ class KrigingSummary:
             "than by the mean of the clips (by two standard errors) gets that mean.",
             "The scale of a control is its weight in the distance between clips, per half-range. "
             "All quantities share the scales. The nugget is the share of the variance that remains "
-            "between clips with equal controls. The correlation is that of the motions of two "
-            "performers with equal controls, the offset the variance of a performer's own offset, "
-            "and the trend that of the slope along a control.",
+            "between clips with equal controls, and the trend the variance of the slope along a "
+            "control. In each label set, such as performers, the correlation is that of the "
+            "motions of two names with equal controls, and the offset the variance of a name's "
+            "own offset.",
         )
         heading = ("quantity", "meaning", "explained", "predicted by", "nugget")
         scales = tuple(f"scale of {name}" for name in self.controls)
-        titles = (*heading, *PARAMETERS, *scales)
+        pose = next(own.hyper for own in self.quantities if own.hyper)
+        titles = (*heading, *self._parameters(pose), *scales)
         table = Table("UniversalKriging models", titles, tuple(map(self._row, self.quantities)))
         return Section("fields", "What the controls explain", paragraphs, (table,))
 
     def _row(self, quantity: KrigedQuantity) -> tuple[str, ...]:
         meaning, share = _MEANING.get(quantity.name, ""), f"{100 * quantity.explained:.0f} %"
         if quantity.hyper is None:
-            blank = ("" for _ in (*PARAMETERS, *self.controls))
+            blank = [""] * (1 + 2 * len(self.label_sets) + len(self.controls))
             return (quantity.name, meaning, share, "mean", "", *blank)
         scales = (f"{scale:.3g}" for scale in quantity.hyper.scales)
-        own = (f"{getattr(quantity.hyper, name):.3g}" for name in ("nugget", *PARAMETERS))
+        parameters = (quantity.hyper.nugget, *self._parameters(quantity.hyper).values())
+        own = (f"{value:.3g}" for value in parameters)
         return (quantity.name, meaning, share, "kriging", *own, *scales)
 
 
@@ -104,4 +112,5 @@ def summarize_kriging(trained: TrainedModel, controls: tuple[Control, ...]) -> K
         )
         for name, share in trained.explained.items()
     ]
-    return KrigingSummary(tuple(found), tuple(control.name for control in controls))
+    names = tuple(control.name for control in controls)
+    return KrigingSummary(tuple(found), names, tuple(trained.model.bank.labels))

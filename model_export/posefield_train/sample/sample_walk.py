@@ -1,9 +1,11 @@
 """A procedural walk with fixed stance feet: strides of two walkers at several speeds and turns.
 
-Its controls have unusual names and units, to test that clients read them from the model.
+Its controls have unusual names and units, to test that clients read them from the model. The
+strides may also be in several styles, a second label set.
 """
 
 import tomllib
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
@@ -76,8 +78,30 @@ def recipe() -> Recipe:
     return Recipe.model_validate(tomllib.loads(RECIPE_TEXT))
 
 
-def walk_stride(speed: float, turn: float, sway: float) -> Clip:
+@dataclass(frozen=True)
+class Style:
+    """Manner of a stride. lift: height of the swinging foot, m. crouch: lowering of the hips, m."""
+
+    lift: float = 0.08
+    crouch: float = 0.0
+
+
+STYLES = {"plain": Style(), "marching": Style(lift=0.2), "sneaking": Style(crouch=0.06)}
+SWAYS = {"ann": 0.0, "ben": 0.12}
+"""Sideways sway of each walker, m."""
+
+
+def styled_recipe() -> Recipe:
+    """Return the recipe of the strides in several styles."""
+    found = tomllib.loads(RECIPE_TEXT)
+    found["clips"]["labels"] = {"style": "manner"}
+    found["kriging"] = {"label": ["performer", "style"], "covariance": "matern52"}
+    return Recipe.model_validate(found)
+
+
+def walk_stride(speed: float, turn: float, sway: float, style: Style | None = None) -> Clip:
     """Return one stride at a speed, m/s, with a turn, rad, and a sideways sway, m."""
+    manner = style or Style()
     frames = round(RATE * (0.5 + 0.45 * speed) / speed)
     length = speed * frames / RATE
     u = np.linspace(0.0, 1.0, frames + 1)
@@ -86,8 +110,9 @@ def walk_stride(speed: float, turn: float, sway: float) -> Clip:
         quat.from_axis_angle(UP, turn * u), quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), roll)
     )
     hips = _along(u, length, turn, sway * np.sin(2 * np.pi * u))
-    hips[:, 1] = HIPS + 0.01 * np.cos(4 * np.pi * u)
-    legs = [_leg(side, u, length, turn, hips, pelvis) for side in SIDES]
+    hips[:, 1] = HIPS - manner.crouch + 0.01 * np.cos(4 * np.pi * u)
+    course = length, turn, manner.lift
+    legs = [_leg(side, u, course, hips, pelvis) for side in SIDES]
     rotations = np.stack([pelvis, *legs[0], *legs[1]], axis=1)
     return assemble(SKELETON, rotations, hips, SKELETON.offsets, RATE)
 
@@ -100,10 +125,13 @@ def _along(u: Floats, length: float, turn: float, left: Floats | float) -> Float
 
 
 def _leg(
-    side: str, u: Floats, length: float, turn: float, hips: Floats, pelvis: Floats
+    side: str, u: Floats, course: tuple[float, float, float], hips: Floats, pelvis: Floats
 ) -> list[Floats]:
-    """Return the rotations of a leg; the foot is fixed in stance, then swings to the next."""
-    off, down = SIDES[side]
+    """Return the rotations of a leg; the foot is fixed in stance, then swings to the next.
+
+    course: length of the stride, m, its turn, rad, and the height of the swinging foot, m.
+    """
+    (off, down), (length, turn, lift) = SIDES[side], course
     steps = np.floor(u - down)
     since = u - down - steps
     swing = np.clip((since - STANCE) / (1.0 - STANCE), 0.0, 1.0)
@@ -114,7 +142,7 @@ def _leg(
     gone = share * share * (3.0 - 2.0 * share)
     here, there = (_along(at + more, length, turn, off * WIDTH) for more in (0.0, 1.0))
     ankle = here + gone[:, None] * (there - here)
-    ankle[:, 1] = ANKLE + 0.08 * np.sin(np.pi * swing) ** 2
+    ankle[:, 1] = ANKLE + lift * np.sin(np.pi * swing) ** 2
     flat = quat.from_axis_angle(UP, turn * (at + gone))
     back = quat.conj(pelvis)
     hip = hips + quat.rotate(pelvis, np.array([off * WIDTH, 0.0, 0.0]))
@@ -134,5 +162,23 @@ def write_walk(folder: Path) -> Path:
         clip = walk_stride(speed, turn, sway)
         (folder / f"{index}.bvh").write_bytes(bvh_writer.dumps(clip, metres_per_unit=1.0))
         rows.append(f"{index}.bvh,{who},{3.6 * speed},{1000 * turn}")
+    (folder / "strides.csv").write_text("\n".join(rows) + "\n")
+    return folder
+
+
+def write_styled_walk(folder: Path) -> Path:
+    """Write strides of both walkers in all styles, and their table, to a folder and return it.
+
+    Each walker walks in each style at six of the thirty-six points.
+    """
+    rows = ["file,who,manner,haste,veer"]
+    points = product(np.linspace(0.7, 1.5, 6), np.linspace(-0.5, 0.5, 6))
+    ways = list(product(SWAYS, STYLES))
+    for index, (speed, turn) in enumerate(points):
+        # Along a row of equal speeds each way occurs once, at another turn than in the row before.
+        who, manner = ways[(index + 2 * (index // 6)) % len(ways)]
+        clip = walk_stride(float(speed), float(turn), SWAYS[who], STYLES[manner])
+        (folder / f"{index}.bvh").write_bytes(bvh_writer.dumps(clip, metres_per_unit=1.0))
+        rows.append(f"{index}.bvh,{who},{manner},{3.6 * speed},{1000 * turn}")
     (folder / "strides.csv").write_text("\n".join(rows) + "\n")
     return folder

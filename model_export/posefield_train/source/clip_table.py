@@ -4,7 +4,7 @@ import csv
 import io
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
@@ -14,7 +14,17 @@ from posefield.common.errors import RecipeError
 from posefield.common.units import Floats
 from posefield_train.source import data_folder, shipped_recipes
 from posefield_train.source.data_folder import FileLocation
-from posefield_train.source.recipe import Clips, Condition, Recipe
+from posefield_train.source.recipe import PERFORMER, Clips, Condition, Recipe
+
+LABEL_FORM = (
+    "a name of printable characters, without commas and colons, and without blanks at its ends"
+)
+
+
+def is_label(name: str) -> bool:
+    """Return True for a name that requests can give, also within a mixture."""
+    marks = "," in name or ":" in name
+    return bool(name) and name == name.strip() and name.isprintable() and not marks
 
 
 @dataclass(frozen=True)
@@ -23,7 +33,7 @@ class ClipRow:
 
     line: in the table, for messages; None without table. first_frame, last_frame: indices in the
     file from 0, last_frame inclusive; None is the end of the file. controls: those of the table.
-    landmarks: frames of the file.
+    landmarks: frames of the file. other_labels: name of the clip in each further label set.
     """
 
     place: FileLocation
@@ -34,6 +44,12 @@ class ClipRow:
     last_frame: int | None
     controls: Floats
     landmarks: tuple[int, ...]
+    other_labels: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Return the name of the clip in each label set, the performer's included."""
+        return {PERFORMER: self.performer, **self.other_labels}
 
     @property
     def named(self) -> str:
@@ -164,6 +180,15 @@ class ClipTable:
             )
         return int(value)
 
+    def name_of(self, line: int, record: dict[str, str], column: str) -> str:
+        """Return the name in a cell of labels."""
+        found = record[column]
+        if not is_label(found):
+            raise RecipeError(
+                self.name, f"column {column!r}: {found!r}, expected {LABEL_FORM}", line
+            )
+        return found
+
     def satisfies(
         self, line: int, record: dict[str, str], column: str, condition: Condition
     ) -> bool:
@@ -186,6 +211,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         clips.file: "clips.file",
         **dict.fromkeys(clips.where, "clips.where"),
         **dict.fromkeys(clips.landmarks, "clips.landmarks"),
+        **{column: f"clips.labels.{name}" for name, column in clips.labels.items()},
         **{control.column: f"control {control.name}" for control in recipe.column_controls},
     }
     for key in ("performer", "first_frame", "last_frame"):
@@ -207,12 +233,24 @@ def _row(
         place=_find_motion_file(folder, clips, cells, line, record),
         table=cells.name,
         line=line,
-        performer=record[clips.performer] if clips.performer else "",
+        performer=_performer(recipe, cells, line, record),
         first_frame=first,
         last_frame=last,
         controls=np.array([cells.number(line, record, c.column) for c in recipe.column_controls]),
         landmarks=tuple(cells.frame(line, record, column) for column in clips.landmarks),
+        other_labels={
+            name: cells.name_of(line, record, column) for name, column in clips.labels.items()
+        },
     )
+
+
+def _performer(recipe: Recipe, cells: ClipTable, line: int, record: dict[str, str]) -> str:
+    """Return the performer of a row, which a label of that set makes a name of requests."""
+    column = recipe.clips.performer
+    if column is None:
+        return ""
+    labelled = PERFORMER in recipe.kriging.label
+    return cells.name_of(line, record, column) if labelled else record[column]
 
 
 def _find_motion_file(

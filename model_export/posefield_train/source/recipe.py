@@ -20,6 +20,7 @@ from posefield.motion import measures
 from posefield.motion.joint_roles import Role
 from posefield_train.source import data_folder, recipe_errors
 from posefield_train.source.control_sources import (
+    RESERVED,
     TIME_NAMES,
     Auto,
     Control,
@@ -31,6 +32,8 @@ from posefield_train.source.control_sources import (
     Text,
 )
 
+PERFORMER = "performer"
+"""Label set whose column is clips.performer."""
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -66,6 +69,11 @@ class Clips(RecipePart):
     table: Text = Field(description="CSV file, relative to the data folder")
     file: Text = Field(description="column: motion file, relative to the table")
     performer: Text | None = Field(default=None, description="column: performer")
+    labels: dict[Name, Text] = Field(
+        default={},
+        description="columns: names of further label sets, such as { style = 'style' }, for "
+        "kriging.label",
+    )
     first_frame: Text | None = Field(default=None, description="column: first frame, from 0")
     last_frame: Text | None = Field(default=None, description="column: last frame, inclusive")
     landmarks: list[Text] = Field(
@@ -136,11 +144,24 @@ class Kriging(RecipePart):
     nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
         default=None, description="nugget as a share of the sill; default: fitted by leave-one-out"
     )
-    label: Literal["performer"] | None = Field(
-        default=None,
-        description="label of clips besides their controls: performers have offsets of their own, "
-        "and their motions a correlation",
+    label: list[Text] = Field(
+        default=[],
+        description="label sets of clips besides their controls: 'performer' and names of "
+        "clips.labels. The names of each set have offsets of their own, and their motions a "
+        "correlation. One set may be given as a text",
     )
+
+    @field_validator("label", mode="before", json_schema_input_type=Text | list[Text])
+    @classmethod
+    def _read_one_label(cls, found: object) -> object:
+        return [found] if isinstance(found, str) else found
+
+    @field_validator("label")
+    @classmethod
+    def _check_labels(cls, labels: list[str]) -> list[str]:
+        if len(set(labels)) < len(labels):
+            raise ValueError(f"found {labels}, expected each label set once")
+        return labels
 
     @property
     def degree(self) -> int:
@@ -261,6 +282,16 @@ class Preset(RecipePart):
     performer: Text | None = Field(
         default=None, description="performer of the motion; default: an unseen performer"
     )
+    named: dict[Name, Text] = Field(
+        default={},
+        alias="labels",
+        description="name of the motion in further label sets; those not given are left open",
+    )
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Return the name of the motion in each label set that the preset names."""
+        return ({} if self.performer is None else {PERFORMER: self.performer}) | self.named
 
     @property
     def values(self) -> dict[str, float]:
@@ -323,10 +354,44 @@ class Recipe(RecipePart):
 
     @model_validator(mode="after")
     def _check_label(self) -> "Recipe":
-        if self.kriging.label and not self.clips.performer:
+        if PERFORMER in self.clips.labels:
             raise KeyFault(
-                "found 'performer', but clips.performer names no column", "kriging", "label"
+                "found 'performer', whose column is clips.performer", "clips", "labels", PERFORMER
             )
+        for name in self.kriging.label:
+            if name == PERFORMER and not self.clips.performer:
+                raise KeyFault(
+                    "found 'performer', but clips.performer names no column", "kriging", "label"
+                )
+            if name != PERFORMER and name not in self.clips.labels:
+                known = (PERFORMER, *self.clips.labels)
+                raise KeyFault(
+                    f"found {name!r}{did_you_mean(name, known)}, expected 'performer' or a name of "
+                    f"clips.labels {[*self.clips.labels]}",
+                    *("kriging", "label"),
+                )
+        unused = [name for name in self.clips.labels if name not in self.kriging.label]
+        if unused:
+            raise KeyFault(
+                f"found {unused[0]!r}, which kriging.label does not name, expected it there",
+                *("clips", "labels", unused[0]),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _check_label_names(self) -> "Recipe":
+        controls = [control.name for control in self.controls]
+        for name in self.kriging.label:
+            if name in controls:
+                raise KeyFault(
+                    f"found {name!r}, which is a control, too, expected another name",
+                    *("kriging", "label"),
+                )
+            if name in RESERVED - {PERFORMER}:
+                raise KeyFault(
+                    f"found {name!r}, which is a parameter of requests, expected another name",
+                    *("kriging", "label"),
+                )
         return self
 
     @field_validator("controls")
@@ -347,14 +412,15 @@ class Recipe(RecipePart):
                 raise KeyFault(
                     f"found {found}, expected a value for each of {names}", "presets", name
                 )
-            if preset.performer is not None and not self.kriging.label:
-                raise KeyFault(
-                    f"found {preset.performer!r} and no kriging.label, expected kriging.label = "
-                    "'performer'",
-                    "presets",
-                    name,
-                    "performer",
-                )
+            for label_set, label in preset.labels.items():
+                if label_set not in self.kriging.label:
+                    raise KeyFault(
+                        f"found {label!r} and no kriging.label {label_set!r}"
+                        f"{did_you_mean(label_set, self.kriging.label)}, expected kriging.label = "
+                        f"{label_set!r}",
+                        *("presets", name),
+                        *((PERFORMER,) if label_set == PERFORMER else ("labels", label_set)),
+                    )
         return self
 
     @model_validator(mode="after")

@@ -44,7 +44,7 @@ def _summary(plain: dict[str, Any]) -> str:
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
         *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
-        *([f"performers: {', '.join(plain['performers'])}"] if plain["performers"] else []),
+        *(f"{own['name']}s: {', '.join(own['names'])}" for own in plain["labels"]),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),
     ]

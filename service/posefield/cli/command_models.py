@@ -43,6 +43,7 @@ class LocalModel:
             ],
             "clips": self.card.samples,
             "performers": list(self.card.performers),
+            "labels": {own.name: list(own.names) for own in self.card.labels},
             "bytes": self.size,
             "licence": self.licence,
             "file": self.file.location,

@@ -7,12 +7,12 @@ the tests check them (tests/shape_checks.py, decision 0048).
 
 Axes of several modules, with the letters of the docstrings. Motions: frames (F; canonical ones T;
 asked ones S), joints (J), poses (P), clips, characters or motions (N, M), strides, levels of detail
-(L), performers (p), knots of a warp, features of a trace; chosen ones of them. Kriging: points (B;
-a and b where there are two kinds), samples (n), their coordinates (d + p), controls (d), functions
-of a drift (k), rows of the system (n + k), linear functions (p + 1 + d), values (m). Tensors: dof
-of a pose (D), those varying (D'), freedoms (r1), times (r2) and modes (r3) of a reduced tensor,
-rank of another decomposition, reduced motions (r2 r1), variables of a correction. Any: batch, rows,
-columns, numbers, pairs, size.
+(L), labels (p, of all label sets), knots of a warp, features of a trace; chosen ones of them.
+Kriging: points (B; a and b where there are two kinds), samples (n), their coordinates (d + p),
+controls (d), functions of a drift (k), rows of the system (n + k), linear functions (p + 1 + d),
+values (m). Tensors: dof of a pose (D), those varying (D'), freedoms (r1), times (r2) and modes (r3)
+of a reduced tensor, rank of another decomposition, reduced motions (r2 r1), variables of a
+correction. Any: batch, rows, columns, numbers, pairs, size.
 """
 
 from typing import Annotated
@@ -58,7 +58,7 @@ Points = Annotated[Floats, "points coordinates"]
 Samples = Annotated[Floats, "samples coordinates"]
 PointControls = Annotated[Floats, "points controls"]
 SampleControls = Annotated[Floats, "samples controls"]
-PointLabels = Annotated[Floats, "points performers"]
+PointLabels = Annotated[Floats, "points labels"]
 PointSamples = Annotated[Floats, "points samples"]
 SampleMatrix = Annotated[Floats, "samples samples"]
 PointValues = Annotated[Floats, "points values"]

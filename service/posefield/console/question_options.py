@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from posefield.common.errors import InvalidField
 from posefield.question import text_decoding
-from posefield.question.text_decoding import CONTROLS_FIELD, Parameter
+from posefield.question.text_decoding import CONTROLS_FIELD, LABELS_FIELD, Parameter
 
 Command = Callable[..., None]
 Controls = Annotated[
@@ -122,6 +122,10 @@ def _value(parameter: Parameter, given: Any, default: Any) -> Any:
     """Return the value of a field; `given` is text where typer does not parse the field's type."""
     if given is None or given == []:
         return default
+    if parameter.field == LABELS_FIELD:
+        return text_decoding.merge_labels(
+            text_decoding.parse_value(parameter, word) for word in given
+        )
     if parameter.repeated and parameter.kind not in TYPED_FIELDS:
         return tuple(text_decoding.parse_value(parameter, word) for word in given)
     if isinstance(given, str) and get_origin(parameter.kind) is not Literal:

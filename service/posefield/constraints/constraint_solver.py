@@ -160,7 +160,7 @@ class ConstraintSolver:
     def _predicted(self, time: float) -> list[PredictionState]:
         """Return the prediction for each captured clip, with the canonical frame of a time, s."""
         card, when = self._session.card, np.array([time])
-        pairs = zip(card.examples, card.labels, strict=True)
+        pairs = zip(card.examples, card.clip_labels, strict=True)
         return [self._session.state(np.array([own]), when, labels[None]) for own, labels in pairs]
 
     def _corrector(self, level: int) -> LevelCorrector:

@@ -61,7 +61,7 @@ def _sample_inputs(
     card = session.card
     low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))
     times = np.linspace(0.0, card.durations[0], BATCH)[:, None]
-    return np.linspace(low, high, BATCH), times, np.zeros((BATCH, len(card.performers)))
+    return np.linspace(low, high, BATCH), times, np.zeros((BATCH, sum(card.label_counts)))
 
 
 def _time_call(session: Session, question: tuple[Floats, Floats, Floats], level: int) -> float:

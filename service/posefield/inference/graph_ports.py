@@ -9,7 +9,7 @@ from posefield.common.units import Floats
 from posefield.inference.onnx_runtime import first_line
 from posefield.model_file.model_card import ModelCard
 
-PERFORMER, LEVEL = "performer", "level"
+LABELS, LEVEL = "labels", "level"
 OUTPUTS = {
     "rotations": 4,
     "root_position": 3,
@@ -39,8 +39,8 @@ def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> No
     points = np.vstack([default_controls(card), card.examples[0]]).astype(np.float32)
     times = np.tile(np.linspace(0.0, card.durations[0], 3, dtype=np.float32), (2, 1))
     feed = {"controls": points, "time": times, LEVEL: np.array(level)}
-    if card.performers:
-        feed[PERFORMER] = np.eye(1, len(card.performers), dtype=np.float32)
+    if card.labels:
+        feed[LABELS] = np.eye(1, sum(card.label_counts), dtype=np.float32)
     try:
         answers = dict(zip(OUTPUTS, runtime.run([*OUTPUTS], feed), strict=True))
     except Exception as fault:  # onnxruntime's exceptions share no base of their own

@@ -109,10 +109,10 @@ def importance_order(
     """Return the index on the card (n,) of each sample, in the file's order of importance."""
     held = weights["samples"].T
     listed = samples[:, : len(card.controls)].astype(np.float32)
-    whose = weights["whose"] if card.performers else np.zeros(len(held), dtype=np.int64)
-    moved = np.array(card.moved_by or [0] * len(listed))
+    graph_names = [weights[f"whose_{index}"] for index in range(len(card.labels))]
+    card_names = [own.clips for own in card.labels]
     place = np.empty(len(held), dtype=np.int64)
-    place[np.lexsort((*held.T, whose))] = np.lexsort((*listed.T, moved))
+    place[np.lexsort((*held.T, *graph_names))] = np.lexsort((*listed.T, *card_names))
     return place
 
 

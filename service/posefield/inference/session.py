@@ -12,7 +12,7 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Singles
 from posefield.inference import graph_ports, onnx_runtime
-from posefield.inference.graph_ports import OUTPUTS, PERFORMER
+from posefield.inference.graph_ports import LABELS, OUTPUTS
 from posefield.inference.onnx_runtime import LazySessions
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
@@ -69,16 +69,14 @@ class Session:
         controls: PointControls | Annotated[Singles, "points controls"],
         time: Annotated[Floats, "points frames"] | Annotated[Singles, "points frames"],
         *outputs: str,
-        labels: Annotated[Floats, "_ performers"]
-        | Annotated[Singles, "_ performers"]
-        | None = None,
+        labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None = None,
         level: int = 0,
     ) -> list[Any]:
         """Return the graph's outputs, in their order, for controls (B, d) and times (B, S).
 
-        labels (B or 1, p): performers; an unseen performer if None. level: level of detail. Outside
-        the sampled ranges, answers are bounded (`answer_bounds`), but sigma is that of the controls
-        as asked.
+        labels (B or 1, p): weights of the names of all label sets; all sets are left open if None.
+        level: level of detail. Outside the sampled ranges, answers are bounded (`answer_bounds`),
+        but sigma is that of the controls as asked.
         """
         if self.bounds.is_inside(controls):
             return self._run(controls, time, outputs, labels, level)
@@ -99,9 +97,7 @@ class Session:
     def durations(
         self,
         controls: PointControls | Annotated[Singles, "points controls"],
-        labels: Annotated[Floats, "_ performers"]
-        | Annotated[Singles, "_ performers"]
-        | None = None,
+        labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None = None,
         level: int = 0,
     ) -> Annotated[Singles, "points"]:
         """Return the durations (B,), s, of `run`, in a quarter of its time."""
@@ -113,7 +109,7 @@ class Session:
         self,
         controls: Annotated[Floats, "1 controls"],
         time: Frames,
-        labels: Annotated[Floats, "1 performers"] | None = None,
+        labels: Annotated[Floats, "1 labels"] | None = None,
         level: int = 0,
     ) -> PredictionState:
         """Return the intermediate values for one question: controls (1, d), times (S,).
@@ -182,9 +178,7 @@ class Session:
     def sigmas(
         self,
         controls: PointControls | Annotated[Singles, "points controls"],
-        labels: Annotated[Floats, "_ performers"]
-        | Annotated[Singles, "_ performers"]
-        | None = None,
+        labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None = None,
     ) -> Annotated[Singles, "points"]:
         """Return the sigmas (B,), m, of `run` at level 0, in half of its time."""
         answers: list[Singles] = self.sigma_sessions[0].run(["sigma"], self._feed(controls, labels))
@@ -195,7 +189,7 @@ class Session:
         """Kriging weights of the captured clips."""
         own = self.card
         points = kriging_model.half_ranges(np.array(own.examples), *own.sampled_ranges)
-        return KrigingWeights(own.kriging, np.hstack([points, own.labels]))
+        return KrigingWeights(own.kriging, np.hstack([points, own.clip_labels]))
 
     @property
     def memory(self) -> int:
@@ -213,11 +207,11 @@ class Session:
     def _feed(
         self,
         controls: PointControls | Annotated[Singles, "points controls"],
-        labels: Annotated[Floats, "_ performers"] | Annotated[Singles, "_ performers"] | None,
+        labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None,
     ) -> dict[str, Singles]:
         feed = {"controls": controls.astype(np.float32, copy=False)}
-        if labels is not None and self.card.performers:
-            feed[PERFORMER] = labels.astype(np.float32, copy=False)
+        if labels is not None and self.card.labels:
+            feed[LABELS] = labels.astype(np.float32, copy=False)
         return feed
 
 

@@ -5,8 +5,10 @@ inverse gives the weight of each sample at a point. Training stores products of 
 model file; the service computes the weights to explain a result.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -19,41 +21,69 @@ from posefield.common.array_shapes import (
     SampleMatrix,
     Samples,
 )
-from posefield.common.bounded_types import Degree, NonNegative
+from posefield.common.bounded_types import Count, Degree, NonNegative
 from posefield.common.units import Floats, Indices
 from posefield.kriging.covariance import COVARIANCE_MODELS
+
+
+@dataclass(frozen=True)
+class LabelKernel:
+    """Part of a covariance that depends on one label set, such as performers or styles.
+
+    count: number of names in the set. correlation: of the motions of two names, at equal controls
+    and other labels. offset: variance of a name's own offset, in sills.
+    """
+
+    count: Count
+    correlation: NonNegative
+    offset: NonNegative
 
 
 @dataclass(frozen=True)
 class Hyper:
     """Parameters of a kriged field.
 
-    The covariance of two points is f(h) (correlation + (1 - correlation) same) + offset same
-    + trend x·x', with the covariance model f at their scaled distance h, same = 1 for one performer
-    and 0 for different ones, and their controls x and x' in half-ranges.
+    The covariance of two points is f(h) Π (c + (1 - c) s) + Σ a s + trend x·x', with the covariance
+    model f at their scaled distance h, and their controls x and x' in half-ranges. Product and sum
+    are over the label sets, with correlation c, offset a, and the inner product s of the points'
+    weights of the set's names: 1 for one name, 0 for different ones. Each s is a Gram matrix of
+    weights, so that sums, products and multiples of them by positive numbers are positive
+    semidefinite (decision 0054).
 
     covariance: name in `COVARIANCE_MODELS`. drifts: polynomial degrees, 0 or 1, whose predictions
-    are averaged; performers never enter it. scales (d,): distance per unit of each control, one
-    over the range. nugget: share of the sill. correlation: of the motions of two performers.
-    offset: variance of a performer's own offset, in sills. trend: variance of the slope along each
-    control, in sills per squared half-range.
+    are averaged; labels never enter it. scales (d,): distance per unit of each control, one over
+    the range. nugget: share of the sill. trend: variance of the slope along each control, in sills
+    per squared half-range. labels: a kernel for each label set.
     """
 
     covariance: str
     drifts: tuple[Degree, ...]
     scales: PerControl
     nugget: NonNegative
-    correlation: NonNegative
-    offset: NonNegative
     trend: NonNegative
+    labels: tuple[LabelKernel, ...] = ()
+
+    @property
+    def label_counts(self) -> tuple[int, ...]:
+        """Return the number of names of each label set."""
+        return tuple(own.count for own in self.labels)
+
+    def with_offsets(self, *offsets: float) -> "Hyper":
+        """Return the parameters with the offset of each label set replaced."""
+        pairs = zip(self.labels, offsets, strict=True)
+        return replace(self, labels=tuple(replace(own, offset=a) for own, a in pairs))
+
+    def without_offsets(self) -> "Hyper":
+        """Return the parameters with offsets of zero."""
+        return self.with_offsets(*(0.0 for _ in self.labels))
 
 
 @dataclass(frozen=True)
 class KrigingWeights:
-    """Kriging weights of samples (n, d + p): d controls in half-ranges and p performer labels.
+    """Kriging weights of samples (n, d + p): d controls in half-ranges and p weights of labels.
 
-    The label of a sample's performer is one and the others zero; all are zero for an unseen
-    performer.
+    The weight of a sample's name is one in each label set and that of the others zero. All of a set
+    are zero for an unseen name, and a mixture has several above zero.
     """
 
     hyper: Hyper
@@ -99,10 +129,23 @@ def stationary_covariances(
 ) -> Annotated[Floats, "a b"]:
     """Return the part (A, B) of the covariances that depends on the points' distance."""
     found = COVARIANCE_MODELS[hyper.covariance](squared_distances(hyper, a, b))
-    if hyper.correlation == 1.0:
-        return found
-    d = len(hyper.scales)
-    return found * (hyper.correlation + (1.0 - hyper.correlation) * (a[:, d:] @ b[:, d:].T))
+    for own, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
+        found = found * (own.correlation + (1.0 - own.correlation) * same)
+    return found
+
+
+def label_products(
+    hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
+) -> list[Annotated[Floats, "a b"]]:
+    """Return the inner products (A, B) of the points' weights of each label set's names."""
+    columns = label_columns(len(hyper.scales), hyper.label_counts)
+    return [a[:, own] @ b[:, own].T for own in columns]
+
+
+def label_columns(first: int, counts: Sequence[int]) -> list[slice]:
+    """Return the columns of each label set, of that many names, from the first column on."""
+    ends = np.cumsum([first, *counts]).tolist()
+    return [slice(start, end) for start, end in pairwise(ends)]
 
 
 def covariances(
@@ -110,8 +153,8 @@ def covariances(
 ) -> Annotated[Floats, "a b"]:
     """Return the covariances (A, B) between points (A, d + p) and (B, d + p)."""
     found, d = stationary_covariances(hyper, a, b), len(hyper.scales)
-    if hyper.offset:
-        found = found + hyper.offset * (a[:, d:] @ b[:, d:].T)
+    for own, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
+        found = found + own.offset * same
     if hyper.trend:
         found = found + hyper.trend * (a[:, :d] @ b[:, :d].T)
     return found
@@ -120,10 +163,12 @@ def covariances(
 def prior_variances(hyper: Hyper, points: Points) -> PerPoint:
     """Return the variance (B,) of the field at points (B, d + p) before any sample, in sills.
 
-    A performer without samples has an offset as unknown as any.
+    A name without samples has an offset as unknown as any. What a mixture's weights leave of unit
+    length counts as such a name.
     """
     controls = points[:, : len(hyper.scales)]
-    return 1.0 + hyper.offset + hyper.trend * np.sum(np.square(controls), axis=1)
+    squares = np.sum(np.square(controls), axis=1)
+    return 1.0 + sum(own.offset for own in hyper.labels) + hyper.trend * squares
 
 
 def drift(points: Points, controls: int, degree: int) -> Annotated[Floats, "points functions"]:
@@ -136,7 +181,7 @@ def drift(points: Points, controls: int, degree: int) -> Annotated[Floats, "poin
 
 
 def linear_functions(hyper: Hyper, points: Points) -> Annotated[Floats, "points linear"]:
-    """Return labels, one and controls (B, p + 1 + d) of points (B, d + p).
+    """Return weights of labels, one and controls (B, p + 1 + d) of points (B, d + p).
 
     In them and the stationary covariances every kriging prediction is linear.
     """
@@ -152,7 +197,8 @@ def linear_terms(hyper: Hyper, samples: Samples) -> Annotated[Floats, "linear sy
     (n, width), d, degree = samples.shape, len(hyper.scales), max(hyper.drifts)
     p = width - d
     found = np.zeros((p + 1 + d, n + 1 + degree * d))
-    found[:p, :n] = hyper.offset * samples[:, d:].T
+    for own, columns in zip(hyper.labels, label_columns(0, hyper.label_counts), strict=True):
+        found[columns, :n] = own.offset * samples.T[d:][columns]
     found[p + 1 :, :n] = hyper.trend * samples[:, :d].T
     found[p, n] = 1.0
     found[p + 1 :, n + 1 :] = np.eye(d) if degree else found[p + 1 :, n + 1 :]

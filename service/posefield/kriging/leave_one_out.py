@@ -50,7 +50,7 @@ def leave_out(
 ) -> SampleMatrix:
     """Return the matrix (n, n) from values to leave-one-out residuals of one field.
 
-    samples (n, d + p): d controls in half-ranges and p performer labels. With more than one drift,
+    samples (n, d + p): d controls in half-ranges and p weights of labels. With more than one drift,
     a residual is from the mean of the predictions.
     """
     d = len(hyper.scales)

@@ -43,8 +43,8 @@ class Gait:
     ) -> PointControls:
         """Return the conditional mean of the controls (K, d) at given rates.
 
-        speeds: (K,), m/s. turning: (K,), rad/s. who: performers (K,) by index on the card, -1 for
-        an unseen performer. The mean is a linear regression over the captured clips, which also
+        speeds: (K,), m/s. turning: (K,), rad/s. who: labels (K,) by index in `stride.label_rows`,
+        -1 for open ones. The mean is a linear regression over the captured clips, which also
         determines controls that do not affect speed or turning, such as the stride length.
         """
         return _design_matrix(speeds, turning) @ self.slopes + self.performer_offsets[who]
@@ -53,7 +53,7 @@ class Gait:
         self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
     ) -> PointControls:
         """Return the controls (K, d), along the regression, that lead to these rates."""
-        labels = stride.PerformerLabels(self.session, who)
+        labels = stride.RowLabels(self.session, who)
         speed, turn = speeds, turning
         for _ in range(ITERATIONS):
             done = stride.strides(self.session, self.mean_controls(speed, turn, who), labels)
@@ -78,7 +78,7 @@ def fit_gait(session: Session) -> Gait:
     _check_speeds(card.name, rates[:, 0])
     slopes = np.linalg.lstsq(_design_matrix(*rates.T), controls, rcond=None)[0]
     manners = mean_residuals(
-        controls - _design_matrix(*rates.T) @ slopes, who, len(card.performers)
+        controls - _design_matrix(*rates.T) @ slopes, who, len(stride.label_rows(card))
     )
     return Gait(
         session, rates, slopes, manners, gait_region.convex_hull(_add_straight_rates(rates))

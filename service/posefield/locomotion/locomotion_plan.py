@@ -26,9 +26,9 @@ Numbers = TypeVar("Numbers", Floats, FloorVectors)
 class LocomotionPlan:
     """Locomotion of N characters at F frames, without their poses.
 
-    controls: (N, F, d). who: (N,), performers by index on the card or -1. phases: (N, F), of the
-    cycle, in [0, 1). places: (N, F) and headings: (N, F), rad, of the frames that travel with the
-    characters. rate: frames a second.
+    controls: (N, F, d). who: (N,), labels by index in `stride.label_rows` or -1. phases: (N, F), of
+    the cycle, in [0, 1). places: (N, F) and headings: (N, F), rad, of the frames that travel with
+    the characters. rate: frames a second.
     """
 
     controls: Annotated[Floats, "characters frames controls"]
@@ -88,7 +88,7 @@ def plan_along_paths(
     everyone = np.repeat(who, known[1])
     turning = (paths.speeds * paths.curvatures).ravel()
     wanted = gait.controls(paths.speeds.ravel(), turning, everyone)
-    labels = stride.PerformerLabels(gait.session, everyone)
+    labels = stride.RowLabels(gait.session, everyone)
     speeds = stride.strides(gait.session, wanted, labels).speeds.reshape(known)
     gone = _distances(speeds, frames, rate)
     _check_path_lengths(paths, gone, (frames - 1) / rate)
@@ -125,7 +125,7 @@ def _measure_strides(
 ) -> Strides:
     """Return the cycles of controls (N, F, d), with fields (N, F)."""
     frames = controls.shape[:2]
-    labels = stride.PerformerLabels(gait.session, np.repeat(who, frames[1]))
+    labels = stride.RowLabels(gait.session, np.repeat(who, frames[1]))
     own = stride.strides(gait.session, controls.reshape(-1, controls.shape[2]), labels)
     return Strides(*(value.reshape(frames) for value in vars(own).values()))
 

@@ -31,8 +31,9 @@ SPEED_MARGIN = 0.05
 class Characters:
     """Performers, phases and random numbers of N characters.
 
-    who: (N,), performers by index on the card, -1 for a model without any. phases: (N,), of the
-    cycle at the beginning. random_numbers: (N, columns), random numbers from 0 to 1 for the paths.
+    who: (N,), labels by index in `stride.label_rows`, -1 for a model without any. phases: (N,), of
+    the cycle at the beginning. random_numbers: (N, columns), random numbers from 0 to 1 for the
+    paths.
     """
 
     who: Annotated[Indices, "characters"]
@@ -43,7 +44,7 @@ class Characters:
 def draw_characters(gait: Gait, count: int, seed: int) -> Characters:
     """Return the characters of a seed."""
     table = _random_table(count, seed)
-    performers = len(gait.session.card.performers)
+    performers = len(stride.label_rows(gait.session.card))
     who = (table[:, 0] * performers).astype(np.int64) if performers else np.full(count, -1)
     return Characters(who, table[:, 1], table[:, 2:])
 

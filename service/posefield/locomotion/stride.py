@@ -56,17 +56,17 @@ class Strides:
 
 
 @dataclass(frozen=True)
-class PerformerLabels:
-    """Labels (B, p) of performers (B,), computed for the requested rows.
+class RowLabels:
+    """Weights (B, p) of the labels of performers (B,), computed for the requested rows.
 
-    who: performers by index on the card, -1 for an unseen one. All rows at once would take more
-    memory than the rest of a plan.
+    who: labels by index in `label_rows`, -1 for open ones. All rows at once would take more memory
+    than the rest of a plan.
     """
 
     session: Session
     who: Annotated[Indices, "points"]
 
-    def __getitem__(self, rows: slice) -> Annotated[Floats, "rows performers"]:
+    def __getitem__(self, rows: slice) -> Annotated[Floats, "rows labels"]:
         return labels(self.session, self.who[rows])
 
 
@@ -85,10 +85,10 @@ class RelativePoses:
 def strides(
     session: Session,
     controls: PointControls,
-    labels: PointLabels | PerformerLabels,
+    labels: PointLabels | RowLabels,
     level: int = 0,
 ) -> Strides:
-    """Return the cycles of controls (B, d) for performer labels (B, p), at a level of detail."""
+    """Return the cycles of controls (B, d) for labels (B, p), at a level of detail."""
     ends = np.full((len(controls), 1), AFTER_END)
     asked = ("duration", "travel", "root_position")
     durations, travel, roots = _run_batches(session, controls, ends, labels, level, *asked)
@@ -158,24 +158,41 @@ def bones(
     return _run_batches(session, controls, begin, labels, 0, "bone_offsets")[0].astype(np.float32)
 
 
+def label_rows(card: ModelCard) -> list[dict[str, str]]:
+    """Return the combinations of labels that were captured, in the order of the card's names.
+
+    With performers alone, these are the performers. Empty without label sets.
+    """
+    return [card.clip_names(clip) for clip in _first_clips(card)[0]] if card.labels else []
+
+
 def clip_performers(card: ModelCard) -> Annotated[Indices, "clips"]:
-    """Return the performers (N,) of the captured clips by index on the card; -1 without any."""
-    return np.array(card.moved_by or [-1] * len(card.examples))
+    """Return the labels (N,) of the captured clips by index in `label_rows`; -1 without any."""
+    return _first_clips(card)[1] if card.labels else np.full(len(card.examples), -1)
 
 
 def labels(
     session: Session, who: Annotated[Indices, "*batch"]
-) -> Annotated[Floats, "*batch performers"]:
-    """Return the labels (..., p) of performers by index on the card; all zero for -1."""
-    performers = len(session.card.performers)
-    return np.vstack([np.eye(performers), np.zeros(performers)])[who]
+) -> Annotated[Floats, "*batch labels"]:
+    """Return the weights (..., p) of labels by index in `label_rows`; all zero for -1."""
+    card = session.card
+    weights = card.clip_labels
+    captured = weights[_first_clips(card)[0]] if card.labels else weights[:0]
+    return np.vstack([captured, np.zeros(weights.shape[1])])[who]
+
+
+def _first_clips(card: ModelCard) -> tuple[Indices, Annotated[Indices, "clips"]]:
+    """Return the first clip of each combination of labels, and the combination of each clip."""
+    indices = np.column_stack([own.clips for own in card.labels])
+    _, first, whose = np.unique(indices, axis=0, return_index=True, return_inverse=True)
+    return first, whose.ravel()
 
 
 def _run_batches(
     session: Session,
     controls: PointControls,
     times: Annotated[Floats, "points frames"],
-    labels: PointLabels | PerformerLabels,
+    labels: PointLabels | RowLabels,
     level: int,
     *outputs: str,
 ) -> list[Annotated[Floats, "points ..."]]:

@@ -103,12 +103,13 @@ def _check_lengths(card: ModelCard) -> None:
     rows += [
         ("sources", card.sources, clips),
         ("left_out", card.left_out, clips),
-        ("moved_by", card.moved_by, clips if card.performers else 0),
         ("joint_sigma", card.joint_sigma, joints),
         ("levels[0].joints", card.levels[0].joints, joints),
         ("kriging.scales", card.kriging.scales, controls),
         ("beside", card.beside, size),
+        ("kriging.labels", card.kriging.labels, len(card.labels)),
     ]
+    rows += [(f"labels[{i}].clips", own.clips, clips) for i, own in enumerate(card.labels)]
     for path, found, expected in rows:
         _expect_length(found, path, expected)
 
@@ -147,11 +148,9 @@ def _check_measure(path: str, own: Measure, card: ModelCard) -> None:
 
 
 def _check_clips(card: ModelCard) -> None:
-    clips, performers = len(card.examples), len(card.performers)
+    clips = len(card.examples)
     _expect(card.samples == clips, "samples", card.samples, f"{clips}, as many as examples")
-    _expect_unique(card.performers, "performers")
-    most = max(card.moved_by, default=0)
-    _expect(most < max(performers, 1), "moved_by", most, f"performers below {performers}")
+    _check_labels(card)
     low, high = card.durations
     shortest, longest = DURATION_RANGE
     right = shortest <= low <= high <= longest
@@ -159,6 +158,22 @@ def _check_clips(card: ModelCard) -> None:
     tensor = card.diagnostics["tensor"]
     right = tuple(tensor[1:]) == (card.frames, card.samples)
     _expect(right, "diagnostics.tensor", tensor, f"{card.frames} frames and {clips} clips")
+
+
+def _check_labels(card: ModelCard) -> None:
+    controls = {control.name for control in card.controls}
+    _expect_unique([own.name for own in card.labels], "labels")
+    for index, (own, kernel) in enumerate(zip(card.labels, card.kriging.labels, strict=True)):
+        path, count = f"labels[{index}]", len(own.names)
+        _expect(own.name not in controls, f"{path}.name", own.name, "none of the controls")
+        _expect_unique(own.names, f"{path}.names")
+        _expect(count > 0, f"{path}.names", [], "names")
+        most = max(own.clips, default=0)
+        _expect(most < count, f"{path}.clips", most, f"indices below {count}")
+        found, where = kernel.count, f"kriging.labels[{index}]"
+        _expect(found == count, f"{where}.count", found, f"{count}, as many as {path}.names")
+        kept = kernel.correlation
+        _expect(kept <= 1.0, f"{where}.correlation", kept, "at most 1")
 
 
 def _check_kriging(card: ModelCard) -> None:
@@ -170,7 +185,6 @@ def _check_kriging(card: ModelCard) -> None:
         f"of {[*COVARIANCE_MODELS]}",
     )
     _expect(len(own.drifts) > 0, "kriging.drifts", [], "degrees")
-    _expect(own.correlation <= 1.0, "kriging.correlation", own.correlation, "at most 1")
     right = own.scales.ndim == 1 and bool((own.scales > 0.0).all())
     _expect(right, "kriging.scales", own.scales.tolist(), "numbers above 0")
     for index, row in enumerate(card.beside):
@@ -207,8 +221,9 @@ def _check_levels(card: ModelCard) -> None:
 
 def _check_training_parameters(card: ModelCard) -> None:
     for name, own in card.making.fields.items():
-        expected = "a nugget, an offset and a trend"
-        _expect(len(own) == 3, f"making.fields.{name}", list(own), expected)
+        sets = len(card.labels)
+        expected = f"a nugget, a trend and an offset for each of {sets} label sets"
+        _expect(len(own) == 2 + sets, f"making.fields.{name}", list(own), expected)
     for joint in card.making.joint_weights:
         _expect(joint in card.skeleton.names, "making.joint_weights", joint, "a joint")
 
@@ -224,20 +239,23 @@ def _check_presets(card: ModelCard) -> None:
             value, least, most = preset.controls[control.name], control.minimum, control.maximum
             right = least <= value <= most
             _expect(right, f"{path}.controls.{control.name}", value, f"{least} to {most}")
-        known = preset.performer is None or preset.performer in card.performers
-        _expect(known, f"{path}.performer", preset.performer, f"one of {[*card.performers]}")
+        known = {own.name: own.names for own in card.labels}
+        for label_set, label in preset.labels.items():
+            _expect(label_set in known, f"{path}.labels", label_set, f"label sets {[*known]}")
+            right, expected = label in known[label_set], f"one of {[*known[label_set]]}"
+            _expect(right, f"{path}.labels.{label_set}", label, expected)
 
 
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     """Return the shapes of constants that the exporter writes for a card, ANY for other sizes."""
-    joints, controls, performers = len(card.skeleton), len(card.controls), len(card.performers)
+    joints, controls, labels = len(card.skeleton), len(card.controls), sum(card.label_counts)
     r1, r2, r3 = card.levels[0].ranks
     shapes = {
         "ladder": (len(card.levels), ANY_SIZE),
         "samples": (controls, card.samples),
         "sill": (1,),
         "pose_weights": (card.samples, r3 + card.levels[0].event),
-        "linear_weights": (performers + 1 + controls, ANY_SIZE),
+        "linear_weights": (labels + 1 + controls, ANY_SIZE),
         "core": (r2, r1, r3),
         "time_basis": (r2, card.frames),
         "root_mean": (3,),
@@ -247,9 +265,9 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
         "offset_mean": (3 * joints,),
         "freedoms": (3 + 3 * joints,),
     }
-    # Without performers the graph has no such constants.
-    labelled = {"performer": (1, performers), "whose": (card.samples,)}
+    # Without label sets the graph has no such constants.
+    labelled: dict[str, tuple[int, ...]] = {"labels": (1, labels) if labels else ()}
     blended = {"event_mixing": (ANY_SIZE, r2), "event_times": (ANY_SIZE, card.frames)}
-    # They come first, since other shapes follow from the number of performers.
-    labelled = labelled if performers else dict.fromkeys(labelled, ())
+    # They come first, since other shapes follow from the number of labels.
+    labelled |= {f"whose_{index}": (card.samples,) for index in range(len(card.labels))}
     return labelled | shapes | (blended if card.levels[0].event else dict.fromkeys(blended, ()))

@@ -28,6 +28,13 @@ class Compression(TypedDict):
     stored: NonNegative
 
 
+class LabelParameters(TypedDict):
+    """Parameters of one label set: correlation between two names, and variance of offsets."""
+
+    correlation: NonNegative
+    offset: NonNegative
+
+
 class Diagnostics(TypedDict):
     """Errors (m), sizes and parameters, written by `posefield_train.graph.onnx_export`."""
 
@@ -42,9 +49,8 @@ class Diagnostics(TypedDict):
     drift: tuple[Degree, ...]
     scales: tuple[NonNegative, ...]
     nugget: NonNegative
-    correlation: NonNegative
-    offset: NonNegative
     trend: NonNegative
+    labels: Mapping[Name, LabelParameters]
     tensor: tuple[Count, Count, Count]
     parity_m: NonNegative
     notes: tuple[Text, ...]

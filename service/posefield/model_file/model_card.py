@@ -32,7 +32,7 @@ from posefield.motion import measures
 from posefield.motion.measures import Measure
 from posefield.motion.skeleton import Skeleton
 
-FORMAT = 3
+FORMAT = 4
 PREFIX = "posefield."
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
@@ -57,6 +57,23 @@ class Control:
     measure: Measure | None = None
 
 
+PERFORMER = "performer"
+"""Label set of the people who move; requests may name one of it in a field of its own."""
+
+
+@dataclass(frozen=True)
+class LabelSet:
+    """Names by which clips differ besides their controls, such as performers or styles.
+
+    name: of the set. names: in the order of the graph's weights. clips (N,): index of each captured
+    clip's name.
+    """
+
+    name: Key
+    names: tuple[Name, ...]
+    clips: tuple[Index, ...]
+
+
 @dataclass(frozen=True)
 class Event:
     """Joint and moment of a motion's main event, such as the hand at the end of a grasp.
@@ -72,26 +89,26 @@ class Event:
 class Preset:
     """Named point of the controls, within the sampled ranges.
 
-    controls: a value for each control. performer: None for an unseen performer.
+    controls: a value for each control. labels: name by label set; sets that are not given are left
+    open.
     """
 
     name: Key
     controls: Mapping[Key, Number]
-    performer: Name | None = None
+    labels: Mapping[Key, Name] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class TrainingParameters:
     """Parameters of training that the graph does not hold and that adapting a model needs.
 
-    fields: nugget, offset and trend of each kriged quantity but the pose. landmarks: columns of the
-    table that name them, and their canonical times. joint_weights: of joints whose weight in the
-    metric is not one. in_phase: whether cycles were shifted to begin in phase.
+    fields: nugget, trend and the offset of each label set, by kriged quantity but the pose.
+    landmarks: columns of the table that name them, and their canonical times. joint_weights: of
+    joints whose weight in the metric is not one. in_phase: whether cycles were shifted to begin in
+    phase.
     """
 
-    fields: Mapping[Name, tuple[NonNegative, NonNegative, NonNegative]] = field(
-        default_factory=dict
-    )
+    fields: Mapping[Name, tuple[NonNegative, ...]] = field(default_factory=dict)
     landmarks: Mapping[Name, Share] = field(default_factory=dict)
     joint_weights: Mapping[Name, Positive] = field(default_factory=dict)
     in_phase: bool = False
@@ -103,19 +120,18 @@ class ModelCard:
 
     cyclic: the last pose leads into the first. root: whether the root travels or stays in place.
     rate: frames a second of the captured clips. frames, samples: T and N of the motion tensor.
-    levels: of detail, the finest first. durations: shortest and longest captured clip, s.
-    performers: names of performers, in the order of the graph's labels; empty where the model does
-    not distinguish performers. examples (N, d): controls of the captured clips. moved_by (N,):
-    index of each clip's performer, empty where performers is. feet: indices of the joints that
-    contact the ground, empty where the recipe names none. diagnostics: measured in training.
-    provenance: recipe, hashes of the data, versions, licence. sources (N,): file and frames of each
-    captured clip. kriging: parameters of the pose's kriging. left_out (N,): distance between each
-    clip and its prediction from the others, root mean square over joints and frames, m.
-    joint_sigma (J,): error of each joint as a share of sigma. making: not sent to clients. roles:
-    joints by the part that each plays (`joint_roles`). event: None where the recipe names
-    none. beside (4, 4): of a cycle, a root of the covariance of the errors of its duration's
-    logarithm and its travel, for a sigma of one metre; else empty. presets: named points of the
-    controls; the file has no such entry if the recipe names none.
+    levels: of detail, the finest first. durations: shortest and longest captured clip, s. labels:
+    label sets, in the order of the graph's weights; empty where the controls alone distinguish
+    clips. examples (N, d): controls of the captured clips. feet: indices of the joints that contact
+    the ground, empty where the recipe names none. diagnostics: measured in training. provenance:
+    recipe, hashes of the data, versions, licence. sources (N,): file and frames of each captured
+    clip. kriging: parameters of the pose's kriging. left_out (N,): distance between each clip and
+    its prediction from the others, root mean square over joints and frames, m. joint_sigma (J,):
+    error of each joint as a share of sigma. making: not sent to clients. roles: joints by the part
+    that each plays (`joint_roles`). event: None where the recipe names none. beside (4, 4): of a
+    cycle, a root of the covariance of the errors of its duration's logarithm and its travel, for a
+    sigma of one metre; else empty. presets: named points of the controls; the file has no such
+    entry if the recipe names none.
     """
 
     name: Slug
@@ -129,9 +145,8 @@ class ModelCard:
     samples: Count
     levels: tuple[Level, ...]
     durations: tuple[Positive, Positive]
-    performers: tuple[Name, ...]
+    labels: tuple[LabelSet, ...]
     examples: tuple[tuple[Number, ...], ...]
-    moved_by: tuple[Index, ...]
     feet: tuple[Index, ...]
     diagnostics: Mapping[str, Any]
     provenance: Mapping[str, Any]
@@ -146,10 +161,29 @@ class ModelCard:
     presets: tuple[Preset, ...] = ()
 
     @property
-    def labels(self) -> Floats:
-        """Return the labels (N, p) of the captured clips' performers."""
-        moved = np.array(self.moved_by or [0] * len(self.examples))
-        return np.eye(max(len(self.performers), 1), len(self.performers))[moved]
+    def clip_labels(self) -> Floats:
+        """Return the weights (N, p) of the captured clips' labels: one for a clip's own names."""
+        own = [np.eye(len(one.names))[list(one.clips)] for one in self.labels]
+        return np.hstack([np.zeros((len(self.examples), 0)), *own])
+
+    @property
+    def label_counts(self) -> tuple[int, ...]:
+        """Return the number of names of each label set."""
+        return tuple(len(own.names) for own in self.labels)
+
+    @property
+    def performers(self) -> tuple[str, ...]:
+        """Return the names of performers; empty where the model does not distinguish them."""
+        return next((own.names for own in self.labels if own.name == PERFORMER), ())
+
+    @property
+    def moved_by(self) -> tuple[int, ...]:
+        """Return the index of each clip's performer; empty where `performers` is."""
+        return next((own.clips for own in self.labels if own.name == PERFORMER), ())
+
+    def clip_names(self, clip: int) -> dict[str, str]:
+        """Return the name of a captured clip in each label set."""
+        return {own.name: own.names[own.clips[clip]] for own in self.labels}
 
     @property
     def sampled_ranges(self) -> tuple[Floats, Floats]:
@@ -167,14 +201,25 @@ def dump(card: ModelCard) -> dict[str, str]:
     making: dict[str, Any] = msgspec.to_builtins(card.making)
     # All defaults are false or empty.
     told = {key: value for key, value in making.items() if value}
-    plain = {**plain_values(card), "format": FORMAT, "making": told}
+    plain = {**_plain_fields(card), "format": FORMAT, "making": told}
     if not card.presets:
         del plain["presets"]
     return {PREFIX + key: json.dumps(plain[key], sort_keys=True) for key in sorted(plain)}
 
 
 def plain_values(card: ModelCard) -> dict[str, Any]:
-    """Return the card as numbers, texts, lists and dicts, without `making`."""
+    """Return the card as numbers, texts, lists and dicts, without `making`.
+
+    The label set of performers is given in keys of its own, too, as in requests.
+    """
+    plain = _plain_fields(card)
+    for preset in plain["presets"]:
+        preset["performer"] = preset["labels"].pop(PERFORMER, None)
+    return {**plain, "performers": list(card.performers), "moved_by": list(card.moved_by)}
+
+
+def _plain_fields(card: ModelCard) -> dict[str, Any]:
+    """Return the fields of the card but `making`, as numbers, texts, lists and dicts."""
     plain: dict[str, Any] = msgspec.to_builtins(card, enc_hook=np.ndarray.tolist)
     del plain["making"]
     # msgspec leaves out defaults of objects that it decoded.
@@ -183,7 +228,7 @@ def plain_values(card: ModelCard) -> dict[str, Any]:
         if own.measure:
             control["measure"] = measures.to_dict(own.measure)
     for preset, point in zip(plain["presets"], card.presets, strict=True):
-        preset["performer"] = point.performer
+        preset["labels"] = dict(point.labels)
     joints = plain["skeleton"]
     # To the micrometre.
     joints["offsets"] = np.round(card.skeleton.offsets, 6).tolist()

@@ -5,7 +5,13 @@ from typing import Annotated
 from msgspec import Meta, Struct
 
 from posefield.common.errors import InvalidField
-from posefield.question.motion_question import Controls, Extrapolate, Performer
+from posefield.question.motion_question import (
+    Controls,
+    Extrapolate,
+    Labels,
+    LabelValue,
+    Performer,
+)
 from posefield.question.value_validation import check_range
 
 MIN_VALUES, MAX_VALUES, MAX_MARGIN = 2, 1024, 1.0
@@ -26,6 +32,7 @@ class SigmaQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     rows: int = 32
     controls: Controls = {}
     performer: Performer = None
+    labels: Labels = {}
     margin: float = 0.0
 
     def __post_init__(self) -> None:
@@ -45,6 +52,7 @@ class WhyQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True)
     controls: Controls
     extrapolate: Extrapolate = "warn"
     performer: Performer = None
+    labels: Labels = {}
     nearest: Annotated[int, Meta(description="number of captured clips to list")] = 10
 
     def __post_init__(self) -> None:
@@ -59,6 +67,13 @@ class SuggestQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         str | None,
         Meta(description="performer whose clips alone count as captured; default: all performers"),
     ] = None
+    labels: Annotated[
+        dict[str, LabelValue],
+        Meta(
+            description="names whose clips alone count as captured, by label set; may be repeated",
+            extra={"word": "label", "metavar": "SET=NAME"},
+        ),
+    ] = {}
 
     def __post_init__(self) -> None:
         check_range("count", self.count, 1, MAX_SUGGESTIONS, "points")

@@ -42,6 +42,18 @@ Performer = Annotated[
 ]
 
 
+LabelValue = str | dict[str, float]
+"""One name of a label set, or weights of several."""
+Labels = Annotated[
+    dict[str, LabelValue],
+    Meta(
+        description="name in a label set such as style, or weights of names (angry:0.7,happy:0.3); "
+        "sets that are not given are left open; may be repeated",
+        extra={"word": "label", "metavar": "SET=NAME"},
+    ),
+]
+
+
 class Target(Struct, frozen=True, forbid_unknown_fields=True):
     """Constraint on the position of a joint at a moment.
 
@@ -65,11 +77,12 @@ class Target(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Query for a motion: controls, performer, level of detail and constraints."""
+    """Query for a motion: controls, labels, level of detail and constraints."""
 
     controls: Controls
     extrapolate: Extrapolate = "warn"
     performer: Performer = None
+    labels: Labels = {}
     level: Annotated[int, Meta(description="level of detail; 0 is the finest")] = 0
     joint_sigma: Annotated[bool, Meta(description="include sigma of each joint, m")] = False
     exact: Annotated[

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from posefield.common.units import Booleans, Floats, Singles
 from posefield.model_file.model_card import Control
 from posefield.motion.clip import Clip
+from posefield.question.motion_question import LabelValue
 
 Number = TypeVar("Number", bound=np.floating[Any])
 
@@ -107,7 +108,8 @@ class Trust:
     set to the most typical values for the given ones. measured: values in this result of the
     controls for which the recipe has a measure. targets: residuals of the constraints. joint_sigma
     (J,), m: sigma of each joint; empty unless requested. deviations: requested controls whose value
-    the motion does not have.
+    the motion does not have. labels: requested names or weights besides the performer, by label
+    set.
     """
 
     model: str
@@ -124,6 +126,7 @@ class Trust:
     targets: tuple[ConstraintResult, ...] = ()
     joint_sigma: tuple[float, ...] = ()
     deviations: tuple[Deviation, ...] = ()
+    labels: Mapping[str, LabelValue] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """Return the Trust (schema of the contract): the facts and the band of sigma."""
@@ -151,6 +154,7 @@ class Trust:
             "targets": [asdict(met) for met in self.targets],
             "joint_sigma": list(self.joint_sigma),
             "deviations": [deviation.facts() for deviation in self.deviations],
+            "labels": dict(self.labels),
         }
         return seen | {name: fact for name, fact in more.items() if fact}
 
@@ -202,6 +206,7 @@ class SigmaGrid:
     sigma: Singles
     inside: Booleans
     supported: Booleans
+    labels: Mapping[str, LabelValue] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -211,7 +216,7 @@ class CapturedClip:
     source: its file and frames. distance: between its controls and the requested ones, in the
     model's metric; at distance one, at most 5 % of the covariance is left. weight: kriging weight
     of the clip in the poses of the result. share: part of the clip in the sum of the positive
-    weights of all clips.
+    weights of all clips. labels: its names in the label sets besides `performer`.
     """
 
     source: str
@@ -220,6 +225,7 @@ class CapturedClip:
     distance: float
     weight: float
     share: float
+    labels: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -258,6 +264,7 @@ class Explanation:
     others_weight: float
     others_share: float
     inferred: tuple[str, ...] = ()
+    labels: Mapping[str, LabelValue] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -291,3 +298,4 @@ class Suggestions:
     performer: str | None
     candidates: int
     suggestions: tuple[Suggestion, ...]
+    labels: Mapping[str, LabelValue] = field(default_factory=dict)

@@ -26,14 +26,14 @@ from msgspec import NODEFAULT, Meta, Struct, structs
 
 from posefield.common.errors import FormError
 from posefield.common.name_suggestion import did_you_mean
-from posefield.question.motion_question import ExactControls, Moment, Target
+from posefield.question.motion_question import ExactControls, LabelValue, Moment, Target
 
 Question = TypeVar("Question", bound=Struct)
 MOMENTS: tuple[Moment, ...] = get_args(Moment)
 # The number syntax of JSON, the same as in a body: no nan, inf, 1_000 or blanks.
 NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?([eE][+-]?[0-9]+)?", re.ASCII)
 FLAGS = {"true": True, "false": False}
-CONTROLS_FIELD = "controls"
+CONTROLS_FIELD, LABELS_FIELD = "controls", "labels"
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,19 @@ def decode_question(form: type[Question], pairs: Iterable[tuple[str, str]]) -> Q
         said[CONTROLS_FIELD] = controls
     if "targets" in said:
         said["targets"] = tuple(said["targets"])
+    if LABELS_FIELD in said:
+        said[LABELS_FIELD] = merge_labels(said[LABELS_FIELD])
     return form(**said)
+
+
+def merge_labels(pairs: Iterable[tuple[str, LabelValue]]) -> dict[str, LabelValue]:
+    """Return the labels by set; FormError for a set that is given twice."""
+    found: dict[str, LabelValue] = {}
+    for name, value in pairs:
+        if name in found:
+            raise FormError("label", f"{name} given twice, expected once")
+        found[name] = value
+    return found
 
 
 def parse_value(parameter: Parameter, text: str) -> Any:
@@ -206,7 +218,36 @@ def parse_target(text: str) -> Target:
     return Target(joint, place, **when)
 
 
+def parse_label(text: str) -> tuple[str, LabelValue]:
+    """Return label set and value of SET=NAME or SET=NAME:WEIGHT,NAME:WEIGHT.
+
+    Raises ValueError for any other text.
+    """
+    name, mark, value = text.partition("=")
+    if not (name and mark and value):
+        raise ValueError(f"{text!r}, expected SET=NAME or SET=NAME:WEIGHT,NAME:WEIGHT")
+    return name, parse_label_value(value)
+
+
+def parse_label_value(text: str) -> LabelValue:
+    """Return a name, or the weights of NAME:WEIGHT,NAME:WEIGHT.
+
+    Names have neither commas nor colons. Raises ValueError for any other text.
+    """
+    if "," not in text and ":" not in text:
+        return text
+    pairs = [part.rpartition(":") for part in text.split(",")]
+    try:
+        weights = {name: parse_number(weight) for name, _, weight in pairs}
+    except ValueError:
+        weights = {}
+    if "" in weights or len(weights) < len(pairs):
+        raise ValueError(f"{text!r}, expected NAME or NAME:WEIGHT,NAME:WEIGHT, each name once")
+    return dict(weights)
+
+
 PARSERS: Mapping[Any, Callable[[str], Any]] = {
+    dict[str, LabelValue]: parse_label,
     float: parse_number,
     int: parse_integer,
     bool: parse_flag,
@@ -223,8 +264,10 @@ def _parameter(field: structs.FieldInfo, hint: Any) -> Parameter:
     if get_origin(hint) is Annotated and isinstance(get_args(hint)[1], Meta):
         kind, meta = get_args(hint)
     kind = _without_none(kind)
-    repeated = get_origin(kind) in (list, tuple) and kind not in PARSERS
-    one = get_args(kind)[0] if repeated else kind
+    several = get_origin(kind) in (list, tuple) and kind not in PARSERS
+    # Each label set of a mapping is a parameter of its own.
+    repeated = several or field.name == LABELS_FIELD
+    one = get_args(kind)[0] if several else kind
     read = (
         choice_parser(get_args(one))
         if get_origin(one) is Literal
@@ -237,11 +280,16 @@ def _parameter(field: structs.FieldInfo, hint: Any) -> Parameter:
         one,
         read,
         repeated,
-        NODEFAULT if field.required else field.default,
+        _default(field),
         meta.description or "",
         extra.get("unit"),
         extra.get("metavar"),
     )
+
+
+def _default(field: structs.FieldInfo) -> Any:
+    """Return the default of a field; NODEFAULT for a required one."""
+    return field.default if field.default_factory is NODEFAULT else field.default_factory()
 
 
 def _without_none(kind: Any) -> Any:

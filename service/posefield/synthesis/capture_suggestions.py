@@ -7,7 +7,7 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.progress_callback import ProgressCallback, ignore_progress
 from posefield.common.units import Floats, Indices
-from posefield.kriging import acquisition
+from posefield.kriging import acquisition, kriging_model
 from posefield.kriging.acquisition import VarianceReduction
 from posefield.kriging.support import Support
 from posefield.model_file.model_card import Control, ModelCard
@@ -15,7 +15,7 @@ from posefield.question.model_question import SuggestQuestion
 from posefield.question.results import Suggestion, Suggestions
 from posefield.question.value_validation import check_range
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation import input_limits, question_validation
+from posefield.validation import input_limits, label_validation, question_validation
 
 DRAWN_CANDIDATES, MAX_CANDIDATES = 1000, 10_000
 """Number of drawn candidates, and the largest number of given ones."""
@@ -30,24 +30,31 @@ def suggest(
     """Return points to capture in order of their expected variance reduction.
 
     candidates: the points, by their controls; None for points across the sampled ranges. Each rank
-    assumes that the points before it were captured. Raises InvalidField for an unknown performer
-    and for an unusable candidate.
+    assumes that the points before it were captured. Raises InvalidField for an unknown label and
+    for an unusable candidate.
     """
     card, own = model.session.card, model.validator.support
-    question_validation.labels(card.performers, asked.performer)
+    weights = label_validation.label_weights(card, asked.performer, asked.labels)[0]
     points = _drawn_points(own) if candidates is None else _given_points(model, candidates)
-    captured = _captured_indices(card, asked.performer)
+    captured = _captured_indices(card, weights)
     scaled, known = own.scaled(points), own.samples[captured]
     ranked = acquisition.rank_candidates(scaled, known, asked.count, progress)
     found = tuple(_suggestion(card, own, captured, points[at], each) for at, each in ranked)
-    return Suggestions(model.identity, asked.performer, len(points), found)
+    return Suggestions(model.identity, asked.performer, len(points), found, asked.labels)
 
 
-def _captured_indices(card: ModelCard, performer: str | None) -> Indices:
-    """Return the indices of the performer's captured clips; of all clips for None."""
-    if performer is None:
-        return np.arange(len(card.examples))
-    return np.flatnonzero(np.array(card.moved_by) == card.performers.index(performer))
+def _captured_indices(card: ModelCard, weights: Floats) -> Indices:
+    """Return the indices of the captured clips of the names with weights (p,) above zero.
+
+    A label set without such a name admits all clips. Raises InvalidField if no clip is left.
+    """
+    kept = np.ones(len(card.examples), dtype=bool)
+    for columns in kriging_model.label_columns(0, card.label_counts):
+        if weights[columns].any():
+            kept &= card.clip_labels[:, columns] @ weights[columns] > 0.0
+    if not kept.any():
+        raise InvalidField("labels", "no captured clip has these names together")
+    return np.flatnonzero(kept)
 
 
 def _given_points(model: Synthesizer, candidates: Sequence[Mapping[str, float]]) -> Floats:

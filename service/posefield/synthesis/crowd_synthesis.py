@@ -73,7 +73,7 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     controls, supported, said = crowd_validation.check_controls(
         card, model.validator.support, question
     )
-    labels = crowd_question.labels(question, card.performers)
+    labels = crowd_question.labels(question, card)
     crowd_question.check_levels(question, len(card.levels))
     early = question.times < 0.0
     crowd_validation.raise_for_first("time", question.times, early, "s, expected 0 s or later")

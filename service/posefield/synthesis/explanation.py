@@ -10,7 +10,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.kriging import kriging_model, support
-from posefield.model_file.model_card import ModelCard
+from posefield.model_file.model_card import PERFORMER, ModelCard
 from posefield.question.model_question import WhyQuestion
 from posefield.question.results import CapturedClip, Explanation, SupportReport
 from posefield.synthesis.synthesizer import Synthesizer
@@ -26,7 +26,9 @@ def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
     Raises InvalidField and OutsideSamples as the validation of questions does.
     """
     card = model.session.card
-    question = model.validator.question(asked.controls, asked.extrapolate, asked.performer, level=0)
+    question = model.validator.question(
+        asked.controls, asked.extrapolate, asked.performer, 0, asked.labels
+    )
     distances = model.session.kriging_weights.distances(_point(card, question))[0]
     limited = model.session.bounds.limit(question.point).astype(np.float64)
     acting = replace(question, point=limited)
@@ -44,7 +46,16 @@ def explain_result(model: Synthesizer, asked: WhyQuestion) -> Explanation:
     )
     inferred, backing = question.inferred, _support_report(model.validator, question)
     return Explanation(
-        model.identity, controls, who, said, backing, found, len(others), *rest, inferred
+        model.identity,
+        controls,
+        who,
+        said,
+        backing,
+        found,
+        len(others),
+        *rest,
+        inferred,
+        question.named,
     )
 
 
@@ -75,6 +86,7 @@ def _captured_clip(
 ) -> CapturedClip:
     names = (control.name for control in card.controls)
     controls = dict(zip(names, card.examples[index], strict=True))
-    who = card.performers[card.moved_by[index]] if card.moved_by else None
+    named = card.clip_names(index)
+    who = named.pop(PERFORMER, None)
     numbers = float(distance), float(weight), float(share)
-    return CapturedClip(card.sources[index], controls, who, *numbers)
+    return CapturedClip(card.sources[index], controls, who, *numbers, named)

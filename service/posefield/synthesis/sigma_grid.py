@@ -12,7 +12,7 @@ from posefield.model_file.model_card import ModelCard
 from posefield.question.model_question import SigmaQuestion
 from posefield.question.results import GridAxis, SigmaGrid
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation import input_limits, question_validation
+from posefield.validation import input_limits, label_validation, question_validation
 
 # Larger batches exceed a core's cache between operators and take 1.5 times as long per row.
 BATCH = 1024
@@ -21,12 +21,12 @@ BATCH = 1024
 def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
     """Return the grid of sigma and support.
 
-    Raises InvalidField for an unknown control or performer, and for a value too far outside the
+    Raises InvalidField for an unknown control or label, and for a value too far outside the
     sampled range.
     """
     card = model.session.card
     input_limits.check_names(card, asked.controls)
-    labels = question_validation.labels(card.performers, asked.performer)
+    labels = label_validation.label_weights(card, asked.performer, asked.labels)
     across = _axis(card, "across", asked.across, asked.columns, asked)
     along = _axis(card, "along", asked.along, asked.rows, asked)
     fixed = _fixed(card, asked)
@@ -42,6 +42,7 @@ def grid(model: Synthesizer, asked: SigmaQuestion) -> SigmaGrid:
         sigma.reshape(shape),
         _inside(card, points).reshape(shape),
         model.validator.support.supported(points).reshape(shape),
+        asked.labels,
     )
 
 

@@ -9,6 +9,7 @@ from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
 from posefield.inference.named_model import NamedModel
+from posefield.model_file.model_card import PERFORMER
 from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion
 from posefield.question.results import ConstraintResult, Deviation, Trust, split_results
 from posefield.validation import input_limits, question_validation
@@ -49,11 +50,11 @@ class Synthesizer(NamedModel):
         OutsideSamples as the validation does.
         """
         policy, who, level = asked.extrapolate, asked.performer, asked.level
-        given = self.validator.question(asked.controls, policy, who, level)
+        given = self.validator.question(asked.controls, policy, who, level, asked.labels)
         found = self.solver.controls(given, asked, self.validator.imputer)
         if found is None:
             return given
-        every = self.validator.question(found, policy, who, level)
+        every = self.validator.question(found, policy, who, level, asked.labels)
         return replace(every, inferred=given.inferred)
 
     def solve_constraints(
@@ -83,7 +84,8 @@ class Synthesizer(NamedModel):
         """Return the trust of an answer with this duration, s, and sigma, m."""
         who, apart = question.performer, question.deviations
         warnings = question_validation.merge_warnings(question.warnings, apart, asked.extrapolate)
-        seen = who is not None if self.session.card.performers else None
+        named = who is not None or PERFORMER in question.named
+        seen = named if self.session.card.performers else None
         shares = self.session.card.joint_sigma if asked.joint_sigma else ()
         return Trust(
             self.identity,
@@ -98,6 +100,7 @@ class Synthesizer(NamedModel):
             inferred=question.inferred,
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
             deviations=apart,
+            labels=question.named,
         )
 
     def constrained_trust(

@@ -1,17 +1,20 @@
 """Question for a crowd: one row per character, validated on construction."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Booleans, Floats, Indices, Singles
 from posefield.inference.level_selection import MAX_COORDINATE, LevelCriteria
+from posefield.model_file.model_card import PERFORMER, ModelCard
 from posefield.motion.crowd_clip import Placement
-from posefield.question.motion_question import ExtrapolationPolicy, RootMode
-from posefield.validation import input_limits
+from posefield.question.motion_question import ExtrapolationPolicy, LabelValue, RootMode
+from posefield.validation.label_validation import label_weights
+
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -23,13 +26,26 @@ class Blending:
 
 
 @dataclass(frozen=True)
+class LabelColumn:
+    """Labels of N characters in one label set.
+
+    values: the distinct names or weights, None where the set is left open. index: (N,), into
+    `values`.
+    """
+
+    values: tuple[LabelValue | None, ...]
+    index: Indices
+
+
+@dataclass(frozen=True)
 class CrowdQuestion:
     """Question for one pose of each of N characters.
 
     controls: (N,) by name, in their units. times: (N,), s from the start of each character's clip.
     performers: the distinct performers, None for an unseen performer. performer: (N,), index into
-    `performers`. detail: levels of detail (N,), or the view that chooses them. extrapolate: policy
-    for controls without similar captured clips. blending: transitions between levels, None without.
+    `performers`. labels: of further label sets. detail: levels of detail (N,), or the view that
+    chooses them. extrapolate: policy for controls without similar captured clips. blending:
+    transitions between levels, None without.
 
     Raises InvalidField, with the index of the first character at fault, for columns of different
     lengths, numbers that are not finite, and positions beyond the precision of float32.
@@ -44,12 +60,13 @@ class CrowdQuestion:
     root: RootMode
     extrapolate: ExtrapolationPolicy
     blending: "Blending | None" = None
+    labels: Mapping[str, LabelColumn] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for field, column in self._columns().items():
+        for name, column in self._columns().items():
             if len(column) != len(self):
-                raise InvalidField(field, f"{len(column)} characters, expected {len(self)}")
-            _check(field, column, np.isfinite(column), "a finite number")
+                raise InvalidField(name, f"{len(column)} characters, expected {len(self)}")
+            _check(name, column, np.isfinite(column), "a finite number")
         near = np.abs(self.placement.positions) <= MAX_COORDINATE
         _check("position", self.placement.positions, near, f"at most {MAX_COORDINATE:g} m")
         if self.blending is not None:
@@ -69,6 +86,7 @@ class CrowdQuestion:
             "position": self.placement.positions,
             "heading": self.placement.headings,
             "performer": self.performer,
+            **{f"labels/{name}": column.index for name, column in self.labels.items()},
             **({} if levels is None else {"previous_level" if seen else "level": levels}),
             **({} if own is None else {"from_level": own.levels, "blend": own.shares}),
         }
@@ -88,21 +106,36 @@ def check_levels(question: CrowdQuestion, count: int) -> None:
             _check(name, column, (column >= 0) & (column < count), f"0 to {count - 1}")
 
 
-def labels(question: CrowdQuestion, known: tuple[str, ...]) -> Singles:
-    """Return the labels (N, p) of the characters' performers; zeros for an unseen performer.
+def labels(question: CrowdQuestion, card: ModelCard) -> Singles:
+    """Return the weights (N, p) of the characters' labels; zeros in sets that are left open.
 
-    known: performers of the model. Raises InvalidField for the first character with an unknown
-    performer.
+    Raises InvalidField for the first character with an unknown name or invalid weights.
     """
-    for index, name in enumerate(question.performers):
-        if name is not None and name not in known:
-            first = int(np.argmax(question.performer == index))
-            hint = did_you_mean(name, known)
-            raise InvalidField(
-                "performer", f"{name!r}{hint}, expected {input_limits.accepted_names(known)}", first
-            )
-    rows = [[name == other for other in known] for name in question.performers]
-    return np.array(rows, dtype=np.float32)[question.performer]
+    found = np.zeros((len(question), sum(card.label_counts)), dtype=np.float32)
+    if PERFORMER in question.labels and question.performers != (None,):
+        raise InvalidField("performer", "given, and labels/performer too, expected one")
+    for performer, rows in _distinct(question.performers, question.performer):
+        found[rows] += _checked(card, rows, performer, {})
+    for name, column in question.labels.items():
+        for given, rows in _distinct(column.values, column.index):
+            found[rows] += _checked(card, rows, None, {} if given is None else {name: given})
+    return found
+
+
+def _distinct(values: Sequence[Value], index: Indices) -> Iterator[tuple[Value, Indices]]:
+    """Yield each of distinct values with the indices of its characters."""
+    for place, value in enumerate(values):
+        yield value, np.flatnonzero(index == place)
+
+
+def _checked(
+    card: ModelCard, rows: Indices, performer: str | None, named: Mapping[str, LabelValue]
+) -> Floats:
+    """Return weights (p,); InvalidField with the first of the rows for invalid ones."""
+    try:
+        return label_weights(card, performer, named)[0]
+    except InvalidField as fault:
+        raise InvalidField(fault.field, fault.message, int(rows[0])) from fault
 
 
 def _check(field: str, column: Floats | Indices, good: Booleans, expected: str) -> None:

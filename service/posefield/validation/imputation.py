@@ -14,8 +14,8 @@ from posefield.kriging.typical_clip import NEAR, Neighbourhood
 from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import Control, ModelCard
 
-OTHER_PERFORMER = 4.0
-"""Cost of a clip of another performer than the named one: as of values two `NEAR` away."""
+OTHER_LABEL = 4.0
+"""Cost of a clip of another performer or style than the named one: as of values two `NEAR` away."""
 SHRINKAGE = 0.1
 """Shrinkage of the correlations: few samples correlate by chance. On left-out samples of three
 families, the best shares are 0.1 to 0.4, and the error hardly depends on the share.
@@ -74,7 +74,8 @@ class ControlImputer:
 
     def __init__(self, card: ModelCard) -> None:
         self._controls = card.controls
-        self._examples, self._labels = np.array(card.examples), card.labels
+        self._examples, self._labels = np.array(card.examples), card.clip_labels
+        self._label_columns = kriging_model.label_columns(0, card.label_counts)
         self._low, self._high = card.sampled_ranges
         self._scaled = kriging_model.half_ranges(self._examples, self._low, self._high)
 
@@ -82,7 +83,7 @@ class ControlImputer:
         """Return all controls in the card's order, those not given as in a typical captured clip.
 
         That is the medoid, in the open controls, of the clips near the given ones. labels (1, p):
-        of the performer, whose own clips come first; all zero for none.
+        weights of names, whose own clips come first; all zero in label sets that are left open.
         """
         open_ = self._open(given)
         row = typical_clip.typical_row(self._scaled[:, open_], self._costs(given, labels))
@@ -103,13 +104,14 @@ class ControlImputer:
         near = np.sum(np.square(self._scaled - self._scaled[row])[:, open_], axis=1) / REACH**2
         samples = np.hstack([self._examples, self._labels, seen])
         known = {i: given[c.name] for i, c in enumerate(self._controls) if c.name in given}
-        who = np.ravel(labels)
-        beside = {len(self._controls) + i: float(label) for i, label in enumerate(who)}
+        who, first = np.ravel(labels), len(self._controls)
+        named = [own for own in self._label_columns if who[own].any()]
+        beside = {first + i: float(who[i]) for own in named for i in range(own.start, own.stop)}
         return LocalImputer(
             self._controls,
             self._examples[row],
             fit_gaussian(samples, weights=np.exp(-0.5 * near)),
-            known | (beside if who.any() else {}),
+            known | beside,
             open_,
             (self._low[open_], self._high[open_]),
             typical_clip.neighbourhood(self._scaled[:, open_]),
@@ -132,8 +134,10 @@ class ControlImputer:
         )
         place = kriging_model.half_ranges(acting, self._low[known], self._high[known])
         costs = np.sum(np.square((self._scaled[:, known] - place) / NEAR), axis=1)
-        if labels.any():
-            costs = costs + OTHER_PERFORMER * (1.0 - self._labels @ np.ravel(labels))
+        weights = np.ravel(labels)
+        for own in self._label_columns:
+            if weights[own].any():
+                costs = costs + OTHER_LABEL * (1.0 - self._labels[:, own] @ weights[own])
         return np.asarray(costs, np.float64)
 
     def _complete(self, given: Mapping[str, float], row: Floats) -> dict[str, float]:

@@ -1,22 +1,22 @@
 """Validation of questions for one character: controls, performer, level and policy."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from posefield.common.errors import InvalidField, OutsideSamples
-from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.kriging import support
 from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.question import value_validation
-from posefield.question.motion_question import ExtrapolationPolicy
+from posefield.question.motion_question import ExtrapolationPolicy, LabelValue
 from posefield.question.results import Deviation
 from posefield.validation import input_limits
 from posefield.validation.imputation import ControlImputer
+from posefield.validation.label_validation import label_weights
 
 DEVIATION_SHARE = 1e-3
 """Share of a control's range by which it may act at another value without a word: a slider that
@@ -29,10 +29,11 @@ class ValidatedQuestion:
     """A validated question.
 
     controls: all controls in the card's order. performer: name, None for an unseen performer.
-    point: the controls as the graph's input, (1, d). labels: the performer as the graph's input,
-    (1, p). warnings: of extrapolation. supported: true if similar clips were captured. inferred:
-    names of the controls that were not given and were chosen. deviations: controls that act at
-    another value than the requested one, which is too far outside the samples.
+    named: requested labels besides the performer, by label set. point: the controls as the graph's
+    input, (1, d). labels: the weights of all labels as the graph's input, (1, p). warnings: of
+    extrapolation. supported: true if similar clips were captured. inferred: names of the controls
+    that were not given and were chosen. deviations: controls that act at another value than the
+    requested one, which is too far outside the samples.
     """
 
     controls: dict[str, float]
@@ -44,6 +45,7 @@ class ValidatedQuestion:
     supported: bool
     inferred: tuple[str, ...] = ()
     deviations: tuple[Deviation, ...] = ()
+    named: Mapping[str, LabelValue] = field(default_factory=dict)
 
 
 class QuestionValidator:
@@ -55,7 +57,7 @@ class QuestionValidator:
             (control.name, *input_limits.sampled_range(control)) for control in card.controls
         ]
         self._names = {control.name for control in card.controls}
-        self._unseen_labels = labels(card.performers, None)
+        self._open_labels = label_weights(card, None, {})
         self.support = support.fit_support(np.array(card.examples))
 
     def question(
@@ -64,16 +66,21 @@ class QuestionValidator:
         extrapolate: ExtrapolationPolicy,
         performer: str | None,
         level: int,
+        named: Mapping[str, LabelValue] | None = None,
     ) -> ValidatedQuestion:
         """Return the validated question; controls that are not given are the conditional mean.
 
-        The mean is conditional on the given controls and the performer. Raises InvalidField for a
-        control, performer or level that cannot be used, and OutsideSamples where `extrapolate` is
-        "refuse" and no similar clips were captured.
+        The mean is conditional on the given controls and labels; named: labels besides the
+        performer. Raises InvalidField for a control, label or level that cannot be used, and
+        OutsideSamples where `extrapolate` is "refuse" and no similar clips were captured.
         """
         if not controls.keys() <= self._names:
             input_limits.check_names(self._card, controls)
-        own = self._unseen_labels if performer is None else labels(self._card.performers, performer)
+        named = named or {}
+        if performer is None and not named:
+            own = self._open_labels
+        else:
+            own = label_weights(self._card, performer, named)
         coarsest = len(self._card.levels) - 1
         if not 0 <= level <= coarsest:
             raise InvalidField("level", f"{level}, expected 0 to {coarsest}")
@@ -93,7 +100,7 @@ class QuestionValidator:
         array = np.array([point])
         limited = () if plain else limited_controls(self._card.controls, point)
         return ValidatedQuestion(
-            given, performer, level, array, own, warnings, supported, inferred, limited
+            given, performer, level, array, own, warnings, supported, inferred, limited, named
         )
 
     def _is_within_ranges(self, controls: Mapping[str, float]) -> bool:
@@ -132,17 +139,6 @@ class QuestionValidator:
     def _gap_warning(self, point: Sequence[float]) -> str:
         variance = float(self.support.variance(np.array([point]))[0])
         return gap_warning("these controls lie", variance, self.support.limit)
-
-
-def labels(performers: tuple[str, ...], asked: str | None) -> Floats:
-    """Return the labels (1, p) of a performer: all zero for None, an unseen performer.
-
-    Raises InvalidField for a name that is not among the performers.
-    """
-    if asked is not None and asked not in performers:
-        known = f"expected {input_limits.accepted_names(performers)}"
-        raise InvalidField("performer", f"{asked!r}{did_you_mean(asked, performers)}, {known}")
-    return np.array([[float(name == asked) for name in performers]])
 
 
 def check_control(control: Control, given: float) -> float:

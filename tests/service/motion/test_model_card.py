@@ -13,7 +13,7 @@ from posefield.model_file.model_card import TrainingParameters
 def test_making_is_in_the_file_and_not_sent_to_clients():
     entries = model_card.dump(CARD)
     assert json.loads(entries["posefield.making"]) == {
-        "fields": {"warp": [0.25, 0, 1]},
+        "fields": {"warp": [0.25, 1, 0]},
         "landmarks": {"peak": 0.4},
         "joint_weights": {"chest": 2.0},
         "in_phase": True,
@@ -56,5 +56,5 @@ def test_control_is_found_by_its_name():
 
 
 def test_labels_are_a_row_for_each_clip():
-    assert CARD.labels.tolist() == [[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
-    assert replace(CARD, performers=(), moved_by=()).labels.shape == (3, 0)
+    assert CARD.clip_labels.tolist() == [[1.0, 0.0], [0.0, 1.0], [1.0, 0.0]]
+    assert replace(CARD, labels=()).clip_labels.shape == (3, 0)

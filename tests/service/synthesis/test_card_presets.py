@@ -11,7 +11,10 @@ from posefield.model_file import card_reader, model_card
 from posefield.model_file.model_card import Preset
 
 POINT = {"height": 1.7, "turn": 20.0}
-PRESETS = (Preset("near", POINT, "ada"), Preset("far", {"height": 1.6, "turn": -60.0}))
+PRESETS = (
+    Preset("near", POINT, {"performer": "ada"}),
+    Preset("far", {"height": 1.6, "turn": -60.0}),
+)
 
 
 def entries(presets):
@@ -23,8 +26,13 @@ def test_presets_are_read_as_they_were_written():
     assert read.presets == PRESETS
     assert entries(read.presets) == entries(PRESETS)
     assert model_card.plain_values(read)["presets"] == (
-        {"name": "near", "controls": POINT, "performer": "ada"},
-        {"name": "far", "controls": {"height": 1.6, "turn": -60.0}, "performer": None},
+        {"name": "near", "controls": POINT, "labels": {}, "performer": "ada"},
+        {
+            "name": "far",
+            "controls": {"height": 1.6, "turn": -60.0},
+            "labels": {},
+            "performer": None,
+        },
     )
 
 
@@ -47,7 +55,11 @@ def test_a_file_without_presets_keeps_its_bytes_and_is_read():
             Preset("far", {**POINT, "turn": 61.0}),
             "presets[1].controls.turn is 61.0, expected -60.0",
         ),
-        (Preset("far", POINT, "cay"), "presets[1].performer is cay, expected one of"),
+        (
+            Preset("far", POINT, {"performer": "cay"}),
+            "presets[1].labels.performer is cay, expected one of",
+        ),
+        (Preset("far", POINT, {"mood": "calm"}), "presets[1].labels is mood, expected label sets"),
         (PRESETS[0], "presets is ['near'], expected each entry once"),
     ],
 )

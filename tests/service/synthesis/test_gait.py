@@ -86,7 +86,8 @@ def test_a_model_that_stays_in_place_does_not_walk(opened):
 
 
 def test_a_model_of_one_speed_does_not_walk(opened):
-    once = replace(opened.card, examples=opened.card.examples[:2], moved_by=(0, 0))
+    one = (replace(opened.card.labels[0], clips=(0, 0)),)
+    once = replace(opened.card, examples=opened.card.examples[:2], labels=one)
     with pytest.raises(InvalidField, match=r"model: stroll goes 0\.\d+ to 0\.\d+ m/s, expected"):
         gait.fit_gait(replace(opened, card=once))
 

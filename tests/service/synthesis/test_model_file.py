@@ -115,8 +115,8 @@ def test_something_else_is_refused(found):
             "its card's diagnostics.tensor is (94, 40, 46), expected 41 frames and 46 clips",
         ),
         (
-            lambda m: setattr(entry(m, "performers"), "value", '["a", "b", "c", "d"]'),
-            "its graph's constant 'performer' has shape (1, 3), expected (1, 4) by its card",
+            lambda m: setattr(entry(m, "labels"), "value", "[]"),
+            "its card's kriging.labels has 1 entries, expected 0",
         ),
     ],
 )

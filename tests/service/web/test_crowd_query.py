@@ -2,15 +2,19 @@
 
 import json
 import math
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from model_cards import CARD
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.http.decoding import crowd_query
 from posefield.inference.level_selection import LevelCriteria
+from posefield.model_file.model_card import LabelSet
 from posefield.validation import crowd_question
 
 CAMERA = {"position": [0, 1.7, -5], "fov": 1.0, "height": 1080}
@@ -187,22 +191,58 @@ def test_in_python_too_every_number_is_finite(number):
     assert (caught.value.field, caught.value.index) == ("controls/speed", 1)
 
 
+def card(names):
+    """Return a card with performers and, if there are any, with styles."""
+    styles = LabelSet("style", ("calm", "tired"), (0, 1, 0))
+    own = (LabelSet("performer", names, (0, 1, 0)), styles)
+    return replace(CARD, labels=own if names else ())
+
+
+def test_labels_of_several_sets_are_columns_in_the_order_of_the_card():
+    given = {"style": ["tired", {"calm": 0.75, "tired": 0.25}, None, "tired"]}
+    found = asked(**changed(controls={}, performer=["bo", None, "ada", "bo"], labels=given))
+    rows = crowd_question.labels(found, card(("ada", "bo")))
+    assert rows[:, :2].tolist() == [[0, 1], [0, 0], [1, 0], [0, 1]]
+    assert rows[:, 2:].tolist() == [[0, 1], [0.75, 0.25], [0, 0], [0, 1]]
+    same = asked(**changed(controls={}, time=[0] * 3, labels={"style": "calm"}))
+    assert crowd_question.labels(same, card(("ada", "bo")))[:, 2:].tolist() == [[1, 0]] * 3
+
+
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [
+        (
+            {"style": ["calm", "tierd"]},
+            "labels/style/1: 'tierd' (did you mean 'tired'?), expected ",
+        ),
+        ({"stile": "calm"}, "labels/stile/0: 'stile' (did you mean 'style'?), expected "),
+        ({"style": ["calm", {"calm": 0.7, "tired": 0.7}]}, "labels/style/1: weights with a sum of"),
+        ({"style": ["calm"] * 3}, "labels/style: 3 characters, expected 2"),
+        ({"performer": "ada"}, "performer: given, and labels/performer too"),
+    ],
+)
+def test_labels_that_no_model_has_are_refused_with_the_first_character(labels, said):
+    with pytest.raises(InvalidField, match=re.escape(said)):
+        question = asked(**changed(controls={}, time=[0, 0], performer="bo", labels=labels))
+        crowd_question.labels(question, card(("ada", "bo")))
+
+
 def test_a_performer_is_a_row_of_zeros_with_a_one():
     found = asked(**changed(controls={}, performer=["bo", None, "ada", "bo"]))
-    rows = crowd_question.labels(found, ("ada", "bo"))
-    assert rows.tolist() == [[0, 1], [0, 0], [1, 0], [0, 1]]
+    rows = crowd_question.labels(found, card(("ada", "bo")))
+    assert rows[:, :2].tolist() == [[0, 1], [0, 0], [1, 0], [0, 1]]
     assert rows.dtype == np.float32
 
 
 def test_a_model_that_knows_nobody_has_labels_without_width():
-    assert crowd_question.labels(asked(**changed()), ()).shape == (2, 0)
+    assert crowd_question.labels(asked(**changed()), card(())).shape == (2, 0)
 
 
 @pytest.mark.parametrize("known", [(), ("ada", "bo")])
 def test_the_first_character_of_whom_nothing_is_known_is_named(known):
     found = asked(**changed(controls={}, performer=[None, None, "eve", "ivan", "eve"]))
     with pytest.raises(InvalidField, match="performer/2: 'eve', expected ") as caught:
-        crowd_question.labels(found, known)
+        crowd_question.labels(found, card(known))
     assert caught.value.index == 2
 
 

@@ -64,7 +64,8 @@ function supported(support: Support, { count, controls }: Rows): boolean[] {
 
 function size(asked: CrowdQuestion): number {
   const { time, position, heading, level, performer } = asked;
-  const columns = [...Object.values(asked.controls), time, position, heading, level, performer];
+  const named = [performer, ...Object.values(asked.labels ?? {})];
+  const columns = [...Object.values(asked.controls), time, position, heading, level, ...named];
   const sizes = columns.filter(Array.isArray).map((column) => column.length);
   const [first = 1] = sizes;
   if (sizes.some((each) => each !== first))
@@ -73,18 +74,24 @@ function size(asked: CrowdQuestion): number {
 }
 
 function questions(card: ModelCard, asked: CrowdQuestion, count: number): Rows {
-  const { performer } = asked;
+  const labels: number[] = [];
   const columns = card.controls.map(({ name }) => column(asked.controls[name], count));
   const controls = new Float32Array(count * columns.length);
-  const who = new Int32Array(count);
   for (let row = 0; row < count; row++) {
     card.controls.forEach((control, i) => {
       controls[row * columns.length + i] = door.value(control, columns[i]![row]);
     });
-    const name = Array.isArray(performer) ? (performer[row] as string | null) : performer;
-    who[row] = door.performer(card, name);
+    labels.push(...door.weights(card, own(asked, row)));
   }
-  return { count, controls, times: Float32Array.from(column(asked.time, count)), who };
+  const times = Float32Array.from(column(asked.time, count));
+  return { count, controls, times, labels: Float32Array.from(labels) };
+}
+
+/** The labels of one character. */
+function own({ performer, labels = {} }: CrowdQuestion, row: number): door.Named {
+  const of = (given: unknown): unknown => (Array.isArray(given) ? given[row] : given);
+  const named = Object.entries(labels).map(([name, given]) => [name, of(given)]);
+  return { performer: of(performer ?? null), labels: Object.fromEntries(named) } as door.Named;
 }
 
 /** A number for everybody, or one for each. */
@@ -141,17 +148,20 @@ async function answers(
   return block;
 }
 
-function picked({ controls, times, who, count }: Rows, which: readonly number[]): Rows {
-  const width = controls.length / count;
-  const own = new Float32Array(which.length * width);
-  which.forEach((row, i) => {
-    own.set(controls.subarray(row * width, (row + 1) * width), i * width);
-  });
+function picked({ controls, times, labels, count }: Rows, which: readonly number[]): Rows {
+  const part = (all: Float32Array) => {
+    const width = all.length / count;
+    const own = new Float32Array(which.length * width);
+    which.forEach((row, i) => {
+      own.set(all.subarray(row * width, (row + 1) * width), i * width);
+    });
+    return own;
+  };
   return {
     count: which.length,
-    controls: own,
-    times: Float32Array.from(which, (row) => times[row]!),
-    who: Int32Array.from(which, (row) => who[row]!),
+    controls: part(controls),
+    times: part(times),
+    labels: part(labels),
   };
 }
 

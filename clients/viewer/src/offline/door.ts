@@ -61,13 +61,32 @@ export function sampled({ minimum, maximum }: Control, value: number): boolean {
   return value >= minimum - slack && value <= maximum + slack;
 }
 
-/** Place of a performer among the card's; -1 for nobody that was seen. */
-export function performer(card: ModelCard, name: string | null | undefined): number {
-  if (name === null || name === undefined) return -1;
-  const place = card.performers.indexOf(name);
-  if (place < 0)
-    throw new Refused(`performer: ${name}, expected one of ${card.performers.join(", ")}`);
-  return place;
+type Label = string | Readonly<Record<string, number>>;
+
+/** What a question says of labels; the performer is short for the label set of that name. */
+export interface Named {
+  readonly performer?: string | null;
+  readonly labels?: Readonly<Record<string, Label | null>>;
+}
+
+/** A weight for each name of all label sets, in the graph's order; zeros where a set is open. */
+export function weights(card: ModelCard, { performer = null, labels = {} }: Named): number[] {
+  const sets = card.labels ?? [];
+  const asked = performer === null ? labels : { ...labels, performer };
+  for (const name of Object.keys(asked)) {
+    if (!sets.some((set) => set.name === name))
+      throw new Refused(`${name}: this model has no such label set`);
+  }
+  return sets.flatMap(({ name, names }) => setWeights(name, names, asked[name] ?? {}));
+}
+
+function setWeights(set: string, names: readonly string[], label: Label): number[] {
+  const given: Readonly<Record<string, number>> =
+    typeof label === "string" ? { [label]: 1 } : label;
+  const unknown = Object.keys(given).find((name) => !names.includes(name));
+  if (unknown !== undefined)
+    throw new Refused(`${set}: ${unknown}, expected one of ${names.join(", ")}`);
+  return names.map((name) => given[name] ?? 0);
 }
 
 export function level(card: ModelCard, asked: number): number {

@@ -13,12 +13,12 @@ const SIZES = { rotations: 4, root_position: 3, bone_offsets: 3, duration: 1, si
 
 export type Output = keyof typeof SIZES;
 
-/** B rows for the graph: controls B × d, times B × S, and whose each is, -1 for nobody's. */
+/** B rows for the graph: controls B × d, times B × S, and weights of all labels B × p. */
 export interface Rows {
   readonly count: number;
   readonly controls: Float32Array;
   readonly times: Float32Array;
-  readonly who: Int32Array;
+  readonly labels: Float32Array;
 }
 
 /** Outputs, row by row. */
@@ -94,8 +94,7 @@ export class Graph {
   }
 
   async #batch(rows: Rows, first: number, count: number, level: number) {
-    const { controls, performers } = this.#card;
-    const [width, steps] = [controls.length, rows.times.length / rows.count];
+    const [width, steps] = [this.#card.controls.length, rows.times.length / rows.count];
     const part = (all: Float32Array, size: number) =>
       new this.#ort.Tensor("float32", all.slice(size * first, size * (first + count)), [
         count,
@@ -105,14 +104,7 @@ export class Graph {
       controls: part(rows.controls, width),
       time: part(rows.times, steps),
     };
-    if (performers.length) {
-      const labels = new Float32Array(count * performers.length);
-      for (let row = 0; row < count; row++) {
-        const who = rows.who[first + row]!;
-        if (who >= 0) labels[row * performers.length + who] = 1;
-      }
-      feeds["performer"] = new this.#ort.Tensor("float32", labels, [count, performers.length]);
-    }
+    if (rows.labels.length) feeds["labels"] = part(rows.labels, rows.labels.length / rows.count);
     const session = await this.#session(level);
     return inTurn(() => session.run(feeds));
   }

@@ -25,10 +25,11 @@ export async function sigma(
     right.map((x) => ({ ...fixed, [across.name]: x, [along.name]: y })),
   );
   const points = rows.map((row) => card.controls.map(({ name }) => row[name]!));
-  const who = new Int32Array(points.length).fill(door.performer(card, asked.performer));
+  const named = door.weights(card, asked);
+  const labels = Float32Array.from(points.flatMap(() => named));
   const times = new Float32Array(points.length);
   const controls = Float32Array.from(points.flat());
-  const found = await graph.unbounded({ count: points.length, controls, times, who }, 0);
+  const found = await graph.unbounded({ count: points.length, controls, times, labels }, 0);
   const split = <Item>(all: readonly Item[]) =>
     up.map((_, row) => all.slice(row * right.length, (row + 1) * right.length));
   const within = (values: readonly number[]) =>
@@ -39,6 +40,7 @@ export async function sigma(
     along: along.name,
     controls: fixed,
     performer: asked.performer ?? null,
+    ...(asked.labels && { labels: asked.labels }),
     units: Object.fromEntries(card.controls.map(({ name, unit }) => [name, unit])),
     across_values: right,
     along_values: up,

@@ -31,8 +31,9 @@ const AFTER = 1e9;
 interface Asked {
   readonly controls: Readonly<Record<string, number>>;
   readonly point: Float32Array;
-  readonly who: Int32Array;
+  readonly weights: Float32Array;
   readonly performer: string | null;
+  readonly labels: NonNullable<ClipQuestion["labels"]>;
   readonly level: number;
   readonly warnings: string[];
   readonly supported: boolean;
@@ -127,7 +128,9 @@ export class Offline implements Source {
     return asked.loop ? closed(placed, stays ? null : way, duration) : placed;
   }
 
-  #asked(question: Pick<ClipQuestion, "controls" | "performer" | "level" | "extrapolate">): Asked {
+  #asked(
+    question: Pick<ClipQuestion, "controls" | "performer" | "labels" | "level" | "extrapolate">,
+  ): Asked {
     const values = door.point(this.#card, question.controls);
     const policy = question.extrapolate ?? "warn";
     const found = door.warnings(this.#card, values);
@@ -138,8 +141,9 @@ export class Offline implements Source {
     return {
       controls: question.controls,
       point: Float32Array.from(values),
-      who: Int32Array.of(door.performer(this.#card, question.performer)),
+      weights: Float32Array.from(door.weights(this.#card, question)),
       performer: question.performer ?? null,
+      labels: question.labels ?? {},
       level: door.level(this.#card, question.level ?? 0),
       warnings: policy === "warn" ? merged(said, apart) : [],
       supported,
@@ -149,7 +153,8 @@ export class Offline implements Source {
 
   #run(asked: Asked, when: Float64Array): Promise<Answers> {
     const times = Float32Array.from(when);
-    return this.#graph.run({ count: 1, controls: asked.point, times, who: asked.who }, asked.level);
+    const { level, point, weights } = asked;
+    return this.#graph.run({ count: 1, controls: point, times, labels: weights }, level);
   }
 
   #trust(asked: Asked, found: Answers): Trust {
@@ -158,7 +163,8 @@ export class Offline implements Source {
     const model = this.#card.identity;
     const seen = this.#card.performers.length ? { performer_seen: performer !== null } : {};
     const own = { model, controls, performer, level, duration, sigma, supported, warnings };
-    return { ...own, ...seen, ...told(asked.deviations, sigma) } as Trust;
+    const labels = Object.keys(asked.labels).length ? { labels: asked.labels } : {};
+    return { ...own, ...labels, ...seen, ...told(asked.deviations, sigma) } as Trust;
   }
 }
 

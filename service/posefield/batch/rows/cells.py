@@ -11,7 +11,7 @@ from typing import Any, Protocol
 import msgspec
 
 from posefield.question import text_decoding
-from posefield.question.motion_question import LEGAL_NAME, ExactControls, Target
+from posefield.question.motion_question import LEGAL_NAME, ExactControls, LabelValue, Target
 
 
 class CellKind(Protocol):
@@ -89,6 +89,34 @@ class ChoiceCell:
         if not set(map(type, cells)) <= {str, type(None)} or not {*cells} <= {*self.choices, None}:
             raise ValueError
         return list(cells)
+
+
+@dataclass(frozen=True)
+class LabelCell:
+    """One name of a label set, or weights of several.
+
+    Weights are NAME:WEIGHT,NAME:WEIGHT in text, else also an object of them.
+    """
+
+    names: tuple[str, ...]
+
+    @property
+    def expected(self) -> str:
+        return f"one of {', '.join(self.names)}, or NAME:WEIGHT,NAME:WEIGHT"
+
+    def text(self, cells: Sequence[str]) -> list[LabelValue | None]:
+        return [self._checked(cell) if cell else None for cell in cells]
+
+    def values(self, cells: Sequence[Any]) -> list[LabelValue | None]:
+        return [None if cell is None else self._checked(cell) for cell in cells]
+
+    def _checked(self, cell: object) -> LabelValue:
+        """Return the label of a cell; ValueError for an unknown name."""
+        value = text_decoding.parse_label_value(cell) if isinstance(cell, str) else cell
+        found = msgspec.convert(value, LabelValue)
+        if not {*([found] if isinstance(found, str) else found)} <= {*self.names}:
+            raise ValueError
+        return found
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Columns of query tables, and the parsing of their headings.
 
-There is one column for each control of the model, by its name, and those of `OPTION_KINDS`. A
-heading may state the unit of a control, `speed [m/s]` or `speed (m/s)`, which must then be the
-model's. `controls/NAME` is accepted for any control, and required for one with the name of an
-option.
+There is one column for each control of the model and for each label set, by its name, and those of
+`OPTION_KINDS`. A heading may state the unit of a control, `speed [m/s]` or `speed (m/s)`, which
+must then be the model's. `controls/NAME` is accepted for any control, and `labels/NAME` for any
+label set but the performer.
 """
 
 import re
@@ -18,24 +18,25 @@ from posefield.batch.rows.cells import (
     ChoiceCell,
     ExactCell,
     IntegerCell,
+    LabelCell,
     NameCell,
     NumberCell,
     TargetsCell,
 )
 from posefield.common.name_suggestion import similar_name
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.model_file.model_card import ModelCard
+from posefield.model_file.model_card import PERFORMER, ModelCard
 from posefield.question import text_decoding
 from posefield.question.motion_question import ExactControls, Name, NamedClipQuestion, Target
 from posefield.question.text_decoding import Parameter
 
-CONTROL_PREFIX = "controls/"
+CONTROL_PREFIX, LABEL_PREFIX = "controls/", "labels/"
 MAX_TEXT_LENGTH = 200
 """Longest value that a message repeats, characters."""
 WITH_UNIT = re.compile(r"(?P<name>.*?)\s*(\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\))")
 
-NO_COLUMN = ("joint_sigma",)
-"""Fields of a question without a column."""
+NO_COLUMN = ("joint_sigma", "labels")
+"""Fields of a question without a column; each label set has one."""
 
 
 def _option_kinds() -> dict[str, Callable[[ModelCard], CellKind]]:
@@ -87,7 +88,7 @@ class Column:
     @property
     def name(self) -> str:
         """Name in messages."""
-        return self.field.removeprefix(CONTROL_PREFIX)
+        return self.field.removeprefix(CONTROL_PREFIX).removeprefix(LABEL_PREFIX)
 
     @property
     def control(self) -> bool:
@@ -161,7 +162,8 @@ class Columns:
         return column
 
     def _closest_title(self, title: str) -> str:
-        known = [name for name in self.titles if not name.startswith(CONTROL_PREFIX)]
+        prefixes = (CONTROL_PREFIX, LABEL_PREFIX)
+        known = [name for name in self.titles if not name.startswith(prefixes)]
         near = similar_name(title, known)
         return f"did you mean {near!r}?" if near else f"expected one of {', '.join(known)}"
 
@@ -171,11 +173,14 @@ def columns_of(card: ModelCard) -> Columns:
     controls = tuple(
         Column(CONTROL_PREFIX + c.name, NumberCell(c.unit), c.unit) for c in card.controls
     )
-    options = {name: _option_column(name, kind(card)) for name, kind in OPTION_KINDS.items()}
-    return Columns(
-        controls,
-        {c.name: c for c in controls} | options | {c.field: c for c in controls},
+    labels = tuple(
+        Column(LABEL_PREFIX + own.name, LabelCell(own.names))
+        for own in card.labels
+        if own.name != PERFORMER
     )
+    options = {name: _option_column(name, kind(card)) for name, kind in OPTION_KINDS.items()}
+    named = (*controls, *labels)
+    return Columns(controls, {c.name: c for c in named} | options | {c.field: c for c in named})
 
 
 def shortened_text(value: object) -> str:

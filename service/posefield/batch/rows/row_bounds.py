@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from posefield.batch.rows.columns import CONTROL_PREFIX
+from posefield.batch.rows.columns import CONTROL_PREFIX, LABEL_PREFIX
 from posefield.common.units import Floats
 from posefield.kriging.support import Support
-from posefield.model_file.model_card import ModelCard
+from posefield.model_file.model_card import PERFORMER, ModelCard
 from posefield.question.motion_question import CONSTRAINING, ClipQuestion
 from posefield.synthesis import frame_times
 from posefield.validation import input_limits
@@ -32,6 +32,7 @@ def all_valid(card: ModelCard, support: Support, values: Values, usual: ClipQues
         and _window_valid(card, values, usual)
         and _loops_valid(card, values, usual)
         and _constraints_valid(values)
+        and _labels_valid(card, values, usual)
         and (bool(card.roles) or {*values.get("names", ()), usual.names} <= {"own", None})
     )
 
@@ -44,6 +45,17 @@ def _controls_valid(card: ModelCard, support: Support, values: Values, usual: Cl
     if not all(_within(column, *allowed(control)) for column, control in pairs):
         return False
     return not strict or bool(support.supported(np.stack(columns, axis=1)).all())
+
+
+def _labels_valid(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+    """Return whether all labels are names; weights and a mixture of performers need validation.
+
+    The names of columns are known ones already.
+    """
+    known = {own.name: own.names for own in card.labels if own.name != PERFORMER}
+    cells = [cell for field in values if field.startswith(LABEL_PREFIX) for cell in values[field]]
+    plain = all(cell is None or isinstance(cell, str) for cell in cells)
+    return plain and all(label in known.get(name, ()) for name, label in usual.labels.items())
 
 
 def _window_valid(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:

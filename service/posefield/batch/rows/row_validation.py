@@ -9,11 +9,11 @@ from msgspec import structs
 
 from posefield.batch.rows import row_bounds
 from posefield.batch.rows.clip_names import UsedNames, generated_name
-from posefield.batch.rows.columns import CONTROL_PREFIX
+from posefield.batch.rows.columns import CONTROL_PREFIX, LABEL_PREFIX
 from posefield.batch.rows.row_blocks import BrokenRow, RowBlock
 from posefield.batch.rows.row_query import MAX_KEPT_FAULTS, ClipQuery, RowFault, RowSurvey
 from posefield.common.errors import QueryError
-from posefield.question.motion_question import ClipQuestion
+from posefield.question.motion_question import ClipQuestion, LabelValue
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -146,12 +146,20 @@ class RowReader:
             form = said.pop("format", self.usual.format)
             said.pop("name", None)
             controls = self._controls(said)
-            question = structs.replace(self.usual.question, controls=controls, **said)
+            labels = dict(self.usual.question.labels) | self._labels(said)
+            question = structs.replace(
+                self.usual.question, controls=controls, labels=labels, **said
+            )
             yield ClipQuery(name, form, question, self.place(number))
 
     def _controls(self, said: dict[str, Any]) -> dict[str, float]:
         """Return the controls of a row in the card's order, removed from `said`."""
         return {name: said.pop(CONTROL_PREFIX + name) for name in self._names}
+
+    def _labels(self, said: dict[str, Any]) -> dict[str, LabelValue]:
+        """Return the labels of a row by label set, removed from `said`."""
+        given = [field for field in said if field.startswith(LABEL_PREFIX)]
+        return {field.removeprefix(LABEL_PREFIX): said.pop(field) for field in given}
 
     @cached_property
     def _names(self) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Answers about a model: sigma grids as tables; reasons and suggestions as JSON and as text."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,7 @@ def _facts(grid: SigmaGrid) -> dict[str, Any]:
         "along": along.name,
         "controls": grid.controls,
         "performer": grid.performer,
+        **_labels(grid.labels),
         "units": {"across": across.unit, "along": along.unit, "sigma": "metre"},
     }
 
@@ -63,6 +65,7 @@ def explanation(found: Explanation) -> dict[str, Any]:
         "model": found.model,
         "controls": found.controls,
         "performer": found.performer,
+        **_labels(found.labels),
         "warnings": list(found.warnings),
         "support": _support_facts(found.backing),
         "nearest": [_clip_facts(clip) for clip in found.nearest],
@@ -77,7 +80,14 @@ def explanation(found: Explanation) -> dict[str, Any]:
 
 def _clip_facts(clip: CapturedClip) -> dict[str, Any]:
     rounded = ("distance", "weight", "share")
-    return {**vars(clip), **{name: round(getattr(clip, name), DECIMALS) for name in rounded}}
+    plain = {name: value for name, value in vars(clip).items() if name != "labels"}
+    numbers = {name: round(getattr(clip, name), DECIMALS) for name in rounded}
+    return {**plain, **numbers, **_labels(clip.labels)}
+
+
+def _labels(labels: Mapping[str, Any]) -> dict[str, Any]:
+    """Return labels by their key; nothing where there are none."""
+    return {"labels": dict(labels)} if labels else {}
 
 
 def _support_facts(found: SupportReport) -> dict[str, Any]:
@@ -126,7 +136,7 @@ def _support_line(found: SupportReport) -> str:
 
 def _clip_line(clip: CapturedClip) -> str:
     values = ", ".join(f"{name} {value:g}" for name, value in clip.controls.items())
-    return f"{clip.performer}, {values}" if clip.performer else values
+    return ", ".join([*filter(None, [clip.performer]), *clip.labels.values(), values])
 
 
 def suggestions(found: Suggestions) -> dict[str, Any]:
@@ -134,6 +144,7 @@ def suggestions(found: Suggestions) -> dict[str, Any]:
     return {
         "model": found.model,
         "performer": found.performer,
+        **_labels(found.labels),
         "candidates": found.candidates,
         "suggestions": [_suggestion_facts(each) for each in found.suggestions],
     }

@@ -6,7 +6,7 @@ a list there is one character.
 
 from collections.abc import Sequence
 from itertools import chain
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -26,9 +26,9 @@ from posefield.motion.crowd_clip import Placement
 from posefield.motion.skeleton import Skeleton
 from posefield.question import json_decoding as bodies
 from posefield.question.body_kind import DEFAULT_BODY
-from posefield.question.motion_question import ExtrapolationPolicy, RootMode
+from posefield.question.motion_question import ExtrapolationPolicy, LabelValue, RootMode
 from posefield.question.walk_question import WalkQuestion
-from posefield.validation.crowd_question import Blending, CrowdQuestion
+from posefield.validation.crowd_question import Blending, CrowdQuestion, LabelColumn
 
 DEFAULT_PIXELS = 1.0
 VALUES, FEWEST = 64, 100_000
@@ -55,6 +55,7 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     position: list[tuple[float, float, float]] | None = None
     heading: Numbers = 0.0
     performer: str | list[str | None] | None = None
+    labels: dict[str, LabelValue | list[LabelValue | None]] = {}
     level: Level | list[Level] | Literal["auto"] = 0.0
     previous_level: list[Level] | None = None
     from_level: list[Level] | None = None
@@ -75,7 +76,7 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
     _check_values(content, most)
     body = bodies.decode_question(CrowdBody, content)
     count = _count(body, most)
-    performers, performer = _performers(body.performer, count)
+    performers, performer = _distinct(body.performer, count)
     return CrowdQuestion(
         {name: _column(values, count) for name, values in body.controls.items()},
         _column(body.time, count),
@@ -86,6 +87,7 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
         body.root,
         body.extrapolate,
         _blending(body, count),
+        {name: LabelColumn(*_distinct(given, count)) for name, given in body.labels.items()},
     )
 
 
@@ -101,6 +103,7 @@ def _count(body: CrowdBody, most: float) -> int:
     fields = {f"controls/{name}": values for name, values in body.controls.items()} | {
         name: getattr(body, name) for name in CrowdBody.__struct_fields__ if name != "controls"
     }
+    fields |= {f"labels/{name}": values for name, values in body.labels.items()}
     sizes = {name: len(values) for name, values in fields.items() if isinstance(values, list)}
     first, count = next(iter(sizes.items()), ("", 1))
     for name, size in sizes.items():
@@ -123,14 +126,15 @@ def _positions(given: list[tuple[float, float, float]] | None, count: int) -> Fl
     return np.fromiter(chain.from_iterable(given), float, 3 * len(given)).reshape(-1, 3) + 0.0
 
 
-def _performers(
-    given: str | list[str | None] | None, count: int
-) -> tuple[tuple[str | None, ...], Indices]:
-    """Return the distinct performers and the index (N,) of each character's performer."""
+def _distinct(given: Any, count: int) -> tuple[tuple[Any, ...], Indices]:
+    """Return the distinct labels and the index (N,) of each character's label."""
     if not isinstance(given, list):
         return (given,), np.zeros(count, dtype=np.int64)
-    places = {name: place for place, name in enumerate(dict.fromkeys(given))}
-    return tuple(places), np.fromiter(map(places.__getitem__, given), np.int64, len(given))
+    # Weights are dicts, which have no hash; their text has quotes, as that of a name.
+    values = {repr(label): label for label in given}
+    places = {key: place for place, key in enumerate(values)}
+    index = (places[repr(label)] for label in given)
+    return tuple(values.values()), np.fromiter(index, np.int64, len(given))
 
 
 def _detail(body: CrowdBody, count: int) -> Indices | LevelCriteria:

@@ -1,0 +1,281 @@
+"""Tests of several label sets: covariance, tuning, graph, and what knowing labels is worth."""
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+from running import outputs
+from scipy.optimize import check_grad
+
+from posefield.kriging import kriging_model
+from posefield.kriging.kriging_model import LabelKernel
+from posefield_train import train
+from posefield_train.kriging import (
+    kriging_graph,
+    kriging_tuning,
+    sample_points,
+    thinning,
+    universal_kriging,
+)
+from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.kriging_bank import KrigingBank
+from posefield_train.kriging.kriging_tuning import TuningProblem
+from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.universal_kriging import Hyper
+from posefield_train.onnx_graph.level_tables import LevelTables
+from posefield_train.sample import sample_walk
+from posefield_train.source import ingest
+
+SETS = {"performer": ("ann", "bob", "cy"), "style": ("calm", "tired")}
+KERNELS = (LabelKernel(3, 0.6, 0.4), LabelKernel(2, 0.3, 1.2))
+COUNT = 24
+
+
+@pytest.fixture(params=COVARIANCES)
+def hyper(request):
+    return Hyper(request.param, (0,), np.array([0.5, 0.9]), 0.1, 1.5, KERNELS)
+
+
+def weights(named):
+    return sample_points.label_weights(named, SETS)
+
+
+@pytest.fixture
+def named(rng):
+    """Names of the samples in both sets."""
+    return [{name: str(rng.choice(names)) for name, names in SETS.items()} for _ in range(COUNT)]
+
+
+@pytest.fixture
+def laid(rng, named):
+    return np.hstack([rng.uniform(-1.0, 1.0, (COUNT, 2)), weights(named)])
+
+
+def mixtures(rng, count):
+    """Points with weights of both sets that sum to at most one; the first leaves both open."""
+    both = [rng.dirichlet(np.ones(len(names) + 1), count)[:, :-1] for names in SETS.values()]
+    found = np.hstack([rng.uniform(-1.0, 1.0, (count, 2)), *both])
+    found[0, 2:] = 0.0
+    return found
+
+
+def least_eigenvalue(hyper, points):
+    """Least eigenvalue of the joint covariance of points, with their prior variances."""
+    joint = kriging_model.covariances(hyper, points, points)
+    np.fill_diagonal(joint, kriging_model.prior_variances(hyper, points))
+    return np.linalg.eigvalsh(joint)[0]
+
+
+# --- the covariance -------------------------------------------------------------------------------
+
+
+def test_covariance_is_a_product_of_correlations_and_a_sum_of_offsets():
+    hyper = Hyper("matern52", (0,), np.array([0.5, 0.9]), 0.1, 0.0, KERNELS)
+    who = ["ann calm", "ann tired", "bob calm", "bob tired", " calm", "ann ", " "]
+    asked = [dict(zip(SETS, pair.split(" "), strict=True)) for pair in who]
+    points = np.hstack([np.zeros((7, 2)), weights(asked)])
+    found = kriging_model.covariances(hyper, points, points[:1])[:, 0]
+    expected = [1.0 + 1.6, 0.3 + 0.4, 0.6 + 1.2, 0.18, 0.6 + 1.2, 0.3 + 0.4, 0.18]
+    assert np.abs(found - expected).max() < 1e-12
+
+
+def test_joint_covariance_of_names_mixtures_and_open_sets_is_positive_definite(hyper, laid, rng):
+    points = np.vstack([laid, mixtures(rng, 30)])
+    assert least_eigenvalue(hyper, points) > -1e-9
+    # The samples' own covariance, which is inverted, needs no nugget.
+    assert np.linalg.eigvalsh(kriging_model.covariances(hyper, laid, laid))[0] > 0.0
+    # Negative control: styles that are further from one another than opposites.
+    beyond = replace(hyper, labels=(KERNELS[0], LabelKernel(2, -3.0, 0.0)), trend=0.0)
+    assert least_eigenvalue(beyond, points) < -0.5
+
+
+def test_own_controls_and_labels_give_the_clip_back_without_nugget(hyper, laid, rng):
+    values = rng.normal(size=(COUNT, 3))
+    field = universal_kriging.solve(replace(hyper, nugget=0.0), laid, values)
+    assert np.abs(field.predict(laid) - values).max() < 1e-7
+    assert np.abs(field.variance(laid)).max() < 1e-7
+    # Negative controls: the other style, an open style, and a nugget.
+    other, open_ = laid.copy(), laid.copy()
+    other[:, 5:], open_[:, 5:] = laid[:, [6, 5]], 0.0
+    assert np.abs(field.predict(other) - values).max() > 0.1
+    assert np.abs(field.predict(open_) - values).max() > 0.1
+    noisy = universal_kriging.solve(hyper, laid, values)
+    assert np.abs(noisy.predict(laid) - values).max() > 1e-2
+
+
+def test_a_mixture_lies_between_its_names_and_is_less_certain(hyper, laid, rng):
+    """Far from all clips the labels' offsets are left, in which the prediction is linear."""
+    field = universal_kriging.solve(hyper, laid, rng.normal(size=(COUNT, 3)))
+    far = np.full((4, 2), 60.0)
+    styles = np.array([[1.0, 0.0], [0.0, 1.0], [0.7, 0.3], [0.0, 0.0]])
+    asked = np.hstack([far, np.tile(np.eye(3)[:1], (4, 1)), styles])
+    calm, tired, mixed, open_ = field.predict(asked)
+    assert np.abs(mixed - (0.7 * calm + 0.3 * tired)).max() < 1e-9
+    assert np.abs(mixed - open_).max() > 1e-3
+    near = np.hstack([np.tile(laid[:1, :5], (4, 1)), styles])
+    named, mixture, unknown = field.variance(near)[[int(laid[0, 6]), 2, 3]]
+    assert named < mixture < unknown
+
+
+def test_the_order_of_label_sets_does_not_matter(hyper, laid, rng):
+    values = rng.normal(size=(COUNT, 3))
+    turned = replace(hyper, labels=KERNELS[::-1])
+    columns = [0, 1, 5, 6, 2, 3, 4]
+    points = mixtures(rng, 9)
+    found = universal_kriging.solve(hyper, laid, values).predict(points)
+    other = universal_kriging.solve(turned, laid[:, columns], values).predict(points[:, columns])
+    assert np.abs(found - other).max() < 1e-9
+    wrong = universal_kriging.solve(turned, laid[:, columns], values).predict(
+        points[:, [0, 1, 6, 5, 2, 3, 4]]
+    )
+    assert np.abs(found - wrong).max() > 1e-2
+
+
+def test_linear_functions_and_stationary_covariances_hold_every_covariance(hyper, laid, rng):
+    points = mixtures(rng, 9)
+    terms = kriging_model.linear_terms(hyper, laid)
+    found = kriging_model.linear_functions(hyper, points) @ terms
+    found[:, :COUNT] += kriging_model.stationary_covariances(hyper, points, laid)
+    assert np.abs(found - kriging_model.basis_functions(hyper, points, laid)).max() < 1e-12
+
+
+# --- tuning ---------------------------------------------------------------------------------------
+
+
+def test_gradient_of_the_loss_is_that_of_both_sets(laid, rng):
+    samples = SamplePoints(laid, 2, np.arange(COUNT) // 2, (3, 2))
+    problem = TuningProblem(samples, rng.normal(size=(COUNT, 4)))
+    names = (
+        ("nugget", 0),
+        ("correlation", 0),
+        ("correlation", 1),
+        ("offset", 0),
+        ("offset", 1),
+        ("trend", 0),
+    )
+    base = Hyper(
+        "matern52", (0,), np.ones(2), 0.0, 0.0, (LabelKernel(3, 1, 0), LabelKernel(2, 1, 0))
+    )
+    loss = kriging_tuning.LeaveOneOutLoss(problem, base, names, own_scales=True)
+    at = np.array([-0.5, -0.2, -2.0, 0.4, -0.7, -1.0, 0.3, 0.2])
+    away = check_grad(
+        lambda x: loss.value_and_slope(x)[0], lambda x: loss.value_and_slope(x)[1], at
+    )
+    size = np.linalg.norm(loss.value_and_slope(at)[1])
+    assert away < 1e-5 * size
+    # Negative control: the slopes of the two correlations are not each other's.
+    slope = loss.value_and_slope(at)[1]
+    assert abs(slope[3] - slope[4]) > 1e-2 * size
+
+
+def test_each_set_gets_the_offset_of_its_own_effect(rng):
+    """Styles differ by ten times as much as performers, and the other way round."""
+    named = [{"performer": p, "style": s} for p in SETS["performer"] for s in SETS["style"]] * 8
+    points = np.hstack([rng.uniform(-1.0, 1.0, (48, 2)), weights(named)])
+    samples = SamplePoints(points, 2, np.arange(48), (3, 2))
+    wave = np.sin(2.0 * points[:, :2])
+
+    def offsets(sizes):
+        own = np.hstack([sizes[0] * points[:, 2:5], sizes[1] * points[:, 5:]])
+        values = wave + own @ rng.normal(size=(5, 2)) + 0.02 * rng.normal(size=(48, 2))
+        found = kriging_tuning.tune(TuningProblem(samples, values), "matern52", None).hyper
+        return [own.offset for own in found.labels]
+
+    few_performers, more_styles = offsets((0.05, 2.0))
+    more_performers, few_styles = offsets((2.0, 0.05))
+    assert more_styles > 1.5 * few_performers and more_performers > 1.5 * few_styles
+    assert more_styles > 1.5 * few_styles and more_performers > 1.5 * few_performers
+
+
+# --- the graph ------------------------------------------------------------------------------------
+
+
+def test_the_graph_weights_names_and_mixtures_as_the_reference_does(laid, rng):
+    low, high = np.array([1.5, -60.0]), np.array([1.9, 60.0])
+    fields = {}
+    for name, size in (("pose", 6), ("offsets", 2), ("duration", 1)):
+        kernels = tuple(replace(own, offset=own.offset * size) for own in KERNELS)
+        hyper = Hyper("matern52", (0,), np.array([0.5, 0.9]), 0.1, 1.5, kernels)
+        fields[name] = universal_kriging.solve(hyper, laid, rng.normal(size=(COUNT, size)))
+    bank = KrigingBank(low, high, SETS, fields.pop("pose"), fields, 0.04)
+    points = mixtures(rng, 40)
+    points[20:, 2:] = np.hstack(thinning.random_labels(rng, SETS, 20))
+    controls = 0.5 * (points[:, :2] * (high - low) + high + low)
+
+    def build(net, controls, *_):
+        ends = LevelTables(kriging_graph.entries(bank, [6])).onnx(net)
+        return tuple(kriging_graph.onnx(bank, net, controls, ends).values())
+
+    asked = controls.astype(np.float32).astype(float)
+    found = outputs(build, (2, 2, 2, 1), controls=asked, labels=points[:, 2:])
+    variance, *values = bank.numpy(bank.points(asked, points[:, 2:])).values()
+    expected = [*values, bank.sigma(variance)]
+
+    def apart(expected):
+        return max(np.abs(a - b).max() for a, b in zip(found, expected, strict=True))
+
+    assert apart(expected) < 2e-4
+    turned = bank.numpy(bank.points(asked, points[:, [3, 4, 2, 6, 5]]))
+    assert apart([*list(turned.values())[1:], bank.sigma(turned["variance"])]) > 1e-2
+
+
+# --- a family of two walkers in three styles ------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def strides(tmp_path_factory):
+    folder = sample_walk.write_styled_walk(tmp_path_factory.mktemp("styles"))
+    return ingest.ingest(sample_walk.styled_recipe(), folder)[0]
+
+
+def left_out_error(labels, examples):
+    """Leave-one-out error, m, of a model that knows some label sets."""
+    recipe = sample_walk.styled_recipe()
+    kriging = recipe.kriging.model_copy(update={"label": labels})
+    made = train.train(recipe.model_copy(update={"kriging": kriging}), examples, lambda _: None)
+    return float(np.sqrt(made.left_out_errors.mean()))
+
+
+def test_both_labels_are_better_than_one_and_one_is_better_than_none(strides):
+    both = left_out_error(["performer", "style"], strides)
+    performer, style = (left_out_error([name], strides) for name in ("performer", "style"))
+    none = left_out_error([], strides)
+    assert both < 0.5 * min(performer, style)
+    assert max(performer, style) < 0.9 * none
+    # Negative control: styles of other clips tell nothing.
+    order = np.random.Generator(np.random.PCG64(5)).permutation(len(strides))
+    shuffled = [
+        replace(own, row=replace(own.row, other_labels=other.row.other_labels))
+        for own, other in zip(strides, [strides[i] for i in order], strict=True)
+    ]
+    assert left_out_error(["performer", "style"], shuffled) > 0.9 * performer
+
+
+def test_sets_that_divide_the_clips_alike_are_noted(strides):
+    recipe = sample_walk.styled_recipe()
+    assert sample_points.data_notes(recipe, strides) == []
+    same = [
+        replace(own, row=replace(own.row, other_labels={"style": own.row.performer}))
+        for own in strides
+    ]
+    (said,) = sample_points.data_notes(recipe, same)
+    assert said.startswith("label sets 'performer' and 'style' divide the clips alike")
+
+
+def test_a_set_of_one_name_is_left_out_and_noted(strides):
+    recipe = sample_walk.styled_recipe()
+    plain = [replace(own, row=replace(own.row, other_labels={"style": "calm"})) for own in strides]
+    laid, known = sample_points.make_samples(recipe, plain)
+    assert known == {"performer": ("ann", "ben")} and laid.labels == (2,)
+    assert sample_points.data_notes(recipe, plain) == [
+        "all clips are of one style, 'calm': kriging.label has no effect"
+    ]
+
+
+@pytest.mark.parametrize("order", list(permutations(("performer", "style"))))
+def test_sets_keep_the_order_of_the_recipe(strides, order):
+    recipe = sample_walk.styled_recipe()
+    kriging = recipe.kriging.model_copy(update={"label": list(order)})
+    known = sample_points.make_samples(recipe.model_copy(update={"kriging": kriging}), strides)[1]
+    assert tuple(known) == order
