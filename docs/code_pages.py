@@ -44,9 +44,11 @@ the name below. `detail` is for people, `errors` names each field at fault by `p
 `pointer`. A running service shows this page at `/problems`."""
 COLUMNS_INTRO = """\
 A table of queries for `posefield export` is CSV, JSON Lines or Parquet. It has one column for
-each control of the model, by the control's name, and may have the columns below. A name may state
-the unit: `speed [m/s]`. An empty cell takes the option of the command. The table of a training is
-described by its [recipe](../guide/recipes.md#the-table)."""
+each control of the model, by the control's name, and may have one for each label set besides
+`performer`, by its name, such as `style`, and the columns below. A label is a name, or weights
+of several: `angry:0.7,happy:0.3`. A name of a control may state the unit: `speed [m/s]`. An
+empty cell takes the option of the command. The table of a training is described by its
+[recipe](../guide/recipes.md#the-table)."""
 MANIFEST_INTRO = """\
 Each line of `manifest.jsonl` is one clip. The fields from `model` on are those of the answer's
 [trust](../guide/answers.md)."""

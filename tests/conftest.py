@@ -210,6 +210,12 @@ def posefield(monkeypatch, capsys):
 
 
 @pytest.fixture(scope="session")
+def styled_path(model_file) -> Path:
+    """Return the path of the file of the walk with performers and styles, styled.onnx."""
+    return model_file("styled")
+
+
+@pytest.fixture(scope="session")
 def models(labelled_path, walk_path, tmp_path_factory) -> Path:
     """Return a folder with the models of the examples: reach, with performers, and walk, a gait."""
     folder = tmp_path_factory.mktemp("models")

@@ -52,6 +52,7 @@ RECIPES = {
     "labelled": labelled_recipe,
     "stroll": sample_walk.recipe,
     "measured": measured_recipe,
+    "styled": sample_walk.styled_recipe,
 }
 
 
@@ -70,7 +71,8 @@ def examples(model: str) -> list[Example]:
     """Return the clips that a model is trained on."""
     if model in ("reaching", "labelled"):
         return reaches()
-    return ingest.ingest(RECIPES[model](), strides_folder())[0]
+    folder = styled_folder() if model == "styled" else strides_folder()
+    return ingest.ingest(RECIPES[model](), folder)[0]
 
 
 @functools.cache
@@ -88,6 +90,16 @@ def exported(model: str) -> ExportedModel:
     return fixture_cache.value(
         f"{model}-exported", lambda: onnx_export.export_model(RECIPES[model](), trained(model), [])
     )
+
+
+def styled_folder() -> Path:
+    """Return the folder of the strides in several styles and the table strides.csv."""
+    return fixture_cache.path("styles", _write_styles)
+
+
+def _write_styles(folder: Path) -> None:
+    folder.mkdir()
+    sample_walk.write_styled_walk(folder)
 
 
 def _write_strides(folder: Path) -> None:

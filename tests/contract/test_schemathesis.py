@@ -228,6 +228,12 @@ def narrowed(spec, card):
     for name in ("performer", "whose"):
         parts["parameters"][name]["schema"] = {"enum": performers}
     parts["schemas"]["Performer"] = {"enum": [*performers, None]}
+    # No schema can say that a performer is given in one of two ways.
+    for name in ("label", "whoseLabel"):
+        parts["parameters"][name]["schema"] = {"type": "array", "maxItems": 0}
+    parts["schemas"]["Labels"] = {"type": "object", "additionalProperties": False}
+    crowd = parts["schemas"]["CrowdQuestion"]["properties"]
+    crowd["labels"] = {"type": "object", "additionalProperties": False}
     for parameter in parts["parameters"].values():
         parameter.pop("example", None)
     return narrow

@@ -214,6 +214,60 @@ def test_a_label_needs_the_column_that_says_who_moved(read):
     assert read(MINIMAL).kriging.label == []
 
 
+LABELLED = MINIMAL.replace(
+    'file = "file"', 'file = "file"\nperformer = "who"\nlabels = { style = "manner" }'
+)
+
+
+def test_label_sets_are_a_text_or_a_list(read):
+    one = read(MINIMAL.replace('file = "file"', 'file = "file"\nperformer = "who"') + ONE_LABEL)
+    assert one.kriging.label == ["performer"]
+    both = read(LABELLED + '[kriging]\nlabel = ["performer", "style"]\n')
+    assert both.kriging.label == ["performer", "style"]
+    assert both.clips.labels == {"style": "manner"}
+    assert read(LABELLED + '[kriging]\nlabel = "style"\n').kriging.label == ["style"]
+
+
+ONE_LABEL = '[kriging]\nlabel = "performer"\n'
+
+
+@pytest.mark.parametrize(
+    ("kriging", "said"),
+    [
+        ('label = ["performer", "stile"]', "kriging.label: found 'stile' (did you mean 'style'?)"),
+        ('label = ["style", "style"]', "expected each label set once"),
+        ('label = "performer"', "clips.labels.style: found 'style', which kriging.label does not"),
+        ('label = ["style", 3]', "kriging.label"),
+    ],
+)
+def test_label_sets_that_do_not_fit_are_refused(read, kriging, said):
+    with pytest.raises(RecipeError, match=re.escape(said)):
+        read(f"{LABELLED}[kriging]\n{kriging}\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("speed", "found 'speed', which is a control, too, expected another name"),
+        ("level", "found 'level', which is a parameter of requests, expected another name"),
+        ("performer", "clips.labels.performer: found 'performer', whose column is clips.performer"),
+        ("Style", "clips.labels.Style"),
+    ],
+)
+def test_a_label_set_has_a_name_of_its_own(read, name, said):
+    named = LABELLED.replace("style =", f"{name} =")
+    with pytest.raises(RecipeError, match=re.escape(said)):
+        read(f'{named}[kriging]\nlabel = "{name}"\n')
+
+
+def test_a_preset_names_labels(read):
+    preset = '[presets.stroll]\nspeed = 1.0\nperformer = "ann"\nlabels = { style = "calm" }\n'
+    both = LABELLED + '[kriging]\nlabel = ["performer", "style"]\n'
+    assert read(both + preset).presets["stroll"].labels == {"performer": "ann", "style": "calm"}
+    with pytest.raises(RecipeError, match=re.escape("found 'calm' and no kriging.label 'mood'")):
+        read(both + preset.replace("style =", "mood ="))
+
+
 def test_feet_are_named_or_there_are_none(read):
     assert read(MINIMAL).motion.feet == []
     footed = MINIMAL.replace("cyclic = false", 'cyclic = false\nfeet = ["l", "r"]')

@@ -3,7 +3,7 @@
 import itertools
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from types import UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
@@ -124,7 +124,7 @@ def _resolve_path(path: list[str], node: Any) -> tuple[list[str], Any]:
     named = []
     for step in path:
         if step == _ANY_KEY and isinstance(node, dict):
-            step = _key_at_fault(node)
+            step = _key_at_fault(node, _is_label if named[-1:] == ["labels"] else _is_numeric)
         named.append(step)
         if isinstance(node, list):
             node = node[int(step)]
@@ -133,11 +133,19 @@ def _resolve_path(path: list[str], node: Any) -> tuple[list[str], Any]:
     return named, node
 
 
-def _key_at_fault(numbers: dict[str, Any]) -> str:
-    """Return the first key whose value is not a number, else the first whose value is a list."""
-    wrong = (key for key, value in numbers.items() if not _is_numeric(value))
-    lists = (key for key, value in numbers.items() if isinstance(value, list))
+def _key_at_fault(values: dict[str, Any], is_valid: Callable[[Any], bool]) -> str:
+    """Return the first key with an invalid value, else the first whose value is a list."""
+    wrong = (key for key, value in values.items() if not is_valid(value))
+    lists = (key for key, value in values.items() if isinstance(value, list))
     return next(itertools.chain(wrong, lists))
+
+
+def _is_label(value: Any) -> bool:
+    """Return whether a value is a name, weights of names, or a list of them with gaps."""
+    if isinstance(value, list):
+        return all(each is None or isinstance(each, str | dict) for each in value)
+    weights = isinstance(value, dict) and all(map(_is_numeric, value.values()))
+    return isinstance(value, str) or weights
 
 
 def _is_numeric(value: Any) -> bool:

@@ -39,6 +39,18 @@ def test_controls_by_keyword_and_by_mapping_are_the_same():
     )
 
 
+def test_labels_are_a_parameter_each_and_weights_a_list():
+    labels = {"style": {"angry": 0.75, "happy": 0.25}, "performer": "kim"}
+    found = target(questions.pose("m", 0, labels=labels))
+    style, who = (("label", text) for text in ("style=angry:0.75,happy:0.25", "performer=kim"))
+    assert parse_qsl(urlsplit(found).query) == [("time", "0"), style, who]
+    assert parse_qsl(urlsplit(target(questions.suggest("m", labels=labels))).query) == [style, who]
+    asked = questions.why("m", labels=labels, nearest=3)
+    assert [*parse_qsl(urlsplit(target(asked)).query)][-2:] == [style, who]
+    body = msgspec.json.decode(files.crowd("m", 0, labels=labels).request("npz").body)
+    assert body["labels"] == labels
+
+
 def test_names_that_are_no_python_words():
     asked = questions.pose("m", 0, controls={"hip height/left": 1, "größe": 2})
     assert target(asked).endswith("?hip+height%2Fleft=1&gr%C3%B6%C3%9Fe=2&time=0")

@@ -102,7 +102,7 @@ PROBLEM_KINDS = (
 )
 
 _PATH_PARAMETERS = ("model", "format")
-_REPEATED_PARAMETERS = {"times": "time", "targets": "target"}
+_REPEATED_PARAMETERS = {"times": "time", "targets": "target", "labels": "label"}
 """Fields that a query string gives as one parameter per element."""
 
 

@@ -1,0 +1,166 @@
+"""Tests of a model with performers and styles: names, weights and open sets in all answers."""
+
+import re
+
+import numpy as np
+import onnx
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.locomotion import gait, stride
+from posefield.model_file import card_reader, model_card
+from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.registry import model_registry
+from posefield.synthesis import capture_suggestions, clips, explanation, poses, sigma_grid
+
+POINT = {"haste": 4.0, "veer": 0.0}
+BOTH = {"performer": "ann", "style": "marching"}
+
+
+@pytest.fixture(scope="module")
+def model(styled_path):
+    return model_registry.load([styled_path]).models["styled"]
+
+
+def posed(model, **asked):
+    return poses.synthesize_poses(model, PoseQuestion(controls=POINT, times=[0.4], **asked))
+
+
+def apart(a, b):
+    return np.abs(a.rotations - b.rotations).max()
+
+
+def test_the_card_has_both_sets_in_the_file_and_for_clients(model):
+    card = model.session.card
+    assert [(own.name, own.names) for own in card.labels] == [
+        ("performer", ("ann", "ben")),
+        ("style", ("marching", "plain", "sneaking")),
+    ]
+    entries = {key: text.encode() for key, text in model_card.dump(card).items()}
+    assert card_reader.decode(entries).labels == card.labels
+    told = model_card.plain_values(card)
+    assert told["performers"] == ["ann", "ben"]
+    assert [own["name"] for own in told["labels"]] == ["performer", "style"]
+    assert card.clip_labels.shape == (36, 5) and (card.clip_labels.sum(axis=1) == 2.0).all()
+
+
+def test_each_set_is_asked_for_by_name_or_left_open(model):
+    asked = (
+        {},
+        {"performer": "ann"},
+        {"labels": {"style": "marching"}},
+        {"performer": "ann", "labels": {"style": "marching"}},
+        {"performer": "ann", "labels": {"style": "sneaking"}},
+        {"performer": "ben", "labels": {"style": "marching"}},
+    )
+    found = [posed(model, **each) for each in asked]
+    for i, one in enumerate(found):
+        assert all(apart(one, other) > 1e-3 for other in found[:i])
+    open_, performer, style, both, *_ = (each.trust.sigma for each in found)
+    assert both < min(performer, style) and max(performer, style) < open_
+    assert found[3].trust.labels == {"style": "marching"}
+    assert found[3].trust.facts()["labels"] == {"style": "marching"}
+    assert "labels" not in found[1].trust.facts()
+
+
+def test_the_performer_is_short_for_its_label_set(model):
+    short, long = posed(model, performer="ann"), posed(model, labels={"performer": "ann"})
+    assert apart(short, long) == 0.0
+    assert (short.trust.performer, long.trust.performer) == ("ann", None)
+    assert short.trust.performer_seen and long.trust.performer_seen
+    assert apart(short, posed(model, labels={"performer": "ben"})) > 1e-3
+
+
+def test_weights_of_one_name_are_the_name_and_others_lie_between(model):
+    named = posed(model, labels={"style": "marching"})
+    assert apart(named, posed(model, labels={"style": {"marching": 1.0}})) == 0.0
+    mixed = posed(model, labels={"style": {"marching": 0.5, "sneaking": 0.5}})
+    other = posed(model, labels={"style": "sneaking"})
+    assert min(apart(mixed, named), apart(mixed, other)) > 1e-3
+    assert max(apart(mixed, named), apart(mixed, other)) < apart(named, other)
+    assert mixed.trust.sigma > max(named.trust.sigma, other.trust.sigma)
+    less = posed(model, labels={"style": {"marching": 0.5}})
+    assert apart(less, named) > 1e-3 and apart(less, posed(model)) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("labels", "said"),
+    [
+        ({"stile": "plain"}, "labels/stile: 'stile' (did you mean 'style'?), expected one of the"),
+        (
+            {"style": "plane"},
+            "labels/style: 'plane' (did you mean 'plain'?), expected one of march",
+        ),
+        ({"style": {"plane": 1.0}}, "labels/style: 'plane' (did you mean 'plain'?)"),
+        ({"style": {"plain": -0.5}}, "labels/style/plain: -0.5, expected a weight of 0 to 1"),
+        ({"style": {"plain": float("nan")}}, "labels/style/plain: nan, expected a finite number"),
+        ({"style": {"plain": 0.75, "marching": 0.5}}, "labels/style: weights with a sum of 1.25"),
+        ({"style": {}}, "labels/style: weights with a sum of 0"),
+    ],
+)
+def test_labels_that_cannot_be_used_are_refused(model, labels, said):
+    questions = (
+        lambda: posed(model, labels=labels),
+        lambda: clips.synthesize_clip(model, ClipQuestion(controls=POINT, labels=labels)),
+        lambda: explanation.explain_result(model, WhyQuestion(controls=POINT, labels=labels)),
+        lambda: sigma_grid.grid(model, SigmaQuestion(across="haste", along="veer", labels=labels)),
+        lambda: capture_suggestions.suggest(model, SuggestQuestion(labels=labels)),
+    )
+    for asked in questions:
+        with pytest.raises(InvalidField, match=re.escape(said)):
+            asked()
+
+
+def test_a_performer_in_both_ways_is_refused(model):
+    with pytest.raises(InvalidField, match="performer: 'ann' and labels/performer, expected one"):
+        posed(model, performer="ann", labels={"performer": "ann"})
+
+
+def test_reasons_name_the_labels_and_weight_the_own_style_most(model):
+    question = WhyQuestion(controls=POINT, labels={"style": "marching"}, nearest=36)
+    found = explanation.explain_result(model, question)
+    assert found.labels == {"style": "marching"}
+    shares = dict.fromkeys(("marching", "plain", "sneaking"), 0.0)
+    for clip in found.nearest:
+        shares[clip.labels["style"]] += clip.share
+        assert clip.performer in ("ann", "ben") and "performer" not in clip.labels
+    assert shares["marching"] > 2.0 * max(shares["plain"], shares["sneaking"])
+    both = explanation.explain_result(model, WhyQuestion(controls=POINT, nearest=36))
+    assert sum(c.share for c in both.nearest if c.labels["style"] == "marching") < 0.6
+
+
+def test_open_controls_are_those_of_clips_with_the_asked_labels(model):
+    card = model.session.card
+    asked = model.validator.question({}, "warn", "ben", 0, {"style": "sneaking"})
+    row = card.examples.index(tuple(asked.controls.values()))
+    assert card.clip_names(row) == {"performer": "ben", "style": "sneaking"}
+
+
+def test_grids_and_suggestions_depend_on_the_labels(model):
+    axes = {"across": "haste", "along": "veer", "columns": 3, "rows": 3}
+    open_ = sigma_grid.grid(model, SigmaQuestion(**axes))
+    named = sigma_grid.grid(model, SigmaQuestion(**axes, labels=BOTH))
+    assert (named.sigma < open_.sigma).all() and named.labels == BOTH
+    found = capture_suggestions.suggest(model, SuggestQuestion(count=3, labels=BOTH))
+    card = model.session.card
+    own = {card.sources[i] for i in range(36) if card.clip_names(i) == BOTH}
+    assert {each.nearest for each in found.suggestions} <= own
+    every = capture_suggestions.suggest(model, SuggestQuestion(count=3))
+    assert not {each.nearest for each in every.suggestions} <= own
+
+
+def test_walkers_have_captured_combinations_of_labels(model):
+    rows = stride.label_rows(model.session.card)
+    assert len(rows) == 6 and {"performer": "ben", "style": "plain"} in rows
+    weights = stride.labels(model.session, np.arange(-1, 6))
+    assert weights.sum(axis=1).tolist() == [0.0, *[2.0] * 6]
+    assert len(np.unique(stride.clip_performers(model.session.card))) == 6
+    assert gait.fit_gait(model.session).performer_offsets.shape == (7, 2)
+
+
+def test_the_graph_has_one_input_of_weights_and_one_number_a_sample_and_set(styled_path):
+    weights = {each.name: each for each in onnx.load(styled_path).graph.initializer}
+    assert list(weights["labels"].dims) == [1, 5]
+    assert [list(weights[f"whose_{i}"].dims) for i in range(2)] == [[36], [36]]
+    assert "whose_2" not in weights
