@@ -5,6 +5,7 @@ import { test } from "node:test";
 
 import { Client, type ClipQuestion, WrongQuestion } from "../src/index.ts";
 import { similarName } from "../src/option-names.ts";
+import { link } from "../src/questions.ts";
 import { KEYS } from "../src/schema.ts";
 
 const controls = { speed: 1 };
@@ -92,4 +93,18 @@ test("a name is suggested only if it is nearest and near", () => {
   assert.equal(similarName("usd", ["usda", "usdc"]), undefined);
   assert.equal(similarName("colour", ["fps", "loop"]), undefined);
   assert.equal(similarName("a".repeat(41), ["a".repeat(40)]), undefined);
+});
+
+test("each label set is a parameter, and weights are a list", () => {
+  const labels = { style: { angry: 0.75, happy: 0.25 }, performer: "kim" };
+  const { searchParams } = new URL(link("/v1", { labels, controls: { speed: 1 } }), "http://any");
+  assert.deepEqual(
+    [...searchParams],
+    [
+      ["speed", "1"],
+      ["label", "style=angry:0.75,happy:0.25"],
+      ["label", "performer=kim"],
+    ],
+  );
+  assert.deepEqual([...new URL(link("/v1", { labels: {} }), "http://any").searchParams], []);
 });

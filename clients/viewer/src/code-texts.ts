@@ -12,7 +12,7 @@ export interface Wanted {
 }
 
 /** Parameters of a clip besides its controls, as the contract and the Python client call them. */
-type Words = Readonly<Record<string, string | number | boolean>>;
+type Words = Readonly<Record<string, string | number | boolean | Readonly<Record<string, string>>>>;
 
 export const fileName = ({ model, format }: Wanted): string =>
   `${model.replace(/[^A-Za-z0-9_-]/g, "_")}.${format}`;
@@ -55,8 +55,8 @@ function quoted(text: string): string {
   return `'${text.replaceAll("'", "'\\''")}'`;
 }
 
-/** As Python reads it: JSON's strings and numbers are Python's too. */
-function literal(value: string | number | boolean): string {
+/** As Python reads it: JSON's strings, numbers and objects of them are Python's too. */
+function literal(value: Words[string]): string {
   if (typeof value === "boolean") return value ? "True" : "False";
   return JSON.stringify(value);
 }
@@ -71,7 +71,7 @@ const TAKEN = new Set(
   (
     "False None True and as assert async await break class continue def del elif else except " +
     "finally for from global if import in is lambda nonlocal not or pass raise return try while " +
-    "with yield controls end extrapolate fps level loop model names performer progress root self " +
+    "with yield controls end extrapolate fps labels level loop model names performer progress root self " +
     "start unit up"
   ).split(" "),
 );

@@ -121,7 +121,7 @@ def _with_whole_numbers(node: Any) -> Any:
 
 def _resolve_path(path: list[str], node: Any) -> tuple[list[str], Any]:
     """Return the path with the invalid key for each placeholder, and the value at its end."""
-    named = []
+    named: list[str] = []
     for step in path:
         if step == _ANY_KEY and isinstance(node, dict):
             step = _key_at_fault(node, _is_label if named[-1:] == ["labels"] else _is_numeric)
