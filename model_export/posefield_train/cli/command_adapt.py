@@ -20,7 +20,7 @@ RootOffset = Literal["replace", "add"]
 
 @dataclass(frozen=True)
 class ClipArguments:
-    """Files of the new clips, and the conventions that they are written in."""
+    """Files of the new clips, their labels, and the conventions that they are written in."""
 
     unit: Annotated[
         float, typer.Option(help="length of the files' unit in metres", metavar="METRES")
@@ -44,6 +44,13 @@ class ClipArguments:
         RootOffset | None,
         typer.Option(help="whether root position channels replace the root's OFFSET or add to it"),
     ] = None
+    label: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="name of all clips in a further label set of the model; may be repeated",
+            metavar="SET=NAME",
+        ),
+    ] = None
 
 
 STEPS = 3
@@ -59,13 +66,6 @@ def adapt(
     licence: Annotated[
         str, typer.Option(help="licence of the new clips, with its required attribution")
     ],
-    label: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="name of all clips in a further label set of the model; may be repeated",
-            metavar="SET=NAME",
-        ),
-    ] = None,
     json: Json = False,
 ) -> None:
     """Add a performer to a model from a few clips.
@@ -87,7 +87,7 @@ def adapt(
         progress(f"reading {model}")
         known = model_reconstruction.load(model)
         adapted_file.check_name(known.card, performer)
-        labels = _labels(label or [])
+        labels = _labels(files.label or [])
         adapted_file.check_labels(known.card, labels)
         labels[PERFORMER] = performer
         source = Source(metres_per_unit=files.unit, up=files.up, root_offset=files.root_offset)

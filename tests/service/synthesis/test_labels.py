@@ -5,8 +5,12 @@ import re
 import numpy as np
 import onnx
 import pytest
+from asking import asker
 
 from posefield.common.errors import InvalidField
+from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
 from posefield.locomotion import gait, stride
 from posefield.model_file import card_reader, model_card
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
@@ -164,3 +168,42 @@ def test_the_graph_has_one_input_of_weights_and_one_number_a_sample_and_set(styl
     assert list(weights["labels"].dims) == [1, 5]
     assert [list(weights[f"whose_{i}"].dims) for i in range(2)] == [[36], [36]]
     assert "whose_2" not in weights
+
+
+@pytest.mark.parametrize("form", CLIP_ENCODERS)
+def test_files_of_all_formats_hold_names_and_weights(model, form):
+    labels = {"style": {"marching": 0.75, "plain": 0.25}, "performer": "ann"}
+    found = clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=10.0, labels=labels))
+    other = clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=10.0))
+    encode = CLIP_ENCODERS[form].encode
+    assert encode(found) and encode(found) != encode(other)
+
+
+@pytest.mark.parametrize("form", POSE_ENCODERS)
+def test_poses_of_all_formats_hold_names_and_weights(model, form):
+    found = posed(model, labels={"style": {"marching": 0.75, "plain": 0.25}})
+    assert POSE_ENCODERS[form].encode(found)
+
+
+def test_over_http_labels_are_parameters_bodies_and_answers(styled_path):
+    ask = asker(create_app(model_registry.load([styled_path]), Settings()))
+    path = "/v1/models/styled"
+    asked = "haste=4&veer=0&label=performer=ann:0.5,ben:0.5&label=style=marching"
+    labels = {"performer": {"ann": 0.5, "ben": 0.5}, "style": "marching"}
+    got = ask("GET", f"{path}/pose.json?{asked}&time=0.4").json()
+    body = {"controls": POINT, "times": [0.4], "labels": labels}
+    assert got == ask("POST", f"{path}/pose.json", json=body).json()
+    assert got["trust"]["labels"] == labels and got["trust"]["performer"] is None
+    why = ask("GET", f"{path}/why?{asked}&nearest=2").json()
+    assert why["labels"] == labels and {*why["nearest"][0]["labels"]} == {"style"}
+    sigma = ask("GET", f"{path}/sigma.json?across=haste&along=veer&label=style=plain").json()
+    assert sigma["labels"] == {"style": "plain"}
+    suggested = ask("GET", f"{path}/suggestions?count=1&label=style=plain").json()
+    assert suggested["labels"] == {"style": "plain"}
+    crowd = {"controls": POINT, "time": [0.1, 0.2], "labels": {"style": ["plain", None]}}
+    assert len(ask("POST", f"{path}/crowd.json", json=crowd).json()["rotations"]) == 2
+    for form in ("usda", "usdc"):
+        answer = ask("GET", f"{path}/crowd.{form}?count=3&seconds=0.5")
+        assert answer.status_code == 200, answer.text
+    card = ask("GET", path).json()
+    assert next(own["names"] for own in card["labels"]) == card["performers"]
