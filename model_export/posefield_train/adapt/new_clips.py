@@ -78,8 +78,8 @@ def examples_of_table(
             **dict.fromkeys(sets, "a label set"),
         }
     )
-    names = (*landmarks, *(control.name for control in controls), *sets)
-    own.expect_only({"file", "first_frame", "last_frame", *names})
+    known = (*landmarks, *(control.name for control in controls), *sets)
+    own.expect_only({"file", "first_frame", "last_frame", *known})
     rows, given = [], []
     for line, record in own.records:
         told = {**labels, **{name: _label(reopened, own, line, record, name) for name in sets}}

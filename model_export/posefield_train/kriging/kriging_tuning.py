@@ -7,7 +7,7 @@ leave the parameters undetermined; the prior decides between those that fit alik
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -351,4 +351,7 @@ def _odds_slope(share: float) -> float:
 
 def _product(shares: Sequence[Floats]) -> Floats | float:
     """Return the product of matrices, 1.0 for none."""
-    return reduce(np.multiply, shares, 1.0)
+    found: Floats | float = 1.0
+    for share in shares:
+        found = found * share
+    return found

@@ -152,9 +152,9 @@ def test_within_the_ranges_the_answer_is_the_graph_s(model, rng):
     outputs = ("rotations", "root_position", "duration", "sigma", "travel")
     feed = {"controls": points.astype(np.float32), "time": time.astype(np.float32)}
     if card.performers:
-        feed["performer"] = np.zeros((50, len(card.performers)), np.float32)
+        feed["labels"] = np.zeros((50, len(card.performers)), np.float32)
     raw = model.session.runtimes[0].run(list(outputs), feed)
-    labels = feed.get("performer")
+    labels = feed.get("labels")
     for own, expected in zip(
         model.session.run(points, time, *outputs, labels=labels), raw, strict=True
     ):

@@ -113,7 +113,7 @@ class LabelCell:
     def _checked(self, cell: object) -> LabelValue:
         """Return the label of a cell; ValueError for an unknown name."""
         value = text_decoding.parse_label_value(cell) if isinstance(cell, str) else cell
-        found = msgspec.convert(value, LabelValue)
+        found: LabelValue = msgspec.convert(value, LabelValue)
         if not {*([found] if isinstance(found, str) else found)} <= {*self.names}:
             raise ValueError
         return found
