@@ -66,7 +66,7 @@ CARD = ModelCard(
     left_out=(0.01, 0.02, 0.5),
     joint_sigma=(0.5, 1.32),
     making=TrainingParameters(
-        {"warp": (0.25, 1.0, 0.0)}, {"peak": 0.4}, {"chest": 2.0}, in_phase=True
+        {"warp": (0.25, 1.0, 0.0)}, {"peak": 0.4}, {"chest": 2.0}, True, takes=(0, 0, 1)
     ),
     roles={"hips": "hips", "upperChest": "chest"},
     event=Event(1, 0.75),

@@ -93,23 +93,33 @@ def results(recipe, family):
 
 
 def test_every_clip_is_held_out_once_with_all_of_its_take(family):
+    files = [replace(e, take="") for e in family]
     same = [
-        replace(e, row=replace(e.row, place=family[i // 3].row.place)) for i, e in enumerate(family)
+        replace(e, row=replace(e.row, place=family[i // 3].row.place)) for i, e in enumerate(files)
     ]
-    for examples, parts in ((family, CLIPS), (same, CLIPS // 3)):
+    stated = [replace(e, take=f"take {i // 3}") for i, e in enumerate(family)]
+    for examples, parts in ((family, CLIPS), (files, CLIPS), (same, CLIPS // 3)):
         own = folds.clip_folds(examples)
         assert sorted(i for fold in own for i in fold.held) == list(range(CLIPS))
         assert len(own) == parts
         for fold in own:
             rest, held = fold.split(examples)
             assert not {e.row.place for e in rest} & {e.row.place for e in held}
+    assert [fold.held for fold in folds.clip_folds(stated)] == [
+        fold.held for fold in folds.clip_folds(same)
+    ]
+
+
+def test_one_take_cannot_be_held_out(family):
+    with pytest.raises(TrainingError, match=r"all \d+ clips are of one take, expected two or more"):
+        folds.clip_folds([replace(e, take="one") for e in family])
 
 
 def test_many_takes_are_dealt_into_parts_of_whole_takes(family):
     def take(i):
         return replace(family[0].row, place=family[0].row.place.with_name(f"{i // 2:03}.bvh"))
 
-    many = [replace(family[0], row=take(i)) for i in range(2 * folds.MANY + 6)]
+    many = [replace(family[0], row=take(i), take="") for i in range(2 * folds.MANY + 6)]
     own = folds.clip_folds(many)
     assert len(own) == folds.PARTS
     assert sorted(i for fold in own for i in fold.held) == list(range(len(many)))
@@ -284,9 +294,7 @@ def test_a_name_is_worth_something_and_so_are_clips(results):
 
 
 def test_clips_are_shown_as_far_apart_as_they_come_and_never_the_asked_ones_take(family):
-    held = [
-        replace(e, row=replace(e.row, place=family[i // 2].row.place)) for i, e in enumerate(family)
-    ]
+    held = [replace(e, take=f"take {i // 2}") for i, e in enumerate(family)]
     for asked in range(CLIPS):
         shown = new_performers.choose_clips(held, asked, 5)
         takes = [i // 2 for i in shown]

@@ -11,6 +11,7 @@ from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.outliers import mirrored_clips, outlier_detection, outlier_distances
 from posefield_train.source import bone_lengths
+from posefield_train.source.takes import joint_sides
 
 HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 0.0)
 NAMES = ("Hips", "LeftHand", "RightHand", "lfoot", "rfoot", "Neck")
@@ -90,8 +91,11 @@ def test_of_two_clips_that_differ_neither_is_believed(offsets):
 
 
 def test_sides_are_known_by_their_names():
-    assert mirrored_clips.mirrored_joints(NAMES) == (0, 2, 1, 4, 3, 5)
-    assert mirrored_clips.mirrored_joints(("root", "left", "relay")) == (0, 1, 2)
+    assert joint_sides.mirrored_joints(NAMES) == (0, 2, 1, 4, 3, 5)
+    assert joint_sides.mirrored_joints(("root", "left", "relay")) == (0, 1, 2)
+    blender = ("hips", "arm_R", "arm_L", "mixamorig:LeftFoot", "mixamorig:RightFoot", "tail_l")
+    assert joint_sides.mirrored_joints(blender) == (0, 2, 1, 4, 3, 5)
+    assert joint_sides.right_joints(blender) == [1, 4]
 
 
 def body(rng):
@@ -102,7 +106,7 @@ def body(rng):
 
 def test_a_disguise_is_seen_through(rng):
     expected, left = body(rng), np.array([1.0, 0.0, 0.0])
-    swap, flip = list(mirrored_clips.mirrored_joints(NAMES)), np.array([-1.0, 1.0, 1.0])
+    swap, flip = list(joint_sides.mirrored_joints(NAMES)), np.array([-1.0, 1.0, 1.0])
     up = quat.rotate(quat.from_axis_angle(left, np.array(np.pi / 2)), expected)
     round_about = quat.rotate(
         quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi / 2)), expected
@@ -118,6 +122,11 @@ def test_a_disguise_is_seen_through(rng):
         found = mirrored_clips.find_transform(own, expected, NAMES, left)
         assert (found.description, found.after < 1e-9, found.before > 0.1) == (said, True, True)
     assert mirrored_clips.find_transform(expected + 0.1, expected, NAMES, left) is None
+    for degrees, noticed in ((-1.0, False), (8.0, False), (30.0, True)):
+        up = np.array([0.0, 1.0, 0.0])
+        own = quat.rotate(quat.from_axis_angle(up, np.array(np.radians(degrees))), expected)
+        found = mirrored_clips.find_transform(own, expected, NAMES, left)
+        assert (found is not None) == noticed
     assert mirrored_clips.find_transform(body(rng), expected, NAMES, left) is None
 
 

@@ -283,7 +283,7 @@ def test_clips_of_one_take_make_a_model_that_says_so(model):
     rows = [f"0.bvh,{i},{10 * i},{10 * i + 15}" for i in range(8)]
     trained, exported = model([small_clip(0.0, 100)], rows, "file,v,a,b", **CUTS)
     (said,) = notes(exported)
-    assert said.startswith("clips of one file are not left out together")
+    assert said.startswith("clips of one take are not left out together")
     assert trained.explained["pose"] > 0.9
 
 

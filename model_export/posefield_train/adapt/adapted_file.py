@@ -10,6 +10,7 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
+from posefield.inference import residual_covariance
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard
 from posefield_train.adapt import adaptation, canonical_clips, new_clips
@@ -19,7 +20,7 @@ from posefield_train.graph import level_errors, onnx_export, truncation_cost
 from posefield_train.graph.level_errors import LevelTest
 from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, ModelLevels
 from posefield_train.graph.onnx_export import MAX_LISTED_VALUES, ExportedModel
-from posefield_train.kriging import thinning
+from posefield_train.kriging import sample_points, thinning
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
@@ -187,7 +188,7 @@ def _card(
         sources=(*old.sources, *(clip.row.source for clip in clips)),
         left_out=left_out,
         kriging=onnx_export.plain_parameters(bank.pose.hyper),
-        making=replace(reopened.making, fields=made),
+        making=replace(reopened.making, fields=made, takes=_takes(old, clips)),
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
     )
@@ -198,6 +199,15 @@ def _labels(adapted: AdaptedModel) -> tuple[LabelSet, ...]:
     counts, every = tuple(map(len, bank.labels.values())), np.arange(len(bank.pose.samples))
     samples = SamplePoints(bank.pose.samples, len(bank.low), every, counts)
     return onnx_export.card_labels(bank.labels, samples)
+
+
+def _takes(old: ModelCard, clips: Sequence[Example]) -> tuple[int, ...]:
+    """Return the number (N,) of each clip's take, new ones last; empty where each file is one."""
+    if not old.making.takes:
+        return ()
+    before = residual_covariance.take_numbers(old)
+    after = 1 + before.max() + sample_points.take_numbers(clips)
+    return (*before.tolist(), *after.tolist())
 
 
 def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:

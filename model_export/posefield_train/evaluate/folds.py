@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from posefield.common.errors import TrainingError
+from posefield_train.kriging import sample_points
 from posefield_train.source.ingest import Example
 
 # Families of more than MANY takes are held out in PARTS parts of whole takes.
@@ -25,11 +27,17 @@ class Fold:
 
 
 def clip_folds(examples: Sequence[Example]) -> list[Fold]:
-    """Return folds that hold out every take once, with all clips cut from it.
+    """Return folds that hold out every take once, with all of its clips.
 
-    Strides of one take are nearly equal; held out one by one, they would predict each other.
+    Strides of one take are nearly equal; held out one by one, they would predict each other. Raises
+    TrainingError if all clips are of one take.
     """
-    takes = _groups([str(example.row.place) for example in examples])
+    takes = _groups(sample_points.take_numbers(examples).tolist())
+    if len(takes) == 1:
+        raise TrainingError(
+            f"all {len(examples)} clips are of one take, expected two or more takes: none can be "
+            "held out (clips.take states takes)"
+        )
     if len(takes) > MANY:
         takes = [sum(takes[part::PARTS], ()) for part in range(PARTS)]
     return [Fold(take) for take in takes]
@@ -40,6 +48,6 @@ def performer_folds(examples: Sequence[Example]) -> list[Fold]:
     return [Fold(own) for own in _groups([example.row.performer for example in examples])]
 
 
-def _groups(names: Sequence[str]) -> list[tuple[int, ...]]:
+def _groups(names: Sequence[str] | Sequence[int]) -> list[tuple[int, ...]]:
     listed = np.array(names)
     return [tuple(np.flatnonzero(listed == name).tolist()) for name in sorted(set(names))]

@@ -103,7 +103,7 @@ def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     said += _repeated_sets(laid, tuple(known))
     if len(np.unique(laid.groups)) > len(np.unique(take_numbers(examples))):
         said.append(
-            "clips of one file are not left out together: those of the other files alone could "
+            "clips of one take are not left out together: those of the other takes alone could "
             "not carry the drift"
         )
     return said
@@ -128,21 +128,22 @@ def _points(examples: Sequence[Example]) -> SampleControls:
 
 
 def take_numbers(examples: Sequence[Example]) -> Annotated[Indices, "{len(examples)}"]:
-    """Return the number (N,) of the file that each example was cut from."""
-    return np.unique([str(e.row.place) for e in examples], return_inverse=True)[1]
+    """Return the number (N,) of the take of each example; its file without a take."""
+    takes = [example.take or str(example.row.place) for example in examples]
+    return np.unique(takes, return_inverse=True)[1]
 
 
 def _groups(
     recipe: Recipe, examples: Sequence[Example], points: SampleControls
 ) -> Annotated[Indices, "samples"]:
-    """Return groups (N,) by file, or singletons if the drift is undetermined without a file.
+    """Return groups (N,) by take, or singletons if the drift is undetermined without a take.
 
     Raises TrainingError if the drift is undetermined without a single example.
     """
     degree = recipe.kriging.degree
-    by_file, alone = take_numbers(examples), np.arange(len(examples))
-    if _indispensable_group(by_file, points, degree) is None:
-        return by_file
+    by_take, alone = take_numbers(examples), np.arange(len(examples))
+    if _indispensable_group(by_take, points, degree) is None:
+        return by_take
     needed = _indispensable_group(alone, points, degree)
     if needed is not None:
         raise TrainingError(

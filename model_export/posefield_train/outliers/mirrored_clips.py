@@ -11,11 +11,13 @@ import numpy as np
 
 from posefield.common.units import UP, Floats
 from posefield_train.source.bone_lengths import apart
+from posefield_train.source.takes import joint_sides
 
 # A transform is reported if undoing it reduces the distance below this share.
 MAX_DISTANCE_RATIO = 0.5
-# Prefixes of the names of left and right joints.
-SIDES = (("Left", "Right"), ("left", "right"), ("L", "R"), ("l", "r"))
+# Smallest turn that is reported, degrees: clips are placed by the heading of their first frame,
+# which differs by some degrees from clip to clip.
+MIN_TURN = 15.0
 
 
 @dataclass(frozen=True)
@@ -43,31 +45,24 @@ def find_transform(
         ClipTransform(said, before, apart(other, expected))
         for said, other in _transformed(own, expected, names, left)
     ]
-    best = min(undone, key=lambda disguise: disguise.after)
-    return best if best.after < MAX_DISTANCE_RATIO * before else None
+    best = min(undone, key=lambda disguise: disguise.after, default=None)
+    return best if best and best.after < MAX_DISTANCE_RATIO * before else None
 
 
 def _transformed(
     own: Floats, expected: Floats, names: tuple[str, ...], left: Floats
 ) -> Iterator[tuple[str, Floats]]:
-    swapped, flipped = mirrored_joints(names), own - 2.0 * (own @ left)[..., None] * left
+    swapped, flipped = (
+        joint_sides.mirrored_joints(names),
+        own - 2.0 * (own @ left)[..., None] * left,
+    )
     turn = _best_rotation(own, expected)
-    yield _describe_rotation(turn), own @ turn.T
+    if said := _describe_rotation(turn):
+        yield said, own @ turn.T
     if swapped != tuple(range(len(names))):
         yield "mirrored left to right", flipped[:, swapped]
         yield "with the names of left and right joints exchanged", own[:, swapped]
         yield "with the axis from left to right reversed", flipped
-
-
-def mirrored_joints(names: tuple[str, ...]) -> tuple[int, ...]:
-    """Return the index (J,) of each joint's counterpart on the other side, or its own."""
-    counterparts: dict[str, str] = {}
-    for a, b in SIDES:
-        for name in names:
-            if name.startswith(a) and b + name.removeprefix(a) in names:
-                other = b + name.removeprefix(a)
-                counterparts |= {name: other, other: name}
-    return tuple(names.index(counterparts.get(name, name)) for name in names)
 
 
 def left_direction(joints: Floats, names: tuple[str, ...]) -> Floats:
@@ -75,8 +70,8 @@ def left_direction(joints: Floats, names: tuple[str, ...]) -> Floats:
 
     It is x if no joint names contain sides.
     """
-    swapped = np.array(mirrored_joints(names))
-    rights = [i for i, other in enumerate(swapped) if names[i][0] in "Rr" and other != i]
+    swapped = np.array(joint_sides.mirrored_joints(names))
+    rights = joint_sides.right_joints(names)
     if not rights:
         return np.array([1.0, 0.0, 0.0])
     # The median over clips ignores a few mirrored clips.
@@ -93,7 +88,10 @@ def _best_rotation(own: Floats, expected: Floats) -> Floats:
 
 
 def _describe_rotation(turn: Floats) -> str:
-    """Describe a rotation in words: the wrong up axis, or the angle about the vertical."""
+    """Describe a rotation in words: the wrong up axis, or the angle about the vertical.
+
+    The description of a small rotation is empty: it is no mistake of a file.
+    """
     tilt = np.degrees(np.arccos(np.clip(UP @ turn @ UP, -1.0, 1.0)))
     if tilt > 45.0:
         # The axis that the rotation maps to up is the file's up axis.
@@ -101,4 +99,6 @@ def _describe_rotation(turn: Floats) -> str:
         axis = int(np.argmax(np.abs(up)))
         return f"with {'-' if up[axis] < 0 else ''}{'xyz'[axis]} for up"
     angle = np.degrees(np.arctan2(turn[0, 2] - turn[2, 0], turn[0, 0] + turn[2, 2]))
+    if abs(angle) < MIN_TURN:
+        return ""
     return f"turned by {angle:.0f} degrees about the vertical"

@@ -33,7 +33,8 @@ class ClipRow:
 
     line: in the table, for messages; None without table. first_frame, last_frame: indices in the
     file from 0, last_frame inclusive; None is the end of the file. controls: those of the table.
-    landmarks: frames of the file. other_labels: name of the clip in each further label set.
+    landmarks: frames of the file. other_labels: name of the clip in each further label set. take:
+    name of the take, unique among the performer's; None if the table has no such column.
     """
 
     place: FileLocation
@@ -44,6 +45,7 @@ class ClipRow:
     last_frame: int | None
     controls: Floats
     landmarks: tuple[int, ...]
+    take: str | None = None
     other_labels: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -214,7 +216,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         **{column: f"clips.labels.{name}" for name, column in clips.labels.items()},
         **{control.column: f"control {control.name}" for control in recipe.column_controls},
     }
-    for key in ("performer", "first_frame", "last_frame"):
+    for key in ("performer", "take", "first_frame", "last_frame"):
         column = getattr(clips, key)
         if column is not None:
             named[column] = f"clips.{key}"
@@ -241,6 +243,7 @@ def _row(
         other_labels={
             name: cells.name_of(line, record, column) for name, column in clips.labels.items()
         },
+        take=_take(clips, cells, line, record),
     )
 
 
@@ -251,6 +254,17 @@ def _performer(recipe: Recipe, cells: ClipTable, line: int, record: dict[str, st
         return ""
     labelled = PERFORMER in recipe.kriging.label
     return cells.name_of(line, record, column) if labelled else record[column]
+
+
+def _take(clips: Clips, cells: ClipTable, line: int, record: dict[str, str]) -> str | None:
+    if clips.take is None:
+        return None
+    name = record[clips.take].strip()
+    if not name:
+        raise RecipeError(
+            cells.name, f"column {clips.take!r}: nothing, expected the name of a take", line
+        )
+    return name
 
 
 def _find_motion_file(
@@ -274,3 +288,25 @@ def refuse_repeats(rows: Sequence[ClipRow]) -> None:
             again = "as before" if line is None else f"as line {line}"
             raise row.error(f"the same frames of the same file {again}")
         seen[key] = row
+
+
+def stated_takes(rows: Sequence[ClipRow]) -> list[str] | None:
+    """Return the takes that the table states, by performer and name; None if it states none.
+
+    Raises RecipeError for a file whose clips are of two takes.
+    """
+    if any(row.take is None for row in rows):
+        return None
+    seen: dict[str, ClipRow] = {}
+    for row in rows:
+        other = seen.setdefault(str(row.place), row)
+        if _named_take(other) != _named_take(row):
+            raise row.error(
+                f"{row.place.name} is of take {row.take!r} here and of take {other.take!r} in line "
+                f"{other.line}, expected one take for a file: its clips were recorded in one go"
+            )
+    return [_named_take(row) for row in rows]
+
+
+def _named_take(row: ClipRow) -> str:
+    return f"{row.performer}/{row.take}"

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from posefield.common.array_shapes import Positions
 from posefield.common.errors import RecipeError
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
@@ -23,6 +24,7 @@ from posefield_train.source import (
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
+from posefield_train.source.takes import take_groups
 
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
 # second, which take 2.4 GB.
@@ -35,7 +37,8 @@ class Example:
 
     controls: (d,), from the table and measured, in the recipe's order. landmarks: fractions of the
     clip, in order. jumps: removed jumps of small joints between two frames. shift: share of a cycle
-    by which the clip was shifted to begin later.
+    by which the clip was shifted to begin later. take: name of the take; examples of one take are
+    left out together.
     """
 
     row: ClipRow
@@ -44,6 +47,7 @@ class Example:
     landmarks: tuple[float, ...]
     jumps: tuple[Finding, ...]
     shift: float = 0.0
+    take: str = ""
 
     @property
     def offsets(self) -> Floats:
@@ -59,12 +63,29 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     rows = clip_table.read(recipe, folder)
     files = read_files(rows)
     found = [_example(recipe, files[str(row.place)], row) for row in rows]
-    examples = [example for example, _ in found]
+    examples = [own.example for own in found]
     _expect_same_skeleton(examples)
-    notes = shipped_recipes.table_notes(rows[0].table)
+    notes = clip_notes.stretch_notes(rows, [own.stretch for own in found])
     if recipe.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
-    return examples, notes + clip_notes.stretch_notes(rows, [stretch for _, stretch in found])
+    takes, said = _takes(rows, found)
+    examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]
+    return examples, [*notes, *said, *shipped_recipes.table_notes(rows[0].table)]
+
+
+def _takes(
+    rows: Sequence[ClipRow], found: "Sequence[_FoundExample]"
+) -> tuple[list[str], list[str]]:
+    """Return the take of each row, stated or found, and notes on those that were found."""
+    stated = clip_table.stated_takes(rows)
+    if stated is not None:
+        return stated, []
+    return take_groups.find_takes(
+        [str(row.place) for row in rows],
+        [row.named for row in rows],
+        [own.positions for own in found],
+        found[0].example.clip.skeleton.names,
+    )
 
 
 def read_files(rows: Sequence[ClipRow]) -> dict[str, bvh.BvhFile]:
@@ -87,15 +108,28 @@ def read_files(rows: Sequence[ClipRow]) -> dict[str, bvh.BvhFile]:
     return files
 
 
-def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> tuple[Example, float]:
-    """Return the example of a row, and the largest change of a bone's length in it, m."""
+@dataclass(frozen=True)
+class _FoundExample:
+    """An example before its take is known.
+
+    stretch: largest change of a bone's length in it, m. positions: of its joints as captured
+    (F, J, 3), m.
+    """
+
+    example: Example
+    stretch: float
+    positions: Positions
+
+
+def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> _FoundExample:
+    """Return the example of a row."""
     own, last = cut_frames(clip_of_file(file, recipe.source), row)
-    clip = _drop_joints(own, recipe, row)
+    captured = _drop_joints(own, recipe, row)
     in_place = recipe.motion.root == "in_place"
-    clip, jumps, stretch = canonicalize(clip, recipe.motion.cyclic, in_place)
+    clip, jumps, stretch = canonicalize(captured, recipe.motion.cyclic, in_place)
     marks = landmarks(row, last)
     values = measured_controls.control_values(recipe, row, clip, marks)
-    return Example(row, clip, values, marks, jumps), stretch
+    return _FoundExample(Example(row, clip, values, marks, jumps), stretch, captured.positions())
 
 
 def clip_of_file(file: bvh.BvhFile, source: Source) -> Clip:

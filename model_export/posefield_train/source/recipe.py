@@ -74,6 +74,12 @@ class Clips(RecipePart):
         description="columns: names of further label sets, such as { style = 'style' }, for "
         "kriging.label",
     )
+    take: Text | None = Field(
+        default=None,
+        description="column: take, unique among the performer's; clips of one take are left out "
+        "together; default: clips of one file are, and clips that share frames, mirror or continue "
+        "each other",
+    )
     first_frame: Text | None = Field(default=None, description="column: first frame, from 0")
     last_frame: Text | None = Field(default=None, description="column: last frame, inclusive")
     landmarks: list[Text] = Field(

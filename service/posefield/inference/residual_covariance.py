@@ -119,13 +119,18 @@ def importance_order(
 def leave_out_groups(card: ModelCard, samples: Samples) -> Annotated[Indices, "samples"]:
     """Return indices (n,) of the groups of captured clips that are left out together.
 
-    Clips of one file form a group; each clip is a group of its own if the other groups could not
+    Clips of one take form a group; each clip is a group of its own if the other groups could not
     determine the drift.
     """
-    hyper = card.kriging
-    files = [source.partition(", frames ")[0] for source in card.sources]
-    takes = np.unique(files, return_inverse=True)[1]
+    hyper, takes = card.kriging, take_numbers(card)
     functions = kriging_model.drift(samples, len(card.controls), max(hyper.drifts))
     if kriging_model.find_required_group(takes, functions) is not None:
         return np.arange(len(samples))
-    return np.asarray(takes, dtype=np.int64)
+    return takes
+
+
+def take_numbers(card: ModelCard) -> Annotated[Indices, "samples"]:
+    """Return the number (N,) of each captured clip's take; without takes, of its file."""
+    files = [source.partition(", frames ")[0] for source in card.sources]
+    found = card.making.takes or np.unique(files, return_inverse=True)[1]
+    return np.asarray(found, dtype=np.int64)

@@ -103,6 +103,7 @@ def _check_lengths(card: ModelCard) -> None:
     rows += [
         ("sources", card.sources, clips),
         ("left_out", card.left_out, clips),
+        ("making.takes", card.making.takes, clips if card.making.takes else 0),
         ("joint_sigma", card.joint_sigma, joints),
         ("levels[0].joints", card.levels[0].joints, joints),
         ("kriging.scales", card.kriging.scales, controls),

@@ -105,13 +105,14 @@ class TrainingParameters:
     fields: nugget, trend and the offset of each label set, by kriged quantity but the pose.
     landmarks: columns of the table that name them, and their canonical times. joint_weights: of
     joints whose weight in the metric is not one. in_phase: whether cycles were shifted to begin in
-    phase.
+    phase. takes (N,): number of each captured clip's take; empty where each file is a take.
     """
 
     fields: Mapping[Name, tuple[NonNegative, ...]] = field(default_factory=dict)
     landmarks: Mapping[Name, Share] = field(default_factory=dict)
     joint_weights: Mapping[Name, Positive] = field(default_factory=dict)
     in_phase: bool = False
+    takes: tuple[Index, ...] = ()
 
 
 @dataclass(frozen=True)

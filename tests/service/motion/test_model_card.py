@@ -17,6 +17,7 @@ def test_making_is_in_the_file_and_not_sent_to_clients():
         "landmarks": {"peak": 0.4},
         "joint_weights": {"chest": 2.0},
         "in_phase": True,
+        "takes": [0, 0, 1],
     }
     assert "making" not in model_card.plain_values(CARD)
 
