@@ -124,7 +124,7 @@ FAULTS = {
     "an event at no landmark": (
         "[size]",
         '[event]\njoint = "hand"\nat = "hit"\n[size]',
-        ["event.at: found 'hit'", "expected 'end' or a column of clips.landmarks []"],
+        ["event.at: found 'hit'", "'farthest' or a column of clips.landmarks []"],
     ),
     "an event without its joint": ("[size]", '[event]\nat = "end"\n[size]', ["event.joint"]),
     "neither ranks nor budget": (
@@ -316,6 +316,23 @@ def test_an_event_may_be_at_a_landmark(read):
     assert read(marked.replace("[size]", event.format("hit"))).event.at == "hit"
     with pytest.raises(RecipeError, match=r"found 'hat', .*clips.landmarks \['touch', 'hit'\]"):
         read(marked.replace("[size]", event.format("hat")))
+    with pytest.raises(RecipeError, match=r"found 'hihgest' \(did you mean 'highest'\?\), "):
+        read(marked.replace("[size]", event.format("hihgest")))
+
+
+def test_an_event_may_be_at_every_moment_at_which_a_control_is_measured(read):
+    marked = MINIMAL.replace('file = "file"', 'file = "file"\nlandmarks = ["touch"]')
+    event = '[event]\njoint = "hand"\nat = "{}"\n[size]'
+    for at in control_sources.TIME_NAMES:
+        own = read(marked.replace("[size]", event.format(at)))
+        found = at not in ("start", "end")
+        assert own.landmark_names == (["touch", at] if found else ["touch"])
+
+
+def test_a_landmark_named_as_a_moment_is_refused(read):
+    marked = MINIMAL.replace('file = "file"', 'file = "file"\nlandmarks = ["touch", "lowest"]')
+    with pytest.raises(RecipeError, match=r"clips.landmarks.1: found 'lowest', a moment that is"):
+        read(marked)
 
 
 def test_every_reserved_name_is_refused_and_a_free_one_is_not(read):

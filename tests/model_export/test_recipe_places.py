@@ -121,10 +121,13 @@ def test_a_missing_key_of_no_table_is_at_the_top(refused):
 
 
 def test_a_mistake_of_our_own_checks_has_its_key_and_no_words_of_pydantic(refused):
-    text = TOML.replace("[size]", '[event]\njoint = "hand"\nat = "highest"\n[size]')
+    text = TOML.replace("[size]", '[event]\njoint = "hand"\nat = "hightest"\n[size]')
     (line,) = refused(text)
     at = place(text, "at = ")
-    expected = "found 'highest', expected 'end' or a column of clips.landmarks []"
+    expected = (
+        "found 'hightest' (did you mean 'highest'?), expected 'start', 'end', 'highest', 'lowest', "
+        "'farthest' or a column of clips.landmarks []"
+    )
     assert line == f"{at}: event.at: {expected}"
 
 

@@ -26,6 +26,7 @@ from posefield_train.source import (
     measured_controls,
 )
 from posefield_train.source.clip_table import ClipRow, ClipTable
+from posefield_train.source.control_sources import TIME_NAMES
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Source
 
@@ -44,7 +45,7 @@ def examples_of_files(
     another skeleton; BvhError for a file that cannot be read.
     """
     typed = [control.name for control in reopened.card.controls if control.measure is None]
-    needed = [*typed, *_open_sets(reopened, labels), *reopened.making.landmarks]
+    needed = [*typed, *_open_sets(reopened, labels), *_landmark_columns(reopened)]
     if needed:
         raise RecipeError(
             paths[0],
@@ -67,7 +68,7 @@ def examples_of_table(
     column, for an invalid cell, and as `examples_of_files`.
     """
     own = clip_table.open_table(path)
-    landmarks, controls = reopened.making.landmarks, reopened.card.controls
+    landmarks, controls = _landmark_columns(reopened), reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
     sets = _open_sets(reopened, labels)
     own.require(
@@ -165,7 +166,7 @@ def _example(
     cut, last = ingest.cut_frames(ingest.clip_of_file(file, source), row)
     clip, notes = _reduce_to_skeleton(cut, own.skeleton, row)
     clip, jumps, stretch = ingest.canonicalize(clip, own.cyclic, own.root == "in_place")
-    marks = ingest.landmarks(row, last)
+    marks = (*ingest.landmarks(row, last), *_found_landmarks(reopened, row, clip))
     nothing = np.full(len(own.controls), np.nan)
     return Example(row, clip, nothing, marks, jumps), notes, stretch
 
@@ -226,9 +227,31 @@ def _controls(reopened: ReconstructedModel, example: Example, given: Mapping[str
     return np.array([value(control, own) for control, own in pairs])
 
 
+def _landmark_columns(reopened: ReconstructedModel) -> list[str]:
+    """Return the columns of the landmarks, in their order in time."""
+    times = reopened.making.landmarks
+    return sorted((name for name in times if name not in TIME_NAMES), key=lambda name: times[name])
+
+
+def _found_names(reopened: ReconstructedModel) -> list[str]:
+    """Return the moments of the event that are found in each clip: one or none."""
+    return [name for name in reopened.making.landmarks if name in TIME_NAMES]
+
+
+def _found_landmarks(reopened: ReconstructedModel, row: ClipRow, clip: Clip) -> list[float]:
+    """Return the shares of a clip at which the model's event is, as in training."""
+    event, found = reopened.card.event, []
+    for at in _found_names(reopened) if event else ():
+        share = measured_controls.moment_share(clip, event.joint, at)
+        name = clip.skeleton.names[event.joint]
+        found.append(ingest.event_landmark(row, name, at, share))
+    return found
+
+
 def _landmark(reopened: ReconstructedModel, control: Control, example: Example) -> float:
     """Return the share of the clip at which a control is measured; 0 without landmark."""
     if control.measure is None or control.measure.share is None:
         return 0.0
-    times = np.array(list(reopened.making.landmarks.values()))
+    names = [*_landmark_columns(reopened), *_found_names(reopened)]
+    times = np.array([reopened.making.landmarks[name] for name in names])
     return example.landmarks[int(np.argmin(np.abs(times - control.measure.share)))]

@@ -101,13 +101,15 @@ def align_to(examples: Sequence[Example], references: Traces, canon: CanonicalTi
     references: traces (N, FINE, features) at uniform steps of canonical time.
     """
     traces = [trace(example.clip, np.sqrt(canon.joint_weights)) for example in examples]
-    knees = _breakpoints(_landmark_times(examples), canon.landmarks)
+    knees = _breakpoints(_landmark_times(examples), np.sort(canon.landmarks))
     logs = _warps_to(_align_piecewise(traces, knees, FINE), references, knees, canon.basis)
     return _resample_all(examples, canon.frames, canon.basis, logs, medoid=0)
 
 
 def _landmark_times(examples: Sequence[Example]) -> Annotated[Floats, "{len(examples)} landmarks"]:
-    return np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
+    """Return the landmarks (N, M) as shares of the clips, in their order in time."""
+    marks = np.array([example.landmarks for example in examples]).reshape(len(examples), -1)
+    return np.sort(marks, axis=1)
 
 
 def _resample_all(

@@ -93,9 +93,9 @@ def captured_event(
     found = truncation_error.event_frame(recipe, trained.examples)
     if found is None or recipe.event is None:
         return None
-    if recipe.event.at == "end":
-        return MotionEvent(found.joint, 1.0)
-    return MotionEvent(found.joint, landmarks[recipe.clips.landmarks.index(recipe.event.at)])
+    if recipe.event.at in ("start", "end"):
+        return MotionEvent(found.joint, float(recipe.event.at == "end"))
+    return MotionEvent(found.joint, landmarks[recipe.landmark_names.index(recipe.event.at)])
 
 
 def _labels(trained: TrainedModel, asked: Queries) -> Floats:

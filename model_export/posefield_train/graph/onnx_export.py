@@ -245,7 +245,7 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
             for name, field in fields
             if isinstance(field, UniversalKriging)
         },
-        dict(zip(recipe.clips.landmarks, map(float, times), strict=True)),
+        dict(zip(recipe.landmark_names, map(float, times), strict=True)),
         {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
         _takes(trained.examples),

@@ -213,7 +213,8 @@ def _event(report: ProbeReport, table: ClipTable | None) -> list[str]:
     at = marks[0] if marks else "end"
     joint = report.roles.get("rightHand", report.joints[-1])
     return [
-        '# The joint that the motion is for, and the moment: "end", or a column of clips.landmarks',
+        '# The joint that the motion is for, and the moment: "start", "end", "highest", "lowest",',
+        '# "farthest" from the root, or a column of clips.landmarks',
         "# [event]",
         f"# joint = {_quote(joint)}",
         f"# at = {_quote(at)}",

@@ -65,6 +65,7 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     found = [_example(recipe, files[str(row.place)], row) for row in rows]
     examples = [own.example for own in found]
     _expect_same_skeleton(examples)
+    _expect_same_order(recipe, examples)
     notes = clip_notes.stretch_notes(rows, [own.stretch for own in found])
     if recipe.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
@@ -127,7 +128,7 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> _FoundExample:
     captured = _drop_joints(own, recipe, row)
     in_place = recipe.motion.root == "in_place"
     clip, jumps, stretch = canonicalize(captured, recipe.motion.cyclic, in_place)
-    marks = landmarks(row, last)
+    marks = (*landmarks(row, last), *_found_landmark(recipe, row, clip))
     values = measured_controls.control_values(recipe, row, clip, marks)
     return _FoundExample(Example(row, clip, values, marks, jumps), stretch, captured.positions())
 
@@ -228,6 +229,43 @@ def landmarks(row: ClipRow, last: int) -> tuple[float, ...]:
     if any(later <= earlier for earlier, later in pairwise(frames)):
         raise row.error(f"landmarks {row.landmarks}, expected to rise within {frames[0]} to {last}")
     return tuple((frame - row.first_frame) / (last - row.first_frame) for frame in row.landmarks)
+
+
+def _found_landmark(recipe: Recipe, row: ClipRow, clip: Clip) -> tuple[float, ...]:
+    """Return the moment of the recipe's event as a share of the clip, if it is found there."""
+    if recipe.event is None or not recipe.event.is_found:
+        return ()
+    joint = clip.skeleton.names.index(recipe.event.joint)
+    share = measured_controls.moment_share(clip, joint, recipe.event.at)
+    return (event_landmark(row, recipe.event.joint, recipe.event.at, share),)
+
+
+def event_landmark(row: ClipRow, joint: str, at: str, share: float) -> float:
+    """Return the share of the clip of a row at which its event is.
+
+    Raises RecipeError for an end of the clip, which alignment cannot move.
+    """
+    if 0.0 < share < 1.0:
+        return share
+    end = "start" if share == 0.0 else "end"
+    raise row.error(
+        f"{joint} is {at} at the {end} of {row.place.name}, expected a moment within the clip: cut "
+        f"it longer, set event.at to '{end}', or name a column of clips.landmarks"
+    )
+
+
+def _expect_same_order(recipe: Recipe, examples: Sequence[Example]) -> None:
+    """Raise RecipeError for a clip whose event lies between other landmarks than elsewhere."""
+    names, first = recipe.landmark_names, examples[0]
+    for example in examples:
+        marks = example.landmarks
+        order = np.argsort(marks).tolist()
+        if order != np.argsort(first.landmarks).tolist() or len(set(marks)) < len(marks):
+            found = ", ".join(f"{names[mark]} at {marks[mark]:.0%}" for mark in order)
+            raise example.row.error(
+                f"found {found} of {example.row.place.name}, expected the order of line "
+                f"{first.row.line}, {', '.join(names[i] for i in np.argsort(first.landmarks))}"
+            )
 
 
 def _expect_same_skeleton(examples: list[Example]) -> None:

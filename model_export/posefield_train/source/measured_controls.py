@@ -100,6 +100,13 @@ def measured_quantities(clip: Clip) -> MeasuredMotion:
     return MeasuredMotion(positions, clip.duration, gone, parents, offsets)
 
 
+def moment_share(clip: Clip, joint: int, at: MeasureMoment) -> float:
+    """Return the moment at which a joint is highest, lowest or farthest, as a share of the clip."""
+    seen = measured_quantities(clip).positions
+    frame = measures.moment_frame(Measure("height", (joint,), at), seen, 0.0)
+    return frame / (len(clip) - 1)
+
+
 def _landmark_time(
     recipe: Recipe, control: ControlMeasured, landmarks: Sequence[float]
 ) -> float | None:

@@ -185,14 +185,24 @@ class Kriging(RecipePart):
         return ("matern52", "gaussian") if self.covariance == "chosen" else (self.covariance,)
 
 
+FOUND_MOMENTS = tuple(name for name in TIME_NAMES if name not in ("start", "end"))
+"""Moments of an event that are found in the motion, and differ from clip to clip."""
+
+
 class Event(RecipePart):
     """Event of a motion: a joint and the moment at which its position matters."""
 
     joint: Text = Field(description="joint of the event: a hand that reaches, a foot that lands")
     at: Text = Field(
-        description="moment of the event: 'end' for the last frame, or a column of clips.landmarks "
-        "such as 'contact_frame'"
+        description="moment of the event: 'start', 'end', 'highest', 'lowest' or 'farthest' (from "
+        "the root) of its joint, or a column of clips.landmarks such as 'contact_frame'; all but "
+        "start and end are aligned to one time in all clips"
     )
+
+    @property
+    def is_found(self) -> bool:
+        """Return True if the moment is found in each clip, as a landmark that needs no column."""
+        return self.at in FOUND_MOMENTS
 
 
 class Detail(RecipePart):
@@ -349,6 +359,12 @@ class Recipe(RecipePart):
         """Return the controls that are measured from the clips."""
         return [control for control in self.controls if isinstance(control, ControlMeasured)]
 
+    @property
+    def landmark_names(self) -> list[str]:
+        """Return the columns of the landmarks, and the event's moment if it is found in clips."""
+        found = [self.event.at] if self.event and self.event.is_found else []
+        return [*self.clips.landmarks, *found]
+
     def leg_ends(self, auto: Auto) -> list[str]:
         """Return the two feet of a step, or the ends of a leg; empty for other quantities."""
         if auto.quantity == "step_length":
@@ -449,11 +465,8 @@ class Recipe(RecipePart):
         if quantity in ("speed", "stride_length") and self.motion.root == "in_place":
             found = f"found {quantity!r} and motion.root = 'in_place', expected one that travels"
             yield ("auto", "quantity"), found
-        if auto.at is not None and auto.at not in (*TIME_NAMES, *landmarks):
-            known = (*TIME_NAMES, *landmarks)
-            moments = ", ".join(map(repr, TIME_NAMES))
-            expected = f"expected {moments} or a column of clips.landmarks {landmarks}"
-            yield ("auto", "at"), f"found {auto.at!r}{did_you_mean(auto.at, known)}, {expected}"
+        if auto.at is not None and (fault := _moment_fault(auto.at, landmarks)):
+            yield ("auto", "at"), fault
         if quantity == "step_length" and len(self.leg_ends(auto)) != 2:
             found = f"found none and motion.feet {self.motion.feet}, expected two feet"
             yield ("auto", "joints"), found
@@ -482,14 +495,30 @@ class Recipe(RecipePart):
                     "and event.at to say where it counts",
                     *("size", "effector_budget_cm"),
                 )
-        elif self.event.at != "end" and self.event.at not in self.clips.landmarks:
-            known = ("end", *self.clips.landmarks)
-            raise KeyFault(
-                f"found {self.event.at!r}{did_you_mean(self.event.at, known)}, expected 'end' or a "
-                f"column of clips.landmarks {self.clips.landmarks}",
-                *("event", "at"),
-            )
+        elif fault := _moment_fault(self.event.at, self.clips.landmarks):
+            raise KeyFault(fault, "event", "at")
         return self
+
+    @model_validator(mode="after")
+    def _check_landmarks(self) -> "Recipe":
+        for index, name in enumerate(self.clips.landmarks):
+            if name in TIME_NAMES:
+                raise KeyFault(
+                    f"found {name!r}, a moment that is found in the motion, expected a column of "
+                    "another name",
+                    *("clips", "landmarks", index),
+                )
+        return self
+
+
+def _moment_fault(at: str, landmarks: list[str]) -> str | None:
+    """Return the fault of an unknown moment; None for a known one."""
+    known = (*TIME_NAMES, *landmarks)
+    if at in known:
+        return None
+    moments = ", ".join(map(repr, TIME_NAMES))
+    expected = f"expected {moments} or a column of clips.landmarks {landmarks}"
+    return f"found {at!r}{did_you_mean(at, known)}, {expected}"
 
 
 MAX_BYTES = 128_000

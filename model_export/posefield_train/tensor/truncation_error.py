@@ -198,7 +198,7 @@ def _canonical_frame(recipe: Recipe, at: str, examples: Sequence[Example]) -> in
 
 
 def _event_share(recipe: Recipe, at: str, examples: Sequence[Example]) -> float:
-    if at == "end":
-        return 1.0
-    mark = recipe.clips.landmarks.index(at)
+    if at in ("start", "end"):
+        return float(at == "end")
+    mark = recipe.landmark_names.index(at)
     return float(np.mean([example.landmarks[mark] for example in examples]))

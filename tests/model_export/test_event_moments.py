@@ -1,0 +1,132 @@
+"""Tests of events at moments that are found in each clip: highest, lowest, farthest."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from minimal import SKELETON, recipe_with, write_clips
+
+from posefield.common.errors import RecipeError
+from posefield.motion import quat
+from posefield.motion.clip import assemble
+from posefield.motion.measures import Measure
+from posefield_train import train
+from posefield_train.adapt import model_reconstruction, new_clips
+from posefield_train.graph import onnx_export
+from posefield_train.source import ingest
+from posefield_train.tensor import truncation_error
+
+FRAMES, HAND = 41, SKELETON.names.index("LeftHand")
+EVENT = {"event": {"joint": "LeftHand", "at": "highest"}}
+MARKED = {"clips": {"landmarks": ["touch"]}}
+
+
+def raised(peak, height, frames=FRAMES):
+    """A clip whose hand is highest at the share `peak`, by an angle of `height`."""
+    t = np.linspace(0.0, 1.0, frames)
+    lifted = height * np.sin(np.pi * np.interp(t, [0.0, peak, 1.0], [0.0, 0.5, 1.0]))
+    rotations = np.tile(quat.IDENTITY, (frames, len(SKELETON), 1))
+    rotations[:, 3] = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), lifted)
+    path = np.stack([0 * t, 0.9 + 0 * t, 0.1 * t], axis=-1)
+    return assemble(SKELETON, rotations, path, SKELETON.offsets, 30.0)
+
+
+PEAKS = tuple((12 + i) / (FRAMES - 1) for i in range(8))
+LIFTED = tuple(raised(peak, 0.6 + 0.1 * i) for i, peak in enumerate(PEAKS))
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Function that writes clips and their table, and returns the recipe and its examples."""
+
+    def of(motions, rows=None, head="file,v", **sections):
+        write_clips(tmp_path, motions)
+        if rows is not None:
+            (tmp_path / "clips.csv").write_text("\n".join([head, *rows]) + "\n")
+        own = recipe_with(**sections)
+        return own, ingest.ingest(own, tmp_path)[0]
+
+    return of
+
+
+def test_the_highest_place_is_a_landmark_that_is_aligned(read):
+    recipe, examples = read(LIFTED, **EVENT)
+    assert [example.landmarks[0] for example in examples] == pytest.approx(PEAKS)
+    trained = train.train(recipe, examples, lambda _: None)
+    moment = truncation_error.event_frame(recipe, trained.examples)
+    assert (moment.joint, moment.frame) == (HAND, round(19 * np.mean(PEAKS)))
+    heights = trained.aligned.rotations[:, :, 3, 3]
+    assert np.abs(np.argmax(heights, axis=1) - moment.frame).max() <= 1
+    card = onnx_export.export_model(recipe, trained, []).card
+    assert card.making.landmarks == {"highest": pytest.approx(np.mean(PEAKS), abs=1e-6)}
+    assert card.event.share == pytest.approx(np.mean(PEAKS), abs=1e-4)
+
+
+def test_every_moment_of_a_control_is_one_of_an_event(read):
+    expected = {"start": 0.0, "end": 1.0}
+    for at in ("start", "end", "highest", "lowest", "farthest"):
+        clips = [raised(peak, -0.5 if at == "lowest" else 0.7) for peak in PEAKS]
+        if at == "farthest":
+            clips = [stretched(clip) for clip in clips]
+        recipe, examples = read(clips, event={"joint": "LeftHand", "at": at})
+        found = truncation_error.event(recipe, examples)
+        assert found.share == pytest.approx(expected.get(at, np.mean(PEAKS)), abs=1e-4)
+
+
+def stretched(clip):
+    """The clip with its arm hanging sideways at rest, so that lifting it moves it away."""
+    rotations = clip.rotations.copy()
+    down = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(-1.2))
+    rotations[:, 3] = quat.mul(np.broadcast_to(down, rotations[:, 3].shape), rotations[:, 3])
+    return replace(clip, rotations=rotations)
+
+
+def test_a_moment_at_the_end_of_a_clip_is_refused_by_line(read):
+    half = LIFTED[3]
+    cut = replace(half, rotations=half.rotations[:12], translations=half.translations[:12])
+    with pytest.raises(RecipeError) as refused:
+        read([*LIFTED[:3], cut], **EVENT)
+    assert refused.value.line == 5
+    assert refused.value.message == (
+        "LeftHand is highest at the end of 3.bvh, expected a moment within the clip: cut it "
+        "longer, set event.at to 'end', or name a column of clips.landmarks"
+    )
+
+
+def test_landmarks_keep_their_order_in_time_around_the_event(read):
+    rows = [f"{i}.bvh,{i},{30 + i}" for i in range(8)]
+    recipe, examples = read(LIFTED, rows, "file,v,touch", **MARKED, **EVENT)
+    assert all(example.landmarks[0] > example.landmarks[1] for example in examples)
+    trained = train.train(recipe, examples, lambda _: None)
+    peaks = np.argmax(trained.aligned.rotations[:, :, 3, 3], axis=1)
+    assert np.ptp(peaks) <= 1
+    rows[5] = "5.bvh,5,3"
+    with pytest.raises(RecipeError) as refused:
+        read(LIFTED, rows, "file,v,touch", **MARKED, **EVENT)
+    assert refused.value.line == 7
+    assert refused.value.message == (
+        "found touch at 8%, highest at 42% of 5.bvh, expected the order of line 2, highest, touch"
+    )
+
+
+def test_a_new_performers_clips_are_aligned_by_the_same_moment(read, tmp_path):
+    clips = [raised(peak, 0.6 + 0.1 * (i // 2)) for i, peak in enumerate(PEAKS)]
+    control = {"name": "lift", "auto": {"quantity": "height", "joint": "LeftHand", "at": "highest"}}
+    own = recipe_with(clips={"performer": "who"}, kriging={"label": "performer"}, **EVENT)
+    plain = own.model_dump(by_alias=True, exclude_unset=True)
+    plain["controls"] = [{**control, "description": "Height of the hand"}]
+    recipe = type(own).model_validate(plain)
+    rows = [f"{i}.bvh,{i},{'ab'[i % 2]}" for i in range(8)]
+    write_clips(tmp_path, clips)
+    (tmp_path / "clips.csv").write_text("\n".join(["file,v,who", *rows]) + "\n")
+    examples, notes = ingest.ingest(recipe, tmp_path)
+    trained = train.train(recipe, examples, lambda _: None)
+    content = onnx_export.export_model(recipe, trained, notes).content
+    reopened = model_reconstruction.reconstruct(content, "a model")
+    (tmp_path / "new").mkdir()
+    write_clips(tmp_path / "new", [raised(0.6, 0.9)])
+    found, _ = new_clips.examples_of_files(
+        reopened, [tmp_path / "new" / "0.bvh"], recipe.source, "c"
+    )
+    assert found[0].landmarks == (pytest.approx(0.6),)
+    assert reopened.card.controls[0].measure == Measure("height", (HAND,), "highest")
