@@ -176,9 +176,9 @@ def test_joints_behind_a_dropped_one_keep_their_parents(read):
     ("motion", "message"),
     [
         ({"drop_joints": ["Hips"]}, "the root cannot be dropped"),
-        ({"drop_joints": ["Tail"]}, r"0\.bvh has no joints \['Tail'\] that the recipe names"),
-        ({"joint_weights": {"Tail": 2.0}}, r"0\.bvh has no joints \['Tail'\]"),
-        ({"feet": ["Tail"]}, r"0\.bvh has no joints \['Tail'\]"),
+        ({"drop_joints": ["Tail"]}, r"0\.bvh has no joints 'Tail' that the recipe names"),
+        ({"joint_weights": {"Tail": 2.0}}, r"0\.bvh has no joints 'Tail'"),
+        ({"feet": ["Tail"]}, r"0\.bvh has no joints 'Tail'"),
         (
             {"feet": ["LeftHand"], "drop_joints": ["LeftArm"]},
             r"joints \['LeftHand'\] are dropped, and named by the recipe elsewhere",
@@ -194,7 +194,7 @@ def test_joints_that_cannot_be_followed_are_refused_by_row(read, motion, message
 @pytest.mark.parametrize(
     ("joint", "dropped", "message"),
     [
-        ("Tail", [], r"0\.bvh has no joints \['Tail'\] that the recipe names"),
+        ("Tail", [], r"0\.bvh has no joints 'Tail' that the recipe names"),
         ("LeftHand", ["LeftArm"], r"joints \['LeftHand'\] are dropped, and named by the recipe"),
     ],
 )

@@ -25,6 +25,7 @@ from posefield_train.source import (
     ingest,
     measured_controls,
 )
+from posefield_train.source.bvh import end_sites
 from posefield_train.source.clip_table import ClipRow, ClipTable
 from posefield_train.source.control_sources import TIME_NAMES
 from posefield_train.source.ingest import Example
@@ -176,6 +177,7 @@ def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Cli
 
     Raises RecipeError if joints are missing or have other parents.
     """
+    clip = end_sites.with_end_joints(clip, family.names)
     own = clip.skeleton
     missing = [name for name in family.names if name not in own.names]
     if missing:

@@ -1,6 +1,6 @@
 """Clips from rows of the table: cut, in metres, Y up, with heading and origin removed."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -9,6 +9,7 @@ import numpy as np
 
 from posefield.common.array_shapes import Positions
 from posefield.common.errors import RecipeError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -21,6 +22,7 @@ from posefield_train.source import (
     measured_controls,
     shipped_recipes,
 )
+from posefield_train.source.bvh import end_sites
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
@@ -176,12 +178,19 @@ def canonicalize(
 
 
 def _drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
-    """Return the clip without the dropped joints and their descendants."""
-    joints = clip.skeleton
+    """Return the clip without the dropped joints and their descendants.
+
+    End sites that the recipe names are joints of the clip.
+    """
     needed = _named_joints(recipe)
+    sites = [name for name in end_sites.end_site_names(clip.skeleton) if name]
+    clip = end_sites.with_end_joints(clip, needed)
+    joints = clip.skeleton
     missing = (needed | set(recipe.motion.drop_joints)) - set(joints.names)
     if missing:
-        raise row.error(f"{row.place} has no joints {sorted(missing)} that the recipe names")
+        raise row.error(
+            f"{row.place} has no joints {_missing_names(missing, (*joints.names, *sites))}"
+        )
     dropped = {joints.names.index(name) for name in recipe.motion.drop_joints}
     for joint, parent in enumerate(joints.parents):
         if parent in dropped:
@@ -193,6 +202,19 @@ def _drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     if gone:
         raise row.error(f"joints {sorted(gone)} are dropped, and named by the recipe elsewhere")
     return keep_joints(clip, kept)
+
+
+MOST_LISTED = 60
+"""Joints that a message lists."""
+
+
+def _missing_names(missing: Collection[str], known: Sequence[str]) -> str:
+    """Return names that the recipe has and a file lacks, with similar ones and all that it has."""
+    told = ", ".join(f"{name!r}{did_you_mean(name, known)}" for name in sorted(missing))
+    there = list(dict.fromkeys(known))
+    more = f" and {len(there) - MOST_LISTED} more" if len(there) > MOST_LISTED else ""
+    listed = ", ".join(there[:MOST_LISTED])
+    return f"{told} that the recipe names, expected some of {listed}{more}"
 
 
 def has_all_parents(joints: Skeleton, kept: Sequence[int]) -> bool:
@@ -220,7 +242,8 @@ def _named_joints(recipe: Recipe) -> set[str]:
     motion = recipe.motion
     autos = [control.auto for control in recipe.measured]
     event |= {joint for auto in autos for joint in (*auto.joint_names, *recipe.leg_ends(auto))}
-    return {*motion.joint_weights, *motion.feet, *recipe.roles.values()} | event
+    listed = {*motion.joint_weights, *motion.feet, *motion.end_sites, *recipe.roles.values()}
+    return listed | event
 
 
 def landmarks(row: ClipRow, last: int) -> tuple[float, ...]:

@@ -109,6 +109,12 @@ class Motion(RecipePart):
     feet: list[Text] = Field(
         default=[], description="joints of the feet, for the measurement of foot skate"
     )
+    end_sites: list[Text] = Field(
+        default=[],
+        description="end sites of the motion files that become joints of the model, for targets: "
+        "each is named as its joint with the ending _end, such as 'LeftToes_end'; those that the "
+        "recipe names elsewhere need not be listed",
+    )
 
 
 class Alignment(RecipePart):
