@@ -31,7 +31,7 @@ from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.kriging_tuning import TunedKriging, TuningProblem
 from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
-from posefield_train.outliers import outlier_detection
+from posefield_train.outliers import family_check, outlier_detection
 from posefield_train.parallel import single_thread
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.ingest import Example
@@ -87,6 +87,7 @@ def train(recipe: Recipe, examples: Sequence[Example], report: StepCallback) -> 
 def _train(recipe: Recipe, examples: Sequence[Example], report: StepCallback) -> TrainedModel:
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
+    family_check.check_family(recipe, examples)
     universal_kriging.check_samples(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
     examples = _sorted(examples)
     report(f"aligning {len(examples)} clips")

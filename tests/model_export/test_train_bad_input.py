@@ -2,6 +2,7 @@
 
 import re
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ from posefield.common.errors import BvhError, RecipeError, TrainingError
 from posefield.motion import quat
 from posefield.motion.clip import assemble
 from posefield_train import train
-from posefield_train.graph import onnx_export
+from posefield_train.graph import onnx_export, training_notes
+from posefield_train.graph.trained_model import Outlier
 from posefield_train.source import ingest, recipe
+from posefield_train.source.half_turns import Finding
 
 EIGHT = tuple(small_clip(0.1 * i, 21 + i % 3) for i in range(8))
 LABELLED = {"clips": {"performer": "who"}, "kriging": {"label": "performer"}}
@@ -287,8 +290,109 @@ def test_clips_of_one_take_make_a_model_that_says_so(model):
     assert trained.explained["pose"] > 0.9
 
 
-def test_motions_that_are_all_the_same_make_a_model_of_their_mean(model):
-    trained, _ = model([EIGHT[0]] * 8)
-    assert np.sqrt(trained.left_out_errors.mean()) < 1e-6
-    answer = trained.model.evaluate(np.array([[0.0], [7.0]]), np.full((2, 1), 0.3))
-    assert np.ptp(answer.positions(SKELETON.parents), axis=0).max() < 1e-6
+def test_motions_that_are_all_the_same_are_refused(model):
+    with pytest.raises(TrainingError) as refused:
+        model([EIGHT[0]] * 8)
+    assert str(refused.value) == (
+        "all 8 clips have the same motion, expected motions that differ with their controls: check "
+        "column 'file' of the table and its frames"
+    )
+    # Negative control: one clip that differs is enough.
+    trained, exported = model([*[EIGHT[0]] * 7, EIGHT[5]])
+    assert np.isfinite(trained.left_out_errors).all()
+    (said,) = notes(exported)[-1:]
+    assert said.startswith("line 3, 1.bvh shares frames with line 2, 0.bvh; 7 clips have such a")
+
+
+def cause(model, rows, head="file,v", **sections):
+    with pytest.raises(TrainingError) as refused:
+        model(EIGHT, rows, head, **sections)
+    start, end = "expected at least two values; ", "; leave it out of the recipe, or add clips"
+    said = str(refused.value)
+    assert said.startswith("control 'speed' has the value 2 in all ")
+    return said[said.index(start) + len(start) : said.index(end)]
+
+
+def test_a_control_of_one_value_is_refused_with_its_cause(model):
+    assert cause(model, speeds(*[2] * 8)) == "column 'v' holds it in every row"
+    rows = [f"{i}.bvh,{i // 4 * 2},{i // 4}" for i in range(8)]
+    lets = {"clips": {"where": {"side": {"minimum": 1.0}}}}
+    assert cause(model, rows, "file,v,side", **lets) == (
+        "column 'v' holds it in every row that [clips.where] lets pass"
+    )
+    lets = {"clips": {"where": {"v": {"minimum": 1.0}}}}
+    assert cause(model, rows, "file,v,side", **lets) == (
+        "column 'v' holds it in every row that [clips.where] lets pass by this column"
+    )
+
+
+@pytest.mark.parametrize(
+    ("auto", "said"),
+    [
+        (
+            {"quantity": "leg_length", "joints": ["LeftArm", "LeftHand"]},
+            "leg_length is of the performer, and all clips have bones of the same size",
+        ),
+        (
+            {"quantity": "forward", "joint": "Hips", "at": "start"},
+            "each clip begins at the origin, so that a root is there in all of them",
+        ),
+        (
+            {"quantity": "root_height", "at": "start"},
+            "root_height at start is measured, and no clip differs in it",
+        ),
+    ],
+)
+def test_a_measured_control_of_one_value_is_refused_with_its_cause(tmp_path, auto, said):
+    write_clips(tmp_path, EIGHT)
+    plain = recipe_with().model_dump(by_alias=True, exclude_unset=True)
+    plain["controls"] = [{"name": "found", "auto": auto, "description": "Measured"}]
+    own = recipe.Recipe.model_validate(plain)
+    with pytest.raises(TrainingError, match=r"'found' has the value .* in all 8") as refused:
+        train.train(own, ingest.ingest(own, tmp_path)[0], lambda _: None)
+    assert said in str(refused.value)
+
+
+def test_equal_controls_with_quite_different_motion_are_noted(model):
+    rng = np.random.default_rng(5)
+    phases = rng.permutation(8) * 0.7
+    clips = [small_clip(phase, 21 + i % 3) for i, phase in enumerate(phases)]
+    _, exported = model(clips, speeds(0, 0, 1, 1, 2, 2, 3, 3))
+    (said,) = [note for note in notes(exported) if "share their controls" in note]
+    assert re.fullmatch(
+        r"8 of 8 clips share their controls with others, such as line \d, \d\.bvh, and differ from "
+        r"them by \d+\.\d cm where all clips differ by \d+\.\d cm: a control that tells them apart "
+        r"may be missing",
+        said,
+    )
+    # Negative control: pairs that resemble each other more than other clips are repeated trials.
+    pairs = [small_clip(0.5 * (i // 2) + 0.05 * (i % 2), 21 + i % 3) for i in range(8)]
+    _, exported = model(pairs, speeds(0, 0, 1, 1, 2, 2, 3, 3))
+    assert [note for note in notes(exported) if "share their controls" in note] == []
+
+
+def test_what_is_the_same_in_many_clips_is_one_note_and_the_worst_come_first(model):
+    trained, _ = model(EIGHT)
+    jumps = [Finding("jump", 4, clip, 1.6 + 0.1 * clip) for clip in range(6)]
+    found = [*jumps, Finding("flip", 2, 1, 2.5), Finding("flip", 2, 3, 2.6)]
+    shifted = tuple(replace(e, shift=0.1 + 0.01 * i) for i, e in enumerate(trained.examples))
+    kinds = ("duration", "size", *["far"] * 7)
+    against = tuple(Outlier(i % 8, kind, f"{kind} {i}") for i, kind in enumerate(kinds))
+    noisy = replace(trained, findings=found, examples=shifted, outliers=against)
+    own = training_notes.training_notes(recipe_with(), noisy, ["of the files"])
+    rows = [example.row.named for example in shifted]
+    assert own == [
+        f"{rows[1]}: size 1",
+        f"{rows[0]}: far 8; duration 0",
+        *(f"{rows[i]}: far {i}" for i in range(2, 6)),
+        f"2 more clips with such evidence: {rows[6]}, {rows[7]}",
+        "of the files",
+        f"jumps between two frames taken out in 6 of 8 clips, the largest in {rows[5]}: LeftHand "
+        "by 120 degrees",
+        f"{rows[1]}: half turns taken out: Head by 143 degrees",
+        f"{rows[3]}: half turns taken out: Head by 149 degrees",
+        f"8 of 8 clips begin elsewhere in their cycle than they were cut, the most {rows[7]}: "
+        "begun 17% of its cycle later than it was cut",
+    ]
+    few = replace(noisy, findings=jumps[:3], outliers=(), examples=trained.examples)
+    assert len(training_notes.training_notes(recipe_with(), few, [])) == 3

@@ -16,7 +16,7 @@ from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelC
 from posefield_train.adapt import adaptation, canonical_clips, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
-from posefield_train.graph import level_errors, onnx_export, truncation_cost
+from posefield_train.graph import level_errors, onnx_export, training_notes, truncation_cost
 from posefield_train.graph.level_errors import LevelTest
 from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, ModelLevels
 from posefield_train.graph.onnx_export import MAX_LISTED_VALUES, ExportedModel
@@ -266,7 +266,7 @@ def _notes(
     return [
         adapting,
         *newcomer.notes,
-        *onnx_export.finding_notes(moved.findings, moved.examples, names),
+        *training_notes.finding_notes(moved.findings, moved.examples, names),
     ]
 
 

@@ -167,7 +167,10 @@ def _example(
     cut, last = ingest.cut_frames(ingest.clip_of_file(file, source), row)
     clip, notes = _reduce_to_skeleton(cut, own.skeleton, row)
     clip, jumps, stretch = ingest.canonicalize(clip, own.cyclic, own.root == "in_place")
-    marks = (*ingest.landmarks(row, last), *_found_landmarks(reopened, row, clip))
+    marks = (
+        *ingest.landmarks(row, last, _landmark_columns(reopened)),
+        *_found_landmarks(reopened, row, clip),
+    )
     nothing = np.full(len(own.controls), np.nan)
     return Example(row, clip, nothing, marks, jumps), notes, stretch
 

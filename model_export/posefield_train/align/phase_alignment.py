@@ -29,6 +29,8 @@ PHASE_STEPS = 96
 NEAR, FAR_WORTH = 0.25, 0.5
 # A shift beyond this share of a cycle is noted.
 NOTED_SHIFT = 0.08
+# Clips beyond this number are noted together.
+MOST_NOTED = 3
 
 
 def align_phases(
@@ -197,13 +199,23 @@ def _shift_clip(clip: Clip, frames: int) -> Clip:
 
 
 def shift_notes(examples: Sequence[Example]) -> list[str]:
-    """Return one note per clip that was shifted by a large share of its cycle."""
+    """Return notes on clips that were shifted by a large share of their cycle.
+
+    A few have a note each, many have one together.
+    """
+    shifted = [example for example in examples if abs(example.shift) > NOTED_SHIFT]
+    if len(shifted) <= MOST_NOTED:
+        return [f"{example.row.named}: {_shift_text(example)}" for example in shifted]
+    most = max(shifted, key=lambda example: abs(example.shift))
     return [
-        f"{example.row.named}: begun {abs(example.shift):.0%} of its cycle "
-        f"{'later' if example.shift > 0 else 'earlier'} than it was cut"
-        for example in examples
-        if abs(example.shift) > NOTED_SHIFT
+        f"{len(shifted)} of {len(examples)} clips begin elsewhere in their cycle than they were "
+        f"cut, the most {most.row.named}: {_shift_text(most)}"
     ]
+
+
+def _shift_text(example: Example) -> str:
+    way = "later" if example.shift > 0 else "earlier"
+    return f"begun {abs(example.shift):.0%} of its cycle {way} than it was cut"
 
 
 def _refuse_split_landmarks(examples: Sequence[Example]) -> None:

@@ -29,8 +29,7 @@ from posefield.model_file.model_card import (
     Preset,
     TrainingParameters,
 )
-from posefield_train.align import phase_alignment
-from posefield_train.graph import levels, truncation_cost
+from posefield_train.graph import levels, training_notes, truncation_cost
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points, thinning
@@ -39,7 +38,6 @@ from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
 from posefield_train.source import measured_controls
-from posefield_train.source.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
@@ -72,7 +70,7 @@ def export_model(recipe: Recipe, trained: TrainedModel, notes: list[str]) -> Exp
     Raises TrainingError for levels of detail that cannot be made, and ExportRefused if the parity
     check fails.
     """
-    notes = [*notes, *sample_points.data_notes(recipe, trained.examples)]
+    notes = training_notes.training_notes(recipe, trained, notes)
     laddered = levels.build_levels(recipe, trained)
     return check_and_export(
         laddered.model, lambda parity: _card(recipe, trained, laddered.levels, notes, parity)
@@ -327,12 +325,7 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         },
         "tensor": list(trained.tensor.values.shape),
         "parity_m": float(f"{parity:.1e}"),
-        "notes": [
-            *notes,
-            *trained.outlier_notes(),
-            *phase_alignment.shift_notes(trained.examples),
-            *finding_notes(trained.findings, trained.examples, trained.skeleton.names),
-        ],
+        "notes": list(notes),
     }
 
 
@@ -351,28 +344,6 @@ def plain_parameters(hyper: Hyper) -> Hyper:
 
 def _rounded(value: Any) -> float:
     return float(f"{float(value):.4g}")
-
-
-def finding_notes(
-    findings: Sequence[Finding], examples: Sequence[Example], names: Sequence[str]
-) -> list[str]:
-    """Return one note per clip and kind of finding."""
-    said: dict[tuple[int, str], list[str]] = {}
-    for finding in findings:
-        entry = f"{names[finding.joint]} by {np.degrees(finding.angle):.0f} degrees"
-        said.setdefault((finding.clip, finding.kind), []).append(entry)
-    return [
-        f"{examples[clip].row.named}: {_MEANING[kind]}: {', '.join(entries)}"
-        for (clip, kind), entries in sorted(said.items())
-    ]
-
-
-_MEANING = {
-    "jump": "jumps between two frames taken out",
-    "flip": "half turns taken out",
-    "wrap": "followed past half a turn from the family's mean",
-    "far": "close to half a turn from the family's mean",
-}
 
 
 def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:

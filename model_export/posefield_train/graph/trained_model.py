@@ -14,6 +14,11 @@ from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
 from posefield_train.tensor.truncation_error import TruncationErrors
 
+KINDS = ("size", "disguise", "bones", "leap", "far", "travel", "duration")
+"""Kinds of evidence, the worst for a model first."""
+MOST_ALIKE = 5
+"""Clips of one kind of evidence that have notes of their own."""
+
 
 @dataclass(frozen=True)
 class Outlier:
@@ -62,8 +67,19 @@ class TrainedModel:
     outliers: tuple[Outlier, ...] = ()
 
     def outlier_notes(self) -> list[str]:
-        """Return one note per clip with evidence against it."""
-        said: dict[int, list[str]] = {}
-        for one in self.outliers:
-            said.setdefault(one.clip, []).append(one.evidence)
-        return [f"{self.examples[i].row.named}: {'; '.join(parts)}" for i, parts in said.items()]
+        """Return one note per clip with evidence against it, the worst kinds first.
+
+        Of many clips with the same worst kind of evidence the last ones are only named.
+        """
+        said: dict[int, list[Outlier]] = {}
+        for one in sorted(self.outliers, key=lambda one: KINDS.index(one.kind)):
+            said.setdefault(one.clip, []).append(one)
+        notes = []
+        for kind in KINDS:
+            clips = sorted(clip for clip, own in said.items() if own[0].kind == kind)
+            for clip in clips[:MOST_ALIKE]:
+                evidence = "; ".join(one.evidence for one in said[clip])
+                notes.append(f"{self.examples[clip].row.named}: {evidence}")
+            if more := [self.examples[clip].row.named for clip in clips[MOST_ALIKE:]]:
+                notes.append(f"{len(more)} more clips with such evidence: {', '.join(more)}")
+        return notes

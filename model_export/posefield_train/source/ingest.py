@@ -130,7 +130,7 @@ def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> _FoundExample:
     captured = _drop_joints(own, recipe, row)
     in_place = recipe.motion.root == "in_place"
     clip, jumps, stretch = canonicalize(captured, recipe.motion.cyclic, in_place)
-    marks = (*landmarks(row, last), *_found_landmark(recipe, row, clip))
+    marks = (*landmarks(row, last, recipe.clips.landmarks), *_found_landmark(recipe, row, clip))
     values = measured_controls.control_values(recipe, row, clip, marks)
     return _FoundExample(Example(row, clip, values, marks, jumps), stretch, captured.positions())
 
@@ -246,11 +246,25 @@ def _named_joints(recipe: Recipe) -> set[str]:
     return listed | event
 
 
-def landmarks(row: ClipRow, last: int) -> tuple[float, ...]:
-    """Return the landmarks of a row as fractions of its clip. last: its last frame in the file."""
-    frames = (row.first_frame, *row.landmarks, last)
-    if any(later <= earlier for earlier, later in pairwise(frames)):
-        raise row.error(f"landmarks {row.landmarks}, expected to rise within {frames[0]} to {last}")
+def landmarks(row: ClipRow, last: int, columns: Sequence[str]) -> tuple[float, ...]:
+    """Return the landmarks of a row as fractions of its clip.
+
+    last: its last frame in the file. columns: of the landmarks. Raises RecipeError for a landmark
+    out of the clip, and for two that do not rise.
+    """
+    named = [*zip(columns, row.landmarks, strict=True)]
+    for column, frame in named:
+        if not row.first_frame < frame < last:
+            raise row.error(
+                f"column {column!r}: frame {frame} is out of the clip, expected one between its "
+                f"frames {row.first_frame} and {last} of {row.place.name}, without these two"
+            )
+    for (before, earlier), (column, later) in pairwise(named):
+        if later <= earlier:
+            raise row.error(
+                f"column {column!r}: frame {later}, expected one after frame {earlier} of column "
+                f"{before!r}, as in clips.landmarks"
+            )
     return tuple((frame - row.first_frame) / (last - row.first_frame) for frame in row.landmarks)
 
 
