@@ -245,8 +245,11 @@ def _found_names(reopened: ReconstructedModel) -> list[str]:
 
 def _found_landmarks(reopened: ReconstructedModel, row: ClipRow, clip: Clip) -> list[float]:
     """Return the shares of a clip at which the model's event is, as in training."""
-    event, found = reopened.card.event, []
-    for at in _found_names(reopened) if event else ():
+    event = reopened.card.event
+    if event is None:
+        return []
+    found = []
+    for at in _found_names(reopened):
         share = measured_controls.moment_share(clip, event.joint, at)
         name = clip.skeleton.names[event.joint]
         found.append(ingest.event_landmark(row, name, at, share))

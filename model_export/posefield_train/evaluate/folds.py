@@ -32,7 +32,8 @@ def clip_folds(examples: Sequence[Example]) -> list[Fold]:
     Strides of one take are nearly equal; held out one by one, they would predict each other. Raises
     TrainingError if all clips are of one take.
     """
-    takes = _groups(sample_points.take_numbers(examples).tolist())
+    numbers = sample_points.take_numbers(examples)
+    takes = [tuple(np.flatnonzero(numbers == take).tolist()) for take in np.unique(numbers)]
     if len(takes) == 1:
         raise TrainingError(
             f"all {len(examples)} clips are of one take, expected two or more takes: none can be "
@@ -48,6 +49,6 @@ def performer_folds(examples: Sequence[Example]) -> list[Fold]:
     return [Fold(own) for own in _groups([example.row.performer for example in examples])]
 
 
-def _groups(names: Sequence[str] | Sequence[int]) -> list[tuple[int, ...]]:
+def _groups(names: Sequence[str]) -> list[tuple[int, ...]]:
     listed = np.array(names)
     return [tuple(np.flatnonzero(listed == name).tolist()) for name in sorted(set(names))]

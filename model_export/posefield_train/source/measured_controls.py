@@ -5,6 +5,7 @@ They are measured on the clip that training uses: cut, heading and origin remove
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.control_sources import TIME_NAMES, Auto, Control, ControlMeasured
 from posefield_train.source.recipe import Recipe
 
+MOMENT_NAMES: dict[str, MeasureMoment] = {name: name for name in get_args(MeasureMoment)}
+"""Moments by name."""
 # Decimals of a measured value. Differences below a micrometre are rounding errors, and would give
 # one performer's leg a different length in every clip.
 DECIMALS = 6
@@ -100,10 +103,11 @@ def measured_quantities(clip: Clip) -> MeasuredMotion:
     return MeasuredMotion(positions, clip.duration, gone, parents, offsets)
 
 
-def moment_share(clip: Clip, joint: int, at: MeasureMoment) -> float:
+def moment_share(clip: Clip, joint: int, at: str) -> float:
     """Return the moment at which a joint is highest, lowest or farthest, as a share of the clip."""
     seen = measured_quantities(clip).positions
-    frame = measures.moment_frame(Measure("height", (joint,), at), seen, 0.0)
+    moment = MOMENT_NAMES[at]
+    frame = measures.moment_frame(Measure("height", (joint,), moment), seen, 0.0)
     return frame / (len(clip) - 1)
 
 

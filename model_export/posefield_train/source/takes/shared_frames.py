@@ -53,6 +53,7 @@ def _overlaps(motions: Motions, swapped: list[int]) -> Iterator[ClipPair]:
     joints = len(swapped)
     other = np.array([*swapped, *(joints + joint for joint in swapped)])
     for second, motion in enumerate(motions):
+        ways: dict[Relation, tuple[Floats, Floats]]
         ways = {"shares frames with": (features[second], motion)}
         if swapped != list(range(joints)):
             ways["mirrors"] = features[second][:, other], _mirrored(motion, swapped)
@@ -106,7 +107,7 @@ def _continuations(motions: Motions) -> Iterator[ClipPair]:
         step = last - before
         pace = _rms(step)
         # A loop ends where each of its copies begins.
-        looped = _rms(last - motions[first][0]) < max(2.0 * pace, 5.0 * SAME)
+        looped = _rms(last - motions[first][0]) < np.maximum(2.0 * pace, 5.0 * SAME)
         if pace < LEAST_STEP or looped:
             continue
         steady = _rms(steps - step) < STEADY * pace
