@@ -318,7 +318,8 @@ def test_bones_that_stretch_are_noted_and_their_mean_is_kept(read):
     source = small_clip()
     translations = source.translations.copy()
     translations[:, 2, 1] += np.linspace(0.0, 0.02, len(source))
-    examples, notes = read(replace(source, translations=translations))
+    elastic = {"motion": {"bones": "stretch"}}
+    examples, notes = read(replace(source, translations=translations), **elastic)
     assert [note.partition(": ")[2] for note in notes] == [
         "bones stretch by up to 0.0200 m; their mean is kept"
     ]
@@ -332,7 +333,7 @@ def test_many_clips_that_stretch_take_one_note_with_the_worst(read, tmp_path):
         translations = source.translations.copy()
         translations[:, 2, 1] += np.linspace(0.0, much, len(source))
         stretched.append(replace(source, translations=translations))
-    assert read(*stretched)[1] == [
+    assert read(*stretched, motion={"bones": "stretch"})[1] == [
         f"3 of 4 clips: bones stretch by up to 0.0500 m, the most in {tmp_path / '2.bvh'}; their "
         "mean is kept"
     ]

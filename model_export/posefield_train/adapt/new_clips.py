@@ -30,6 +30,7 @@ from posefield_train.source.clip_table import ClipRow, ClipTable
 from posefield_train.source.control_sources import TIME_NAMES
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Source
+from posefield_train.source.rigs import dummy_roots, facing
 
 Labels = Mapping[str, str]
 """Names of clips by label set."""
@@ -165,14 +166,28 @@ def _example(
     """Return the example of a row, notes on it, and the stretch of its bones, m."""
     own = reopened.card
     cut, last = ingest.cut_frames(ingest.clip_of_file(file, source), row)
-    clip, notes = _reduce_to_skeleton(cut, own.skeleton, row)
-    clip, jumps, stretch = ingest.canonicalize(clip, own.cyclic, own.root == "in_place")
+    clip, notes = _reduce_to_skeleton(_without_dummies(cut, own.skeleton), own.skeleton, row)
+    ahead = reopened.making.facing
+    clip = facing.turn_basis(clip, ahead or 0.0)
+    clip, jumps, stretch = ingest.canonicalize(
+        clip, own.cyclic, own.root == "in_place", ahead is not None
+    )
     marks = (
         *ingest.landmarks(row, last, _landmark_columns(reopened)),
         *_found_landmarks(reopened, row, clip),
     )
     nothing = np.full(len(own.controls), np.nan)
-    return Example(row, clip, nothing, marks, jumps), notes, stretch
+    return Example(row, clip, nothing, marks, jumps, facing=ahead), notes, stretch
+
+
+def _without_dummies(clip: Clip, family: Skeleton) -> Clip:
+    """Return the clip without the dummy roots that the family's files had above its root."""
+    own = clip.skeleton
+    above = own.names.index(family.names[0]) if family.names[0] in own.names else 0
+    chain = list(range(-1, above))
+    is_chain = list(own.parents[: above + 1]) == chain
+    alone = all(own.parents.count(joint) == 1 for joint in range(above))
+    return dummy_roots.collapse_roots(clip, above) if is_chain and alone else clip
 
 
 def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Clip, list[str]]:

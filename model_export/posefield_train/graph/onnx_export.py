@@ -247,6 +247,7 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
         {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
         _takes(trained.examples),
+        trained.examples[0].facing,
     )
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import skeleton
-from posefield_train.probe import joint_recognition
 from posefield_train.source import bvh
 from posefield_train.source.bvh import bvh_conversion
+from posefield_train.source.rigs import joint_recognition
 
 MAX_FRAMES = 200
 """Frames of a file that are measured, spread evenly."""

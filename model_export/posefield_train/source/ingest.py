@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from posefield.common.array_shapes import Positions
-from posefield.common.errors import RecipeError
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
@@ -26,6 +25,8 @@ from posefield_train.source.bvh import end_sites
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
+from posefield_train.source.rigs import rig_normalization
+from posefield_train.source.rigs.rig_normalization import RigError, RiggedClips, RigSettings
 from posefield_train.source.takes import take_groups
 
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
@@ -40,7 +41,8 @@ class Example:
     controls: (d,), from the table and measured, in the recipe's order. landmarks: fractions of the
     clip, in order. jumps: removed jumps of small joints between two frames. shift: share of a cycle
     by which the clip was shifted to begin later. take: name of the take; examples of one take are
-    left out together.
+    left out together. facing: degrees from the root's +z to the body's facing in the file, to the
+    left; None for a motion without a facing.
     """
 
     row: ClipRow
@@ -50,6 +52,7 @@ class Example:
     jumps: tuple[Finding, ...]
     shift: float = 0.0
     take: str = ""
+    facing: float | None = 0.0
 
     @property
     def offsets(self) -> Floats:
@@ -64,16 +67,22 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     """
     rows = clip_table.read(recipe, folder)
     files = read_files(rows)
-    found = [_example(recipe, files[str(row.place)], row) for row in rows]
+    cuts = [_cut(recipe, files[str(row.place)], row) for row in rows]
+    _expect_same_skeleton(rows, [clip for clip, _ in cuts])
+    rigged = _normalize_rigs(recipe, rows, [clip for clip, _ in cuts])
+    found = [
+        _example(recipe, row, clip, last, rigged.facing)
+        for row, clip, (_, last) in zip(rows, rigged.clips, cuts, strict=True)
+    ]
     examples = [own.example for own in found]
-    _expect_same_skeleton(examples)
     _expect_same_order(recipe, examples)
-    notes = clip_notes.stretch_notes(rows, [own.stretch for own in found])
+    notes = shipped_recipes.table_notes(rows[0].table)
     if recipe.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
+    notes += [*rigged.notes, *clip_notes.stretch_notes(rows, [own.stretch for own in found])]
     takes, said = _takes(rows, found)
     examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]
-    return examples, [*notes, *said, *shipped_recipes.table_notes(rows[0].table)]
+    return examples, [*said, *notes]
 
 
 def _takes(
@@ -124,15 +133,44 @@ class _FoundExample:
     positions: Positions
 
 
-def _example(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> _FoundExample:
-    """Return the example of a row."""
+def _cut(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> tuple[Clip, int]:
+    """Return the clip of a row without dropped joints, and the index of its last frame."""
     own, last = cut_frames(clip_of_file(file, recipe.source), row)
-    captured = _drop_joints(own, recipe, row)
-    in_place = recipe.motion.root == "in_place"
-    clip, jumps, stretch = canonicalize(captured, recipe.motion.cyclic, in_place)
+    return _drop_joints(own, recipe, row), last
+
+
+def _normalize_rigs(recipe: Recipe, rows: Sequence[ClipRow], clips: Sequence[Clip]) -> RiggedClips:
+    """Return the clips with normalized skeletons; RecipeError names the row at fault."""
+    motion = recipe.motion
+    roles = {str(role): joint for role, joint in recipe.roles.items()}
+    named = frozenset(_named_joints(recipe))
+    directions = {"left", "forward", "step_length"}
+    directed = any(control.auto.quantity in directions for control in recipe.measured)
+    settings = RigSettings(
+        motion.facing, motion.bones == "stretch", motion.cyclic, directed, roles, named
+    )
+    performers = [row.performer for row in rows]
+    try:
+        return rig_normalization.normalize(
+            clips, performers, [row.place.name for row in rows], settings
+        )
+    except RigError as fault:
+        row = rows[fault.clip]
+        raise row.error(f"{row.place}: {fault}") from fault
+
+
+def _example(
+    recipe: Recipe, row: ClipRow, captured: Clip, last: int, facing: float | None
+) -> _FoundExample:
+    """Return the example of a row."""
+    motion = recipe.motion
+    clip, jumps, stretch = canonicalize(
+        captured, motion.cyclic, motion.root == "in_place", facing is not None
+    )
     marks = (*landmarks(row, last, recipe.clips.landmarks), *_found_landmark(recipe, row, clip))
     values = measured_controls.control_values(recipe, row, clip, marks)
-    return _FoundExample(Example(row, clip, values, marks, jumps), stretch, captured.positions())
+    example = Example(row, clip, values, marks, jumps, facing=facing)
+    return _FoundExample(example, stretch, captured.positions())
 
 
 def clip_of_file(file: bvh.BvhFile, source: Source) -> Clip:
@@ -164,16 +202,21 @@ def cut_frames(clip: Clip, row: ClipRow) -> tuple[Clip, int]:
 
 
 def canonicalize(
-    clip: Clip, cyclic: bool, in_place: bool
+    clip: Clip, cyclic: bool, in_place: bool, has_facing: bool = True
 ) -> tuple[Clip, tuple[Finding, ...], float]:
     """Return the clip with heading and origin removed, the corrections, and the stretch of bones.
 
-    A cycle is closed. The stretch is the largest change of a component of a bone's offset, m.
+    A cycle is closed. A motion without a facing keeps its heading. The stretch is the largest
+    change of a component of a bone's offset, m.
     """
     stretch = float(np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0))
     # Before the cycle is closed, because closing it would spread a jump over all frames.
     clip, jumps = half_turns.remove_jumps(clip, 0)
-    clip = _close_cycle(straighten_gait(clip)) if cyclic else _start_at_origin(clip)
+    if not has_facing:
+        clip = place(clip, _horizontal(clip.root_path[0]), np.zeros(()))
+    else:
+        clip = straighten_gait(clip) if cyclic else _start_at_origin(clip)
+    clip = _close_cycle(clip) if cyclic else clip
     return remove_drift(clip) if in_place else clip, tuple(jumps), stretch
 
 
@@ -305,15 +348,13 @@ def _expect_same_order(recipe: Recipe, examples: Sequence[Example]) -> None:
             )
 
 
-def _expect_same_skeleton(examples: list[Example]) -> None:
-    first = examples[0]
-    for example in examples[1:]:
-        if not example.clip.skeleton.same_tree(first.clip.skeleton):
-            raise RecipeError(
-                example.row.table,
-                f"{example.row.place} has other joints than {first.row.place} of line "
-                f"{first.row.line}: {_difference(example.clip.skeleton, first.clip.skeleton)}",
-                example.row.line,
+def _expect_same_skeleton(rows: Sequence[ClipRow], clips: Sequence[Clip]) -> None:
+    first = clips[0].skeleton
+    for row, clip in zip(rows, clips, strict=True):
+        if not clip.skeleton.same_tree(first):
+            raise row.error(
+                f"{row.place} has other joints than {rows[0].place} of line "
+                f"{rows[0].line}: {_difference(clip.skeleton, first)}"
             )
 
 

@@ -31,6 +31,7 @@ from posefield_train.source.control_sources import (
     RecipePart,
     Text,
 )
+from posefield_train.source.rigs.facing import Facing
 
 PERFORMER = "performer"
 """Label set whose column is clips.performer."""
@@ -114,6 +115,18 @@ class Motion(RecipePart):
         description="end sites of the motion files that become joints of the model, for targets: "
         "each is named as its joint with the ending _end, such as 'LeftToes_end'; those that the "
         "recipe names elsewhere need not be listed",
+    )
+    facing: Facing | None = Field(
+        default=None,
+        description="horizontal axis of the root along which the body faces at rest (y up); or "
+        "measured: travel, from the way of the clips; hips, from the line between the upper legs; "
+        "roles, the same by [roles] only; or none, for a hand or a prop; default: +z; a facing "
+        "that the motion contradicts is an error",
+    )
+    bones: Literal["rigid", "stretch"] = Field(
+        default="rigid",
+        description="rigid refuses clips with bones that stretch by more than 0.6 % of the body's "
+        "size, 1 cm of an adult; stretch keeps the mean of each bone, with a note",
     )
 
 

@@ -106,6 +106,8 @@ class TrainingParameters:
     landmarks: columns of the table that name them, and their canonical times. joint_weights: of
     joints whose weight in the metric is not one. in_phase: whether cycles were shifted to begin in
     phase. takes (N,): number of each captured clip's take; empty where each file is a take.
+    facing: degrees from the root's +z in the files to the body's facing, to the left; None for
+    motions without one.
     """
 
     fields: Mapping[Name, tuple[NonNegative, ...]] = field(default_factory=dict)
@@ -113,6 +115,7 @@ class TrainingParameters:
     joint_weights: Mapping[Name, Positive] = field(default_factory=dict)
     in_phase: bool = False
     takes: tuple[Index, ...] = ()
+    facing: Number | None = 0.0
 
 
 @dataclass(frozen=True)

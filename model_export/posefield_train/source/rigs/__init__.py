@@ -1,0 +1,1 @@
+"""Checks and normalization of skeletons: dummy roots, rest poses, stretching bones, facing."""
