@@ -184,9 +184,18 @@ def test_sample_says_what_to_do_next(posefield, reaching_folder):
     )
 
 
+@pytest.mark.parametrize("family", ["quadruped", "hand"])
+def test_sample_writes_other_figures(posefield, refused, tmp_path, family):
+    code, out, _ = posefield("sample", family, "-o", tmp_path / family, "--json")
+    assert (code, json.loads(out)) == (0, {"recipe": str(tmp_path / family / "recipe.toml")})
+    assert len(list((tmp_path / family / "bvh").iterdir())) == 24
+    said = refused(2, "sample", family, "--truth", "-o", tmp_path / "truth.bvh")
+    assert said == f"truth: found for '{family}', expected for reaching only"
+
+
 def test_sample_of_another_family_is_refused(refused, tmp_path):
     said = refused(2, "sample", "dancing", "-o", tmp_path / "x")
-    assert said == "family: 'dancing', expected reaching"
+    assert said == "family: 'dancing', expected one of reaching, quadruped, hand"
 
 
 def test_sample_into_a_folder_of_something_else_is_refused(refused, tmp_path):

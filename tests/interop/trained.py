@@ -13,6 +13,7 @@ from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_files, sample_walk
+from posefield_train.sample.figures import hand_grip, quadruped_walk
 from posefield_train.source import ingest, recipe
 from posefield_train.source.recipe import Recipe
 
@@ -20,10 +21,12 @@ ROOT = Path(__file__).parents[2]
 RECIPES = sorted((ROOT / "model_export/posefield_train/recipes").glob("*.toml"))
 DATA = Path(os.environ.get("POSEFIELD_DATA", ROOT.parent / "shared/data"))
 
+FIGURES = {"quadruped": quadruped_walk, "hand": hand_grip}
+
 
 def answers() -> list[tuple[str, ClipAnswer]]:
     """A clip in the middle of the controls' ranges of each model, by the model's name."""
-    made = [middle()]
+    made = [middle(), *(_middle(figure(name)[0]) for name in FIGURES)]
     # .ci/run looks for these words: there the real clips must not be missing.
     if not DATA.exists():
         print(f"no motion capture in {DATA}: set POSEFIELD_DATA")
@@ -41,6 +44,14 @@ def family() -> tuple[Synthesizer, bytes]:
     """Model of the procedural family, and its file's content."""
     with tempfile.TemporaryDirectory() as name:
         path = sample_files.write_family(Path(name) / "reaching")
+        return _trained(path, path.parent)
+
+
+@cache
+def figure(name: str) -> tuple[Synthesizer, bytes]:
+    """Model of the procedural quadruped or hand, and its file's content."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = sample_files.write_folder(Path(folder) / name, FIGURES[name].files())
         return _trained(path, path.parent)
 
 

@@ -18,14 +18,24 @@ if TYPE_CHECKING:
     from posefield_train.sample.sample_family import SampleTrial
 
 
+FAMILIES = ("reaching", "quadruped", "hand")
+"""Names of the procedural families; only the first has a noise-free motion at any point."""
+
+
 def sample(
-    family: Annotated[str, typer.Argument(help="name of the family: reaching", metavar="FAMILY")],
+    family: Annotated[
+        str,
+        typer.Argument(help="name of the family: reaching, quadruped or hand", metavar="FAMILY"),
+    ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="output folder; with --truth, output file")
     ],
     truth: Annotated[
         bool,
-        typer.Option("--truth", help="write the noise-free motion at the controls of --control"),
+        typer.Option(
+            "--truth",
+            help="write the noise-free motion of reaching at the controls of --control",
+        ),
     ] = False,
     control: Annotated[
         list[str] | None,
@@ -41,16 +51,20 @@ def sample(
 ) -> None:
     """Write a procedural family of motions, or its noise-free motion.
 
-    The noise-free motion exists at any control point.
+    reaching: people who reach; its noise-free motion exists at any control point. quadruped: two
+    animals that walk. hand: two hands that grip.
     """
     from posefield_train.sample import noise_free as truths
 
-    if family != "reaching":
+    if family not in FAMILIES:
+        known = ", ".join(FAMILIES)
         raise InvalidField(
-            "family", f"{family!r}{did_you_mean(family, ['reaching'])}, expected reaching"
+            "family", f"{family!r}{did_you_mean(family, FAMILIES)}, expected one of {known}"
         )
+    if truth and family != "reaching":
+        raise InvalidField("truth", f"found for {family!r}, expected for reaching only")
     if not truth:
-        path = _write_family(output)
+        path = _write_figures(family, output) if family != "reaching" else _write_family(output)
         typer.echo(
             as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )
@@ -76,3 +90,12 @@ def _write_family(output: Path) -> Path:
                 yield each
 
         return sample_files.write_family(output, watched())
+
+
+def _write_figures(family: str, output: Path) -> Path:
+    """Write the family of a quadruped or a hand, and return the path of its recipe."""
+    from posefield_train.sample import sample_files
+    from posefield_train.sample.figures import hand_grip, quadruped_walk
+
+    made = quadruped_walk.files() if family == "quadruped" else hand_grip.files()
+    return sample_files.write_folder(output, made)

@@ -167,7 +167,8 @@ def _alike(figure: Figure, other: Figure) -> bool:
 def propose_facing(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:
     """Return the angle from the root's forward axis to the body's, degrees to the left.
 
-    Training takes +z of the root (after conversion to y up) as forward.
+    Training takes +z of the root (after conversion to y up) as forward unless the recipe says
+    otherwise.
     """
     if up is None:
         return Proposal(None, "none", ("the up axis is not known",))
@@ -180,8 +181,8 @@ def propose_facing(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:
     said = [f"the line between the hips faces {value:g} degrees to the left of the root's +z"]
     if abs(mean) > 45.0:
         said.append(
-            "training takes +z of the root as forward: turn the root by this angle, or the "
-            "controls left and forward are not the body's"
+            "training takes +z of the root as forward: say motion.facing = 'hips' to take the "
+            "nearest axis"
         )
     return Proposal(value, "high" if agree > 0.9 and abs(mean) < 45.0 else "low", tuple(said))
 

@@ -118,7 +118,14 @@ def write_family(output: Path, chosen: Iterable[SampleTrial] | None = None) -> P
     chosen: samples; default: the family's 92. A directory with exactly these files is left
     unchanged; raises FileError for an existing file, or a directory with other content.
     """
-    files = _files(samples() if chosen is None else chosen)
+    return write_folder(output, _files(samples() if chosen is None else chosen))
+
+
+def write_folder(output: Path, files: dict[str, bytes]) -> Path:
+    """Write the files of a family to a directory atomically and return its recipe's path.
+
+    files: contents by path relative to the directory. Raises FileError as `write_family`.
+    """
     if output.exists() and not output.is_dir():
         raise FileError(output, "found a file, expected a new or empty directory")
     if output.is_dir() and any(output.iterdir()):

@@ -1,0 +1,1 @@
+"""Procedural families of other figures than people: a quadruped that walks, a hand that grips."""
