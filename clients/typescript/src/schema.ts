@@ -1039,7 +1039,7 @@ export interface components {
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
-            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, one for each element of `deviations`, and one for each target that is not reached. */
+            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, one for each element of `deviations`, one for each target that is not reached, and one for each pinned foot that slides by more than 1.5 cm. */
             warnings: string[];
             /** @description Requested controls whose value the motion does not have. Absent if there is none. Since 3.1.0. */
             deviations?: components["schemas"]["Deviation"][];
@@ -2140,7 +2140,7 @@ export interface components {
                 "application/json": components["schemas"]["CrowdQuestion"];
             };
         };
-        /** @description Default limits: 8 MiB, 10,000 clips, 1,000,000 frames in all, and a total target cost of 2,000. A target costs 1, or 4 if the clip omits controls; pinned feet cost 4. */
+        /** @description Default limits: 8 MiB, 10,000 clips, 1,000,000 frames in all, and a total target cost of 2,000. A target costs 1, or 4 if the clip omits controls; each pinned foot costs 4. */
         ClipsQuestion: {
             content: {
                 "application/json": components["schemas"]["ClipsQuestion"];

@@ -7,8 +7,9 @@ import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath, Rotations, Variables, Vector
 from posefield.constraints import constraint, gauss_newton, pinned_feet
-from posefield.constraints.constraint import Constraint, PositionConstraint
+from posefield.constraints.constraint import Constraint
 from posefield.constraints.motion_variables import MotionVariables
+from posefield.constraints.pinned_feet import FootPins
 from posefield.inference import reduced_motion, residual_covariance
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.residual_covariance import ResidualCovariance
@@ -28,7 +29,7 @@ class ConstrainedMotion:
 
     numbers: the motion as the variables of the correction. state: the model's prediction.
     results: error of each constraint. steps: of the correction. distance: Mahalanobis distance of
-    the constraints from the prediction.
+    the constraints from the prediction. slides: of each pinned foot, by its joint, m.
     """
 
     scene: MotionVariables
@@ -37,6 +38,7 @@ class ConstrainedMotion:
     results: tuple[ConstraintResult, ...]
     steps: int = 0
     distance: float = 0.0
+    slides: tuple[tuple[int, float], ...] = ()
 
     @property
     def duration(self) -> float:
@@ -99,7 +101,7 @@ class LevelCorrector:
             begun.scene, self.spread, begun.state.sigma, begun.numbers, aims
         )
 
-    def pins(self, begun: ConstrainedMotion) -> list[PositionConstraint]:
+    def pins(self, begun: ConstrainedMotion) -> tuple[FootPins, ...]:
         """Return the pins for the feet of a predicted motion."""
         return pinned_feet.build_pins(begun.scene, begun.numbers, self.card.feet)
 

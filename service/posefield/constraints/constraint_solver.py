@@ -181,7 +181,8 @@ class ConstraintSolver:
         if not asked.constraints:
             return begun
         aims = constraint.from_controls(asked.constraints.controls, bench.reduced.frames)
-        pins = bench.pins(begun) if asked.constraints.pinned else []
+        feet = bench.pins(begun) if asked.constraints.pinned else ()
+        pins = [pin for foot in feet for pin in foot.constraints()]
         last = bench.reduced.frames - 1.0
         for _ in range(MAX_ROUNDS):
             aimed = self._target_constraints(question, asked.constraints.targets, held)
@@ -195,7 +196,8 @@ class ConstraintSolver:
             held = overshoot.bring_back(bench, held, asked.constraints, question.controls, bounds)
         self._check_times(asked.constraints.targets, held)
         _check_duplicates(self._target_constraints(question, asked.constraints.targets, held), last)
-        return held
+        slides = tuple((foot.foot, foot.slide(held.scene, held.numbers)) for foot in feet)
+        return replace(held, slides=slides)
 
     def _without_targeted(
         self, aims: Sequence[Constraint], targets: Sequence[PositionConstraint], last: float

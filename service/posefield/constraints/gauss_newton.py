@@ -29,6 +29,8 @@ MAX_STEPS, MAX_HALVINGS = 25, 6
 TOLERANCE = 1e-5
 # Factor by which a step must reduce the squared error.
 SUFFICIENT_DECREASE = 0.98
+# Steps that serve the pins alone, and the factor by which each must reduce their squared error.
+PIN_STEPS, PIN_DECREASE = 3, 0.9
 # Largest move of a position in one step, m, for which the linearisation is trusted.
 TRUST_RADIUS = 0.15
 # Above this error, in its unit, a target counts as missed.
@@ -94,14 +96,19 @@ def correct(
     begun: its numbers. sigma: its standard deviation, m. Constraints beyond the spread of captured
     motions are approached up to it; pins stay near their positions.
     """
+    if not aims and not pins:
+        return Correction(begun, (), 0, 0.0)
     looked = constraint.evaluate([*aims, *pins], scene, begun)
-    found = reachability.assess(scene, spread, sigma, begun, aims, looked)
-    loose = np.repeat([0.0, (PIN_DEVIATION / sigma) ** 2], [len(found.differences), 3 * len(pins)])
-    near = looked[0][: len(found.differences)] + found.reachable
+    near, weights, apart = np.zeros(0), np.zeros(0), 0.0
+    if aims:
+        found = reachability.assess(scene, spread, sigma, begun, aims, looked)
+        near = looked[0][: len(found.differences)] + found.reachable
+        weights, apart = found.weights, found.distance
+    loose = np.repeat([0.0, (PIN_DEVIATION / sigma) ** 2], [len(near), 3 * len(pins)])
     goal = np.concatenate([near, *(pin.target for pin in pins)])
-    task = _Problem(scene, spread, begun, aims, pins, found.weights, loose)
+    task = _Problem(scene, spread, begun, aims, pins, weights, loose)
     numbers, values, steps = _descend(task, looked, goal)
-    return Correction(numbers, tuple(_constraint_results(aims, values)), steps, found.distance)
+    return Correction(numbers, tuple(_constraint_results(aims, values)), steps, apart)
 
 
 def _descend(
@@ -110,7 +117,9 @@ def _descend(
     """Return the corrected numbers, their values, and the number of steps."""
     numbers, whole = task.begun, True
     for step in range(MAX_STEPS):
-        if np.abs((goal - looked[0])[: task.hard_count]).max() < TOLERANCE:
+        # Pins are worth some steps where the constraints are met already.
+        met = _largest_error(task, goal - looked[0]) < TOLERANCE
+        if met and (not task.pins or step >= PIN_STEPS):
             return numbers, looked[0], step
         moved = _next_iterate(task, numbers, looked, goal, whole)
         if moved is None:
@@ -141,12 +150,29 @@ def _next_iterate(
         toward = share * left + gradients @ (numbers - base)
         tried = base + task.least_change(gradients, toward)
         found = task.evaluate(tried)
-        if _weighted_error(
-            (goal - found[0])[:hard_count], task.weights
-        ) < SUFFICIENT_DECREASE * _weighted_error(left[:hard_count], task.weights):
+        if _is_better(task, goal - values, goal - found[0]):
             return tried, found, bool(share < 1.0)
+        if _largest_error(task, goal - values) < TOLERANCE:
+            return None
         share *= 0.5
     return None
+
+
+def _is_better(task: _Problem, before: Values, after: Values) -> bool:
+    """Return whether a step reduces the error of the constraints, or that of the pins alone.
+
+    before, after: errors of aims and pins. The latter counts while the constraints are met.
+    """
+    count = task.hard_count
+    old, new = (_weighted_error(left[:count], task.weights) for left in (before, after))
+    if new < SUFFICIENT_DECREASE * old:
+        return True
+    slipped, slips = (float(np.sum(np.square(left[count:]))) for left in (before, after))
+    return _largest_error(task, after) < MISS_TOLERANCE and slips < PIN_DECREASE * slipped
+
+
+def _largest_error(task: _Problem, left: Values) -> float:
+    return float(np.abs(left[: task.hard_count]).max(initial=0.0))
 
 
 def _solve(matrix: ValueMatrix, right: Values) -> Values:

@@ -17,7 +17,7 @@ from posefield.validation.question_validation import ValidatedQuestion
 MAX_COORDINATE = 100.0
 MAX_TARGETS = 32
 OPEN_COST, PIN_COST = 4, 4
-"""Cost of a target of a clip with open controls, and of pinned feet, relative to the cost of a
+"""Cost of a target of a clip with open controls, and of a pinned foot, relative to the cost of a
 target.
 """
 
@@ -40,7 +40,7 @@ class ConstraintSet:
     """Constraints of a question.
 
     controls: measured controls with their target values. targets: target positions of joints.
-    pinned: joints that keep their predicted positions while they are planted.
+    pinned: joints that keep their places while they are planted.
     """
 
     controls: tuple[tuple[str, Measure, float], ...]
@@ -48,7 +48,7 @@ class ConstraintSet:
     pinned: tuple[int, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.controls or self.targets)
+        return bool(self.controls or self.targets or self.pinned)
 
 
 NO_CONSTRAINTS = ConstraintSet((), ())
@@ -57,10 +57,10 @@ NO_CONSTRAINTS = ConstraintSet((), ())
 def solver_cost(card: ModelCard, asked: MotionQuestion) -> int:
     """Return the cost of solving the constraints of a question, in units of a plain target.
 
-    Open controls and pinned feet cost several units each (decision 0028).
+    Open controls and each pinned foot cost several units (decision 0028).
     """
     each = OPEN_COST if len(asked.controls) < len(card.controls) else 1
-    return each * len(asked.targets) + PIN_COST * asked.pin_feet
+    return each * len(asked.targets) + PIN_COST * len(card.feet) * asked.pin_feet
 
 
 def from_question(

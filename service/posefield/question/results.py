@@ -100,7 +100,8 @@ class Trust:
     length of the whole clip at these controls, s. sigma: expected distance between this clip and a
     captured clip at these controls, root mean square over joints and frames, m. warnings: one
     sentence for each control outside its sampled range, or one for controls in a gap between the
-    samples, one for each deviation, and one for each target that is not reached. performer:
+    samples, one for each deviation, one for each target that is not reached, and one for each
+    pinned foot that slides. performer:
     requested name; None for an
     unseen performer. level: of detail. supported: whether clips with similar controls were
     captured. performer_seen: whether the requested performer was captured; None where the model
