@@ -124,7 +124,8 @@ class _OutlierSearch:
     def transformed_clips(self) -> Iterator[Outlier]:
         """Yield clips that would fit better mirrored, turned or with sides exchanged."""
         suspects = np.flatnonzero(self.leave_one_out.times > SUSPECT_FACTOR)
-        if not len(suspects):
+        # A single joint has no shape that could be mirrored or turned.
+        if not len(suspects) or len(self.trained.skeleton) == 1:
             return
         names, whole = self.trained.skeleton.names, self.trained.tensor.values
         offsets = np.stack([example.offsets for example in self.trained.examples])

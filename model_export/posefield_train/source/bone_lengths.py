@@ -41,9 +41,13 @@ class ForeignBones:
 
 
 def relative_sizes(offsets: Floats) -> Floats:
-    """Return the total bone length (N,) of offsets (N, J, 3) relative to the family's median."""
+    """Return the total bone length (N,) of offsets (N, J, 3) relative to the family's median.
+
+    A single joint has no bones: its clips are alike.
+    """
     lengths = np.linalg.norm(offsets, axis=-1).sum(axis=-1)
-    return np.asarray(lengths / np.median(lengths))
+    usual = np.median(lengths)
+    return np.asarray(lengths / usual) if usual > 0.0 else np.ones(len(lengths))
 
 
 def guess_unit(metres_per_unit: float, size: float) -> str:

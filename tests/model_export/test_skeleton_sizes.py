@@ -1,0 +1,74 @@
+"""Tests that skeletons of one joint and of hundreds train, answer, and reach every format."""
+
+import subprocess
+
+import numpy as np
+import pytest
+from minimal import TOML, recipe_with, write_clips
+from serving import POSEFIELD
+
+from posefield.encode.formats import CLIP_ENCODERS
+from posefield.inference import session
+from posefield.motion import quat
+from posefield.motion.clip import assemble
+from posefield.motion.skeleton import Skeleton
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.source import ingest
+
+BRANCHES = 8
+
+
+def creature(joints):
+    """A root with some chains of bones of 5 cm."""
+    number = np.arange(joints)
+    offsets = np.column_stack([0.01 * (number % BRANCHES - 3), 0.05 + 0.0 * number, 0.0 * number])
+    offsets[0] = 0.0
+    parents = (-1, *(max(0, joint - BRANCHES) for joint in range(1, joints)))
+    names = tuple(f"j{joint}" for joint in range(joints))
+    return Skeleton(names, parents, offsets, (), np.zeros((0, 3)))
+
+
+def clip(joints, value):
+    t = np.linspace(0.0, 1.0, 25)
+    own = creature(joints)
+    phases = 0.3 * value + np.arange(3 * joints).reshape(joints, 3)
+    rotations = quat.exp((0.2 + 0.05 * value) * np.sin(4.0 * t[:, None, None] + phases))
+    path = np.stack([0.2 * value * t, 0.5 + 0.1 * value * np.sin(3.0 * t), 0.5 * t], axis=-1)
+    return assemble(own, rotations, path, own.offsets, 30.0)
+
+
+@pytest.mark.parametrize("joints", [1, 2, pytest.param(200, marks=pytest.mark.system)])
+def test_a_skeleton_of_any_size_trains_and_is_written(tmp_path, joints):
+    family = [clip(joints, value) for value in range(8)]
+    folder = write_clips(tmp_path / "clips", family)
+    own = recipe_with(motion={"facing": "none"})
+    examples, notes = ingest.ingest(own, folder)
+    exported = onnx_export.export_model(own, train.train(own, examples, lambda _: None), notes)
+    model = Synthesizer("tiny", session.open_bytes(exported.content, "tiny"))
+    answer = clips.synthesize_clip(model, ClipQuestion(controls={"speed": 3.0}, fps=30.0))
+    assert len(answer.clip.skeleton) == joints and notes == []
+    # The clip in the middle was seen.
+    wanted = examples[3].clip.positions()
+    assert np.abs(answer.clip.positions()[-1] - wanted[-1]).max() < 0.05
+    for encoder in CLIP_ENCODERS.values():
+        assert len(encoder.encode(answer)) > 500
+
+
+@pytest.mark.system
+def test_one_joint_passes_the_commands(tmp_path):
+    folder = write_clips(tmp_path / "clips", [clip(1, value) for value in range(8)])
+    (folder / "tiny.toml").write_text(TOML.replace("[motion]", '[motion]\nfacing = "none"'))
+    model = folder / "tiny.onnx"
+    for words in (
+        ["train", folder / "tiny.toml", "-o", model, "--report", folder / "tiny.html"],
+        ["inspect", model],
+        ["clip", model, "-c", "speed=3", "-o", folder / "prop.usdc"],
+        ["check", folder / "prop.usdc"],
+        ["why", model, "-c", "speed=3"],
+    ):
+        done = subprocess.run([POSEFIELD, *map(str, words)], capture_output=True, text=True)
+        assert done.returncode == 0, (words, done.stderr)
