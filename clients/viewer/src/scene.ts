@@ -23,6 +23,7 @@ const LEASH = 0.15;
 
 export class Scene {
   readonly root = new Root();
+  #leash = LEASH;
   readonly camera = new PerspectiveCamera(38, 1, 0.05, 500);
   readonly renderer: WebGLRenderer;
   readonly orbit: OrbitControls;
@@ -47,7 +48,6 @@ export class Scene {
     host.append(canvas);
     this.orbit = new OrbitControls(this.camera, canvas);
     this.orbit.maxPolarAngle = 0.53 * Math.PI;
-    this.orbit.minDistance = 0.5;
     this.orbit.maxDistance = 60;
     this.frame();
     this.orbit.addEventListener("change", () => this.redraw());
@@ -72,10 +72,15 @@ export class Scene {
     requestAnimationFrame((now) => this.#draw(now));
   }
 
-  /** Where the whole of a body is seen that stands at the origin. */
-  frame(): void {
-    this.camera.position.set(1.75, 1.55, 3.05);
-    this.orbit.target.set(0, 0.88, 0);
+  /**
+   * Shows the whole of a body at the origin. `scale`: its size relative to a person's; `middle`: the
+   * height of its middle, m.
+   */
+  frame(scale = 1, middle = 0.88): void {
+    this.#leash = LEASH * scale;
+    this.orbit.minDistance = 0.5 * Math.min(1, scale);
+    this.camera.position.set(1.75 * scale, middle + 0.67 * scale, 3.05 * scale);
+    this.orbit.target.set(0, middle, 0);
     this.orbit.update();
     this.#light();
   }
@@ -84,8 +89,8 @@ export class Scene {
   follow(x: number, z: number): void {
     const { target } = this.orbit;
     const way = Math.hypot(x - target.x, z - target.z);
-    if (way <= LEASH) return;
-    const share = 1 - LEASH / way;
+    if (way <= this.#leash) return;
+    const share = 1 - this.#leash / way;
     const [dx, dz] = [share * (x - target.x), share * (z - target.z)];
     for (const place of [target, this.camera.position]) {
       place.x += dx;
