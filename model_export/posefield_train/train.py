@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from posefield.common.units import Floats
+from posefield.motion.curves import Curve
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment, travel
 from posefield_train.align.canonical_timing import CanonicalTiming
@@ -97,7 +98,7 @@ def _train(recipe: Recipe, examples: Sequence[Example], report: StepCallback) ->
     report("building the motion tensor")
     parents = examples[0].clip.skeleton.parents
     own_tensor = motion_tensor.build_tensor(
-        moved.numbers, moved.chart, parents, moved.offsets, weights
+        moved.numbers, moved.chart, parents, moved.offsets, weights, _curves(examples)
     )
     full = hosvd.decompose(own_tensor.values)
     report("fitting the fields")
@@ -112,6 +113,12 @@ def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
         return (*example.controls, example.clip.duration, *example.clip.root_path[-1])
 
     return tuple(sorted(examples, key=key))
+
+
+def _curves(examples: Sequence[Example]) -> tuple[Curve, ...]:
+    """Return the curves of the family."""
+    own = examples[0].clip.curves
+    return own.curves if own else ()
 
 
 def _vectorize(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _VectorizedClips:
@@ -203,7 +210,7 @@ def _fit_models(
         judge.parents,
     )
     warped = warped_errors.mean_squared_errors(
-        warped_errors.captured_positions(examples), predicted
+        warped_errors.captured_positions(examples), predicted, len(own_tensor.curves)
     )
     event = _fit_event(recipe, laid, judge, full, pose)
     return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law, event)
@@ -267,7 +274,7 @@ def _assemble(
     return FloatModel(
         KrigingBank(*ends, moved.labels, solved, others, sill, (), fits.power_law, event),
         timing,
-        Decoder(reduced, own_tensor.mean, own_tensor.unwhiten, own_tensor.chart.means, event=blend),
+        _decoder(own_tensor, reduced, blend),
         fits.proportions,
         Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
     )
@@ -282,6 +289,10 @@ def _event_blend(
         recipe.motion.frames, judge.event_frame.frame, recipe.motion.cyclic
     )
     return event_blend.build_blend(COEFFICIENTS, weights, reduced.core, reduced.bases[1])
+
+
+def _decoder(own: MotionTensor, reduced: TuckerTensor, blend: EventBlend | None) -> Decoder:
+    return Decoder(reduced, own.mean, own.unwhiten, own.chart.means, event=blend, curves=own.curves)
 
 
 def _fit_and_truncate(
@@ -358,7 +369,10 @@ def joint_error_shares(
     apart = truncation_error.positions(own, predicted, judge.parents, judge.offsets) - judge.whole
     squares = np.mean(np.sum(np.square(apart), axis=-1), axis=1)
     if travels is not None:
-        squares += travel.mean_squared_distance(travels)[:, None]
+        squares[:, : len(judge.parents)] += travel.mean_squared_distance(travels)[:, None]
     usual = np.mean(squares / pose.variances[:, None], axis=0)
-    every = np.mean(usual)
-    return np.maximum(np.sqrt(usual / every), MIN_JOINT_SHARE) if every > 0 else np.ones_like(usual)
+    # Sigma is that of joints and curves together.
+    every, joints = np.mean(usual), usual[: len(judge.parents)]
+    if every == 0.0:
+        return np.ones_like(joints)
+    return np.maximum(np.sqrt(joints / every), MIN_JOINT_SHARE)

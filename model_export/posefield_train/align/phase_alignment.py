@@ -17,6 +17,7 @@ from posefield.common.errors import RecipeError
 from posefield.common.units import UP, Floats, Indices
 from posefield.motion import quat
 from posefield.motion.clip import Clip
+from posefield.motion.curves import CurveValues
 from posefield_train.align import time_alignment
 from posefield_train.source import ingest, measured_controls
 from posefield_train.source.ingest import Example
@@ -195,7 +196,13 @@ def _shift_clip(clip: Clip, frames: int) -> Clip:
         clip,
         rotations=np.concatenate([clip.rotations[frames:], rotations]),
         translations=np.concatenate([clip.translations[frames:], translations]),
+        curves=clip.curves and _shift_curves(clip.curves, frames),
     )
+
+
+def _shift_curves(own: CurveValues, frames: int) -> CurveValues:
+    values = np.concatenate([own.values[frames:], own.values[1 : frames + 1]])
+    return replace(own, values=values)
 
 
 def shift_notes(examples: Sequence[Example]) -> list[str]:

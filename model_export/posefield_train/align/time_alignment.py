@@ -20,7 +20,7 @@ from posefield.common.array_shapes import (
     Traces,
 )
 from posefield.common.units import UP, Floats
-from posefield.motion import blend, quat, skeleton
+from posefield.motion import blend, curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import dtw
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
@@ -38,6 +38,7 @@ class AlignedClips:
 
     rotations: (N, T, J, 4). root_path: (N, T, 3), m. logs: log increments (N, knots) of each clip's
     warp from its own time to canonical time. durations: (N,), s. reference: index of the medoid.
+    curves: values (N, T, C); None for a family without curves.
     """
 
     rotations: ClipRotations
@@ -45,6 +46,7 @@ class AlignedClips:
     logs: Annotated[Floats, "clips knots"]
     durations: PerClip
     reference: int
+    curves: Annotated[Floats, "clips frames curves"] | None = None
 
 
 Predictor = Callable[[Floats], Floats]
@@ -119,16 +121,17 @@ def _resample_all(
     logs: Annotated[Floats, "clips knots"],
     medoid: int,
 ) -> AlignedClips:
-    resampled = [
-        resample(e.clip, basis.invert(log, _uniform_times(frames)))
-        for e, log in zip(examples, logs, strict=True)
-    ]
+    times = [basis.invert(log, _uniform_times(frames)) for log in logs]
+    pairs = list(zip(examples, times, strict=True))
+    resampled = [resample(example.clip, u) for example, u in pairs]
+    values = [interpolate(e.clip.curve_values, np.clip(u, 0.0, 1.0)) for e, u in pairs]
     return AlignedClips(
         np.stack([rotations for rotations, _ in resampled]),
         np.stack([path for _, path in resampled]),
         logs,
         np.array([example.clip.duration for example in examples]),
         medoid,
+        np.stack(values) if examples[0].clip.curves else None,
     )
 
 
@@ -137,10 +140,17 @@ def _uniform_times(frames: int) -> Annotated[Floats, "{frames}"]:
 
 
 def trace(clip: Clip, weights: JointWeights) -> Annotated[Floats, "frames joints*3"]:
-    """Return joint positions (F, J * 3), m, relative to root and heading, times weights (J,)."""
+    """Return joint positions (F, J * 3), m, relative to root and heading, times weights (J,).
+
+    Curves follow, each as the distance that it counts as.
+    """
     joint_positions = clip.positions() - (clip.root_path * (1.0 - UP))[:, None]
     facing = quat.from_axis_angle(UP, -heading(clip))[:, None]
-    return (quat.rotate(facing, joint_positions) * weights[:, None]).reshape(len(clip), -1)
+    body = (quat.rotate(facing, joint_positions) * weights[:, None]).reshape(len(clip), -1)
+    if clip.curves is None:
+        return body
+    scaled = clip.curves.values * curves.distances(clip.curves.curves)
+    return np.concatenate([body, scaled], axis=-1)
 
 
 def interpolate(

@@ -15,17 +15,16 @@ from posefield.console.question_options import parse_controls
 from posefield.question.results import ClipAnswer, Trust
 
 if TYPE_CHECKING:
+    from posefield_train.sample.face.face_motion import FaceTrial
     from posefield_train.sample.sample_family import SampleTrial
-
-
-FAMILIES = ("reaching", "quadruped", "hand")
-"""Names of the procedural families; only the first has a noise-free motion at any point."""
 
 
 def sample(
     family: Annotated[
         str,
-        typer.Argument(help="name of the family: reaching, quadruped or hand", metavar="FAMILY"),
+        typer.Argument(
+            help="name of the family: reaching, quadruped, hand or face", metavar="FAMILY"
+        ),
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="output folder; with --truth, output file")
@@ -52,19 +51,19 @@ def sample(
     """Write a procedural family of motions, or its noise-free motion.
 
     reaching: people who reach; its noise-free motion exists at any control point. quadruped: two
-    animals that walk. hand: two hands that grip.
+    animals that walk. hand: two hands that grip. face: a head with a jaw and blend shapes.
     """
     from posefield_train.sample import noise_free as truths
 
-    if family not in FAMILIES:
-        known = ", ".join(FAMILIES)
+    if family not in WRITERS:
+        known = ", ".join(WRITERS)
         raise InvalidField(
-            "family", f"{family!r}{did_you_mean(family, FAMILIES)}, expected one of {known}"
+            "family", f"{family!r}{did_you_mean(family, WRITERS)}, expected one of {known}"
         )
     if truth and family != "reaching":
         raise InvalidField("truth", f"found for {family!r}, expected for reaching only")
     if not truth:
-        path = _write_figures(family, output) if family != "reaching" else _write_family(output)
+        path = WRITERS[family](output)
         typer.echo(
             as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )
@@ -92,10 +91,39 @@ def _write_family(output: Path) -> Path:
         return sample_files.write_family(output, watched())
 
 
-def _write_figures(family: str, output: Path) -> Path:
-    """Write the family of a quadruped or a hand, and return the path of its recipe."""
+def _write_quadruped(output: Path) -> Path:
     from posefield_train.sample import sample_files
-    from posefield_train.sample.figures import hand_grip, quadruped_walk
+    from posefield_train.sample.figures import quadruped_walk
 
-    made = quadruped_walk.files() if family == "quadruped" else hand_grip.files()
-    return sample_files.write_folder(output, made)
+    return sample_files.write_folder(output, quadruped_walk.files())
+
+
+def _write_hand(output: Path) -> Path:
+    from posefield_train.sample import sample_files
+    from posefield_train.sample.figures import hand_grip
+
+    return sample_files.write_folder(output, hand_grip.files())
+
+
+def _write_face(output: Path) -> Path:
+    """Write the procedural face with a progress bar, and return the path of its recipe."""
+    from posefield.console.progress import ProgressBar
+    from posefield_train.sample.face import face_files, face_motion
+
+    with ProgressBar("motions", face_motion.COUNT) as bar:
+
+        def watched() -> "Iterator[FaceTrial]":
+            for each in face_motion.trials():
+                bar.advance(1)
+                yield each
+
+        return face_files.write_family(output, watched())
+
+
+WRITERS = {
+    "reaching": _write_family,
+    "quadruped": _write_quadruped,
+    "hand": _write_hand,
+    "face": _write_face,
+}
+"""Writers of the procedural families; only the first has a noise-free motion at any point."""

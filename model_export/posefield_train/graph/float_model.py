@@ -8,6 +8,7 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.model_file import checksum
 from posefield.motion import skeleton
+from posefield.motion.curves import Curve, as_points
 from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
 from posefield_train.kriging import kriging_graph
@@ -22,7 +23,8 @@ class ModelOutputs:
     """Outputs of a model.
 
     rotations: (B, S, J, 4). root_position: (B, S, 3), m. bone_offsets: (B, J, 3), m. duration:
-    (B,), s. sigma: (B,), m. travel: (B, S, 3).
+    (B,), s. sigma: (B,), m. travel: (B, S, 3). curves: values (B, S, C); None for a model without
+    curves.
     """
 
     rotations: Floats
@@ -31,11 +33,19 @@ class ModelOutputs:
     duration: Floats
     sigma: Floats
     travel: Floats
+    curves: Floats | None = None
 
     def positions(self, parents: tuple[int, ...]) -> Floats:
         """Return joint positions (B, S, J, 3), m."""
         translations = skeleton.translations(self.bone_offsets, self.root_position)
         return skeleton.positions(parents, self.rotations, translations)
+
+    def points(self, parents: tuple[int, ...], own: tuple[Curve, ...]) -> Floats:
+        """Return joint positions and, behind them, the points of curves (B, S, J + C, 3), m."""
+        joints = self.positions(parents)
+        if self.curves is None:
+            return joints
+        return np.concatenate([joints, as_points(own, self.curves)], axis=-2)
 
 
 @dataclass(frozen=True)
@@ -96,13 +106,15 @@ class FloatModel:
         return skeleton.positions(parents, rotations, translations)[:, 0, -1]
 
     def _decode(self, fields: dict[str, Floats], place: Floats, level: int) -> ModelOutputs:
-        rotations, root = self.decoder.at_level(level).numpy(fields[POSE], place)
+        decoder = self.decoder.at_level(level)
+        rotations, root = decoder.numpy(fields[POSE], place)
         gone, duration = np.zeros((*place.shape, 3)), np.exp(fields["duration"][:, 0])
         if self.travel:
             rotations, root, gone = self.travel.numpy(rotations, root, fields["travel"], place)
         offsets = self.proportions.numpy(fields["offsets"])
         sigma = self.bank.sigma(fields[VARIANCE])
-        return ModelOutputs(rotations, root, offsets, duration, sigma, gone)
+        curves = decoder.curve_values(fields[POSE], place) if decoder.curves else None
+        return ModelOutputs(rotations, root, offsets, duration, sigma, gone, curves)
 
     def onnx(self, metadata: dict[str, str], about: dict[str, str]) -> bytes:
         """Return the file of the model: one graph with metadata, producer fields and a checksum."""
@@ -115,7 +127,7 @@ class FloatModel:
         fields[POSE] = net.rename_value("coefficients", fields[POSE])
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
         place = net.rename_value("frame", place)
-        rotations, root = self.decoder.onnx(net, fields[POSE], place, ends)
+        rotations, root, curves = self.decoder.onnx(net, fields[POSE], place, ends)
         if self.travel:
             way = net.rename_value("way", fields["travel"])
             rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)
@@ -127,6 +139,10 @@ class FloatModel:
         net.add_output("duration", duration)
         net.add_output("sigma", fields["sigma"])
         net.add_output("travel", gone)
+        if curves is not None:
+            steps = net("Shape", place, start=0, end=2)
+            shape = net("Concat", steps, net.indices(len(self.decoder.curves)), axis=0)
+            net.add_output("curves", net("Reshape", curves, shape))
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.labels:
@@ -141,4 +157,6 @@ class FloatModel:
             "sigma": ["batch"],
             "travel": ["batch", "steps", 3],
         }
+        if self.decoder.curves:
+            outputs["curves"] = ["batch", "steps", len(self.decoder.curves)]
         return checksum.append_checksum(net.model(inputs, outputs, metadata, about))

@@ -58,8 +58,8 @@ class LevelErrors:
 class LevelTest:
     """Random test inputs with the output of the model before truncation.
 
-    controls: (Q, d). labels: (Q, p). times: (Q, 1), s. whole: joint positions (Q, J, 3), m.
-    at_event: position (Q, 3) of the event's joint at the event, m.
+    controls: (Q, d). labels: (Q, p). times: (Q, 1), s. whole: joint positions (Q, J, 3), m, and
+    points of the curves behind them. at_event: position (Q, 3) of the event's joint at the event, m.
     """
 
     controls: Floats
@@ -101,10 +101,11 @@ class LevelOutputs:
     fields: dict[str, Floats]
 
     def errors(self, joints: Sequence[int]) -> LevelErrors:
-        """Return the errors over some joints."""
+        """Return the errors over some joints and all curves."""
         found = self.model.outputs_at_times(self.fields, self.test.times, self.level)
-        gaps = np.linalg.norm(found.positions(self.test.parents)[:, 0] - self.test.whole, axis=-1)
-        return LevelErrors(gaps[:, list(joints)])
+        points = found.points(self.test.parents, self.model.decoder.curves)[:, 0]
+        gaps = np.linalg.norm(points - self.test.whole, axis=-1)
+        return LevelErrors(gaps[:, [*joints, *range(len(self.test.parents), gaps.shape[1])]])
 
     @property
     def effector(self) -> float | None:
@@ -134,7 +135,7 @@ def level_test_against(
     rng = np.random.Generator(np.random.PCG64(len(points)))
     fields = whole.fields(controls, labels, 0)
     times = rng.uniform(0.0, 1.0, (len(points), 1)) * np.exp(fields["duration"])
-    joints = whole.outputs_at_times(fields, times, 0).positions(parents)[:, 0]
+    joints = whole.outputs_at_times(fields, times, 0).points(parents, whole.decoder.curves)[:, 0]
     event = (
         _event_positions(whole, fields, 0, moment, parents)
         if moment

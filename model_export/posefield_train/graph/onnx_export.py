@@ -15,8 +15,7 @@ import numpy as np
 from posefield import __version__
 from posefield.common.errors import ExportRefused
 from posefield.common.units import Floats
-from posefield.inference import session
-from posefield.inference.graph_ports import OUTPUTS
+from posefield.inference import graph_ports, session
 from posefield.inference.session import Session
 from posefield.kriging import typical_clip
 from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
@@ -121,8 +120,9 @@ def check_parity(model: FloatModel, content: bytes, own_card: ModelCard) -> floa
         at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         worst = max(worst, float(gaps[at]))
         if worst > PARITY_LIMIT:
+            named = [*own_card.skeleton.names, *(curve.name for curve in own_card.curves)]
             raise ExportRefused(
-                f"the graph puts {own_card.skeleton.names[at[2]]} {100 * worst:.4f} cm from where "
+                f"the graph puts {named[at[2]]} {100 * worst:.4f} cm from where "
                 f"the reference does, expected at most {100 * PARITY_LIMIT:g} cm; at "
                 f"{asked.said(own_card, int(at[0]))}. Fewer controls, or a larger nugget, "
                 "condition it better"
@@ -169,12 +169,13 @@ def _draw_inputs(
 
 
 def _joint_distances(model: FloatModel, opened: Session, asked: _ParityInputs) -> Floats:
-    """Return distances (B, 1, J), m, between the joints of graph and reference."""
-    question, parents = (asked.points, asked.times), opened.card.skeleton.parents
-    expected = model.evaluate(*question, asked.labels, asked.level).positions(parents)
-    answers = opened.run(*question, *OUTPUTS, labels=asked.labels, level=asked.level)
-    finding_notes = ModelOutputs(*answers).positions(parents)
-    return np.asarray(np.linalg.norm(finding_notes - expected, axis=-1))
+    """Return distances (B, 1, J + C), m, between joints and curves of graph and reference."""
+    question, card = (asked.points, asked.times), opened.card
+    parents, names = card.skeleton.parents, graph_ports.outputs(card)
+    expected = model.evaluate(*question, asked.labels, asked.level).points(parents, card.curves)
+    answers = opened.run(*question, *names, labels=asked.labels, level=asked.level)
+    found = ModelOutputs(*answers).points(parents, card.curves)
+    return np.asarray(np.linalg.norm(found - expected, axis=-1))
 
 
 def _card(
@@ -213,6 +214,7 @@ def _card(
         presets=tuple(
             Preset(name, preset.values, preset.labels) for name, preset in recipe.presets.items()
         ),
+        curves=trained.tensor.curves,
     )
 
 
@@ -358,10 +360,16 @@ def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
 
 
 def data_digest(files: Mapping[str, Example]) -> str:
-    """Return one SHA-256 digest over the names and contents of motion files, sorted by name."""
+    """Return one SHA-256 digest over the names and contents of files, sorted by name.
+
+    files: clips by the names of their motion files. Files of curves count as well.
+    """
     total = hashlib.sha256()
-    for name in sorted(files):
-        with files[name].row.place.open("rb") as file:
+    places = {name: example.row.place for name, example in files.items()}
+    curves = (example.row.curve_place for example in files.values())
+    places |= {place.name: place for place in curves if place is not None}
+    for name in sorted(places):
+        with places[name].open("rb") as file:
             own = hashlib.file_digest(file, "sha256").digest()
         total.update(name.encode() + b"\0" + own)
     return total.hexdigest()

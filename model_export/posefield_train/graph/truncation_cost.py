@@ -50,10 +50,12 @@ def operation_cost(own_tensor: MotionTensor, controls: int) -> RankCost:
     """Return the price in multiply-adds of one pose, counting terms that grow with the ranks.
 
     Counted are the kriging weights, the core, the interpolation between two frames, its product
-    with the motion, and directions of three numbers for the root and a quaternion for each joint.
+    with the motion, and directions of three numbers for the root, a quaternion for each joint and a
+    number for each curve.
     """
     joints, samples = len(own_tensor.chart.means), own_tensor.values.shape[2]
-    return RankCost((4 * joints + 3, 1, samples + controls + 1), pair=1)
+    directions = 4 * joints + 3 + len(own_tensor.curves)
+    return RankCost((directions, 1, samples + controls + 1), pair=1)
 
 
 def count_numbers(model: FloatModel, level: int) -> int:
@@ -95,7 +97,7 @@ def count_operations(model: FloatModel, level: int) -> int:
     r1, r2, r3 = rung.ranks if level else model.decoder.blended[0].shape
     distances = columns * (2 + 2 * len(bank.low) + len(bank.labels) * bank.label_count)
     values = (bank.linear + columns) * sum(bank.sizes(r3))
-    decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3)
+    decoding = r1 * r2 * (r3 + 1) + r1 * (4 * len(rung.joints) + 3 + len(model.decoder.curves))
     return distances + values + _form_rows(bank, level) ** 2 + decoding
 
 

@@ -122,9 +122,10 @@ def write_family(output: Path, chosen: Iterable[SampleTrial] | None = None) -> P
 
 
 def write_folder(output: Path, files: dict[str, bytes]) -> Path:
-    """Write the files of a family to a directory atomically and return its recipe's path.
+    """Write files by path relative to a directory, atomically; return the path of recipe.toml.
 
-    files: contents by path relative to the directory. Raises FileError as `write_family`.
+    A directory with exactly these files is left unchanged; raises FileError for an existing file,
+    or a directory with other content.
     """
     if output.exists() and not output.is_dir():
         raise FileError(output, "found a file, expected a new or empty directory")

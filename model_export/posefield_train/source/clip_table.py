@@ -35,6 +35,7 @@ class ClipRow:
     file from 0, last_frame inclusive; None is the end of the file. controls: those of the table.
     landmarks: frames of the file. other_labels: name of the clip in each further label set. take:
     name of the take, unique among the performer's; None if the table has no such column.
+    curve_place: file of the clip's curves; None without them, and where the clip has curves alone.
     """
 
     place: FileLocation
@@ -48,10 +49,17 @@ class ClipRow:
     take: str | None = None
     other_labels: Mapping[str, str] = field(default_factory=dict)
 
+    curve_place: FileLocation | None = None
+
     @property
     def labels(self) -> dict[str, str]:
         """Return the name of the clip in each label set, the performer's included."""
         return {PERFORMER: self.performer, **self.other_labels}
+
+    @property
+    def curve_file(self) -> FileLocation:
+        """Return the file of the clip's curves."""
+        return self.curve_place or self.place
 
     @property
     def named(self) -> str:
@@ -140,6 +148,11 @@ class ClipTable:
     name: str
     records: list[tuple[int, dict[str, str]]]
 
+    @property
+    def columns(self) -> list[str]:
+        """Return the names of the columns, in order."""
+        return list(self.records[0][1]) if self.records else []
+
     def expect_only(self, columns: Collection[str]) -> None:
         """Raise RecipeError for unknown columns."""
         unknown = sorted(set(self.records[0][1]) - set(columns))
@@ -220,6 +233,8 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         column = getattr(clips, key)
         if column is not None:
             named[column] = f"clips.{key}"
+    if recipe.curves and recipe.curves.column:
+        named[recipe.curves.column] = "curves.column"
     return named
 
 
@@ -231,8 +246,9 @@ def _row(
     last = cells.frame(line, record, clips.last_frame) if clips.last_frame else None
     if last is not None and last <= first:
         raise RecipeError(cells.name, f"frames {first} to {last}, expected at least two", line)
+    find = _FileFinder(folder, clips, cells.name, line)
     return ClipRow(
-        place=_find_motion_file(folder, clips, cells, line, record),
+        place=find(clips.file, record[clips.file]),
         table=cells.name,
         line=line,
         performer=_performer(recipe, cells, line, record),
@@ -244,6 +260,7 @@ def _row(
             name: cells.name_of(line, record, column) for name, column in clips.labels.items()
         },
         take=_take(clips, cells, line, record),
+        curve_place=_curve_place(recipe, find, record),
     )
 
 
@@ -267,15 +284,36 @@ def _take(clips: Clips, cells: ClipTable, line: int, record: dict[str, str]) -> 
     return name
 
 
-def _find_motion_file(
-    folder: Path, clips: Clips, cells: ClipTable, line: int, record: dict[str, str]
-) -> FileLocation:
-    beside = clips.table.rpartition("/")[0]
-    name = f"{beside}/{record[clips.file]}" if beside else record[clips.file]
-    try:
-        return data_folder.find(folder, name)
-    except RecipeError as fault:
-        raise RecipeError(cells.name, f"column {clips.file!r}: {fault.message}", line) from fault
+@dataclass(frozen=True)
+class _FileFinder:
+    """Finder of the files that a line of the table names."""
+
+    folder: Path
+    clips: Clips
+    table: str
+    line: int
+
+    def __call__(self, column: str, cell: str) -> FileLocation:
+        """Return the file that a cell names; RecipeError names the column."""
+        beside = self.clips.table.rpartition("/")[0]
+        name = f"{beside}/{cell}" if beside else cell
+        try:
+            return data_folder.find(self.folder, name)
+        except RecipeError as fault:
+            text = f"column {column!r}: {fault.message}"
+            raise RecipeError(self.table, text, self.line) from fault
+
+
+def _curve_place(recipe: Recipe, find: _FileFinder, record: dict[str, str]) -> FileLocation | None:
+    """Return the file of a clip's curves beside its motion file; None if there is none."""
+    keys, column = recipe.curves, recipe.clips.file
+    if keys is None or keys.alone:
+        return None
+    if keys.column:
+        return find(keys.column, record[keys.column])
+    folder, slash, name = record[column].rpartition("/")
+    stem = name.rpartition(".")[0] or name
+    return find(column, f"{folder}{slash}{stem}{keys.suffix}")
 
 
 def refuse_repeats(rows: Sequence[ClipRow]) -> None:

@@ -1,6 +1,6 @@
 """Clips from rows of the table: cut, in metres, Y up, with heading and origin removed."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +12,7 @@ from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
+from posefield.motion.curves import CurveValues, clamp
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source import (
     bvh,
@@ -23,6 +24,8 @@ from posefield_train.source import (
 )
 from posefield_train.source.bvh import end_sites
 from posefield_train.source.clip_table import ClipRow
+from posefield_train.source.curves import curve_files
+from posefield_train.source.curves.curve_files import CurveReader
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
 from posefield_train.source.rigs import rig_normalization
@@ -66,8 +69,10 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     Raises RecipeError for an invalid row, BvhError for a file that cannot be read.
     """
     rows = clip_table.read(recipe, folder)
-    files = read_files(rows)
-    cuts = [_cut(recipe, files[str(row.place)], row) for row in rows]
+    alone = recipe.curves is not None and recipe.curves.alone
+    files = {} if alone else read_files(rows)
+    curves = curve_files.reader(recipe.curves, rows) if recipe.curves else None
+    cuts = [_cut(recipe, _whole_clip(recipe, files, curves, row), row) for row in rows]
     _expect_same_skeleton(rows, [clip for clip, _ in cuts])
     rigged = _normalize_rigs(recipe, rows, [clip for clip, _ in cuts])
     found = [
@@ -133,9 +138,20 @@ class _FoundExample:
     positions: Positions
 
 
-def _cut(recipe: Recipe, file: bvh.BvhFile, row: ClipRow) -> tuple[Clip, int]:
+def _whole_clip(
+    recipe: Recipe, files: Mapping[str, bvh.BvhFile], curves: CurveReader | None, row: ClipRow
+) -> Clip:
+    """Return the clip of all frames of a row's file, with its curves."""
+    values = curves.read(row.curve_file) if curves else None
+    if values and recipe.curves and recipe.curves.rate:
+        return curve_files.resting_clip(values, recipe.curves.rate)
+    clip = clip_of_file(files[str(row.place)], recipe.source)
+    return curve_files.with_curves(clip, values, row) if values else clip
+
+
+def _cut(recipe: Recipe, whole: Clip, row: ClipRow) -> tuple[Clip, int]:
     """Return the clip of a row without dropped joints, and the index of its last frame."""
-    own, last = cut_frames(clip_of_file(file, recipe.source), row)
+    own, last = cut_frames(whole, row)
     return _drop_joints(own, recipe, row), last
 
 
@@ -198,7 +214,8 @@ def cut_frames(clip: Clip, row: ClipRow) -> tuple[Clip, int]:
         raise row.error(f"{row.place} has frames 0 to {last}, expected two or more")
     kept = slice(row.first_frame, last + 1)
     rotations, translations = clip.rotations[kept], clip.translations[kept]
-    return replace(clip, rotations=rotations, translations=translations), last
+    curves = clip.curves and replace(clip.curves, values=clip.curves.values[kept])
+    return replace(clip, rotations=rotations, translations=translations, curves=curves), last
 
 
 def canonicalize(
@@ -276,7 +293,8 @@ def keep_joints(clip: Clip, kept: Sequence[int]) -> Clip:
         tuple(kept.index(joints.tip_joints[i]) for i in tips),
         joints.tip_offsets[tips],
     )
-    return Clip(smaller, clip.rotations[:, kept], clip.translations[:, kept], clip.rate)
+    rotations, translations = clip.rotations[:, kept], clip.translations[:, kept]
+    return replace(clip, skeleton=smaller, rotations=rotations, translations=translations)
 
 
 def _named_joints(recipe: Recipe) -> set[str]:
@@ -420,4 +438,12 @@ def _close_cycle(clip: Clip) -> Clip:
     translations = clip.translations.copy()
     rise = (clip.root_path[-1] - clip.root_path[0]) @ UP
     translations[:, 0] += share[:, None] * rise * UP
-    return replace(clip, rotations=rotations, translations=translations)
+    closed = replace(clip, rotations=rotations, translations=translations)
+    return closed if clip.curves is None else replace(closed, curves=_close_curves(clip.curves))
+
+
+def _close_curves(own: CurveValues) -> CurveValues:
+    """Close the curves of a cycle as `_close_cycle` closes its poses, within their limits."""
+    share = np.linspace(0.5, -0.5, len(own.values))[:, None]
+    values = own.values + share * (own.values[-1] - own.values[0])
+    return replace(own, values=clamp(own.curves, values))

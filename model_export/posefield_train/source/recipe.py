@@ -31,6 +31,7 @@ from posefield_train.source.control_sources import (
     RecipePart,
     Text,
 )
+from posefield_train.source.curves.curve_keys import Curves
 from posefield_train.source.rigs.facing import Facing
 
 PERFORMER = "performer"
@@ -356,6 +357,7 @@ class Recipe(RecipePart):
     alignment: Alignment = Alignment()
     kriging: Kriging = Kriging()
     event: Event | None = None
+    curves: Curves | None = None
     roles: dict[Role, Text] = Field(
         default={},
         description="joints by role; exports need them for the joint names of Mixamo, Unreal, VRM "

@@ -17,6 +17,7 @@ from posefield.common.array_shapes import (
 )
 from posefield.common.units import Floats, Indices
 from posefield.motion import blend, quat
+from posefield.motion.curves import Curve, clamp, limits
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.onnx_graph.level_tables import Integers
 from posefield_train.tensor.event_blend import EventBlend
@@ -50,7 +51,8 @@ class Decoder:
     the metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. means:
     rotations (J, 4) about which the rotation vectors are taken. coarse: ranks and joints of each
     coarser level. event: blend into a second prediction around the event, at the finest level; its
-    coefficients follow those of the core.
+    coefficients follow those of the core. curves: those of the last
+    numbers of a pose vector.
     """
 
     reduced: TuckerTensor
@@ -59,6 +61,7 @@ class Decoder:
     means: JointRotations
     coarse: tuple[LevelSize, ...] = ()
     event: EventBlend | None = None
+    curves: tuple[Curve, ...] = ()
 
     @property
     def blended(
@@ -81,10 +84,11 @@ class Decoder:
         rung = self.level_sizes[level]
         moves = np.zeros((1 + len(self.means), 3))
         moves[[0, *(1 + joint for joint in rung.joints)]] = 1.0
+        moved = np.append(moves, np.ones(len(self.curves)))
         return replace(
             self,
             reduced=self.reduced.truncated(rung.ranks),
-            unwhiten=self.unwhiten * moves.reshape(-1, 1),
+            unwhiten=self.unwhiten * moved[:, None],
             coarse=(),
             event=None if level else self.event,
         )
@@ -105,6 +109,17 @@ class Decoder:
         numbers = self.mean + self.reduced_poses(coefficients, place) @ self.directions
         return PoseChart(self.means).poses(numbers)
 
+    def curve_values(
+        self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
+    ) -> Annotated[Floats, "clips frames curves"]:
+        """Return the values (B, S, C) of the curves at canonical frames (B, S).
+
+        coefficients: (B, r3).
+        """
+        own = PoseChart(self.means).curve_numbers
+        numbers = self.mean[own] + self.reduced_poses(coefficients, place) @ self.directions[:, own]
+        return clamp(self.curves, numbers)
+
     def at_frame(
         self, coefficients: Annotated[Floats, "clips modes"], frame: int
     ) -> tuple[Annotated[Floats, "clips joints 4"], ClipTravel]:
@@ -118,15 +133,16 @@ class Decoder:
         return PoseChart(self.means).poses(numbers)
 
     def select_joints(self, joints: Sequence[int]) -> "Decoder":
-        """Return the decoder of some joints alone, including the root, at its finest level."""
+        """Return the decoder of some joints without curves, including the root, at its finest level."""
         kept = [0, *(1 + joint for joint in joints)]
-        rows = np.ravel(np.arange(len(self.mean)).reshape(-1, 3)[kept])
+        rows = np.ravel(np.arange(3 + 3 * len(self.means)).reshape(-1, 3)[kept])
         return replace(
             self,
             mean=self.mean[rows],
             unwhiten=self.unwhiten[rows],
             means=self.means[list(joints)],
             coarse=(),
+            curves=(),
         )
 
     def reduced_poses(
@@ -162,18 +178,20 @@ class Decoder:
             "turning": [[4 * n, r1] for n, (r1, _, _) in zip(joints, ranks, strict=True)],
             "joints": [[n] for n in joints],
             "quaternions": [[4 * n] for n in joints],
+            **({"curves": [[len(self.mean), r1] for r1, _, _ in ranks]} if self.curves else {}),
         }
 
     def onnx(
         self, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
-    ) -> tuple[str, str]:
-        """Build `numpy` in a graph, from canonical frames (B, S, 1).
+    ) -> tuple[str, str, str | None]:
+        """Build `numpy` and `curve_values` in a graph, from canonical frames (B, S, 1).
 
-        ends: graph values of the level's slice ends, by the names of `entries`.
+        ends: graph values of the level's slice ends, by the names of `entries`. The last name is
+        None without curves.
         """
         flat = self._reduced(net, coefficients, place, ends)
         directions = self._directions(net)
-        three, end = net.indices(3), net.indices(len(self.mean))
+        three, end = net.indices(3), net.indices(3 + 3 * len(self.means))
         of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
         mean = net.weights("root_mean", self.mean[:3])
         root = net("Gemm", flat, of_root, mean, transA=1, transB=1)
@@ -184,7 +202,18 @@ class Decoder:
         return (
             net("Reshape", self._rotations(net, flat, of_joints, ends), joint_shape),
             net("Reshape", root, root_shape),
+            self._curves(net, flat, directions, ends) if self.curves else None,
         )
+
+    def _curves(self, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]) -> str:
+        """Build the values (B S, C) of the curves, clamped, from coefficients (r1, B S)."""
+        own = PoseChart(self.means).curve_numbers
+        of_curves = net("Slice", directions, net.indices(own.start, 0), ends["curves"])
+        mean = net.weights("curve_mean", self.mean[own])
+        values = net("Gemm", flat, of_curves, mean, transA=1, transB=1)
+        low, high = limits(self.curves)
+        least, most = net.weights("curve_minimum", low), net.weights("curve_maximum", high)
+        return net("Min", net("Max", values, least), most)
 
     def _reduced(
         self, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
@@ -249,7 +278,7 @@ class Decoder:
     ) -> str:
         """Build quaternions (B S, J, 4) from the first mode's coefficients (r1, B S)."""
         turning = half_angle_products_onnx(net, self.means, directions)
-        offset = half_angle_products(self.means, self.mean[3:])
+        offset = half_angle_products(self.means, self._mean_vectors)
         if any(len(rung.joints) < len(self.means) for rung in self.level_sizes):
             return self._partly_fixed_rotations(net, flat, turning, offset, ends)
         turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
@@ -285,7 +314,7 @@ class Decoder:
         ordered = net("Gather", ordered, net.weights("joint_order", order))
         moving = net("Slice", ordered, zero, ends["joints"], zero)
         found = quaternions(net, net("Gemm", turning, flat, constant), moving)
-        still = quat.mul(self.means, quat.exp(self.mean[3:].reshape(-1, 3)))[order][:, :, None]
+        still = quat.mul(self.means, quat.exp(self._mean_vectors.reshape(-1, 3)))[order][:, :, None]
         still_ones = net(
             "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
         )
@@ -294,6 +323,11 @@ class Decoder:
         both = net("Concat", found, net("Expand", still_ones, shape), axis=0)
         back = net("Gather", both, net.weights("joint_places", np.argsort(order)))
         return innermost_joints(net, back, joints)
+
+    @property
+    def _mean_vectors(self) -> Annotated[Floats, "numbers"]:
+        """Return the mean rotation vectors (3 J,)."""
+        return self.mean[PoseChart(self.means).joint_numbers]
 
     def _order(self) -> Annotated[Indices, "joints"]:
         """Return the joints sorted by the number of coarser levels that keep them, descending."""

@@ -9,7 +9,9 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import ClipBones, JointWeights, PoseVectors
+from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
+from posefield.motion.curves import Curve, distances
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.source import half_turns
 from posefield_train.source.half_turns import Finding
@@ -28,7 +30,7 @@ class MotionTensor:
     values: (D', T, N), of the D' degrees of freedom that vary. A unit of squared distance between
     two entries is a square metre, summed over weighted joints and frames. mean: pose vector (D,) on
     which it is centred. whiten, unwhiten: maps (D', D) and (D, D') to whitened values and back.
-    weight: sum of the joints' weights.
+    weight: sum of the joints' weights, and one for each curve. curves: of the family.
     """
 
     values: Annotated[Floats, "varying frames clips"]
@@ -37,6 +39,7 @@ class MotionTensor:
     unwhiten: Annotated[Floats, "dof varying"]
     chart: PoseChart
     weight: float
+    curves: tuple[Curve, ...] = ()
 
     def numbers(self, values: Annotated[Floats, "varying frames clips"]) -> PoseVectors:
         """Return pose vectors (B, T, D) of slices (D', T, B) of the tensor."""
@@ -58,7 +61,10 @@ def pose_vectors(
     small = half_turns.small_joints(parents, offsets.mean(axis=0))
     rotations, flipped = half_turns.remove_flips(aligned.rotations, small)
     own_chart, far = chart.fit_chart(rotations)
-    return own_chart.numbers(rotations, aligned.root_path), own_chart, flipped + far
+    numbers = own_chart.numbers(rotations, aligned.root_path)
+    if aligned.curves is not None:
+        numbers = np.concatenate([numbers, aligned.curves], axis=-1)
+    return numbers, own_chart, flipped + far
 
 
 def build_tensor(
@@ -67,19 +73,35 @@ def build_tensor(
     parents: tuple[int, ...],
     offsets: ClipBones,
     joint_weights: JointWeights,
+    curves: tuple[Curve, ...] = (),
 ) -> MotionTensor:
     """Return the tensor of pose vectors (N, T, D) in the metric of their own poses.
 
-    offsets: bone offsets (N, J, 3) of each clip's performer, m. joint_weights: (J,).
+    offsets: bone offsets (N, J, 3) of each clip's performer, m. joint_weights: (J,). curves: those
+    of the last numbers of the pose vectors; each counts as a joint of weight one. Raises
+    TrainingError if nothing varies.
     """
     mean = numbers.mean(axis=(0, 1))
     varies = np.ptp(numbers.reshape(-1, len(mean)), axis=0) > CONSTANT_RANGE
+    if not varies.any():
+        raise TrainingError("found no joint and no curve that moves, expected motion in some clip")
     own_gram = sampled_gram(numbers, own_chart, parents, offsets, joint_weights)
-    root, inverse = pose_metric.whitening(own_gram[np.ix_(varies, varies)])
-    whiten, unwhiten = np.zeros((2, len(root), len(mean)))
-    whiten[:, varies], unwhiten[:, varies] = root, inverse
+    moves = varies[: len(own_gram)]
+    root, inverse = pose_metric.whitening(own_gram[np.ix_(moves, moves)])
+    # Curves are no part of the body, so their metric is diagonal.
+    units = distances(curves)[varies[len(own_gram) :]]
+    whiten, unwhiten = np.zeros((2, len(root) + len(units), len(mean)))
+    whiten[:, varies] = _block_diagonal(root, np.diag(units))
+    unwhiten[:, varies] = _block_diagonal(inverse, np.diag(1.0 / units))
     values = _whiten(numbers, mean, whiten)
-    return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, float(joint_weights.sum()))
+    weight = float(joint_weights.sum()) + len(curves)
+    return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, weight, curves)
+
+
+def _block_diagonal(
+    a: Annotated[Floats, "some some"], b: Annotated[Floats, "others others"]
+) -> Annotated[Floats, "varying varying"]:
+    return np.block([[a, np.zeros((len(a), len(b)))], [np.zeros((len(b), len(a))), b]])
 
 
 def _whiten(
@@ -108,5 +130,5 @@ def sampled_gram(
     rotations, root = own_chart.poses(some)
     translations = offsets[chosen // frames].copy()
     translations[:, 0] = root
-    vectors = some[:, 3:].reshape(len(some), -1, 3)
+    vectors = some[:, own_chart.joint_numbers].reshape(len(some), -1, 3)
     return pose_metric.gram(parents, rotations, vectors, translations, joint_weights)

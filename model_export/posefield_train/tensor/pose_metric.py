@@ -104,6 +104,8 @@ def whitening(
 
     Eigenvalues below FLOOR times the largest are raised to it.
     """
+    if not len(gram):
+        return gram, gram
     values, vectors = np.linalg.eigh(gram)
     roots = np.sqrt(np.maximum(values, FLOOR * values[-1]))
     return (vectors * roots) @ vectors.T, (vectors / roots) @ vectors.T

@@ -32,6 +32,16 @@ class PoseChart:
 
     means: JointRotations
 
+    @property
+    def joint_numbers(self) -> slice:
+        """Return the place of the rotation vectors in a pose vector."""
+        return slice(3, 3 + 3 * len(self.means))
+
+    @property
+    def curve_numbers(self) -> slice:
+        """Return the place of the curves in a pose vector."""
+        return slice(3 + 3 * len(self.means), None)
+
     def numbers(
         self, rotations: ClipRotations, root_path: ClipPaths
     ) -> Annotated[Floats, "clips frames 3+joints*3"]:
@@ -42,13 +52,16 @@ class PoseChart:
     def poses(
         self, numbers: Annotated[Floats, "*poses dof"]
     ) -> tuple[Annotated[Floats, "*poses joints 4"], Annotated[Floats, "*poses 3"]]:
-        """Return rotations (..., J, 4), root positions (..., 3) of pose vectors (..., 3 + 3 J)."""
+        """Return rotations (..., J, 4), root positions (..., 3) of pose vectors (..., D).
+
+        Numbers beyond 3 + 3 J are those of curves.
+        """
         *lead, freedoms = numbers.shape
         rows = numbers.reshape(-1, freedoms)
         rotations = np.empty((len(rows), 4 * len(self.means)))
         for start in range(0, len(rows), POSES_PER_BLOCK):
             block = slice(start, start + POSES_PER_BLOCK)
-            planes = self.rotation_planes(np.ascontiguousarray(rows[block, 3:].T))
+            planes = self.rotation_planes(np.ascontiguousarray(rows[block, self.joint_numbers].T))
             rotations[block] = planes.reshape(rotations.shape[1], -1).T
         return rotations.reshape(*lead, -1, 4), numbers[..., :3]
 

@@ -15,6 +15,7 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Event
 from posefield.motion import skeleton
+from posefield.motion.curves import distances
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import hosvd
@@ -49,16 +50,16 @@ class EventFrame:
 class TruncationReference:
     """Joint positions of the full tensor, for measuring truncations.
 
-    whole: joint positions (N, T, J, 3), m, without a cycle's travel. offsets: (N, J, 3), m.
-    weights: joint weights (J,).
+    whole: joint positions (N, T, J, 3), m, without a cycle's travel, and points of the curves
+    behind them. offsets: (N, J, 3), m. weights: of joints and curves.
     """
 
     own_tensor: MotionTensor
     parents: tuple[int, ...]
     offsets: ClipBones
-    weights: JointWeights
+    weights: Annotated[Floats, "points"]
     event_frame: EventFrame | None
-    whole: ClipPositions
+    whole: Annotated[Floats, "clips frames points 3"]
 
     def evaluate(self, reduced: TuckerTensor) -> TruncationErrors:
         """Return the fidelity of a truncation of this tensor."""
@@ -128,7 +129,8 @@ def truncation_reference(
 
     Raises TrainingError if the skeleton lacks the event's joint.
     """
-    parents, weights = examples[0].clip.skeleton.parents, joint_weights(recipe, examples)
+    parents = examples[0].clip.skeleton.parents
+    weights = np.append(joint_weights(recipe, examples), np.ones(len(own_tensor.curves)))
     offsets = np.stack([example.offsets for example in examples])
     whole = positions(own_tensor, own_tensor.values, parents, offsets)
     return TruncationReference(
@@ -144,7 +146,7 @@ def positions(
 ) -> ClipPositions:
     """Return joint positions (N, T, J, 3), m, of whitened values (D', T, N).
 
-    offsets: bone offsets (N, J, 3), m.
+    Points of the curves follow those of the joints. offsets: bone offsets (N, J, 3), m.
     """
     return _joint_positions(
         own_tensor, hosvd.mode_dot(values, own_tensor.unwhiten, 0), parents, offsets
@@ -157,16 +159,24 @@ def _joint_positions(
     parents: tuple[int, ...],
     offsets: ClipBones,
 ) -> ClipPositions:
-    """Return joint positions (N, T, J, 3) of pose vectors (D, T, N) less the tensor's mean."""
+    """Return joint positions (N, T, J, 3) of pose vectors (D, T, N) less the tensor's mean.
+
+    Points of the curves follow those of the joints.
+    """
     _, frames, samples = centred.shape
-    places = np.empty((len(parents), 3, frames, samples))
+    chart, joints = own_tensor.chart, len(parents)
+    places = np.zeros((joints + len(own_tensor.curves), 3, frames, samples))
+    units = distances(own_tensor.curves)[:, None, None]
     bones = offsets.transpose(1, 2, 0)[1:, :, None]
     step = max(1, skeleton.POSES_PER_BLOCK // samples)
     for start in range(0, frames, step):
         block = slice(start, start + step)
         numbers = own_tensor.mean[:, None, None] + centred[:, block]
-        rotations = own_tensor.chart.rotation_planes(numbers[3:])
-        places[:, :, block] = skeleton.position_planes(parents, rotations, [numbers[:3], *bones])
+        rotations = chart.rotation_planes(numbers[chart.joint_numbers])
+        places[:joints, :, block] = skeleton.position_planes(
+            parents, rotations, [numbers[:3], *bones]
+        )
+        places[joints:, 0, block] = units * numbers[chart.curve_numbers]
     return places.transpose(3, 2, 0, 1)
 
 

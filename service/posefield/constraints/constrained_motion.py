@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath, Rotations, Variables, Vector
+from posefield.common.units import Floats
 from posefield.constraints import constraint, gauss_newton, pinned_feet
 from posefield.constraints.constraint import Constraint
 from posefield.constraints.motion_variables import MotionVariables
@@ -63,6 +65,10 @@ class ConstrainedMotion:
             return rotations, roots
         share = frames / (scene.reduced.frames - 1)
         return root_travel.add_travel(rotations, roots, share[:, None] * self.travel)
+
+    def curve_values(self, frames: Frames) -> Annotated[Floats, "frames curves"]:
+        """Return the values (S, C) of the curves at canonical frames (S,)."""
+        return self.scene.reduced.curve_values(self.scene.motion(self.numbers), frames)
 
 
 @dataclass(frozen=True)
@@ -127,7 +133,7 @@ class LevelCorrector:
 def build_corrector(session: Session, level: int) -> LevelCorrector:
     """Return the data for corrections at a level."""
     weights = subgraph.initializers(session.content)
-    own = reduced_motion.read(weights, session.card.levels[level])
+    own = reduced_motion.read(weights, session.card.levels[level], session.card.curves)
     return LevelCorrector(
         session.card,
         own,

@@ -134,8 +134,10 @@ class ConstraintSolver:
         self, question: ValidatedQuestion, held: ConstrainedMotion, when: Frames, trust: Trust
     ) -> PoseAnswer[np.float64]:
         """Return the poses of a motion at times (S,), s."""
-        rotations, roots = held.poses(self._frames(question, held, when))
-        return PoseAnswer(when, rotations, roots, held.state.bones, trust)
+        frames = self._frames(question, held, when)
+        rotations, roots = held.poses(frames)
+        curves = held.curve_values(frames) if self._session.card.curves else None
+        return PoseAnswer(when, rotations, roots, held.state.bones, trust, curves)
 
     def _captured_positions(
         self, moment: Measure, time: float | None

@@ -20,6 +20,15 @@ OUTPUTS = {
 }
 
 
+CURVES = "curves"
+"""Output of a model with curves."""
+
+
+def outputs(card: ModelCard) -> tuple[str, ...]:
+    """Return the names of the outputs of a card's graph."""
+    return (*OUTPUTS, CURVES) if card.curves else tuple(OUTPUTS)
+
+
 def check(runtime: Any, card: ModelCard, source: str) -> None:
     """Check the answers of an onnxruntime session at each level of detail.
 
@@ -42,10 +51,10 @@ def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> No
     if card.labels:
         feed[LABELS] = np.eye(1, sum(card.label_counts), dtype=np.float32)
     try:
-        answers = dict(zip(OUTPUTS, runtime.run([*OUTPUTS], feed), strict=True))
+        answers = dict(zip(outputs(card), runtime.run([*outputs(card)], feed), strict=True))
     except Exception as fault:  # onnxruntime's exceptions share no base of their own
         raise ModelError(source, f"does not run: {first_line(fault)}") from fault
-    for name, shape in _shapes(len(points), times.shape[1], len(card.skeleton)).items():
+    for name, shape in _shapes(len(points), times.shape[1], card).items():
         if answers[name].shape != shape:
             raise ModelError(source, f"{name} {answers[name].shape}, expected {shape}")
         if not np.isfinite(answers[name]).all():
@@ -54,8 +63,10 @@ def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> No
         raise ModelError(source, f"its duration is {answers['duration'].min()} s, expected above 0")
 
 
-def _shapes(rows: int, times: int, joints: int) -> dict[str, tuple[int, ...]]:
-    return {
+def _shapes(rows: int, times: int, card: ModelCard) -> dict[str, tuple[int, ...]]:
+    joints = len(card.skeleton)
+    curves = {CURVES: (rows, times, len(card.curves))} if card.curves else {}
+    return curves | {
         "rotations": (rows, times, joints, 4),
         "root_position": (rows, times, 3),
         "bone_offsets": (rows, joints, 3),

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from posefield.common.array_shapes import Bones, Frames, JointRotations, RootPath, Rotations
 from posefield.common.units import Floats
 from posefield.model_file.level_of_detail import Level
-from posefield.motion import blend, quat
+from posefield.motion import blend, curves, quat
+from posefield.motion.curves import Curve
 
 GraphConstants = Mapping[str, npt.NDArray[Any]]
 """Constants of a model's graph by name."""
@@ -22,7 +23,8 @@ class ReducedTensor:
 
     core: (r2, r1, r3), modes of time, degrees of freedom and samples. time: (T, r2). directions:
     (r1, D) and mean: (D,), pose vectors of the root's position and a rotation vector for each joint
-    about its mean rotation. rotations: mean rotations (J, 4).
+    about its mean rotation, and then of the curves. rotations: mean rotations (J, 4). curves: of
+    the family.
     """
 
     core: Annotated[Floats, "times freedoms modes"]
@@ -30,6 +32,7 @@ class ReducedTensor:
     directions: Annotated[Floats, "freedoms dof"]
     mean: Annotated[Floats, "dof"]
     rotations: JointRotations
+    curves: tuple[Curve, ...] = ()
 
     @property
     def frames(self) -> int:
@@ -58,17 +61,32 @@ class ReducedTensor:
     ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
         numbers = self.mean + self.rows(places) @ motion @ self.directions
-        vectors = numbers[:, 3:].reshape(len(places), -1, 3)
+        vectors = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(places), -1, 3)
         return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
 
+    def curve_values(
+        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+    ) -> Annotated[Floats, "frames curves"]:
+        """Return the values (S, C) of the curves in a reduced motion (r2, r1)."""
+        own = slice(3 + 3 * len(self.rotations), None)
+        numbers = self.mean[own] + self.rows(places) @ motion @ self.directions[:, own]
+        return curves.clamp(self.curves, numbers)
 
-def read(weights: GraphConstants, level: Level) -> ReducedTensor:
-    """Return the reduced tensor of a level; KeyError for a missing constant."""
+
+def read(
+    weights: GraphConstants, level: Level, own_curves: tuple[Curve, ...] = ()
+) -> ReducedTensor:
+    """Return the reduced tensor of a level; KeyError for a missing constant.
+
+    own_curves: those of the card.
+    """
     r1, r2, r3 = level.ranks
     rotations = weights["mean_rotations"][:, :, 0].astype(np.float64)
     moves = np.zeros((1 + len(rotations), 1))
     moves[[0, *(1 + joint for joint in level.joints)]] = 1.0
-    directions = _directions(weights)[:, :r1] * np.repeat(moves, 3, axis=0)
+    moved = np.concatenate([np.repeat(moves, 3, axis=0), np.ones((len(own_curves), 1))])
+    directions = _directions(weights)[:, :r1] * moved
+    mean = [weights["root_mean"], _mean_vectors(weights, rotations).ravel()]
     core = weights["core"][:r2, :r1, :r3].astype(np.float64)
     time = weights["time_basis"][:r2].T.astype(np.float64)
     if level.event:
@@ -78,8 +96,9 @@ def read(weights: GraphConstants, level: Level) -> ReducedTensor:
         core,
         time,
         directions.T.copy(),
-        np.concatenate([weights["root_mean"], _mean_vectors(weights, rotations).ravel()]),
+        np.concatenate([*mean, *([weights["curve_mean"]] if own_curves else [])]),
         rotations,
+        own_curves,
     )
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Singles
 from posefield.inference import graph_ports, onnx_runtime
-from posefield.inference.graph_ports import LABELS, OUTPUTS
+from posefield.inference.graph_ports import LABELS
 from posefield.inference.onnx_runtime import LazySessions
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
@@ -198,7 +198,8 @@ class Session:
 
     def run_trial(self) -> bytes:
         """Return the answer at the default controls; equals `golden` for a sound model."""
-        answers = self.run(graph_ports.default_controls(self.card), np.zeros((1, 1)), *OUTPUTS)
+        names = graph_ports.outputs(self.card)
+        answers = self.run(graph_ports.default_controls(self.card), np.zeros((1, 1)), *names)
         return b"".join(
             answer.tobytes()
             for answer in (*answers, self.durations(graph_ports.default_controls(self.card)))

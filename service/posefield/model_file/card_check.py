@@ -24,6 +24,8 @@ CYCLE_VARIABLES = 4
 MAX_SHOWN = 60
 """Largest number of characters of a value in a message."""
 
+MAX_CURVES = 1_000
+"""Largest number of curves; a face has about fifty."""
 ANY_SIZE = -1
 """A size that the card does not determine."""
 REQUIRED_VALUES = ("coefficients", "frame")
@@ -46,6 +48,7 @@ def check(card: ModelCard) -> None:
     _check_levels(card)
     _check_training_parameters(card)
     _check_presets(card)
+    _check_curves(card)
 
 
 def check_graph(
@@ -247,6 +250,14 @@ def _check_presets(card: ModelCard) -> None:
             _expect(right, f"{path}.labels.{label_set}", label, expected)
 
 
+def _check_curves(card: ModelCard) -> None:
+    _expect_unique([curve.name for curve in card.curves], "curves")
+    _expect(len(card.curves) <= MAX_CURVES, "curves", len(card.curves), f"at most {MAX_CURVES}")
+    for index, curve in enumerate(card.curves):
+        ends = [curve.minimum, curve.maximum]
+        _expect(ends[0] < ends[1], f"curves[{index}]", ends, "a minimum below the maximum")
+
+
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     """Return the shapes of constants that the exporter writes for a card, ANY for other sizes."""
     joints, controls, labels = len(card.skeleton), len(card.controls), sum(card.label_counts)
@@ -264,8 +275,10 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
         "mean_rotations": (joints, 4, 1),
         "rotation_mean": (4 * joints, 1),
         "offset_mean": (3 * joints,),
-        "freedoms": (3 + 3 * joints,),
+        "freedoms": (3 + 3 * joints + len(card.curves),),
     }
+    if card.curves:
+        shapes["curve_mean"] = (len(card.curves),)
     # Without label sets the graph has no such constants.
     labelled: dict[str, tuple[int, ...]] = {"labels": (1, labels) if labels else ()}
     blended = {"event_mixing": (ANY_SIZE, r2), "event_times": (ANY_SIZE, card.frames)}

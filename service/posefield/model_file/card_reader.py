@@ -10,7 +10,7 @@ import numpy as np
 from posefield.common.bounded_types import Count, Degree, Name, NonNegative, Number, Text
 from posefield.common.units import Floats
 from posefield.model_file import card_check
-from posefield.model_file.model_card import FORMAT, PREFIX, UNITS, ModelCard
+from posefield.model_file.model_card import FORMAT, OPTIONAL_ENTRIES, PREFIX, UNITS, ModelCard
 
 MAX_BYTES = 4 << 20
 """Largest size of all texts together. A card of 50 clips has 9 kB, and each further clip adds about
@@ -77,7 +77,7 @@ class Provenance(TypedDict):
     adapted: NotRequired[tuple[Adaptation, ...]]
 
 
-OPTIONAL = {"presets": b"[]"}
+OPTIONAL = dict.fromkeys(OPTIONAL_ENTRIES, b"[]")
 """Entries that a file may lack, and the text that stands for them."""
 
 _TYPES = get_type_hints(ModelCard, include_extras=True) | {

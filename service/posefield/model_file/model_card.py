@@ -29,11 +29,14 @@ from posefield.common.units import Floats
 from posefield.kriging.kriging_model import Hyper
 from posefield.model_file.level_of_detail import Level
 from posefield.motion import measures
+from posefield.motion.curves import Curve
 from posefield.motion.measures import Measure
 from posefield.motion.skeleton import Skeleton
 
 FORMAT = 4
 PREFIX = "posefield."
+OPTIONAL_ENTRIES = ("presets", "curves")
+"""Entries that a file lacks where they are empty."""
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
 
@@ -135,7 +138,8 @@ class ModelCard:
     that each plays (`joint_roles`). event: None where the recipe names none. beside (4, 4): of a
     cycle, a root of the covariance of the errors of its duration's logarithm and its travel, for a
     sigma of one metre; else empty. presets: named points of the controls; the file has no such
-    entry if the recipe names none.
+    entry if the recipe names none. curves: scalar channels of the family, in the order of the
+    graph's output `curves`; the file has no such entry without them.
     """
 
     name: Slug
@@ -163,6 +167,7 @@ class ModelCard:
     event: Event | None = None
     beside: tuple[tuple[Number, ...], ...] = ()
     presets: tuple[Preset, ...] = ()
+    curves: tuple[Curve, ...] = ()
 
     @property
     def clip_labels(self) -> Floats:
@@ -206,8 +211,9 @@ def dump(card: ModelCard) -> dict[str, str]:
     # All defaults are false or empty.
     told = {key: value for key, value in making.items() if value}
     plain = {**_plain_fields(card), "format": FORMAT, "making": told}
-    if not card.presets:
-        del plain["presets"]
+    for name in OPTIONAL_ENTRIES:
+        if not getattr(card, name):
+            plain.pop(name, None)
     return {PREFIX + key: json.dumps(plain[key], sort_keys=True) for key in sorted(plain)}
 
 
@@ -226,6 +232,8 @@ def _plain_fields(card: ModelCard) -> dict[str, Any]:
     """Return the fields of the card but `making`, as numbers, texts, lists and dicts."""
     plain: dict[str, Any] = msgspec.to_builtins(card, enc_hook=np.ndarray.tolist)
     del plain["making"]
+    if not card.curves:
+        del plain["curves"]
     # msgspec leaves out defaults of objects that it decoded.
     for control, own in zip(plain["controls"], card.controls, strict=True):
         control.pop("measure", None)

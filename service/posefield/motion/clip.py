@@ -1,11 +1,14 @@
 """Clip: one motion of one skeleton, sampled at a constant rate."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common.array_shapes import Bones, Positions, RootPath, Rotations
+from posefield.common.units import Floats
 from posefield.motion import skeleton
+from posefield.motion.curves import CurveValues
 from posefield.motion.skeleton import Skeleton
 
 
@@ -15,13 +18,14 @@ class Clip:
 
     rotations (F, J, 4): unit quaternions local to the parent. translations (F, J, 3): joint
     translations local to the parent, m; the root's is its path, the others' are the bone offsets.
-    rate: frames a second.
+    rate: frames a second. curves: values of scalar channels; None for a family without them.
     """
 
     skeleton: Skeleton
     rotations: Rotations
     translations: Positions
     rate: float
+    curves: CurveValues | None = None
 
     def __post_init__(self) -> None:
         frames, joints = len(self.rotations), len(self.skeleton)
@@ -33,6 +37,9 @@ class Clip:
             )
         if not (np.isfinite(self.rate) and self.rate > 0):
             raise ValueError(f"rate {self.rate}, expected a positive number")
+        expected = (frames, len(self.curves.curves)) if self.curves else (frames, 0)
+        if self.curve_values.shape != expected:
+            raise ValueError(f"curves {self.curve_values.shape}, expected {expected}")
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -46,6 +53,11 @@ class Clip:
     def root_path(self) -> RootPath:
         """Return the root positions (F, 3), m."""
         return self.translations[:, 0]
+
+    @property
+    def curve_values(self) -> Annotated[Floats, "frames curves"]:
+        """Return the values (F, C) of the curves; (F, 0) without them."""
+        return np.zeros((len(self), 0)) if self.curves is None else self.curves.values
 
     def positions(self) -> Positions:
         """Return the joint positions (F, J, 3) in the character's frame, m."""

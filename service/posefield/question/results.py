@@ -164,7 +164,8 @@ class Trust:
 class PoseAnswer(Generic[Number]):
     """Poses at times (S,), s.
 
-    rotations: (S, J, 4). root_position: (S, 3), m. bone_offsets: (J, 3), m.
+    rotations: (S, J, 4). root_position: (S, 3), m. bone_offsets: (J, 3), m. curves: values (S, C)
+    of the model's curves; None for a model without them.
     """
 
     times: Floats
@@ -172,6 +173,7 @@ class PoseAnswer(Generic[Number]):
     root_position: NDArray[Number]
     bone_offsets: NDArray[Number]
     trust: Trust
+    curves: NDArray[Number] | None = None
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
 from posefield.locomotion import stride
 from posefield.locomotion.stride import Strides
 from posefield.motion.clip import assemble
+from posefield.motion.curves import CurveValues
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
 from posefield.synthesis import frame_times
-from posefield.synthesis.poses import POSE_OUTPUTS
+from posefield.synthesis.poses import pose_outputs
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import question_validation
 from posefield.validation.question_validation import ValidatedQuestion
@@ -52,7 +53,10 @@ def synthesize_clip(
     else:
         answer = _unconstrained(model, question, asked, most)
     turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
-    return ClipAnswer(assemble(joints, turns, path, offsets, float(asked.fps)), answer.trust)
+    clip = assemble(joints, turns, path, offsets, float(asked.fps))
+    if answer.curves is not None:
+        clip = replace(clip, curves=CurveValues(model.session.card.curves, answer.curves))
+    return ClipAnswer(clip, answer.trust)
 
 
 def check(model: Synthesizer, asked: ClipQuestion) -> None:
@@ -170,8 +174,12 @@ def _predict(
 ) -> PoseAnswer[np.float64]:
     labels, level = question.labels, question.level
     answers = model.session.run(
-        question.point, when[None], *POSE_OUTPUTS, labels=labels, level=level
+        question.point,
+        when[None],
+        *pose_outputs(model.session.card),
+        labels=labels,
+        level=level,
     )
-    rotations, root, offsets, duration, sigma = (a[0].astype(np.float64) for a in answers)
+    rotations, root, offsets, duration, sigma, *curves = (a[0].astype(np.float64) for a in answers)
     trust = model.trust(asked, question, float(duration), float(sigma))
-    return PoseAnswer(when, rotations, root, offsets, trust)
+    return PoseAnswer(when, rotations, root, offsets, trust, *curves)

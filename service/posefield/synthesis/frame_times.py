@@ -70,11 +70,13 @@ def close_loop(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswe
         root = root + floor_plane.at_height(
             floor_plane.arc_displacement(way.travels, way.turns), np.zeros(1)
         )
+    curves = answer.curves
     return replace(
         answer,
         times=np.append(answer.times, answer.trust.duration),
         rotations=np.concatenate([answer.rotations, rotations]),
         root_position=np.concatenate([answer.root_position, root]),
+        curves=None if curves is None else np.concatenate([curves, curves[:1]]),
     )
 
 

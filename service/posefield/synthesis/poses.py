@@ -9,6 +9,8 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Singles
 from posefield.constraints.targets import ConstraintSet
+from posefield.inference.graph_ports import CURVES
+from posefield.model_file.model_card import ModelCard
 from posefield.question import value_validation
 from posefield.question.motion_question import PoseQuestion
 from posefield.question.results import PoseAnswer
@@ -17,10 +19,18 @@ from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 
 POSE_OUTPUTS = ("rotations", "root_position", "bone_offsets", "duration", "sigma")
-"""Outputs that poses are made of."""
+"""Outputs that all poses are made of."""
 
 OutputRow = tuple[Singles, ...]
-"""Values of ANSWERED for one question: (S, J, 4), (S, 3), (J, 3), and two numbers."""
+"""Values of `pose_outputs` for one question: (S, J, 4), (S, 3), (J, 3), two numbers, and (S, C) of a
+model with curves.
+"""
+
+
+def pose_outputs(card: ModelCard) -> tuple[str, ...]:
+    """Return the outputs that the poses of a model are made of."""
+    return (*POSE_OUTPUTS, CURVES) if card.curves else POSE_OUTPUTS
+
 
 SAMPLE_SIZE = 17
 """Number of questions that show whether a row depends on its batch: odd, and more than a kernel's
@@ -108,7 +118,8 @@ def run_batch(model: Synthesizer, asked: Sequence[PreparedPoseQuestion]) -> list
         points = np.concatenate([each.question.point for each in asked])
         labels = np.concatenate([each.question.labels for each in asked])
         when = np.array([each.graph_times for each in asked])
-    answers = model.session.run(points, when, *POSE_OUTPUTS, labels=labels, level=first.level)
+    names = pose_outputs(model.session.card)
+    answers = model.session.run(points, when, *names, labels=labels, level=first.level)
     return [tuple(answer[row] for answer in answers) for row in range(len(asked))]
 
 
@@ -119,12 +130,12 @@ def build_answer(
 
     Raises as `synthesize_poses` does for a time outside the clip.
     """
-    rotations, root, offsets, length, sigma = row
+    rotations, root, offsets, length, sigma, *curves = row
     duration = model.check_duration(float(length))
     # The graph limits times to the end of the clip.
     when = _check_times(asked, duration)
     trust = model.trust(asked.given, asked.question, duration, float(sigma))
-    return PoseAnswer(when, rotations, root, offsets, trust)
+    return PoseAnswer(when, rotations, root, offsets, trust, *curves)
 
 
 def is_batch_exact(model: Synthesizer, level: int) -> bool:

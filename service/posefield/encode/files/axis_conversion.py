@@ -60,11 +60,11 @@ def convert_clip(convention: Convention, clip: Clip) -> Clip:
     turned = np.concatenate(
         [turns[..., :1], convert_directions(convention, turns[..., 1:])], axis=-1
     )
-    return Clip(
-        replace(joints, offsets=offsets, tip_offsets=tips),
-        turned,
-        convert_positions(convention, clip.translations),
-        clip.rate,
+    return replace(
+        clip,
+        skeleton=replace(joints, offsets=offsets, tip_offsets=tips),
+        rotations=turned,
+        translations=convert_positions(convention, clip.translations),
     )
 
 

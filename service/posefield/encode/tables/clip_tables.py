@@ -37,6 +37,7 @@ def clip_json(answer: ClipAnswer, convention: Convention) -> bytes:
         "units": unit_names(convention),
         "names": clip.skeleton.names,
         "parents": clip.skeleton.parents,
+        **_curve_names(clip),
         "rate": clip.rate,
         "frames": len(clip),
         "times": np.round(frame_times(clip), DECIMALS),
@@ -54,6 +55,7 @@ def table(answer: ClipAnswer, convention: Convention) -> Table:
     facts = {
         "names": list(clip.skeleton.names),
         "parents": list(clip.skeleton.parents),
+        **_curve_names(clip),
         "rate": clip.rate,
         "units": unit_names(convention),
         "trust": answer.trust.document(),
@@ -76,11 +78,22 @@ def frame_times(clip: Clip) -> Floats:
 def motion_arrays(clip: Clip) -> dict[str, Floats]:
     """Return rotations (F, J, 4), root positions (F, 3) and bone offsets (J, 3).
 
-    In the unit of the clip; the root's offset is zero.
+    In the unit of the clip; the root's offset is zero. A clip with curves has their values (F, C).
     """
     # The root has a path and no bone.
     offsets = np.concatenate([np.zeros((1, 3)), clip.translations[0, 1:]])
-    return {"rotations": clip.rotations, "root_position": clip.root_path, "bone_offsets": offsets}
+    curves = {} if clip.curves is None else {"curves": clip.curves.values}
+    return {
+        "rotations": clip.rotations,
+        "root_position": clip.root_path,
+        "bone_offsets": offsets,
+        **curves,
+    }
+
+
+def _curve_names(clip: Clip) -> dict[str, list[str]]:
+    """Return the names of a clip's curves, in the order of their values; nothing without them."""
+    return {} if clip.curves is None else {"curve_names": clip.curves.names}
 
 
 def _rounded(values: Floats) -> npt.NDArray[np.float32]:
@@ -89,11 +102,13 @@ def _rounded(values: Floats) -> npt.NDArray[np.float32]:
 
 def pose_table(answer: PoseAnswer[Any]) -> Table:
     """Return a table of S rows; bone offsets are one array for all times."""
+    curves = {} if answer.curves is None else {"curves": tables.as_float32(answer.curves)}
     return Table(
         {
             "times": answer.times,
             "rotations": tables.as_float32(answer.rotations),
             "root_position": tables.as_float32(answer.root_position),
+            **curves,
         },
         {"trust": answer.trust.document()},
         {"bone_offsets": tables.as_float32(answer.bone_offsets)},

@@ -1,0 +1,118 @@
+"""Files of curves: CSV with a column `frame` that counts from 0 and a column for each curve."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from posefield.common.errors import RecipeError
+from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import Floats
+from posefield.motion import quat
+from posefield.motion.clip import Clip
+from posefield.motion.curves import Curve, CurveValues
+from posefield.motion.skeleton import Skeleton
+from posefield_train.source import clip_table
+from posefield_train.source.clip_table import ClipRow, ClipTable
+from posefield_train.source.curves.curve_keys import Curves
+from posefield_train.source.data_folder import FileLocation
+
+FRAME = "frame"
+RESTING_JOINT = "Root"
+"""Name of the only joint of clips without a skeleton."""
+
+
+@dataclass(frozen=True)
+class CurveReader:
+    """Reader of the curve files of one recipe: all have the curves of the first one."""
+
+    keys: Curves
+    curves: tuple[Curve, ...]
+
+    def read(self, place: FileLocation) -> CurveValues:
+        """Return the curves of a file.
+
+        Raises RecipeError for a missing column or frame, and for a cell that is not a number within
+        the curve's range.
+        """
+        table = clip_table.open_table(place)
+        _expect_frames(table)
+        _expect_columns(table, [curve.name for curve in self.curves], self.keys)
+        columns = [_column(table, curve) for curve in self.curves]
+        return CurveValues(self.curves, np.stack(columns, axis=-1))
+
+
+def reader(keys: Curves, rows: Sequence[ClipRow]) -> CurveReader:
+    """Return the reader of the files of rows.
+
+    Raises RecipeError for keys of an unknown curve, and for a file without curves.
+    """
+    first = clip_table.open_table(rows[0].curve_file)
+    _expect_frames(first)
+    found = [name for name in first.columns if name != FRAME]
+    names = keys.names or found
+    if not names:
+        raise RecipeError(first.name, f"found no column beside {FRAME!r}, expected curves", 1)
+    for name in keys.of:
+        if name not in names:
+            text = f"curves.of.{name}{did_you_mean(name, names)}, expected one of {names}"
+            raise RecipeError(first.name, text, 1)
+    return CurveReader(keys, tuple(map(keys.curve, names)))
+
+
+def with_curves(clip: Clip, own: CurveValues, row: ClipRow) -> Clip:
+    """Return a clip of all frames of a motion file with its curves.
+
+    Raises RecipeError for another number of frames.
+    """
+    if len(own.values) != len(clip):
+        raise row.error(
+            f"{row.curve_file} has {len(own.values)} frames of curves and {row.place} has "
+            f"{len(clip)} frames, expected as many"
+        )
+    return replace(clip, curves=own)
+
+
+def resting_clip(own: CurveValues, rate: float) -> Clip:
+    """Return a clip of curves on one joint that rests at the origin."""
+    frames, nothing = len(own.values), np.zeros((1, 3))
+    joints = Skeleton((RESTING_JOINT,), (-1,), nothing, (), np.zeros((0, 3)))
+    rotations = np.tile(quat.IDENTITY, (frames, 1, 1))
+    return Clip(joints, rotations, np.zeros((frames, 1, 3)), rate, own)
+
+
+def _expect_frames(table: ClipTable) -> None:
+    """Raise RecipeError unless the column of frames counts 0, 1, 2, …"""
+    table.require({FRAME: "number of the frame, from 0"})
+    found = [(line, table.frame(line, record, FRAME)) for line, record in table.records]
+    for (_, before), (line, frame) in pairwise([(0, -1), *found]):
+        if frame != before + 1:
+            at = f"after {before}" if before >= 0 else "first"
+            raise RecipeError(table.name, f"frame {frame} {at}, expected {before + 1}", line)
+
+
+def _expect_columns(table: ClipTable, names: Sequence[str], keys: Curves) -> None:
+    found = [name for name in table.columns if name != FRAME]
+    missing = [name for name in names if name not in found]
+    # Columns beside those that the recipe names are not curves of the family.
+    more = [] if keys.names else [name for name in found if name not in names]
+    if missing or more:
+        hint = did_you_mean(missing[0], found) if missing else ""
+        parts = [f"no curves {missing}{hint}"] * bool(missing)
+        parts += [f"curves {more} that the first clip lacks"] * bool(more)
+        raise RecipeError(table.name, f"found {' and '.join(parts)}, expected {list(names)}", 1)
+
+
+def _column(table: ClipTable, curve: Curve) -> Floats:
+    """Return the values (F,) of a curve."""
+    values = [(line, table.number(line, record, curve.name)) for line, record in table.records]
+    for line, value in values:
+        if not curve.minimum <= value <= curve.maximum:
+            raise RecipeError(
+                table.name,
+                f"column {curve.name!r}: {value:g}, expected {curve.minimum:g} to "
+                f"{curve.maximum:g} (curves.range)",
+                line,
+            )
+    return np.array([value for _, value in values])
