@@ -22,6 +22,7 @@ from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.motion import quat
 from posefield.motion.clip import Clip
+from posefield.motion.curves import CurveValues
 from posefield.question.results import ClipAnswer
 
 Bytes = npt.NDArray[np.uint8]
@@ -64,6 +65,15 @@ class GlbBuffer:
         self.accessors.append(found | said)
         return len(self.accessors) - 1
 
+    def zeros(self, count: int) -> int:
+        """Return the index of an accessor of vectors (count, 3) that are zero, without numbers."""
+        ends = {"min": [0.0, 0.0, 0.0], "max": [0.0, 0.0, 0.0]}
+        component = COMPONENTS["f4"]
+        self.accessors.append(
+            {"componentType": component, "count": count, "type": "VEC3"} | ends
+        )
+        return len(self.accessors) - 1
+
     def add(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
         """Return the index of an accessor of a whole array; said: properties of its view."""
         return self.accessor(array, kind, self.view(array.tobytes(), **said))
@@ -93,14 +103,15 @@ def glb(answer: ClipAnswer, said: Convention) -> bytes:
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": _joints(clip, offsets),
-        **_body(store, resting),
+        **_body(store, resting, clip.curves),
         "animations": [_animation(store, clip)],
         "bufferViews": store.views,
         "accessors": store.accessors,
     }
-    if rig.body is not None:
+    if "meshes" in document:
         document["scenes"] = [{"nodes": [0, len(offsets)]}]
-        document["nodes"].append({"name": "Body", "mesh": 0, "skin": 0})
+        skin = {} if rig.body is None else {"skin": 0}
+        document["nodes"].append({"name": document["meshes"][0]["name"], "mesh": 0, **skin})
     binary = b"".join(store.parts)
     return _container(document | {"buffers": [{"byteLength": len(binary)}]}, binary)
 
@@ -124,16 +135,43 @@ def _joints(clip: Clip, offsets: Floats) -> list[dict[str, Any]]:
     return nodes
 
 
-def _body(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
-    """Return mesh, material and skin; nothing for a rig without a body."""
+def _body(store: GlbBuffer, resting: RestPose, curves: CurveValues | None) -> dict[str, Any]:
+    """Return mesh, material and skin; nothing for a rig without a body and curves."""
     mesh = resting.rig.body
     if mesh is None:
-        return {}
+        return {} if curves is None else {"meshes": [_carrier(store, curves)]}
     rest = resting.rig.skeleton.at_rest(resting.offsets[0])
+    body = {"name": "Body", "primitives": [_primitive(store, resting, mesh)]}
     return {
-        "meshes": [{"name": "Body", "primitives": [_primitive(store, resting, mesh)]}],
+        "meshes": [body if curves is None else _with_targets(store, body, curves)],
         "materials": [_material(_mesh_arrays(resting.rig).colors is None)],
         "skins": [_skin(store, rest)],
+    }
+
+
+def _carrier(store: GlbBuffer, curves: CurveValues) -> dict[str, Any]:
+    """Return a mesh of one triangle without area, which carries curves where there is no body."""
+    points = store.add_bounded(np.zeros((3, 3), np.float32), "VEC3", target=VERTICES)
+    mesh = {"name": "Curves", "primitives": [{"attributes": {"POSITION": points}}]}
+    return _with_targets(store, mesh, curves)
+
+
+def _with_targets(
+    store: GlbBuffer, mesh: dict[str, Any], curves: CurveValues
+) -> dict[str, Any]:
+    """Return a mesh with a morph target for each curve, named as its readers expect.
+
+    The targets move no point: they carry the weights to readers, in which they can be modelled. All
+    share one accessor, whose numbers are zeros because it has no buffer view.
+    """
+    (primitive,) = mesh["primitives"]
+    still = store.zeros(store.accessors[primitive["attributes"]["POSITION"]]["count"])
+    targets = [{"POSITION": still}] * len(curves.curves)
+    return {
+        **mesh,
+        "primitives": [{**primitive, "targets": targets}],
+        "weights": curves.values[0].tolist(),
+        "extras": {"targetNames": curves.names},
     }
 
 
@@ -208,7 +246,7 @@ def _skin(store: GlbBuffer, rest: Floats) -> dict[str, Any]:
 
 
 def _animation(store: GlbBuffer, clip: Clip) -> dict[str, Any]:
-    """Return channels of all rotations, and of the translations that are not constant."""
+    """Return channels of all rotations, of translations that are not constant, and of curves."""
     when = store.add_bounded(_as_float32(np.arange(len(clip)) / clip.rate), "SCALAR")
     # Readers interpolate between neighbours, which must lie in one hemisphere.
     turns = _as_float32(np.moveaxis(quat.unroll(clip.rotations), 1, 0)[..., [1, 2, 3, 0]])
@@ -219,6 +257,10 @@ def _animation(store: GlbBuffer, clip: Clip) -> dict[str, Any]:
         *((joint, "rotation", o) for joint, o in enumerate(_tracks(store, turns, "VEC4"))),
         *zip(moved, ["translation"] * len(moved), _tracks(store, paths, "VEC3"), strict=True),
     ]
+    if clip.curves is not None:
+        # The node of the mesh follows those of the joints.
+        weights = store.add(_as_float32(clip.curves.values).reshape(-1), "SCALAR")
+        outputs.append((len(clip.skeleton), "weights", weights))
     return {
         "name": "clip",
         "samplers": [{"input": when, "output": output} for _, _, output in outputs],

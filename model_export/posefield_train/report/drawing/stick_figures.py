@@ -94,7 +94,8 @@ def pose_strip(
     step = right - left + MARGIN
     at = np.zeros((FRAMES, 1, 2))
     at[:, 0, 0] = step * np.arange(FRAMES) - left + 0.5 * MARGIN
-    ends = np.array(bones)
+    # A family of a single joint has no bones.
+    ends = np.array(bones, dtype=np.int64).reshape(-1, 2)
     first, second = ((points + at)[:, ends] for points in flat)
-    floor = min(0.0, float(first[..., 1].min()))
+    floor = float(first[..., 1].min(initial=0.0))
     return PoseStrip(first, second, frames / (count - 1), floor, step)

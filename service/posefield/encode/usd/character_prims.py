@@ -1,6 +1,6 @@
 """USD prims of a character: its skeleton, its skinned body and its animation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -11,14 +11,18 @@ from pxr import Gf, Vt
 from posefield.common.units import Singles
 from posefield.encode.body import body_colours
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
+from posefield.encode.character import joint_names
 from posefield.encode.character.character import CharacterArrays, CharacterRig
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.usd import prim_specs
+from posefield.encode.usd.layer_content import WEIGHTS
 from posefield.encode.usd.prim_specs import ValueTypes
 
 BINDING_SCHEMAS = ("SkelBindingAPI",)
 PRIMVAR_READER = "UsdPrimvarReader_float3"
+NO_OFFSET = np.zeros((1, 3), np.float32)
+"""Displacement of the only point of a blend shape that moves none."""
 MESH_SCHEMAS = ("SkelBindingAPI", "MaterialBindingAPI")
 
 UsdValues = Mapping[str, Any]
@@ -63,11 +67,14 @@ def _normals(mesh: SkinnedMesh, convention: Convention) -> Singles:
     return np.ascontiguousarray(axis_conversion.convert_directions(convention, mesh.normals))
 
 
-def fixed_vectors(rig: CharacterRig, convention: Convention) -> tuple[Singles, ...]:
-    """Return the arrays of vectors that all characters of a rig share."""
+def fixed_vectors(
+    rig: CharacterRig, convention: Convention, curves: Sequence[str] = ()
+) -> tuple[Singles, ...]:
+    """Return the arrays of vectors that all characters of a rig with named curves share."""
     if rig.body is None:
         return ()
-    return _normals(rig.body, convention), body_colours.colours(rig.body)
+    shapes = (NO_OFFSET,) if curves else ()
+    return _normals(rig.body, convention), body_colours.colours(rig.body), *shapes
 
 
 def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = METRES) -> Any:
@@ -117,8 +124,31 @@ def bind_animation(root: Any, animation: Any) -> None:
     prim_specs.add_relationship(skeleton, "skel:animationSource", animation)
 
 
-def animation(parent: Any, name: str, paths: tuple[str, ...]) -> Any:
-    """Return a new SkelAnimation of these joints, without samples of translations and rotations."""
+def add_blend_shapes(root: Any, rig: CharacterRig, curves: Sequence[str]) -> None:
+    """Add a blend shape for each curve to the body of a SkelRoot, if it has one.
+
+    The shapes move no point: they carry the weights to readers, in which they can be modelled.
+    """
+    if rig.body is None or not curves:
+        return
+    mesh = root.layer.GetPrimAtPath(root.path.AppendChild("Body"))
+    prim_specs.uniform_attribute(
+        mesh, "skel:blendShapes", ValueTypes.TokenArray, Vt.TokenArray(list(curves))
+    )
+    shapes = []
+    for name in joint_names.legal_names(curves):
+        shape = prim_specs.prim(mesh, name, "BlendShape")
+        offsets, points = Vt.Vec3fArray.FromNumpy(NO_OFFSET), Vt.IntArray([0])
+        prim_specs.uniform_attribute(shape, "offsets", ValueTypes.Vector3fArray, offsets)
+        prim_specs.uniform_attribute(shape, "pointIndices", ValueTypes.IntArray, points)
+        shapes.append(shape.path)
+    prim_specs.add_relationship(mesh, "skel:blendShapeTargets", *shapes)
+
+
+def animation(
+    parent: Any, name: str, paths: tuple[str, ...], curves: Sequence[str] = ()
+) -> Any:
+    """Return a new SkelAnimation of these joints and curves, without samples."""
     made = prim_specs.prim(parent, name, "SkelAnimation")
     prim_specs.uniform_attribute(made, "joints", ValueTypes.TokenArray, Vt.TokenArray(paths))
     prim_specs.varying_attribute(made, "translations", ValueTypes.Float3Array)
@@ -127,6 +157,10 @@ def animation(parent: Any, name: str, paths: tuple[str, ...]) -> Any:
     prim_specs.varying_attribute(
         made, "scales", ValueTypes.Half3Array, Vt.Vec3hArray(len(paths), Gf.Vec3h(1, 1, 1))
     )
+    if curves:
+        names = Vt.TokenArray(list(curves))
+        prim_specs.uniform_attribute(made, "blendShapes", ValueTypes.TokenArray, names)
+        prim_specs.varying_attribute(made, WEIGHTS, ValueTypes.FloatArray)
     return made
 
 

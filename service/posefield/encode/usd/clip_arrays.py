@@ -8,13 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from posefield.common import cancellation
+from posefield.common.units import Singles
 from posefield.encode.character import animation_samples, character, extent
 from posefield.encode.character.animation_samples import AnimationSamples
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import custom_data
-from posefield.encode.usd.layer_content import Array, LayerContent, Samples
+from posefield.encode.usd.layer_content import WEIGHTS, Array, LayerContent, Samples
+from posefield.motion.clip import Clip
 from posefield.question.results import ClipAnswer
 
 FRAMES_AT_ONCE = 3200
@@ -25,11 +27,12 @@ WITHOUT_BODY = Convention(1.0, "y", "none")
 
 
 class ClipArrays(NamedTuple):
-    """Rig, frame rate and layer content of one clip."""
+    """Rig, frame rate, layer content and names of the curves of one clip."""
 
     rig: CharacterRig
     rate: float
     content: LayerContent
+    curves: tuple[str, ...]
 
 
 def arrays_with_character(
@@ -42,7 +45,7 @@ def arrays_with_character(
         boxes = extent.bounding_boxes(rig.tree, made, rest.radii)
         values = character.character_arrays(rest, convention)
         values["extent"] = axis_conversion.convert_box(convention, boxes).astype(np.float32)
-        for index, samples in enumerate(_samples(made, convention)):
+        for index, samples in enumerate(_samples(made, some, convention)):
             own = {name: array[index] for name, array in values.items()}
             yield _clip_arrays(rig, some[index], samples, own)
 
@@ -53,7 +56,7 @@ def arrays_without_character(
     """Yield takes in the order of their results, with samples and facts only."""
     for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
         made = animation_samples.from_clips([answer.clip for answer in some])
-        for answer, samples in zip(some, _samples(made, convention), strict=True):
+        for answer, samples in zip(some, _samples(made, some, convention), strict=True):
             yield _clip_arrays(rig, answer, samples, {})
 
 
@@ -90,11 +93,23 @@ def _clip_arrays(
 ) -> ClipArrays:
     cancellation.check()
     content = LayerContent(samples, values, custom_data.split_facts(answer.trust.facts()))
-    return ClipArrays(rig, answer.clip.rate, content)
+    names = answer.clip.curves.names if answer.clip.curves else ()
+    return ClipArrays(rig, answer.clip.rate, content, tuple(names))
 
 
-def _samples(made: AnimationSamples, convention: Convention) -> Iterator[Samples]:
+def _samples(
+    made: AnimationSamples, answers: Sequence[ClipAnswer], convention: Convention
+) -> Iterator[Samples]:
     translations = axis_conversion.convert_positions(convention, made.translations)
     rotations = axis_conversion.convert_rotations(convention, made.rotations)
-    for first, last in pairwise(made.starts):
-        yield {"translations": translations[first:last], "rotations": rotations[first:last]}
+    for answer, (first, last) in zip(answers, pairwise(made.starts), strict=True):
+        own = {"translations": translations[first:last], "rotations": rotations[first:last]}
+        yield own | _weights(answer.clip)
+
+
+def _weights(clip: Clip) -> dict[str, Singles]:
+    """Return the curves (F, C) of a clip as weights of blend shapes; nothing without them."""
+    if clip.curves is None:
+        return {}
+    # USD's deduplication does not distinguish -0 from 0.
+    return {WEIGHTS: np.ascontiguousarray(clip.curves.values, np.float32) + np.float32(0.0)}

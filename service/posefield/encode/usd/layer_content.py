@@ -19,6 +19,9 @@ Array = npt.NDArray[Any]
 Samples = Mapping[str, Singles]
 """Samples (F, ...) of attributes at the time codes 0 to F - 1, by name."""
 
+WEIGHTS = "blendShapeWeights"
+"""Name of the samples (F, C) of curves; those of other attributes are vectors (F, N, n)."""
+
 Repeats = tuple[int, ...] | None
 """For each row of samples the index of the first equal row; None if all rows differ."""
 
@@ -74,13 +77,14 @@ class LayerPattern(NamedTuple):
 
     samples: name, shape and repeats. values: name, shape and type. numbers: of each number INLINE,
     or the index of the first equal one among those of the author and those before it. facts: their
-    shape.
+    shape. compressed: whether USD compresses some weights.
     """
 
     samples: tuple[tuple[str, tuple[int, ...], Repeats], ...]
     values: tuple[tuple[str, tuple[int, ...], str], ...]
     numbers: tuple[int, ...]
     facts: Hashable
+    compressed: bool = False
 
 
 def pattern(content: LayerContent, known: tuple[float, ...]) -> LayerPattern:
@@ -90,6 +94,7 @@ def pattern(content: LayerContent, known: tuple[float, ...]) -> LayerPattern:
         tuple((name, found.shape, found.dtype.char) for name, found in content.values.items()),
         _first_equal_numbers(content.facts.numbers, known),
         content.facts.shape,
+        _is_compressed(content.samples.get(WEIGHTS)),
     )
 
 
@@ -148,6 +153,22 @@ def _repeats(rows: Singles) -> Repeats:
         first = {}
         alike = [first.setdefault(row.tobytes(), index) for index, row in enumerate(rows)]
     return tuple(alike) if len(first) < len(rows) else None
+
+
+LEAST_COMPRESSED, LARGEST_SHARE = 16, 4
+"""Size from which USD compresses arrays of floats, and how often on average a number occurs in one
+that it compresses (pxr/usd/sdf/crateFile.cpp, `_WritePossiblyCompressedArray`).
+"""
+
+
+def _is_compressed(weights: Singles | None) -> bool:
+    """Return whether USD compresses some row of weights (F, C): of whole or of few numbers."""
+    if weights is None or weights.shape[1] < LEAST_COMPRESSED:
+        return False
+    whole = np.all(weights == np.trunc(weights), axis=1)
+    ordered = np.sort(weights, axis=1)
+    distinct = 1 + np.count_nonzero(ordered[:, 1:] != ordered[:, :-1], axis=1)
+    return bool(np.any(whole | (distinct * LARGEST_SHARE <= weights.shape[1])))
 
 
 def _all_distinct(numbers: Singles) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from posefield.common.units import Floats
-from posefield.encode.usd.layer_content import Samples
+from posefield.encode.usd.layer_content import WEIGHTS, Samples
 
 ValueTypes = Sdf.ValueTypeNames
 
@@ -42,10 +42,10 @@ def vertex_attribute(owner: Any, name: str, kind: Any, value: Any = None) -> Any
     return spec
 
 
-def add_relationship(owner: Any, name: str, target: Any) -> None:
-    """Create a relationship to the prim at a path."""
+def add_relationship(owner: Any, name: str, *targets: Any) -> None:
+    """Create a relationship to the prims at paths."""
     spec = Sdf.RelationshipSpec(owner, name, custom=False)
-    spec.targetPathList.explicitItems = [target]
+    spec.targetPathList.explicitItems = list(targets)
 
 
 def float3_array(values: Floats) -> Any:
@@ -54,11 +54,13 @@ def float3_array(values: Floats) -> Any:
 
 
 def set_time_samples(prim: Any, values: Samples) -> None:
-    """Set the time samples of translations and rotations of a SkelAnimation."""
+    """Set the time samples of translations, rotations and weights, if any, of a SkelAnimation."""
     _set_attribute_samples(
         prim, "translations", map(Vt.Vec3fArray.FromNumpy, values["translations"])
     )
     _set_attribute_samples(prim, "rotations", map(Vt.QuatfArray.FromNumpy, values["rotations"]))
+    if WEIGHTS in values:
+        _set_attribute_samples(prim, WEIGHTS, map(Vt.FloatArray.FromNumpy, values[WEIGHTS]))
 
 
 def _set_attribute_samples(prim: Any, name: str, values: Iterable[Any]) -> None:

@@ -79,8 +79,12 @@ def _array_texts(content: LayerContent) -> dict[str, bytes]:
 
 def _samples_text(rows: Singles) -> bytes:
     """Return time samples as text, from the first time code to the last bracket."""
-    spelt = quaternion_texts(rows) if rows.shape[-1] == 4 else vector_texts(rows)
-    return (b",\n" + INDENT).join(b"%d: [(%b)]" % each for each in enumerate(spelt))
+    if rows.ndim == 2:
+        spelt, form = row_texts(rows[:, None]), b"%d: [%b]"
+    else:
+        spelt = quaternion_texts(rows) if rows.shape[-1] == 4 else vector_texts(rows)
+        form = b"%d: [(%b)]"
+    return (b",\n" + INDENT).join(form % each for each in enumerate(spelt))
 
 
 def _array_spans(body: bytes, spelt: dict[str, bytes]) -> Iterator[tuple[int, int, str]]:

@@ -18,9 +18,10 @@ ANIMATION_NAME = "Anim"
 
 @dataclass(frozen=True)
 class AnimationLayerBuilder(BaseLayerBuilder):
-    """Layers of an animation of joints with given paths."""
+    """Layers of an animation of joints with given paths, and of curves with given names."""
 
     paths: tuple[str, ...]
+    curves: tuple[str, ...] = ()
 
     @property
     def values(self) -> tuple[Array, ...]:
@@ -38,7 +39,8 @@ class AnimationLayerBuilder(BaseLayerBuilder):
         made = self.head(content)
         with Sdf.ChangeBlock():
             prim_specs.set_time_samples(
-                character_prims.animation(made, ANIMATION_NAME, self.paths), content.samples
+                character_prims.animation(made, ANIMATION_NAME, self.paths, self.curves),
+                content.samples,
             )
         return made
 
@@ -47,7 +49,7 @@ def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, with the facts and without a character."""
     return [
         CRATE_CACHE.write(
-            AnimationLayerBuilder(take.rate, convention, take.rig.paths), take.content
+            AnimationLayerBuilder(take.rate, convention, take.rig.paths, take.curves), take.content
         )
         for take in clip_arrays.arrays_without_character(answers, convention)
     ]

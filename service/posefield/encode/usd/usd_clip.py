@@ -26,14 +26,15 @@ ANIMATION = ROOT.AppendChild("Anim")
 
 @dataclass(frozen=True)
 class ClipLayerBuilder(BaseLayerBuilder):
-    """Layers of clips of one skeleton."""
+    """Layers of clips of one skeleton. curves: names of the clips' curves."""
 
     rig: CharacterRig
+    curves: tuple[str, ...] = ()
 
     @property
     def values(self) -> tuple[Array, ...]:
         """Return the arrays that every layer holds."""
-        return character_prims.fixed_vectors(self.rig, self.convention)
+        return character_prims.fixed_vectors(self.rig, self.convention, self.curves)
 
     def head(self, content: LayerContent) -> Any:
         """Return the layer without its prims."""
@@ -44,7 +45,7 @@ class ClipLayerBuilder(BaseLayerBuilder):
     def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
         made = Sdf.Layer.CreateAnonymous("clip.usda")
-        made.TransferContent(_character_prims(self.rig, self.convention))
+        made.TransferContent(_character_prims(self.rig, self.convention, self.curves))
         with Sdf.ChangeBlock():
             self.set_metadata(made, ROOT.name, content)
             character_prims.set_values(
@@ -55,16 +56,16 @@ class ClipLayerBuilder(BaseLayerBuilder):
 
 
 @lru_cache(maxsize=16)
-def _character_prims(rig: CharacterRig, convention: Convention) -> Any:
+def _character_prims(rig: CharacterRig, convention: Convention, curves: tuple[str, ...]) -> Any:
     """Return a layer of a character and its animation without numbers.
 
     Cached, since building it takes as long as exporting it.
     """
     made = Sdf.Layer.CreateAnonymous("prims.usda")
     root = character_prims.root(made, ROOT.name, rig, convention)
-    character_prims.bind_animation(
-        root, character_prims.animation(root, ANIMATION.name, rig.paths).path
-    )
+    character_prims.add_blend_shapes(root, rig, curves)
+    made_animation = character_prims.animation(root, ANIMATION.name, rig.paths, curves)
+    character_prims.bind_animation(root, made_animation.path)
     return made
 
 
@@ -93,4 +94,4 @@ def builders_and_contents(
 ) -> Iterator[tuple[ClipLayerBuilder, LayerContent]]:
     """Yield the author and the content of the layer of each answer."""
     for take in clip_arrays.arrays_with_character(answers, convention):
-        yield ClipLayerBuilder(take.rate, convention, take.rig), take.content
+        yield ClipLayerBuilder(take.rate, convention, take.rig, take.curves), take.content

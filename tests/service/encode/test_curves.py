@@ -1,0 +1,153 @@
+"""Curves of clips in every format that carries them, with usd-core as the oracle of USD."""
+
+import json
+import struct
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+from pxr import Usd, UsdSkel
+
+from posefield.encode.character import joint_names
+from posefield.encode.files.file_convention import METRES
+from posefield.encode.formats import CLIP_ENCODERS
+from posefield.encode.usd import crate_template, text_template, usd_clip
+from posefield.motion.curves import Curve, CurveValues
+from posefield.question.results import ClipAnswer
+
+FLOAT32 = 1e-7
+NAMES = ("jawOpen", "Mouth Smile", "眉")
+
+
+def curves(count, frames, seed=0):
+    rng = np.random.default_rng(seed)
+    own = tuple(Curve(f"shape{index}", 0.0, 1.0, 0.02) for index in range(count))
+    return CurveValues(own, rng.uniform(0.0, 1.0, (frames, count)))
+
+
+def with_curves(answer, own):
+    return ClipAnswer(replace(answer.clip, curves=own), answer.trust)
+
+
+@pytest.fixture
+def face(walk):
+    """The walk with three curves, of names that USD does not allow for prims."""
+    own = curves(3, len(walk.clip))
+    named = tuple(replace(one, name=name) for one, name in zip(own.curves, NAMES, strict=True))
+    return with_curves(walk, CurveValues(named, own.values))
+
+
+def stage(content, path):
+    path.write_bytes(content)
+    return Usd.Stage.Open(str(path))
+
+
+@pytest.mark.parametrize("ending", ["usda", "usdc", "usdz"])
+@pytest.mark.parametrize("body", ["mannequin", "bones", "none"])
+def test_usd_skel_reads_the_weights_of_every_frame(face, ending, body, tmp_path):
+    said = replace(METRES, body=body)
+    opened = stage(CLIP_ENCODERS[ending].encode(face, said), tmp_path / f"face.{ending}")
+    animation = UsdSkel.Animation(opened.GetPrimAtPath("/Character/Anim"))
+    assert tuple(animation.GetBlendShapesAttr().Get()) == NAMES
+    weights = animation.GetBlendShapeWeightsAttr()
+    found = np.array([weights.Get(frame) for frame in weights.GetTimeSamples()])
+    assert np.abs(found - face.clip.curve_values).max() < FLOAT32
+    assert np.abs(found[1:] - face.clip.curve_values[:-1]).max() > 0.1
+
+
+@pytest.mark.parametrize("body", ["mannequin", "bones"])
+def test_the_body_has_a_blend_shape_for_each_curve_that_moves_no_point(face, body, tmp_path):
+    content = CLIP_ENCODERS["usdc"].encode(face, replace(METRES, body=body))
+    opened = stage(content, tmp_path / "face.usdc")
+    skinned = UsdSkel.BindingAPI(opened.GetPrimAtPath("/Character/Body"))
+    shapes = UsdSkel.BlendShapeQuery(skinned)
+    assert tuple(skinned.GetBlendShapesAttr().Get()) == NAMES
+    assert shapes.GetNumBlendShapes() == len(NAMES)
+    targets = [path.name for path in skinned.GetBlendShapeTargetsRel().GetTargets()]
+    assert targets == list(joint_names.legal_names(NAMES))
+    for target in skinned.GetBlendShapeTargetsRel().GetTargets():
+        shape = UsdSkel.BlendShape(opened.GetPrimAtPath(target))
+        assert np.all(np.array(shape.GetOffsetsAttr().Get()) == 0.0)
+
+
+SPARSE = 0.9
+"""Share of the frames whose curves rest at zero, as a face's do."""
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 11, 15, 16, 52])
+@pytest.mark.parametrize("kind", ["busy", "resting", "tiny", "few"])
+def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
+    for seed in range(4):
+        own = curves(count, len(walk.clip), seed)
+        rng = np.random.default_rng(seed)
+        values = own.values.copy()
+        if kind == "resting":
+            values[rng.uniform(size=len(values)) < SPARSE] = 0.0
+        if kind == "tiny":
+            values *= 1e-7
+        if kind == "few":
+            values = np.round(2.0 * values) / 2.0
+        made = with_curves(walk, CurveValues(own.curves, values))
+        ((author, content),) = usd_clip.builders_and_contents([made], METRES)
+        for form, write in ((crate_template, usd_clip.usdc), (text_template, usd_clip.usda)):
+            assert write([made], METRES)[0] == form.ordinary(author, content)
+
+
+def test_weights_that_usd_does_not_compress_are_filled_in_a_template(walk):
+    made = with_curves(walk, curves(52, len(walk.clip)))
+    ((author, content),) = usd_clip.builders_and_contents([made], METRES)
+    for form in (crate_template, text_template):
+        found = form.template(author, content, form.pattern(author, content))
+        assert found is not None
+        assert found.write(author, content) == form.ordinary(author, content)
+    # Equal to the ordinary file of other weights it would be no template.
+    ((_, other),) = usd_clip.builders_and_contents(
+        [with_curves(walk, curves(52, len(walk.clip), seed=1))], METRES
+    )
+    assert found.write(author, content) != form.ordinary(author, other)
+
+
+def gltf(content):
+    """The document of a glTF file, and its buffer."""
+    length = struct.unpack_from("<L", content, 12)[0]
+    return json.loads(content[20 : 20 + length]), content[28 + length :]
+
+
+@pytest.mark.parametrize("body", ["mannequin", "none"])
+def test_gltf_has_a_named_morph_target_for_each_curve(face, body):
+    document, binary = gltf(CLIP_ENCODERS["glb"].encode(face, replace(METRES, body=body)))
+    (mesh,) = document["meshes"]
+    assert mesh["extras"]["targetNames"] == list(NAMES)
+    assert [len(one["targets"]) for one in mesh["primitives"]] == [len(NAMES)]
+    (animation,) = document["animations"]
+    (channel,) = [one for one in animation["channels"] if one["target"]["path"] == "weights"]
+    assert document["nodes"][channel["target"]["node"]]["mesh"] == 0
+    assert channel["target"]["node"] in document["scenes"][0]["nodes"]
+    accessor = document["accessors"][animation["samplers"][channel["sampler"]]["output"]]
+    view = document["bufferViews"][accessor["bufferView"]]
+    found = np.frombuffer(binary, "<f4", accessor["count"], view["byteOffset"])
+    expected = face.clip.curve_values
+    assert np.abs(found.reshape(expected.shape) - expected).max() < FLOAT32
+    assert np.abs(found.reshape(expected.shape[::-1]).T - expected).max() > 0.1
+
+
+def test_json_and_tables_name_the_curves(face):
+    clip = json.loads(CLIP_ENCODERS["json"].encode(face))
+    packed = msgspec.msgpack.decode(CLIP_ENCODERS["msgpack"].encode(face))
+    expected = face.clip.curve_values
+    assert clip["curve_names"] == packed["curve_names"] == list(NAMES)
+    assert np.abs(np.array(clip["curves"]) - expected).max() < 1e-6
+    assert packed["curves"]["shape"] == list(expected.shape)
+
+
+@pytest.mark.parametrize("ending", ["json", "msgpack", "usda", "glb"])
+def test_files_of_a_clip_without_curves_name_none(walk, face, ending):
+    words = (b"curve", b"lendShape", b"targetNames", b'"weights"')
+    assert not any(word in CLIP_ENCODERS[ending].encode(walk) for word in words)
+    assert any(word in CLIP_ENCODERS[ending].encode(face) for word in words)
+
+
+def test_a_clip_refuses_curves_of_another_number_of_frames(walk):
+    with pytest.raises(ValueError, match="curves"):
+        replace(walk.clip, curves=curves(3, len(walk.clip) - 1))
