@@ -272,6 +272,15 @@ class Preset(Struct, frozen=True, kw_only=True):
     labels: dict[str, str] = {}
 
 
+class Curve(Struct, frozen=True, kw_only=True):
+    """Scalar channel of a model's motions, such as the weight of a blend shape."""
+
+    name: str
+    minimum: float
+    maximum: float
+    distance: float
+
+
 class ModelCardKriging(Struct, frozen=True, kw_only=True):
     """Parameters of the kriging model that weights the captured clips."""
 
@@ -320,6 +329,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     left_out: tuple[float, ...] = ()
     event: ModelCardEvent | None = None
     presets: tuple[Preset, ...] = ()
+    curves: tuple[Curve, ...] = ()
 
 
 class Deviation(Struct, frozen=True, kw_only=True):

@@ -36,7 +36,8 @@ class Pose(Arrays, frozen=True, eq=False):
     """Poses at S times of the J joints that the model's card names.
 
     times: (S,), s. rotations: (S, J, 4), unit quaternions w x y z, local to the parent.
-    root_position: (S, 3), m. bone_offsets: (J, 3), m.
+    root_position: (S, 3), m. bone_offsets: (J, 3), m. curves: (S, C), values of the curves that the
+    card names; None for a model without curves.
     """
 
     trust: Trust
@@ -44,13 +45,14 @@ class Pose(Arrays, frozen=True, eq=False):
     rotations: Array
     root_position: Array
     bone_offsets: Array
+    curves: Array | None = None
 
 
 class ClipNumbers(Arrays, frozen=True, eq=False):
     """A clip of F frames of J joints, with arrays as in Pose.
 
     rate: frames per second. names, parents: of the joints; the root's parent is -1. units: of the
-    arrays, by name.
+    arrays, by name. curve_names: of the C curves; empty for a model without curves.
     """
 
     trust: Trust
@@ -62,6 +64,8 @@ class ClipNumbers(Arrays, frozen=True, eq=False):
     rotations: Array
     root_position: Array
     bone_offsets: Array
+    curve_names: tuple[str, ...] = ()
+    curves: Array | None = None
 
 
 class SigmaGrid(Arrays, frozen=True, eq=False):
@@ -120,7 +124,13 @@ def _array(kind: type, found: Any) -> Array:
 
 
 SHAPES: dict[Any, dict[str, str]] = {
-    Pose: {"times": "S", "rotations": "SJ4", "root_position": "S3", "bone_offsets": "J3"},
+    Pose: {
+        "times": "S",
+        "rotations": "SJ4",
+        "root_position": "S3",
+        "bone_offsets": "J3",
+        "curves": "SC",
+    },
     ClipNumbers: {
         "names": "J",
         "parents": "J",
@@ -128,6 +138,8 @@ SHAPES: dict[Any, dict[str, str]] = {
         "rotations": "FJ4",
         "root_position": "F3",
         "bone_offsets": "J3",
+        "curve_names": "C",
+        "curves": "FC",
     },
     SigmaGrid: {
         "across_values": "C",

@@ -34,6 +34,7 @@ export function motion(content: Uint8Array<ArrayBuffer>): Motion {
     ...own,
     names,
     parents: integers(found, "parents", names.length),
+    curveNames: own.curves ? strings(found, "curve_names") : [],
     rate: number(found, "rate"),
     frames: own.times.length,
     units: record<Record<string, string>>(found, "units"),
@@ -67,7 +68,13 @@ function posesOf(found: Packed): Poses {
     rotations: float32(found, "rotations", [frames, joints, 4]),
     rootPosition: float32(found, "root_position", [frames, 3]),
     boneOffsets: float32(found, "bone_offsets", [joints, 3]),
+    curves: "curves" in found ? curvesOf(found, frames) : null,
   };
+}
+
+function curvesOf(found: Packed, frames: number): Float32Array {
+  const [, curves = 0] = array(found, "curves").shape;
+  return float32(found, "curves", [frames, curves]);
 }
 
 function unpacked(content: Uint8Array<ArrayBuffer>): Packed {

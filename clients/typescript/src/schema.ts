@@ -1109,6 +1109,18 @@ export interface components {
         RootPosition: components["schemas"]["Vector"][];
         /** @description Translation of each joint from its parent at these controls, in metres. The entry of the root is not used. */
         BoneOffsets: components["schemas"]["Vector"][];
+        /** @description Value of each curve at each time, within the limits on the card. Absent for models without curves. */
+        CurveValues: number[][];
+        /** @description Scalar channel of a model's motions, such as the weight of a blend shape. */
+        Curve: {
+            name: string;
+            /** @description Smallest value of the answers. */
+            minimum: number;
+            /** @description Largest value of the answers. */
+            maximum: number;
+            /** @description Distance of a joint that one unit of the curve counts as in sigma and in errors of levels, in metres. */
+            distance: number;
+        };
         /** @description Poses of the joints of the model's card, in its order. */
         PoseAnswer: {
             trust: components["schemas"]["Trust"];
@@ -1117,6 +1129,7 @@ export interface components {
             rotations: components["schemas"]["Rotations"];
             root_position: components["schemas"]["RootPosition"];
             bone_offsets: components["schemas"]["BoneOffsets"];
+            curves?: components["schemas"]["CurveValues"];
         };
         /** @description A clip with its skeleton. */
         ClipDocument: {
@@ -1137,6 +1150,9 @@ export interface components {
             rotations: components["schemas"]["Rotations"];
             root_position: components["schemas"]["RootPosition"];
             bone_offsets: components["schemas"]["BoneOffsets"];
+            /** @description Names of the curves. Absent for models without curves. */
+            curve_names?: string[];
+            curves?: components["schemas"]["CurveValues"];
         };
         Quaternion: number[];
         Vector: number[];
@@ -1289,6 +1305,8 @@ export interface components {
             } | null;
             /** @description Points of the controls that the recipe names, such as stroll and hurry; empty if it names none. */
             presets?: components["schemas"]["Preset"][];
+            /** @description Curves of the answers, in their order. Absent for models without curves. */
+            curves?: components["schemas"]["Curve"][];
         };
         /** @description Names by which clips differ besides their controls. */
         LabelSet: {

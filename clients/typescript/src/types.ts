@@ -52,12 +52,16 @@ export interface Poses {
   readonly rootPosition: Float32Array;
   /** J × 3, m from the parent; the root's is not used. */
   readonly boneOffsets: Float32Array;
+  /** S × C, the card's curves; null for a model without curves. */
+  readonly curves: Float32Array | null;
 }
 
 /** A clip as numbers, with the skeleton that it moves. */
 export interface Motion extends Poses {
   readonly names: readonly string[];
   readonly parents: readonly number[];
+  /** C; empty for a model without curves. */
+  readonly curveNames: readonly string[];
   readonly rate: number;
   readonly frames: number;
   /** What the numbers are: other lengths and another axis up, where the question asked for them. */

@@ -9,6 +9,7 @@ import {
   Problem,
 } from "@posefield/client";
 
+import { curvesAt } from "./curves.ts";
 import type { Source } from "./page.ts";
 import { pose as posture, sample } from "./playback.ts";
 import type { State } from "./state.ts";
@@ -77,7 +78,12 @@ async function inPlace(
   const { controls, performer, labels, level, model } = state;
   const question = { controls, performer, labels, level, time: [time], root: "in_place" as const };
   const answer = await source.crowd(model, question, signal);
-  return { ...answer, times: Float64Array.of(time), trust: trust(answer, card, state) };
+  return {
+    ...answer,
+    times: Float64Array.of(time),
+    trust: trust(answer, card, state),
+    curves: null,
+  };
 }
 
 function trust(answer: CrowdPoses, card: ModelCard, state: State): Poses["trust"] {
@@ -104,5 +110,5 @@ function seen({ performers }: ModelCard, performer: string | null) {
 
 function at(found: Motion, time: number): Poses {
   const { rotations, root } = sample(posture(found.names.length), found, time);
-  return { ...found, rotations, rootPosition: root };
+  return { ...found, rotations, rootPosition: root, curves: curvesAt(found, time) };
 }

@@ -3,6 +3,7 @@
 import * as bodies from "./bodies.ts";
 import * as controls from "./controls.ts";
 import * as crowd from "./crowd.ts";
+import * as curves from "./curves.ts";
 import * as detail from "./detail-panel.ts";
 import * as feet from "./feet.ts";
 import * as files from "./files.ts";
@@ -33,6 +34,7 @@ const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<st
     welcome: welcome.mount,
     controls: controls.mount,
     trust: trust.mount,
+    curves: curves.mount,
     target: target.mount,
     map: map.mount,
     feet: feet.mount,

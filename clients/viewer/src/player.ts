@@ -3,6 +3,7 @@
 import type { ModelCard, Motion, Poses, Trust } from "@posefield/client";
 
 import * as ask from "./ask.ts";
+import { curvesAt } from "./curves.ts";
 import { Latest } from "./latest.ts";
 import type { Page } from "./page.ts";
 import {
@@ -25,6 +26,8 @@ const IDLE = 140;
 export interface Shown extends Pose {
   readonly offsets: Float32Array;
   readonly carried: Carried;
+  /** Values of the card's curves; none where only a crowd's pose is known. */
+  readonly curves?: Float32Array | null;
 }
 
 export type Watcher = (shown: Shown) => void;
@@ -39,6 +42,7 @@ export class Player {
   readonly #poses = new Latest<number>((asked) => this.#askPose(asked));
   readonly #whole = new Latest<number>((asked) => this.#askClip(asked));
   #offsets: Float32Array;
+  #curves: Float32Array | null = null;
   #clip: Motion | null = null;
   #lap: Carried = NOWHERE;
   #carried: Carried = NOWHERE;
@@ -72,7 +76,8 @@ export class Player {
   }
 
   get shown(): Shown {
-    return { ...this.#pose, offsets: this.#offsets, carried: this.#carried };
+    const [offsets, carried, curves] = [this.#offsets, this.#carried, this.#curves];
+    return { ...this.#pose, offsets, carried, curves };
   }
 
   /** Called with every new pose that is shown, and once at the start. */
@@ -146,6 +151,7 @@ export class Player {
     if (!answer || asked < this.#answered) return;
     this.#pose.rotations.set(answer.rotations.subarray(0, this.#pose.rotations.length));
     this.#pose.root.set(answer.rootPosition.subarray(0, 3));
+    this.#curves = answer.curves;
     this.#take(asked, answer);
     this.#told();
   }
@@ -208,6 +214,7 @@ export class Player {
       return;
     }
     sample(this.#pose, this.#clip, time);
+    this.#curves = curvesAt(this.#clip, time);
     this.#told();
   }
 

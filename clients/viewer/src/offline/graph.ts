@@ -21,8 +21,8 @@ export interface Rows {
   readonly labels: Float32Array;
 }
 
-/** Outputs, row by row. */
-export type Answers = Readonly<Record<Output, Float32Array>>;
+/** Outputs, row by row; those of models with curves have `curves`. */
+export type Answers = Readonly<Record<Output, Float32Array>> & { readonly curves?: Float32Array };
 
 let last: Promise<unknown> = Promise.resolve();
 
@@ -79,8 +79,10 @@ export class Graph {
     const steps = rows.times.length / rows.count;
     const joints = this.#card.skeleton.parents.length;
     const shared = { rotations: steps * joints, root_position: steps, bone_offsets: joints };
-    const widths = { ...shared, duration: 1, sigma: 1, travel: steps };
-    const sizes = Object.entries(SIZES) as [Output, number][];
+    const widths = { ...shared, duration: 1, sigma: 1, travel: steps, curves: steps };
+    const curves = this.#card.curves?.length ?? 0;
+    const own = curves ? { ...SIZES, curves } : SIZES;
+    const sizes = Object.entries(own) as [Output, number][];
     const whole = Object.fromEntries(
       sizes.map(([name, size]) => [name, new Float32Array(rows.count * widths[name] * size)]),
     ) as Record<Output, Float32Array>;

@@ -78,6 +78,7 @@ export class Offline implements Source {
       rotations: found.rotations,
       rootPosition: found.root_position,
       boneOffsets: found.bone_offsets,
+      curves: found.curves ?? null,
     };
   }
 
@@ -100,6 +101,8 @@ export class Offline implements Source {
       trust: this.#trust(asked, found),
       ...routed,
       boneOffsets: found.bone_offsets,
+      curves: found.curves ? curvesOf(found.curves, when, routed) : null,
+      curveNames: this.#card.curves?.map(({ name }) => name) ?? [],
       names,
       parents,
       rate: question.fps ?? 30,
@@ -166,6 +169,13 @@ export class Offline implements Source {
     const labels = Object.keys(asked.labels).length ? { labels: asked.labels } : {};
     return { ...own, ...labels, ...seen, ...told(asked.deviations, sigma) } as Trust;
   }
+}
+
+/** The curves of the frames, and of the first again where a loop repeats it. */
+function curvesOf(curves: Float32Array, when: Float64Array, routed: Course): Float32Array {
+  if (routed.times.length === when.length) return curves;
+  const width = curves.length / when.length;
+  return new Float32Array([...curves, ...curves.subarray(0, width)]);
 }
 
 /** What one cycle does, as its end says (service/posefield/locomotion/stride.py). */
