@@ -11,6 +11,7 @@ from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.sample import sample_files, sample_walk
+from posefield_train.sample.face import face_files
 from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
@@ -47,12 +48,34 @@ def measured_recipe() -> Recipe:
     return Recipe.model_validate({**tomllib.loads(sample_walk.RECIPE_TEXT), "controls": measured})
 
 
+def face() -> Path:
+    """Return the folder of the procedural face; its recipe is recipe.toml."""
+    return fixture_cache.path("face", face_files.write_family)
+
+
+@functools.cache
+def face_recipe() -> Recipe:
+    """Return the recipe of the procedural face, which trains in a second."""
+    return recipe.read(face() / "recipe.toml")
+
+
+@functools.cache
+def curves_recipe() -> Recipe:
+    """Return the recipe of the face's curves without its skeleton."""
+    whole = face_recipe().model_dump(by_alias=True, exclude_unset=True)
+    clips = {**whole["clips"], "file": "curves"}
+    alone = {**whole, "name": "curves", "clips": clips, "curves": {"rate": 60.0}}
+    return Recipe.model_validate(alone)
+
+
 RECIPES = {
     "reaching": small_recipe,
     "labelled": labelled_recipe,
     "stroll": sample_walk.recipe,
     "measured": measured_recipe,
     "styled": sample_walk.styled_recipe,
+    "face": face_recipe,
+    "curves": curves_recipe,
 }
 
 
@@ -71,6 +94,8 @@ def examples(model: str) -> list[Example]:
     """Return the clips that a model is trained on."""
     if model in ("reaching", "labelled"):
         return reaches()
+    if model in ("face", "curves"):
+        return ingest.ingest(RECIPES[model](), face())[0]
     folder = styled_folder() if model == "styled" else strides_folder()
     return ingest.ingest(RECIPES[model](), folder)[0]
 

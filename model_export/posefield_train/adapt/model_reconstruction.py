@@ -78,9 +78,17 @@ def load(path: Path) -> ReconstructedModel:
 def reconstruct(content: bytes, source: str) -> ReconstructedModel:
     """Return the model of one level, and its card, from the bytes of a file.
 
-    source: name of the file in errors. Raises ModelError for an invalid checksum, graph or card.
+    source: name of the file in errors. Raises ModelError for an invalid checksum, graph or
+    card, and for a model with curves.
     """
     own_card = checked_file.load_card(content, source)
+    if own_card.curves:
+        names = [curve.name for curve in own_card.curves]
+        message = (
+            f"found curves {names}, expected a model without: train a model with curves again to "
+            "add a performer"
+        )
+        raise ModelError(source, message)
     numbers = {name: _as_float64(array) for name, array in subgraph.initializers(content).items()}
     file = _ModelFile(numbers, own_card, own_card.making, source)
     return ReconstructedModel(

@@ -139,7 +139,7 @@ def _uniform_times(frames: int) -> Annotated[Floats, "{frames}"]:
     return np.linspace(0.0, 1.0, frames)
 
 
-def trace(clip: Clip, weights: JointWeights) -> Annotated[Floats, "frames joints*3"]:
+def trace(clip: Clip, weights: JointWeights) -> Annotated[Floats, "frames features"]:
     """Return joint positions (F, J * 3), m, relative to root and heading, times weights (J,).
 
     Curves follow, each as the distance that it counts as.

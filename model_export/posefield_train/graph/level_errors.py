@@ -59,7 +59,8 @@ class LevelTest:
     """Random test inputs with the output of the model before truncation.
 
     controls: (Q, d). labels: (Q, p). times: (Q, 1), s. whole: joint positions (Q, J, 3), m, and
-    points of the curves behind them. at_event: position (Q, 3) of the event's joint at the event, m.
+    points of the curves behind them. at_event: position (Q, 3) of the event's joint at the event,
+    m.
     """
 
     controls: Floats

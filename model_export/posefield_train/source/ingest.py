@@ -18,14 +18,14 @@ from posefield_train.source import (
     bvh,
     clip_notes,
     clip_table,
+    curve_files,
     half_turns,
     measured_controls,
     shipped_recipes,
 )
 from posefield_train.source.bvh import end_sites
 from posefield_train.source.clip_table import ClipRow
-from posefield_train.source.curves import curve_files
-from posefield_train.source.curves.curve_files import CurveReader
+from posefield_train.source.curve_files import CurveReader
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
 from posefield_train.source.rigs import rig_normalization

@@ -26,6 +26,7 @@ from posefield_train.source.control_sources import (
     Control,
     ControlColumn,
     ControlMeasured,
+    Curves,
     KeyFault,
     Name,
     RecipePart,

@@ -133,7 +133,7 @@ class Decoder:
         return PoseChart(self.means).poses(numbers)
 
     def select_joints(self, joints: Sequence[int]) -> "Decoder":
-        """Return the decoder of some joints without curves, including the root, at its finest level."""
+        """Return the finest level's decoder of some joints, including the root, without curves."""
         kept = [0, *(1 + joint for joint in joints)]
         rows = np.ravel(np.arange(3 + 3 * len(self.means)).reshape(-1, 3)[kept])
         return replace(

@@ -120,8 +120,8 @@ def sampled_gram(
     parents: tuple[int, ...],
     offsets: ClipBones,
     joint_weights: JointWeights,
-) -> Annotated[Floats, "dof dof"]:
-    """Return the Gram matrix (D, D) over poses spaced evenly through pose vectors (N, T, D)."""
+) -> Annotated[Floats, "freedoms freedoms"]:
+    """Return the mean Gram matrix (3 + 3 J, 3 + 3 J) of evenly spaced pose vectors (N, T, D)."""
     samples, frames, _ = numbers.shape
     chosen = np.unique(
         np.linspace(0, samples * frames - 1, pose_metric.SAMPLED_POSES).astype(np.int64)

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipBones, ClipPositions, JointWeights
+from posefield.common.array_shapes import ClipBones, JointWeights
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Event
@@ -88,8 +88,8 @@ class TruncationReference:
 class _Distances:
     """Distances (N, T, J), m, with the statistics of `TruncationErrors`, computed on access."""
 
-    gaps: Annotated[Floats, "clips frames joints"]
-    weights: JointWeights
+    gaps: Annotated[Floats, "clips frames points"]
+    weights: Annotated[Floats, "points"]
     event_frame: EventFrame | None
 
     @property
@@ -143,7 +143,7 @@ def positions(
     values: Annotated[Floats, "varying frames clips"],
     parents: tuple[int, ...],
     offsets: ClipBones,
-) -> ClipPositions:
+) -> Annotated[Floats, "clips frames points 3"]:
     """Return joint positions (N, T, J, 3), m, of whitened values (D', T, N).
 
     Points of the curves follow those of the joints. offsets: bone offsets (N, J, 3), m.
@@ -158,7 +158,7 @@ def _joint_positions(
     centred: Annotated[Floats, "dof frames clips"],
     parents: tuple[int, ...],
     offsets: ClipBones,
-) -> ClipPositions:
+) -> Annotated[Floats, "clips frames points 3"]:
     """Return joint positions (N, T, J, 3) of pose vectors (D, T, N) less the tensor's mean.
 
     Points of the curves follow those of the joints.

@@ -69,9 +69,7 @@ class GlbBuffer:
         """Return the index of an accessor of vectors (count, 3) that are zero, without numbers."""
         ends = {"min": [0.0, 0.0, 0.0], "max": [0.0, 0.0, 0.0]}
         component = COMPONENTS["f4"]
-        self.accessors.append(
-            {"componentType": component, "count": count, "type": "VEC3"} | ends
-        )
+        self.accessors.append({"componentType": component, "count": count, "type": "VEC3"} | ends)
         return len(self.accessors) - 1
 
     def add(self, array: npt.NDArray[Any], kind: str, **said: Any) -> int:
@@ -156,9 +154,7 @@ def _carrier(store: GlbBuffer, curves: CurveValues) -> dict[str, Any]:
     return _with_targets(store, mesh, curves)
 
 
-def _with_targets(
-    store: GlbBuffer, mesh: dict[str, Any], curves: CurveValues
-) -> dict[str, Any]:
+def _with_targets(store: GlbBuffer, mesh: dict[str, Any], curves: CurveValues) -> dict[str, Any]:
     """Return a mesh with a morph target for each curve, named as its readers expect.
 
     The targets move no point: they carry the weights to readers, in which they can be modelled. All

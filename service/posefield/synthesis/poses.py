@@ -22,8 +22,8 @@ POSE_OUTPUTS = ("rotations", "root_position", "bone_offsets", "duration", "sigma
 """Outputs that all poses are made of."""
 
 OutputRow = tuple[Singles, ...]
-"""Values of `pose_outputs` for one question: (S, J, 4), (S, 3), (J, 3), two numbers, and (S, C) of a
-model with curves.
+"""Values of `pose_outputs` for one question: (S, J, 4), (S, 3), (J, 3), two numbers, and (S, C) of
+a model with curves.
 """
 
 

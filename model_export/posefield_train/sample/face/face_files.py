@@ -43,6 +43,10 @@ frames = 60
 cyclic = false
 root = "travelling"
 
+# Expressions differ in strength rather than in timing: more knots would fit the difference.
+[alignment]
+knots = 3
+
 [curves]
 column = "curves"
 range = [0.0, 1.0]
@@ -57,7 +61,7 @@ smile = 0.1
 openness = 0.9
 
 [size]
-rms_budget_cm = 0.05
+rms_budget_cm = 0.02
 """
 
 DECIMALS = 4

@@ -145,9 +145,7 @@ def add_blend_shapes(root: Any, rig: CharacterRig, curves: Sequence[str]) -> Non
     prim_specs.add_relationship(mesh, "skel:blendShapeTargets", *shapes)
 
 
-def animation(
-    parent: Any, name: str, paths: tuple[str, ...], curves: Sequence[str] = ()
-) -> Any:
+def animation(parent: Any, name: str, paths: tuple[str, ...], curves: Sequence[str] = ()) -> Any:
     """Return a new SkelAnimation of these joints and curves, without samples."""
     made = prim_specs.prim(parent, name, "SkelAnimation")
     prim_specs.uniform_attribute(made, "joints", ValueTypes.TokenArray, Vt.TokenArray(paths))

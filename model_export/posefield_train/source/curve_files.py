@@ -15,7 +15,7 @@ from posefield.motion.curves import Curve, CurveValues
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source import clip_table
 from posefield_train.source.clip_table import ClipRow, ClipTable
-from posefield_train.source.curves.curve_keys import Curves
+from posefield_train.source.control_sources import Curves
 from posefield_train.source.data_folder import FileLocation
 
 FRAME = "frame"

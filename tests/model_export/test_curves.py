@@ -1,0 +1,207 @@
+"""Curves as rows of the tensor: their metric, timing and answers, with and without a skeleton."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.common.errors import ModelError
+from posefield.constraints import constrained_motion
+from posefield.inference import graph_ports, session
+from posefield.model_file import model_card
+from posefield.motion import curves as curve_values
+from posefield.motion import quat
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train import train
+from posefield_train.adapt import model_reconstruction
+from posefield_train.sample.face import face_motion
+from posefield_train.source.recipe import Recipe
+
+LAUGH, CALM = {"smile": 0.7, "openness": 0.5}, {"smile": 0.2, "openness": 0.5}
+# Trials vary by 1 %. A blink lasts a tenth of the clip, so most of its error is of timing.
+NEAR = 0.04
+# The graph computes in float32.
+SINGLE = 1e-5
+
+
+@pytest.fixture(scope="session")
+def face(models_trained):
+    return models_trained.trained("face")
+
+
+@pytest.fixture(scope="session")
+def alone(models_trained):
+    return models_trained.trained("curves")
+
+
+@pytest.fixture(scope="session", params=["face", "curves"])
+def opened(models_trained, request):
+    """A model with curves, with a skeleton and without."""
+    content = models_trained.exported(request.param).content
+    return Synthesizer(request.param, session.open_bytes(content, request.param))
+
+
+def truth(controls, clip):
+    shares = np.minimum(np.arange(len(clip)) / clip.rate / clip.duration, 1.0)
+    return face_motion.curve_values(controls["smile"], controls["openness"], shares)
+
+
+def test_an_expression_between_the_examples_is_near_the_truth(opened):
+    clip = clips.synthesize_clip(opened, ClipQuestion(controls=LAUGH, fps=60.0)).clip
+    assert clip.curves.names == list(face_motion.CURVE_NAMES)
+    away = np.sqrt(np.mean(np.square(clip.curve_values - truth(LAUGH, clip)), axis=0))
+    assert away.max() < NEAR
+    other = np.sqrt(np.mean(np.square(clip.curve_values - truth(CALM, clip)), axis=0))
+    assert other.max() > 4 * NEAR
+
+
+def test_poses_have_the_curves_of_the_clip_at_their_times(opened):
+    clip = clips.synthesize_clip(opened, ClipQuestion(controls=LAUGH, fps=10.0)).clip
+    times = [frame / 10.0 for frame in range(len(clip))]
+    found = poses.synthesize_poses(opened, PoseQuestion(controls=LAUGH, times=times))
+    assert np.abs(found.curves - clip.curve_values).max() < SINGLE
+    assert np.abs(found.curves[1:] - clip.curve_values[:-1]).max() > 0.1
+
+
+def test_every_level_answers_with_curves_within_their_limits(opened):
+    finest = None
+    for level in range(len(opened.session.card.levels)):
+        asked = ClipQuestion(controls=LAUGH, fps=60.0, level=level)
+        found = clips.synthesize_clip(opened, asked).clip.curve_values
+        finest = found if finest is None else finest
+        assert found.shape[1] == len(face_motion.CURVE_NAMES)
+        assert found.min() >= 0.0 and found.max() <= 1.0
+        assert np.ptp(found, axis=0).max() > 0.3
+    # Coarser levels are coarser here too.
+    assert np.abs(found[: len(finest)] - finest[: len(found)]).max() > NEAR
+
+
+def test_answers_are_clamped_to_the_range_of_the_curves(opened):
+    asked = ClipQuestion(controls={"smile": 1.2, "openness": 1.2}, fps=60.0, extrapolate="ok")
+    found = clips.synthesize_clip(opened, asked).clip.curve_values
+    assert found.max() == 1.0 and found.min() == 0.0
+    narrow = np.abs(
+        truth({"smile": 1.2, "openness": 1.2}, clips.synthesize_clip(opened, asked).clip)
+    )
+    assert narrow.max() <= 1.0
+
+
+def test_the_graph_computes_the_curves_of_the_reference(models_trained, opened):
+    model = models_trained.exported(opened.name).model
+    points, times = np.array([[0.3, 0.4], [0.8, 0.7]]), np.array([[0.2, 0.7], [0.4, 0.9]])
+    for level in range(len(opened.session.card.levels)):
+        expected = model.evaluate(points, times, level=level).curves
+        (found,) = opened.session.run(points, times, graph_ports.CURVES, level=level)
+        assert np.abs(found - expected).max() < SINGLE
+        assert np.abs(found[::-1] - expected).max() > 0.05
+
+
+def test_the_solver_predicts_the_curves_of_the_graph(opened):
+    own, times = opened.session, np.linspace(0.0, 0.9, 7)
+    for level in range(len(own.card.levels)):
+        state = own.state(np.array([[0.7, 0.5]]), times, level=level)
+        predicted = constrained_motion.build_corrector(own, level).predict(state)
+        (expected,) = own.run(np.array([[0.7, 0.5]]), times[None], graph_ports.CURVES, level=level)
+        assert np.abs(predicted.curve_values(state.frames) - expected[0]).max() < SINGLE
+
+
+def test_one_unit_of_a_curve_counts_as_its_distance(face):
+    own, joints = face.tensor, len(face.skeleton)
+    numbers = own.numbers(own.values)
+    moved = numbers[0, 0].copy()
+    moved[3 + 3 * joints + 2] += 0.5
+    apart = own.whiten @ (moved - numbers[0, 0])
+    assert np.linalg.norm(apart) == pytest.approx(0.5 * own.curves[2].distance)
+    assert own.weight == joints + len(own.curves)
+
+
+def test_points_of_curves_are_as_far_apart_as_the_curves_count(face):
+    own = face.tensor.curves
+    values = np.random.default_rng(0).uniform(size=(2, len(own)))
+    points = curve_values.as_points(own, values)
+    apart = np.linalg.norm(points[0] - points[1], axis=-1)
+    assert np.allclose(apart, np.abs(values[0] - values[1]) * curve_values.distances(own))
+
+
+def test_a_larger_distance_keeps_more_of_the_curves(models_trained):
+    """Budgets are of distances, so the truncation follows what a curve counts as."""
+    errors = []
+    for distance in (0.5, 20.0):
+        plain = models_trained.curves_recipe().model_dump(by_alias=True, exclude_unset=True)
+        size = {"rms_budget_cm": 0.5, "levels": []}
+        keys = {"rate": 60.0, "distance_cm": distance}
+        recipe = Recipe.model_validate({**plain, "curves": keys, "size": size})
+        examples = [
+            replace(e, clip=replace(e.clip, curves=at_distance(e.clip.curves, 0.01 * distance)))
+            for e in models_trained.examples("curves")
+        ]
+        trained = train.train(recipe, examples, lambda _: None)
+        restored = trained.model.decoder.reduced.restored()
+        lost = trained.tensor.unwhiten @ (restored - trained.tensor.values).reshape(
+            len(restored), -1
+        )
+        errors.append(float(np.sqrt(np.mean(np.square(lost)))))
+    assert errors[1] < 0.5 * errors[0]
+
+
+def at_distance(own, distance):
+    return replace(own, curves=tuple(replace(one, distance=distance) for one in own.curves))
+
+
+def test_curves_follow_the_warp_of_their_clip(face):
+    """The jaw turns and the mouth opens by the same law, before the alignment and after."""
+    jaw = face.skeleton.names.index("Jaw")
+    turned = np.linalg.norm(quat.log(face.aligned.rotations[:, :, jaw]), axis=-1)
+    opened = face.aligned.curves[:, :, face_motion.CURVE_NAMES.index("jawOpen")]
+    strengths = opened[:, -1] / turned[:, -1]
+    assert np.abs(opened - strengths[:, None] * turned).max() < NEAR
+    # Of another clip, whose warp differs, the same does not hold.
+    mixed = np.roll(turned, 1, axis=0) * (turned[:, -1] / np.roll(turned[:, -1], 1))[:, None]
+    assert np.abs(opened - strengths[:, None] * mixed).max() > NEAR
+
+
+def test_curves_without_a_skeleton_are_aligned_by_themselves(alone):
+    """Beside one joint that rests, the warps can come from the curves alone."""
+    assert np.ptp(alone.aligned.logs, axis=0).max() > 0.05
+    assert alone.tensor.values.shape[0] == len(face_motion.CURVE_NAMES)
+
+
+def test_sigma_of_curves_alone_is_that_of_their_errors(alone, models_trained):
+    content = models_trained.exported("curves").content
+    model = Synthesizer("curves", session.open_bytes(content, "curves"))
+    missed = float(np.sqrt(np.mean(alone.warped_errors)))
+    sigma = clips.synthesize_clip(model, ClipQuestion(controls=LAUGH)).trust.sigma
+    assert 0.1 * missed < sigma < 10 * missed
+    # A clip left out is missed by a few hundredths of a unit at most.
+    assert 0.0 < missed < 0.05 * alone.tensor.curves[0].distance
+
+
+def test_the_card_names_the_curves_only_of_a_model_that_has_some(opened, exported):
+    named = [curve["name"] for curve in model_card.plain_values(opened.session.card)["curves"]]
+    assert named == list(face_motion.CURVE_NAMES)
+    assert "posefield.curves" in model_card.dump(opened.session.card)
+    assert "curves" not in model_card.plain_values(exported.card)
+    assert "posefield.curves" not in model_card.dump(exported.card)
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (lambda own: own * 2, "each entry once"),
+        (lambda own: (replace(own[0], minimum=1.0, maximum=0.0), *own[1:]), "below the maximum"),
+        (lambda own: own[1:], "constant 'freedoms' has shape"),
+    ],
+)
+def test_a_card_whose_curves_contradict_it_is_refused(models_trained, change, said):
+    made = models_trained.exported("face")
+    card = replace(made.card, curves=change(made.card.curves))
+    content = made.model.onnx(model_card.dump(card), {"producer_name": "t"})
+    with pytest.raises(ModelError, match=said):
+        session.open_bytes(content, "face")
+
+
+def test_a_performer_cannot_be_added_to_a_model_with_curves(models_trained):
+    with pytest.raises(ModelError, match=r"found curves \['jawOpen'.*expected a model without"):
+        model_reconstruction.reconstruct(models_trained.exported("face").content, "face.onnx")
