@@ -24,6 +24,7 @@ import crowds
 import engines
 import environment
 import exports
+import faces
 import godot
 import lint
 import numpy as np
@@ -89,6 +90,7 @@ def main() -> int:
     wrong = _report(rows)
     others = blender_bvh.faults(python) + lint.faults(node) + container.faults() + cache.faults()
     others += slow_clients.faults()
+    others += faces.faults(python, node)
     others += engines.faults(*environment.node()) + page.faults(node) + addon.faults()
     others += godot.faults()
     print("\n".join(others) or "no fault in what runs elsewhere")
