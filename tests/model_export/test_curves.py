@@ -107,6 +107,10 @@ def test_the_solver_predicts_the_curves_of_the_graph(opened):
         assert np.abs(predicted.curve_values(state.frames) - expected[0]).max() < SINGLE
 
 
+def test_a_pose_with_curves_has_the_same_bytes_in_every_batch(opened):
+    assert all(poses.is_batch_exact(opened, level) for level in range(4))
+
+
 def test_one_unit_of_a_curve_counts_as_its_distance(face):
     own, joints = face.tensor, len(face.skeleton)
     numbers = own.numbers(own.values)
