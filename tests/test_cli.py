@@ -176,6 +176,20 @@ def test_sample_writes_the_family(posefield, tmp_path, reaching_folder):
         assert again.read_bytes() == path.read_bytes()
 
 
+def test_sample_writes_the_face(posefield, tmp_path, models_trained):
+    code, out, _ = posefield("sample", "face", "-o", tmp_path / "face", "--json")
+    assert code == 0
+    assert json.loads(out) == {"recipe": str(tmp_path / "face" / "recipe.toml")}
+    for path in sorted(models_trained.face().rglob("*.*")):
+        again = tmp_path / "face" / path.relative_to(models_trained.face())
+        assert again.read_bytes() == path.read_bytes()
+
+
+def test_sample_of_the_face_has_no_truth_to_write(refused, tmp_path):
+    said = refused(2, "sample", "face", "--truth", "-o", tmp_path / "truth.bvh")
+    assert said == "truth: given with 'face', expected with reaching only"
+
+
 def test_sample_says_what_to_do_next(posefield, reaching_folder):
     code, out, _ = posefield("sample", "reaching", "-o", reaching_folder)
     assert (code, out) == (
@@ -195,7 +209,7 @@ def test_sample_writes_other_figures(posefield, refused, tmp_path, family):
 
 def test_sample_of_another_family_is_refused(refused, tmp_path):
     said = refused(2, "sample", "dancing", "-o", tmp_path / "x")
-    assert said == "family: 'dancing', expected one of reaching, quadruped, hand"
+    assert said == "family: 'dancing', expected one of reaching, quadruped, hand, face"
 
 
 def test_sample_into_a_folder_of_something_else_is_refused(refused, tmp_path):
@@ -348,6 +362,13 @@ def test_a_report_that_cannot_be_written_leaves_no_half_of_it(posefield, train_w
     said = refused_after_progress(posefield, 3, *words)
     assert said.startswith(f"{page}: cannot be written: ")
     assert [p.name for p in page.parent.iterdir()] == ["quick.html"]
+
+
+def test_inspect_lists_the_curves_of_a_model(posefield, model_file, model_path):
+    code, out, _ = posefield("inspect", model_file("face"))
+    assert code == 0
+    assert "curve jawOpen: 0 to 1, a unit counts as 2 cm" in out.splitlines()
+    assert "curve" not in posefield("inspect", model_path)[1]
 
 
 def test_inspect_answers_as_json(posefield, model_path):

@@ -127,7 +127,7 @@ class FloatModel:
         fields[POSE] = net.rename_value("coefficients", fields[POSE])
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
         place = net.rename_value("frame", place)
-        rotations, root, curves = self.decoder.onnx(net, fields[POSE], place, ends)
+        rotations, root, *curves = self.decoder.onnx(net, fields[POSE], place, ends)
         if self.travel:
             way = net.rename_value("way", fields["travel"])
             rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)
@@ -139,10 +139,10 @@ class FloatModel:
         net.add_output("duration", duration)
         net.add_output("sigma", fields["sigma"])
         net.add_output("travel", gone)
-        if curves is not None:
+        if curves:
             steps = net("Shape", place, start=0, end=2)
             shape = net("Concat", steps, net.indices(len(self.decoder.curves)), axis=0)
-            net.add_output("curves", net("Reshape", curves, shape))
+            net.add_output("curves", net("Reshape", *curves, shape))
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.labels:

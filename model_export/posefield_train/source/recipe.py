@@ -32,7 +32,6 @@ from posefield_train.source.control_sources import (
     RecipePart,
     Text,
 )
-from posefield_train.source.curves.curve_keys import Curves
 from posefield_train.source.rigs.facing import Facing
 
 PERFORMER = "performer"

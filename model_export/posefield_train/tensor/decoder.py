@@ -183,11 +183,11 @@ class Decoder:
 
     def onnx(
         self, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
-    ) -> tuple[str, str, str | None]:
+    ) -> tuple[str, ...]:
         """Build `numpy` and `curve_values` in a graph, from canonical frames (B, S, 1).
 
-        ends: graph values of the level's slice ends, by the names of `entries`. The last name is
-        None without curves.
+        ends: graph values of the level's slice ends, by the names of `entries`. The third name, of
+        the curves (B S, C), is missing without curves.
         """
         flat = self._reduced(net, coefficients, place, ends)
         directions = self._directions(net)
@@ -202,7 +202,7 @@ class Decoder:
         return (
             net("Reshape", self._rotations(net, flat, of_joints, ends), joint_shape),
             net("Reshape", root, root_shape),
-            self._curves(net, flat, directions, ends) if self.curves else None,
+            *([self._curves(net, flat, directions, ends)] if self.curves else []),
         )
 
     def _curves(self, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]) -> str:

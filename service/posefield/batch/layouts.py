@@ -148,7 +148,8 @@ def _library_stage(
     clips = [usd_library.LibraryEntry(*(entry[key] for key in keys)) for entry in entries]
     skeleton = joint_roles.rename_joints(card.skeleton, card.roles, job.names)
     convention = CLIP_ENCODERS[LIBRARY_FORMAT].convention(job.unit, job.up, job.body)
-    yield STAGE, usd_library.library_stage(skeleton, convention, clips[0].rate, clips)
+    curves = [curve.name for curve in card.curves]
+    yield STAGE, usd_library.library_stage(skeleton, convention, clips[0].rate, clips, curves)
 
 
 LAYOUTS = {

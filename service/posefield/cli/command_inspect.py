@@ -44,6 +44,7 @@ def _summary(plain: dict[str, Any]) -> str:
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
         *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
+        *map(_curve, plain.get("curves", [])),
         *(f"{own['name']}s: {', '.join(own['names'])}" for own in plain["labels"]),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),
@@ -57,6 +58,12 @@ def _level(number: int, level: dict[str, Any], seconds: float) -> str:
         f"numbers, {level['operations']} multiply-adds a pose, off by {100 * level['rms']:.2f} cm, "
         f"the worst pose by {100 * level['pose']:.1f} cm, here {1e6 * seconds:.2f} µs a pose"
     )
+
+
+def _curve(plain: dict[str, Any]) -> str:
+    """Return one line on a curve: its limits, and the distance that one unit counts as."""
+    span = f"{plain['minimum']:g} to {plain['maximum']:g}"
+    return f"curve {plain['name']}: {span}, a unit counts as {100 * plain['distance']:g} cm"
 
 
 def _control(plain: dict[str, Any], joints: list[str]) -> str:

@@ -12,7 +12,13 @@ from pxr import Usd, UsdSkel
 from posefield.encode.character import joint_names
 from posefield.encode.files.file_convention import METRES
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd import crate_template, text_template, usd_clip
+from posefield.encode.usd import (
+    crate_template,
+    text_template,
+    usd_animation,
+    usd_clip,
+    usd_library,
+)
 from posefield.motion.curves import Curve, CurveValues
 from posefield.question.results import ClipAnswer
 
@@ -106,6 +112,20 @@ def test_weights_that_usd_does_not_compress_are_filled_in_a_template(walk):
         [with_curves(walk, curves(52, len(walk.clip), seed=1))], METRES
     )
     assert found.write(author, content) != form.ordinary(author, other)
+
+
+def test_a_library_binds_the_weights_of_its_clips_to_shapes_of_its_body(face, tmp_path):
+    (content,) = usd_animation.usdc([face], METRES)
+    (tmp_path / "laugh.usdc").write_bytes(content)
+    entry = usd_library.library_entry("laugh", "laugh.usdc", face)
+    written = usd_library.library_stage(face.clip.skeleton, METRES, 30.0, [entry], NAMES)
+    opened = stage(written, tmp_path / "library.usda")
+    animation = UsdSkel.Animation(opened.GetPrimAtPath("/Character/Clips/laugh"))
+    assert tuple(animation.GetBlendShapesAttr().Get()) == NAMES
+    skinned = UsdSkel.BindingAPI(opened.GetPrimAtPath("/Character/Body"))
+    assert UsdSkel.BlendShapeQuery(skinned).GetNumBlendShapes() == len(NAMES)
+    without = usd_library.library_stage(face.clip.skeleton, METRES, 30.0, [entry])
+    assert b"BlendShape" not in without and b"BlendShape" in written
 
 
 def gltf(content):

@@ -13,6 +13,7 @@ create as many prims, and as long to read them.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pxr import Sdf
@@ -58,27 +59,34 @@ def library_entry(name: str, file: str, answer: ClipAnswer) -> LibraryEntry:
 
 
 def library_stage(
-    skeleton: Skeleton, convention: Convention, rate: float, entries: Sequence[LibraryEntry]
+    skeleton: Skeleton,
+    convention: Convention,
+    rate: float,
+    entries: Sequence[LibraryEntry],
+    curves: Sequence[str] = (),
 ) -> bytes:
     """Return the USD text of the stage; names of clips are made legal names of prims.
 
-    rate: of the stage, frames a second. The stage is as long as the longest clip.
+    rate: of the stage, frames a second. The stage is as long as the longest clip. curves: names of
+    the clips' curves, for which the body has blend shapes.
     """
     prims = joint_names.legal_names(each.name for each in entries)
-    text = _character_text(skeleton, convention, rate, entries, prims[:1])
+    character_layer = _character_layer(skeleton, convention, rate, entries)
+    root = character_layer.GetPrimAtPath(ROOT)
+    character_prims.add_blend_shapes(root, character.rig(skeleton, convention.body), curves)
+    prim_specs.prim(root, CLIPS.name, "Scope")
+    for name in prims[:1]:
+        character_prims.bind_animation(root, CLIPS.AppendChild(name))
+    text: str = character_layer.ExportToString()
     head, opening, tail = text.rpartition(CLIPS_SCOPE)
     clips = "\n".join(_clip_prims(prims, entries))
     return "".join((head, opening, clips, tail)).encode()
 
 
-def _character_text(
-    skeleton: Skeleton,
-    convention: Convention,
-    rate: float,
-    entries: Sequence[LibraryEntry],
-    bound: tuple[str, ...],
-) -> str:
-    """Return the text of the stage without its clips."""
+def _character_layer(
+    skeleton: Skeleton, convention: Convention, rate: float, entries: Sequence[LibraryEntry]
+) -> Any:
+    """Return the layer of the stage with its character alone."""
     rig, made = character.rig(skeleton, convention.body), Sdf.Layer.CreateAnonymous("library.usda")
     lasting = max((each.frames - 1) / each.rate for each in entries) if entries else 0.0
     layer_metadata.set_layer_metadata(made, ROOT.name, round(lasting * rate) + 1, rate, convention)
@@ -86,11 +94,7 @@ def _character_text(
     numbers = character.rest_pose_arrays(rig, convention)
     extent = _library_box(numbers["extent"], entries, convention)
     character_prims.set_values(root, character_prims.values({**numbers, "extent": extent}))
-    prim_specs.prim(root, CLIPS.name, "Scope")
-    for name in bound:
-        character_prims.bind_animation(root, CLIPS.AppendChild(name))
-    text: str = made.ExportToString()
-    return text
+    return made
 
 
 def _clip_prims(prims: Sequence[str], entries: Sequence[LibraryEntry]) -> Iterator[str]:
