@@ -3,12 +3,24 @@
 import numpy as np
 import pytest
 from scipy.interpolate import RBFInterpolator
+from sklearn.gaussian_process import GaussianProcessRegressor
+from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from posefield_train.evaluate import interpolation_peers
-from posefield_train.evaluate.interpolation_peers import INTERPOLATORS
+from posefield_train.evaluate.peers import (
+    gaussian_process,
+    interpolation_peers,
+    linear_smoothers,
+    predicted_values,
+)
 from posefield_train.kriging.sample_points import SamplePoints
 
 EXACT = 1e-8
+PEERS = (*interpolation_peers.LINEAR_PEERS, predicted_values.GP)
+
+
+def predicted(name, samples, values, queries):
+    """Return the prediction of a peer, by its name."""
+    return predicted_values.predict(samples, {"pose": values}, queries).values[name]["pose"]
 
 
 def laid(points, labels=None):
@@ -44,50 +56,51 @@ REPRODUCE_LINES = (
 )
 
 
-@pytest.mark.parametrize("name", INTERPOLATORS)
+@pytest.mark.parametrize("name", PEERS)
 def test_a_constant_is_predicted_as_such(name, points, queries):
-    found = INTERPOLATORS[name][0](laid(points), np.full((24, 2), 7.0), queries)
+    found = predicted(name, laid(points), np.full((24, 2), 7.0), queries)
     assert found.shape == (7, 2)
     assert np.abs(found - 7.0).max() < 1e-6
 
 
 @pytest.mark.parametrize("name", REPRODUCE_LINES)
 def test_lines_are_reproduced_by_those_with_a_linear_part(name, points, queries):
-    predict = INTERPOLATORS[name][0]
-    found = predict(laid(points), linear(points), queries)
+    found = predicted(name, laid(points), linear(points), queries)
     assert np.abs(found - linear(queries)).max() < EXACT
     # Negative control: a curve is not a line.
-    assert np.abs(predict(laid(points), curved(points), queries) - linear(queries)).max() > 0.1
+    assert (
+        np.abs(predicted(name, laid(points), curved(points), queries) - linear(queries)).max() > 0.1
+    )
 
 
 @pytest.mark.parametrize("name", ["thin_plate", "linear_rbf", "cubic_rbf", "linear_coefficients"])
 def test_interpolators_meet_their_samples(name, points):
-    found = INTERPOLATORS[name][0](laid(points), curved(points), points)
+    found = predicted(name, laid(points), curved(points), points)
     assert np.abs(found - curved(points)).max() < EXACT
 
 
 @pytest.mark.parametrize("name", ["thin_plate_smoothed", "gp", "mean", "linear_regression"])
 def test_what_smooths_does_not_meet_noise(name, points, rng):
     noise = rng.standard_normal((24, 2))
-    found = INTERPOLATORS[name][0](laid(points), noise, points + 1e-3)
+    found = predicted(name, laid(points), noise, points + 1e-3)
     assert np.abs(found - noise).max() > 0.1
 
 
 def test_thin_plates_are_scipys_own(points, queries):
     values = curved(points)
     own = RBFInterpolator(points, values, kernel="thin_plate_spline", degree=1)(queries)
-    found = INTERPOLATORS["thin_plate"][0](laid(points), values, queries)
+    found = predicted("thin_plate", laid(points), values, queries)
     assert np.abs(found - own).max() < EXACT
-    assert np.abs(INTERPOLATORS["cubic_rbf"][0](laid(points), values, queries) - own).max() > 1e-3
+    assert np.abs(predicted("cubic_rbf", laid(points), values, queries) - own).max() > 1e-3
 
 
 def test_smoothing_is_chosen_by_what_is_left_out(points, queries, rng):
     noisy = linear(points) + 0.3 * rng.standard_normal((24, 2))
-    smoothed = interpolation_peers.thin_plate_smoothed(laid(points), noisy, queries)
-    plain = INTERPOLATORS["thin_plate"][0](laid(points), noisy, queries)
+    smoothed = predicted("thin_plate_smoothed", laid(points), noisy, queries)
+    plain = predicted("thin_plate", laid(points), noisy, queries)
     truth = linear(queries)
     assert np.abs(smoothed - truth).mean() < 0.7 * np.abs(plain - truth).mean()
-    clean = interpolation_peers.thin_plate_smoothed(laid(points), linear(points), queries)
+    clean = predicted("thin_plate_smoothed", laid(points), linear(points), queries)
     assert np.abs(clean - truth).max() < 1e-6
 
 
@@ -96,12 +109,10 @@ def test_equal_controls_are_trials_of_one_motion(points, queries):
     twice = laid(np.vstack([points, points]))
     apart = np.vstack([values + 0.2, values - 0.2])
     for name in ("thin_plate", "linear_rbf", "cubic_rbf", "thin_plate_smoothed"):
-        found = INTERPOLATORS[name][0](twice, apart, queries)
+        found = predicted(name, twice, apart, queries)
         assert np.isfinite(found).all()
-    found = INTERPOLATORS["thin_plate"][0](twice, apart, queries)
-    assert (
-        np.abs(found - INTERPOLATORS["thin_plate"][0](laid(points), values, queries)).max() < EXACT
-    )
+    found = predicted("thin_plate", twice, apart, queries)
+    assert np.abs(found - predicted("thin_plate", laid(points), values, queries)).max() < EXACT
 
 
 def test_the_nearest_of_the_same_performer_is_taken(points):
@@ -120,10 +131,10 @@ def test_the_process_tells_performers_apart_where_it_is_told(points, queries):
     asked = np.hstack([queries, np.tile([0.0, 1.0], (7, 1))])
     truth = linear(queries)
     told = np.abs(
-        interpolation_peers.gp_with_performers(laid(points, labels), values, asked) - truth
+        gaussian_process.gp_with_performers(laid(points, labels), values, asked) - truth
     ).mean()
     untold = np.abs(
-        interpolation_peers.gp_without_performers(laid(points, labels), values, asked) - truth
+        gaussian_process.gp_without_performers(laid(points, labels), values, asked) - truth
     ).mean()
     assert told < 0.3 * untold
 
@@ -143,3 +154,85 @@ def test_one_control_is_interpolated_on_its_line():
         laid(points), values, np.array([[0.75], [-0.25]])
     )
     assert found.ravel() == pytest.approx([2.5, 1.0])
+
+
+def test_the_likelihood_is_scikit_learns(points, rng):
+    kernel = ConstantKernel(1.0) * RBF(np.ones(3)) + WhiteKernel(0.1)
+    values = curved(points) + 0.1 * rng.standard_normal((24, 2))
+    theta = kernel.theta + 0.3 * rng.standard_normal(5)
+    model = GaussianProcessRegressor(kernel, optimizer=None).fit(points, values)
+    expected, slope = model.log_marginal_likelihood(theta, eval_gradient=True)
+    own = gaussian_process.MarginalLikelihood(np.square(points[:, None] - points), values)
+    found, found_slope = own.negative(theta)
+    assert found == pytest.approx(-expected, rel=1e-10)
+    assert found_slope == pytest.approx(-slope, rel=1e-8)
+    # Negative control: elsewhere it is another number.
+    assert own.negative(theta + 0.1)[0] != pytest.approx(-expected, rel=1e-4)
+
+
+@pytest.fixture
+def two(points):
+    """Two performers, of whom one stands five units beside the other, and their labels."""
+    labels = np.tile(np.eye(2), (12, 1))
+    return laid(points, labels), linear(points) + 5.0 * labels[:, :1]
+
+
+def known_and_open(name, two, queries):
+    """Errors of a peer that is told the second performer, and of one that is not."""
+    asked = np.hstack([queries, np.tile([0.0, 1.0], (len(queries), 1))])
+    found = predicted_values.predict(two[0], {"pose": two[1]}, asked).values
+    truth = linear(queries)
+    ends = ("", predicted_values.OPEN)
+    return [float(np.abs(found[name + end]["pose"] - truth).mean()) for end in ends]
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_every_peer_has_a_use_for_the_performer(name, two, queries):
+    told, untold = known_and_open(name, two, queries)
+    assert told < 0.75 * untold
+
+
+def test_offsets_are_those_of_the_performers(two):
+    own = linear_smoothers.smoother(interpolation_peers.thin_plate(1.0), two[0], two[0].points)
+    found = linear_smoothers.performer_offsets(own, *two)
+    assert found[0] - found[1] == pytest.approx(np.full(2, 5.0), rel=0.1)
+
+
+def test_performers_who_do_not_differ_have_no_offsets(points, queries, rng):
+    noise = rng.standard_normal((24, 3))
+    samples = laid(points, np.tile(np.eye(2), (12, 1)))
+    own = linear_smoothers.smoother(interpolation_peers.thin_plate(1.0), samples, samples.points)
+    same = linear_smoothers.performer_offsets(own, samples, linear(points)[:, :1] + 0 * noise)
+    assert np.abs(same).max() < EXACT
+
+
+def test_an_unknown_performer_has_no_offset(two, queries):
+    nobody = np.hstack([queries, np.zeros((len(queries), 2))])
+    choices = [linear_smoothers.smoother(interpolation_peers.thin_plate(1.0), two[0], nobody)]
+    found = linear_smoothers.predict_with_performers(choices, *two, nobody)
+    own = linear_smoothers.performer_offsets(choices[0], *two)
+    rest = two[1] - two[0].points[:, 3:] @ own
+    assert np.abs(found - linear_smoothers.predict(choices, rest)).max() < EXACT
+
+
+def test_left_out_weights_are_those_of_a_peer_without_the_part(two):
+    samples, values = two
+    own = linear_smoothers.smoother(interpolation_peers.thin_plate(0.0), samples, samples.points)
+    parts = linear_smoothers.left_out_parts(samples)
+    assert len(parts) == linear_smoothers.MOST_PARTS
+    assert np.sum(parts, axis=0).tolist() == [1] * 24
+    out = parts[3]
+    known, asked = samples.half_ranges[~out], samples.half_ranges[out]
+    expected = RBFInterpolator(known, values[~out], kernel="thin_plate_spline", degree=1)(asked)
+    assert np.abs((own.left_out @ values)[out] - expected).max() < EXACT
+
+
+def test_a_part_that_carries_the_line_is_not_left_out_whole():
+    """Every thirteenth take is off the line of the others; dealt into parts they share one."""
+    height = np.zeros(26)
+    height[[0, 12]] = 1.0
+    points = np.stack([np.arange(26.0), height], axis=1)
+    parts = linear_smoothers.left_out_parts(laid(points))
+    assert len(parts) == 26
+    # Negative control: of points in general position, parts are fewer.
+    assert len(linear_smoothers.left_out_parts(laid(points + np.sin(points[:, ::-1] * 7)))) == 12

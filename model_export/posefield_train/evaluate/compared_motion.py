@@ -1,5 +1,6 @@
 """Motions in the form that is compared: joints and points around them at uniform time steps."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,8 +61,25 @@ def motion_of_poses(
     event: MotionEvent | None,
 ) -> ComparedMotion:
     """Return the motion of local rotations (FRAMES, J, 4) and translations (FRAMES, J, 3), m."""
+    (found,) = motions_of_poses(parents, rotations[None], translations[None], [duration], [event])
+    return found
+
+
+def motions_of_poses(
+    parents: tuple[int, ...],
+    rotations: Floats,
+    translations: Floats,
+    durations: Sequence[float],
+    events: Sequence[MotionEvent | None],
+) -> list[ComparedMotion]:
+    """Return motions of local rotations (Q, FRAMES, J, 4) and translations (Q, FRAMES, J, 3), m."""
     positions, orientations = skeleton.forward_kinematics(parents, rotations, translations)
-    axes = quat.rotate(orientations[:, :, None], SHELL_RADIUS * np.eye(3))
-    shell = positions[:, :, None] + axes
-    points = np.concatenate([positions[:, :, None], shell], axis=2)
-    return ComparedMotion(points, duration, event.position_of(positions) if event else None)
+    axes = quat.rotate(orientations[..., None, :], SHELL_RADIUS * np.eye(3))
+    points = positions[..., None, :] + np.concatenate(
+        [np.zeros_like(axes[..., :1, :]), axes], axis=-2
+    )
+    listed = zip(points, durations, positions, events, strict=True)
+    return [
+        ComparedMotion(own, duration, event.position_of(joints) if event else None)
+        for own, duration, joints, event in listed
+    ]

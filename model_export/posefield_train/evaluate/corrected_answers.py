@@ -197,7 +197,8 @@ def _correct_far(
 
 
 def _acceleration_ratio(after: ComparedMotion, before: ComparedMotion) -> float:
-    return motion_errors.acceleration(after.points) / motion_errors.acceleration(before.points)
+    before_it = motion_errors.acceleration(before.points)
+    return float(motion_errors.acceleration(after.points) / before_it)
 
 
 def _is_reachable(held: ConstrainedMotion) -> bool:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.evaluate import corrections, motion_errors
-from posefield_train.evaluate.methods import DEFINITIONS, EXACT, OURS
+from posefield_train.evaluate import corrections, equal_information, motion_errors
+from posefield_train.evaluate.methods import EXACT, OURS, TOLD, definition
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS, NO_PERFORMER
 from posefield_train.evaluate.protocol import EvaluationResult
@@ -25,9 +25,9 @@ DISTANCES = {
 COLUMNS = (
     ("method", "defined below"),
     ("relative", "distance without the root's position, after time warping"),
-    ("±", "standard error of the column before, over clips"),
-    ("difference", "relative distance less that of posefield, clip by clip"),
-    ("±", "standard error of the column before, over clips"),
+    ("±", "standard error of the column before, over takes"),
+    ("difference", "relative distance less that of posefield with equal information"),
+    ("±", "standard error of the column before, over takes"),
     ("global", "distance with the root's position, after time warping"),
     ("effector", "distance of the event's joint at its event"),
     ("rel. unwarped", "relative distance at equal shares of the duration, without time warping"),
@@ -48,8 +48,8 @@ class MethodSummary:
     """Errors of one method over all clips that it predicted.
 
     clips: number of those. left_out: number of all others. mean: its errors. standard_error: of the
-    mean relative distance, m. worse: mean difference of its relative distance from posefield's on
-    the same clips, m. worse_error: standard error of that difference, m.
+    mean relative distance, m. worse: mean difference of its relative distance from posefield's with
+    equal information on the same clips, m. worse_error: standard error of that difference, m.
     """
 
     name: str
@@ -92,7 +92,7 @@ class MethodSummary:
                 }
                 for name in DISTANCES
             },
-            "definition": DEFINITIONS[self.name],
+            "definition": definition(self.name),
         }
 
     def cells(self) -> tuple[str, ...]:
@@ -137,20 +137,18 @@ def summarize(result: EvaluationResult) -> list[MethodSummary]:
 def _summary(result: EvaluationResult, name: str) -> MethodSummary:
     places = result.asked(name)
     found = result.of(name, places)
-    own, ours = relative_distances(found), relative_distances(result.of(OURS, places))
+    row = equal_information.posefield_row(result, name)
+    own, ours = relative_distances(found), relative_distances(result.of(row, places))
+    takes = np.array(result.takes)[places]
     return MethodSummary(
         name,
         len(found),
         len(result.clips) - len(found),
         motion_errors.mean(found),
-        _standard_error(own),
+        equal_information.clustered_standard_error(own, takes),
         float((own - ours).mean()),
-        _standard_error(own - ours),
+        equal_information.clustered_standard_error(own - ours, takes),
     )
-
-
-def _standard_error(values: Floats) -> float:
-    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
 
 
 def sigma_ratio(result: EvaluationResult) -> float:
@@ -182,6 +180,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
             name: significant_digits.round_number(ratio) for name, ratio in by_joint.items()
         },
         **held,
+        "equal_information": equal_information.facts(result),
         "methods": methods,
     }
 
@@ -194,7 +193,10 @@ def table(result: EvaluationResult) -> str:
     )
     head = [title for title, _ in COLUMNS]
     rows = [summary.cells() for summary in summarize(result)]
-    return f"{title}\n\n{markdown_table.markdown_table(head, rows)}"
+    paired = equal_information.table(result)
+    return "\n\n".join(
+        [title, markdown_table.markdown_table(head, rows), *([paired] if paired else [])]
+    )
 
 
 def trust_text(result: EvaluationResult) -> list[str]:
@@ -212,8 +214,10 @@ def legend(results: Sequence[EvaluationResult]) -> str:
     """Return units, columns and methods of the tables of some results, one per line."""
     meanings = [f"  {title}: {meaning}" for title, meaning in COLUMNS if title != "±"]
     names = dict.fromkeys(name for result in results for name in result.errors)
-    definitions = [f"  {name}: {DEFINITIONS[name]}" for name in names]
-    return "\n".join([UNITS, *meanings, "  ±: standard error over clips", "Methods:", *definitions])
+    definitions = [f"  {name}: {definition(name)}" for name in names]
+    return "\n".join(
+        [UNITS, *meanings, "  ±: standard error over takes", "Methods:", *definitions, TOLD]
+    )
 
 
 def performer_facts(results: Sequence[EvaluationResult]) -> dict[str, Any]:

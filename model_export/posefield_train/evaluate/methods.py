@@ -1,6 +1,6 @@
 """Predictions of every method for the same queries, from the same training."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +12,8 @@ from posefield.motion import skeleton
 from posefield_train.align import time_alignment, travel
 from posefield_train.evaluate import compared_motion
 from posefield_train.evaluate.compared_motion import UNIFORM_SHARES, ComparedMotion, MotionEvent
-from posefield_train.evaluate.interpolation_peers import INTERPOLATORS, Interpolator
+from posefield_train.evaluate.peers import predicted_values
+from posefield_train.evaluate.peers.predicted_values import OPEN
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import naive_kriging, sample_points, universal_kriging, variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
@@ -22,13 +23,11 @@ from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 
 OURS, EXACT, NAIVE = "posefield", "posefield_exact", "naive"
-# Methods that repeat another row where the model does not distinguish performers.
-PERFORMER_METHODS = ("gp_controls", "nearest_same_performer")
 DEFINITIONS = {
     OURS: "the model as exported: truncated, with its own bone lengths and timing",
     EXACT: "the same, with the event's joint moved by the service's constraint solver to its "
     "captured position at the event",
-    "posefield_no_performer": "the same model without a performer",
+    OURS + OPEN: "the same model, asked with the performer left open",
     **{
         f"posefield_adapt_{count}": f"the same model adapted to the performer with {shown} from "
         "different takes, far apart in the controls and not from the take of the predicted clip; "
@@ -37,9 +36,23 @@ DEFINITIONS = {
     },
     NAIVE: "kriging of each frame on its own, isotropic, variogram fitted by weighted least "
     "squares (Mukai & Kuriyama 2005); posefield's own code, checked against GSTools",
-    **{name: words for name, (_, words) in INTERPOLATORS.items()},
+    **predicted_values.DEFINITIONS,
 }
 """Definition of each method."""
+TOLD = (
+    "Where performers have labels, everybody is told the performer: as columns (gp), by the choice "
+    "of examples (nearest_same_performer), or as an offset of each performer, estimated from "
+    "left-out takes and shrunk as far as they advise (all others; naive has the offsets of "
+    "thin_plate_smoothed). The same methods with controls alone end in _no_performer."
+)
+"""What the methods know of performers, for people."""
+
+
+def definition(name: str) -> str:
+    """Return the definition of a method."""
+    if name in DEFINITIONS:
+        return DEFINITIONS[name]
+    return f"{name.removesuffix(OPEN)} without the performer"
 
 
 @dataclass(frozen=True)
@@ -73,15 +86,32 @@ class _PredictedValues:
     numbers: Floats
     beside: dict[str, Floats]
 
+    def __add__(self, other: "_PredictedValues") -> "_PredictedValues":
+        rest = {key: own + other.beside[key] for key, own in self.beside.items()}
+        return _PredictedValues(self.numbers + other.numbers, rest)
+
+    def __sub__(self, other: "_PredictedValues") -> "_PredictedValues":
+        rest = {key: own - other.beside[key] for key, own in self.beside.items()}
+        return _PredictedValues(self.numbers - other.numbers, rest)
+
 
 def predict_all(recipe: Recipe, trained: TrainedModel, asked: Queries) -> Predictions:
     """Return the answers of every method, posefield's first."""
     event = truncation_error.event_frame(recipe, trained.examples)
     bank = trained.model.bank
     points = bank.points(asked.controls, _labels(trained, asked))
+    peers = _peer_values(trained, points)
+    together = _PredictedValues(
+        np.concatenate([own.numbers for own in peers.values()]),
+        {
+            key: np.concatenate([own.beside[key] for own in peers.values()])
+            for key in next(iter(peers.values())).beside
+        },
+    )
+    listed = _motions_of_values(trained, together, event)
     motions: dict[str, list[ComparedMotion]] = {OURS: predict_posefield(recipe, trained, asked)}
-    for name, predict in _methods(trained).items():
-        motions[name] = _motions_of_values(trained, predict(points), event)
+    for place, name in enumerate(peers):
+        motions[name] = listed[place * len(points) : (place + 1) * len(points)]
     sigma = bank.sigma(bank.numpy(points)[VARIANCE])
     return Predictions(motions, sigma, sigma[:, None] * trained.joints)
 
@@ -127,8 +157,9 @@ def _motions(
     """Return motions of rotations (Q, S, J, 4), root paths (Q, S, 3), bone offsets (Q, J, 3)."""
     translations = skeleton.translations(offsets, path)
     events = [_synthesised_event(trained, log, event) for log in logs]
-    parts = zip(rotations, translations, map(float, durations), events, strict=True)
-    return [compared_motion.motion_of_poses(trained.skeleton.parents, *part) for part in parts]
+    return compared_motion.motions_of_poses(
+        trained.skeleton.parents, rotations, translations, list(map(float, durations)), events
+    )
 
 
 def _synthesised_event(
@@ -142,20 +173,15 @@ def _synthesised_event(
     return MotionEvent(event.joint, float(timing.basis.invert(logs, place)[0]))
 
 
-def _methods(trained: TrainedModel) -> dict[str, Callable[[Floats], _PredictedValues]]:
-    """Return functions from points (Q, d + p) to predicted values, by method."""
+def _peer_values(trained: TrainedModel, points: Floats) -> dict[str, _PredictedValues]:
+    """Return the values that each peer predicts at points (Q, d + p)."""
     laid = _groups_for_lines(trained.samples)
-
-    def of_peer(peer: Interpolator) -> Callable[[Floats], _PredictedValues]:
-        def predict(points: Floats) -> _PredictedValues:
-            found = {name: peer(laid, v, points) for name, v in trained.values.items()}
-            return _PredictedValues(_pose_vectors(trained, found.pop("pose")), found)
-
-        return predict
-
-    left = () if laid.labels else PERFORMER_METHODS
-    peers = {name: of_peer(peer) for name, (peer, _) in INTERPOLATORS.items() if name not in left}
-    return {NAIVE: lambda points: _predict_naive(trained, laid, points), **peers}
+    found = predicted_values.predict(laid, trained.values, points)
+    peers = _predict_naive(trained, laid, points, found.offsets if laid.labels else {})
+    for name, values in found.values.items():
+        rest = {key: own for key, own in values.items() if key != "pose"}
+        peers[name] = _PredictedValues(_pose_vectors(trained, values["pose"]), rest)
+    return peers
 
 
 def _groups_for_lines(laid: SamplePoints) -> SamplePoints:
@@ -188,21 +214,52 @@ def _pose_vectors(trained: TrainedModel, coefficients: Floats) -> Floats:
     return trained.tensor.numbers(trained.full.slices(coefficients))
 
 
-def _predict_naive(trained: TrainedModel, laid: SamplePoints, points: Floats) -> _PredictedValues:
-    """Krige each frame on its own, and the other quantities in the same way as one frame."""
+def _predict_naive(
+    trained: TrainedModel, laid: SamplePoints, points: Floats, offsets: Mapping[str, Floats]
+) -> dict[str, _PredictedValues]:
+    """Krige each frame on its own, and the other quantities in the same way as one frame.
+
+    offsets: of performers (p, m) by quantity, taken from the samples and added to the prediction;
+    empty for a family without labels.
+    """
     whole, parents = trained.tensor, trained.skeleton.parents
-    offsets = np.stack([example.offsets for example in trained.examples])
-    positions = truncation_error.positions(whole, whole.values, parents, offsets)
+    bones = np.stack([example.offsets for example in trained.examples])
+    positions = truncation_error.positions(whole, whole.values, parents, bones)
     known, asked = laid.half_ranges, points[:, : laid.controls]
-
-    def krige(shown: Floats, values: Floats) -> Floats:
-        return naive_kriging.fit_naive(
-            known, shown, values, "matern52", variogram.fit_by_grid
-        ).numpy(asked)
-
     rest = {name: values for name, values in trained.values.items() if name != "pose"}
-    found = {n: krige(v[:, None, :, None], v[:, None])[:, 0] for n, v in rest.items()}
-    return _PredictedValues(krige(positions, whole.numbers(whole.values)), found)
+
+    def krige(samples: _PredictedValues) -> _PredictedValues:
+        def predict(shown: Floats, values: Floats) -> Floats:
+            fitted = naive_kriging.fit_naive(
+                known, shown, values, "matern52", variogram.fit_by_grid
+            )
+            return fitted.numpy(asked)
+
+        beside = {
+            n: predict(rest[n][:, None, :, None], own[:, None])[:, 0]
+            for n, own in samples.beside.items()
+        }
+        return _PredictedValues(predict(positions, samples.numbers), beside)
+
+    alone = _PredictedValues(whole.numbers(whole.values), rest)
+    if not offsets:
+        return {NAIVE: krige(alone)}
+    own = _offset_values(trained, offsets, laid.points[:, laid.controls :])
+    return {
+        NAIVE: krige(alone - own) + _offset_values(trained, offsets, points[:, laid.controls :]),
+        NAIVE + OPEN: krige(alone),
+    }
+
+
+def _offset_values(
+    trained: TrainedModel, offsets: Mapping[str, Floats], labels: Floats
+) -> _PredictedValues:
+    """Return the offsets of labelled performers (Q, p)."""
+    found = {key: labels @ own for key, own in offsets.items()}
+    pose = found.pop("pose")
+    return _PredictedValues(
+        _pose_vectors(trained, pose) - _pose_vectors(trained, np.zeros_like(pose)), found
+    )
 
 
 def _motions_of_values(

@@ -60,26 +60,47 @@ def compare_motions(
     made: ComparedMotion, captured: ComparedMotion, feet: tuple[int, ...]
 ) -> MotionErrors:
     """Return the errors of a synthesized motion. feet: joint indices."""
-    own, true = made.points, captured.points
-    phase = dtw.warp(_warping_features(true)[None], _warping_features(own))[0]
-    warped = _resample(own, phase)
-    return MotionErrors(
-        _distances(_joint_distances(_root_relative(warped), _root_relative(true))),
-        _distances(_joint_distances(warped, true)),
-        _distances(_joint_distances(_root_relative(own), _root_relative(true))),
-        _distances(_joint_distances(own, true)),
-        _distances(
-            np.linalg.norm(_root_relative(warped) - _root_relative(true), axis=-1)[:, :, 1:].max(
-                axis=2
-            )
+    return compare_all([made], captured, feet)[0]
+
+
+def compare_all(
+    made: Sequence[ComparedMotion], captured: ComparedMotion, feet: tuple[int, ...]
+) -> list[MotionErrors]:
+    """Return the errors of several motions against one captured motion. feet: joint indices."""
+    own, true = np.stack([motion.points for motion in made]), captured.points
+    features = np.broadcast_to(_warping_features(true), (len(made), FRAMES, true.shape[1] * 3))
+    phases = dtw.warp(features, _warping_features(own))
+    warped = np.stack([_resample(*pair) for pair in zip(own, phases, strict=True)])
+    apart = _joint_distances(warped, true)
+    shell = np.linalg.norm(_root_relative(warped) - _root_relative(true), axis=-1)
+    spreads = zip(
+        *map(
+            _distances,
+            (
+                _joint_distances(_root_relative(warped), _root_relative(true)),
+                apart,
+                _joint_distances(_root_relative(own), _root_relative(true)),
+                _joint_distances(own, true),
+                shell[..., 1:].max(axis=-1),
+            ),
         ),
-        _effector(made.event, captured.event),
-        acceleration(own) / acceleration(true),
-        skate(made, feet),
-        skate(captured, feet),
-        float(np.log(made.duration / captured.duration)),
-        np.mean(np.square(_joint_distances(warped, true)), axis=0),
+        strict=True,
     )
+    jerks = acceleration(own) / acceleration(true)
+    slid = skate(captured, feet)
+    squares = np.mean(np.square(apart), axis=1)
+    return [
+        MotionErrors(
+            *found,
+            _effector(motion.event, captured.event),
+            float(jerk),
+            skate(motion, feet),
+            slid,
+            float(np.log(motion.duration / captured.duration)),
+            joints,
+        )
+        for motion, found, jerk, joints in zip(made, spreads, jerks, squares, strict=True)
+    ]
 
 
 def _effector(made: Floats | None, captured: Floats | None) -> float:
@@ -89,12 +110,12 @@ def _effector(made: Floats | None, captured: Floats | None) -> float:
 
 
 def _root_relative(points: Floats) -> Floats:
-    return points - points[:, :1, :1]
+    return points - points[..., :1, :1, :]
 
 
 def _warping_features(points: Floats) -> Floats:
-    """Return joint positions (FRAMES, J * 3) relative to the root, for time warping."""
-    return _root_relative(points)[:, :, 0].reshape(FRAMES, -1)
+    """Return joint positions (..., FRAMES, J * 3) relative to the root, for time warping."""
+    return _root_relative(points)[..., 0, :].reshape(*points.shape[:-3], -1)
 
 
 def _resample(points: Floats, phase: Floats) -> Floats:
@@ -102,19 +123,25 @@ def _resample(points: Floats, phase: Floats) -> Floats:
 
 
 def _joint_distances(a: Floats, b: Floats) -> Floats:
-    return np.linalg.norm(a[:, :, 0] - b[:, :, 0], axis=-1)
+    return np.linalg.norm(a[..., 0, :] - b[..., 0, :], axis=-1)
 
 
-def _distances(apart: Floats) -> DistanceStatistics:
-    p95, p99 = np.percentile(apart, [95, 99])
-    rms = np.sqrt(np.mean(np.square(apart)))
-    return DistanceStatistics(*map(float, (apart.mean(), rms, p95, p99, apart.max())))
+def _distances(apart: Floats) -> list[DistanceStatistics]:
+    """Return the statistics of distances (M, FRAMES, J) of each of M motions."""
+    flat = apart.reshape(len(apart), -1)
+    p95, p99 = np.percentile(flat, [95, 99], axis=1)
+    rms = np.sqrt(np.mean(np.square(flat), axis=1))
+    rows = zip(flat.mean(axis=1), rms, p95, p99, flat.max(axis=1), strict=True)
+    return [DistanceStatistics(*map(float, row)) for row in rows]
 
 
-def acceleration(points: Floats) -> float:
-    """Return the mean size of second differences of points (FRAMES, J, 4, 3), root-relative, m."""
-    joints = _root_relative(points)[:, 1:, 0]
-    return float(np.linalg.norm(np.diff(joints, n=2, axis=0), axis=-1).mean())
+def acceleration(points: Floats) -> Floats:
+    """Return mean sizes (...) of second differences of points (..., FRAMES, J, 4, 3), m.
+
+    The points are taken relative to the root.
+    """
+    joints = _root_relative(points)[..., 1:, 0, :]
+    return np.linalg.norm(np.diff(joints, n=2, axis=-3), axis=-1).mean(axis=(-2, -1))
 
 
 def skate(motion: ComparedMotion, feet: tuple[int, ...]) -> float:

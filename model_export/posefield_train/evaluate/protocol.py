@@ -28,6 +28,7 @@ from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.support_flags import SupportFlags
 from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.kriging import sample_points
 from posefield_train.parallel import single_thread
 from posefield_train.parallel.jobs import Jobs
 from posefield_train.source.ingest import Example
@@ -50,10 +51,10 @@ class EvaluationResult:
 
     clips: names. errors: of each method by clip; None for clips that a method did not predict.
     sigma: standard deviation (C,) that posefield predicts, m. joint_sigma: of each joint (C, J), m.
-    joints: their names. corrections: of the predictions to the captured event (C,); empty without
-    an event. flags: accuracy of the support flag; None against the truth, which has no held-out
-    clips. stills: bodies at the event, of captured clips and of posefield's predictions. parents:
-    of the joints.
+    joints: their names. takes: number (C,) of the take of each clip. corrections: of the
+    predictions to the captured event (C,); empty without an event. flags: accuracy of the support
+    flag; None against the truth, which has no held-out clips. bodies: at the event, of captured
+    clips and of posefield's predictions. parents: of the joints.
     """
 
     family: str
@@ -63,6 +64,7 @@ class EvaluationResult:
     sigma: Floats
     joint_sigma: Floats
     joints: tuple[str, ...]
+    takes: tuple[int, ...]
     corrections: tuple[Correction, ...]
     flags: SupportFlags | None = None
     bodies: EventBodies = field(default_factory=dict)
@@ -126,7 +128,8 @@ def run_protocol(
     found = support_flags.measure_flags(
         controls, [control.name for control in recipe.controls], own
     )
-    asked = _ResultNames(f"leave_one_{protocol}_out", names, examples[0].clip.skeleton.names)
+    joints, takes = examples[0].clip.skeleton.names, sample_points.take_numbers(examples)
+    asked = _ResultNames(f"leave_one_{protocol}_out", names, joints, takes.tolist())
     parts = with_progress(jobs.run(_run_fold, each, (recipe, examples)), len(each), report)
     return replace(_merge_parts(recipe, asked, parts), flags=found)
 
@@ -142,7 +145,7 @@ def run_against_truth(
     made = _evaluated_model(recipe, examples)
     each = [(points[at : at + BATCH], at) for at in range(0, len(points), BATCH)]
     names = [", ".join(f"{value:.4g}" for value in point) for point in points]
-    asked = _ResultNames("truth", names, made.trained.skeleton.names)
+    asked = _ResultNames("truth", names, made.trained.skeleton.names, range(len(points)))
     return _merge_parts(
         recipe, asked, with_progress(jobs.run(_run_truth_batch, each, (made,)), len(each), report)
     )
@@ -223,13 +226,7 @@ def _compare_methods(
         corrected = corrected_answers.correct_motions(recipe, trained, made.file, asked, wanted)
         ours[EXACT], corrections = corrected.motions, corrected.corrections
     motions = {**ours, **held.more, **rest}
-    compared = {
-        name: [
-            None if own is None else motion_errors.compare_motions(own, true, feet)
-            for own, true in zip(named, held.captured, strict=True)
-        ]
-        for name, named in motions.items()
-    }
+    compared = _compare_all(motions, held.captured, feet)
     named = {
         CAPTURED: held.captured,
         **{name: motions[name] for name in motions if name in CHARTED_METHODS},
@@ -244,13 +241,29 @@ def _compare_methods(
     return _PartialResult(places, compared, *trust, corrections, looks, parents)
 
 
+def _compare_all(
+    motions: ExtraPredictions, captured: Sequence[ComparedMotion], feet: tuple[int, ...]
+) -> dict[str, list[MotionErrors | None]]:
+    """Return the errors of every method by clip; None for clips that it did not predict."""
+    found: dict[str, list[MotionErrors | None]] = {name: [] for name in motions}
+    for place, true in enumerate(captured):
+        made = {name: own for name, listed in motions.items() if (own := listed[place])}
+        errors = dict(
+            zip(made, motion_errors.compare_all(list(made.values()), true, feet), strict=True)
+        )
+        for name, own in found.items():
+            own.append(errors.get(name))
+    return found
+
+
 @dataclass(frozen=True)
 class _ResultNames:
-    """Names of the protocol, of the clips and of the joints."""
+    """Names of the protocol, of the clips and of the joints; takes: number of each clip's."""
 
     protocol: str
     clips: Sequence[str]
     joints: tuple[str, ...]
+    takes: Sequence[int]
 
 
 def _merge_parts(
@@ -276,6 +289,7 @@ def _merge_parts(
         np.concatenate([part.sigma for part in listed])[order],
         np.concatenate([part.joint_sigma for part in listed])[order],
         asked.joints,
+        tuple(asked.takes),
         tuple(corrections[i] for i in order if corrections),
         bodies={name: [own[i] for i in order] for name, own in looks.items()},
         parents=listed[0].parents,

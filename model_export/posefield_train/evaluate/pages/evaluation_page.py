@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from posefield_train.evaluate import corrections, evaluation_summary
+from posefield_train.evaluate import corrections, equal_information, evaluation_summary
 from posefield_train.evaluate.evaluation_summary import MethodSummary
 from posefield_train.evaluate.learning_curves import Learning
-from posefield_train.evaluate.methods import DEFINITIONS, OURS
+from posefield_train.evaluate.methods import OURS, TOLD, definition
 from posefield_train.evaluate.pages import evaluation_charts
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.report.drawing.html_page import Page, Section, Table
@@ -15,6 +15,12 @@ TITLES = {
     "leave_one_performer_out": "Each performer predicted from the other performers",
     "truth": "Comparison with the noise-free truth",
 }
+
+EQUAL = (
+    "Posefield is compared with the best single peer of each measure with equal information. "
+    "Differences are the peer's error less that of posefield, clip by clip; ± is their standard "
+    "error over takes. Posefield is better or worse by more than that, or within it."
+)
 
 
 def html(
@@ -44,10 +50,14 @@ def _section(result: EvaluationResult) -> Section:
         TITLES[result.protocol],
         (
             evaluation_summary.UNITS,
-            _comparison(found),
+            EQUAL,
             *map(_sentence, evaluation_summary.trust_text(result)),
         ),
-        (Table(caption, head, tuple(one.cells() for one in found)), *_corrections(result)),
+        (
+            *_equal_information(result),
+            Table(caption, head, tuple(one.cells() for one in found)),
+            *_corrections(result),
+        ),
         (
             evaluation_charts.method_bars(found),
             evaluation_charts.clips(result, rival),
@@ -72,19 +82,13 @@ def _other_methods(found: Sequence[MethodSummary]) -> list[MethodSummary]:
     return [one for one in found if not one.name.startswith(OURS)]
 
 
-def _comparison(found: Sequence[MethodSummary]) -> str:
-    """Return which methods are better than posefield, or tie with it."""
-    others = _other_methods(found)
-    ahead = [one.name for one in others if one.worse < -one.worse_error]
-    tied = [one.name for one in others if abs(one.worse) <= one.worse_error]
-    if ahead:
-        return f"Better than posefield by more than one standard error: {', '.join(ahead)}."
-    if tied:
-        return (
-            "No method is better than posefield by more than one standard error. Within one "
-            f"standard error: {', '.join(tied)}."
-        )
-    return "Posefield is better than every other method by more than one standard error."
+def _equal_information(result: EvaluationResult) -> list[Table]:
+    """Return the tables of posefield and the best single peers with equal information."""
+    return [
+        Table(f"Posefield and the best single peer: {title}", equal_information.HEAD, tuple(rows))
+        for information, title in equal_information.TITLES.items()
+        if (rows := equal_information.best_rows(result, information))
+    ]
 
 
 def _distances(result: EvaluationResult) -> Section:
@@ -119,9 +123,10 @@ def _learning(curve: Learning) -> Section:
 
 def _legend(results: Sequence[EvaluationResult]) -> Section:
     names = dict.fromkeys(name for result in results for name in result.errors)
-    methods = tuple((name, DEFINITIONS[name]) for name in names)
+    methods = tuple((name, definition(name)) for name in names)
     paragraphs = (
         "All methods get the same aligned clips, and predict motion, bone lengths and timing.",
+        TOLD,
     )
     tables = (
         Table("Methods", ("method", "definition"), methods),

@@ -4,16 +4,12 @@ A peer is a method of a library, not a copy of it. Its inputs are the controls i
 the quantities that posefield kriges: reduced motions, bone offsets, duration, warp and travel.
 """
 
-import warnings
 from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator, RBFInterpolator
 from sklearn.dummy import DummyRegressor
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
@@ -59,47 +55,14 @@ def _distinct_points(known: Floats, values: Floats) -> tuple[Floats, Floats]:
     return points, sums / counts[:, None]
 
 
-def thin_plate_smoothed(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-    """Return thin-plate predictions with the smoothing of the least leave-one-out error."""
-    known, asked = _controls(samples, queries)
-    losses = [_leave_one_out_error(samples, known, values, smoothing) for smoothing in SMOOTHINGS]
-    best = SMOOTHINGS[int(np.argmin(losses))]
-    return _rbf_interpolator(known, values, "thin_plate_spline", best)(asked)
+def thin_plate(smoothing: float) -> Interpolator:
+    """Return thin-plate interpolation with a smoothing."""
 
+    def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
+        known, asked = _controls(samples, queries)
+        return _rbf_interpolator(known, values, "thin_plate_spline", smoothing)(asked)
 
-def _leave_one_out_error(
-    samples: SamplePoints, known: Floats, values: Floats, smoothing: float
-) -> float:
-    total = 0.0
-    for group in np.unique(samples.groups):
-        out = samples.groups == group
-        found = _rbf_interpolator(known[~out], values[~out], "thin_plate_spline", smoothing)(
-            known[out]
-        )
-        total += float(np.sum(np.square(found - values[out])))
-    return total
-
-
-def gp_with_performers(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-    """Return predictions of a Gaussian process with a length scale for each control and performer.
-
-    Length scales, amplitude and noise maximise the marginal likelihood.
-    """
-    centre, size = values.mean(axis=0), max(float(values.std()), 1e-12)
-    lengths = np.ones(samples.points.shape[1])
-    kernel = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(lengths, (0.1, 100.0))
-    model = GaussianProcessRegressor(kernel + WhiteKernel(0.1, (1e-5, 10.0)), random_state=0)
-    with warnings.catch_warnings():
-        # A length scale at its bound is a valid result: the control has no influence, or all.
-        warnings.simplefilter("ignore", ConvergenceWarning)
-        found = model.fit(samples.points, (values - centre) / size).predict(queries)
-    return centre + size * found.reshape(len(queries), -1)
-
-
-def gp_without_performers(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-    """Return the predictions of `gp_with_performers` from the controls alone."""
-    known, asked = _controls(samples, queries)
-    return gp_with_performers(SamplePoints(known, samples.controls, samples.groups), values, asked)
+    return predict
 
 
 def _regression(degree: int) -> Interpolator:
@@ -154,30 +117,30 @@ def sample_mean(samples: SamplePoints, values: Floats, queries: Floats) -> Float
     return DummyRegressor().fit(samples.points, values).predict(queries).reshape(len(queries), -1)
 
 
-INTERPOLATORS: dict[str, tuple[Interpolator, str]] = {
-    "thin_plate": (_rbf("thin_plate_spline"), "scipy RBFInterpolator, thin plate, degree 1"),
+LINEAR_PEERS: dict[str, tuple[tuple[Interpolator, ...], str]] = {
+    "thin_plate": ((thin_plate(0.0),), "scipy RBFInterpolator, thin plate, degree 1"),
     "thin_plate_smoothed": (
-        thin_plate_smoothed,
-        "the same, smoothing tuned by leave-one-take-out for each of motion, bones, duration, warp",
+        tuple(map(thin_plate, SMOOTHINGS)),
+        "the same, smoothing tuned by leaving out takes for each of motion, bones, duration, warp",
     ),
-    "linear_rbf": (_rbf("linear"), "scipy RBFInterpolator, linear kernel, degree 1"),
-    "cubic_rbf": (_rbf("cubic"), "scipy RBFInterpolator, cubic kernel, degree 1"),
-    "gp": (
-        gp_with_performers,
-        "scikit-learn GaussianProcessRegressor, ARD RBF + white noise, label as columns",
+    "linear_rbf": ((_rbf("linear"),), "scipy RBFInterpolator, linear kernel, degree 1"),
+    "cubic_rbf": ((_rbf("cubic"),), "scipy RBFInterpolator, cubic kernel, degree 1"),
+    "inverse_distance": (
+        (_neighbours(None, _inverse_square),),
+        "scikit-learn, weights 1 / distance²",
     ),
-    "gp_controls": (gp_without_performers, "the same without the performer's label"),
-    "inverse_distance": (_neighbours(None, _inverse_square), "scikit-learn, weights 1 / distance²"),
-    "k_nearest": (_neighbours(5, "distance"), "scikit-learn, 5 nearest, weights 1 / distance"),
-    "nearest": (_neighbours(1, "uniform"), "scikit-learn, nearest example"),
-    "nearest_same_performer": (nearest_of_performer, "scikit-learn, nearest of the same performer"),
-    "linear_regression": (_regression(1), "scikit-learn LinearRegression"),
-    "quadratic_regression": (_regression(2), "scikit-learn, quadratic polynomial"),
+    "k_nearest": (
+        (_neighbours(5, "distance"),),
+        "scikit-learn, 5 nearest, weights 1 / distance",
+    ),
+    "nearest": ((_neighbours(1, "uniform"),), "scikit-learn, nearest example"),
+    "linear_regression": ((_regression(1),), "scikit-learn LinearRegression"),
+    "quadratic_regression": ((_regression(2),), "scikit-learn, quadratic polynomial"),
     "linear_coefficients": (
-        linear_coefficients,
+        (linear_coefficients,),
         "multilinear model, coefficients interpolated linearly (scipy LinearNDInterpolator; "
         "nearest outside the hull)",
     ),
-    "mean": (sample_mean, "the mean motion"),
+    "mean": ((sample_mean,), "the mean motion"),
 }
-"""Peers by name, each with its definition."""
+"""Peers whose predictions are linear in the values: each with its settings, and its definition."""

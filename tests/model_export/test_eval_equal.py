@@ -1,0 +1,128 @@
+"""Tests of comparisons with equal information: standard errors over takes, verdicts and rivals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield_train.evaluate import equal_information
+from posefield_train.evaluate.motion_errors import DistanceStatistics, MotionErrors
+from posefield_train.evaluate.protocol import EvaluationResult
+
+TAKES = (0, 0, 0, 1, 1, 2, 2, 3)
+
+
+def error(relative, duration=0.0, effector=0.01):
+    own = DistanceStatistics(relative, relative, relative, relative, relative)
+    return MotionErrors(*[own] * 5, effector, 1.0, 0.0, 0.0, duration, np.full(2, relative**2))
+
+
+def result(rows, takes=TAKES):
+    """Result with relative errors of some methods by clip, m."""
+    names = tuple(map(str, range(len(takes))))
+    errors = {name: tuple(map(error, row)) for name, row in rows.items()}
+    sigma = np.ones(len(takes))
+    return EvaluationResult(
+        "tiny", "leave_one_clip_out", names, errors, sigma, sigma[:, None], ("Hips",), takes, ()
+    )
+
+
+OURS = np.linspace(0.01, 0.02, len(TAKES))
+
+
+def test_one_clip_per_take_gives_the_usual_standard_error(rng):
+    values = rng.standard_normal(20)
+    found = equal_information.clustered_standard_error(values, np.arange(20))
+    assert found == pytest.approx(values.std(ddof=1) / np.sqrt(20))
+
+
+def test_clips_that_agree_within_takes_count_as_one(rng):
+    takes = np.repeat(np.arange(6), 5)
+    values = rng.standard_normal(6)
+    found = equal_information.clustered_standard_error(values[takes], takes)
+    assert found == pytest.approx(values.std(ddof=1) / np.sqrt(6))
+    # Negative control: over clips the same differences look more certain than they are.
+    assert found > 2 * equal_information.clustered_standard_error(values[takes], np.arange(30))
+    assert equal_information.clustered_standard_error(values, np.zeros(6, dtype=int)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("shift", "verdict"),
+    [
+        (0.01, equal_information.BETTER),
+        (0.0, equal_information.WITHIN),
+        (-0.01, equal_information.WORSE),
+    ],
+)
+def test_the_verdict_follows_the_paired_difference(rng, shift, verdict):
+    noise = 0.001 * rng.standard_normal(len(TAKES))
+    found = result({"posefield": OURS, "gp": OURS + shift + noise - noise.mean()})
+    one = equal_information.compare(found, equal_information.MEASURES[0], "posefield", "gp")
+    assert one.verdict == verdict
+    assert one.difference == pytest.approx(100 * shift, abs=1e-9)
+    expected = equal_information.clustered_standard_error(noise, np.array(TAKES))
+    assert one.standard_error == pytest.approx(100 * expected)
+
+
+def test_rivals_have_the_information_of_posefield():
+    rows = {
+        name: OURS + shift
+        for name, shift in (
+            ("posefield", 0.0),
+            ("posefield_exact", 0.0),
+            ("posefield_no_performer", 0.02),
+            ("gp", 0.002),
+            ("gp_no_performer", 0.03),
+            ("mean", 0.05),
+            ("mean_no_performer", 0.06),
+        )
+    }
+    found = equal_information.facts(result(rows))
+    assert found["known"]["posefield"] == "posefield"
+    # Whoever knows the performer may ignore it.
+    assert set(found["known"]["peers"]) == {
+        "gp", "gp_no_performer", "mean", "mean_no_performer"
+    }  # fmt: skip
+    assert found["open"]["posefield"] == "posefield_no_performer"
+    assert set(found["open"]["peers"]) == {"gp_no_performer", "mean_no_performer"}
+    assert found["known"]["best"]["relative"]["peer"] == "gp"
+    assert found["open"]["best"]["relative"]["difference"] == pytest.approx(1.0)
+    assert found["known"]["takes"] == 4
+
+
+def test_a_family_without_labels_has_one_table():
+    found = equal_information.facts(result({"posefield": OURS, "gp": OURS + 0.01}))
+    assert list(found) == ["open"]
+    assert found["open"]["posefield"] == "posefield"
+
+
+def test_without_an_event_no_effector_is_compared():
+    own = result({"posefield": OURS, "gp": OURS})
+    bare = {
+        name: tuple(replace(one, effector=np.nan) for one in row)
+        for name, row in own.errors.items()
+    }
+    found = equal_information.facts(replace(own, errors=bare))
+    assert set(found["open"]["best"]) == {"relative", "global", "duration"}
+    # Negative control.
+    assert "effector" in equal_information.facts(own)["open"]["best"]
+
+
+def test_durations_are_compared_by_their_squares():
+    own = result({"posefield": OURS, "gp": OURS})
+    far = {
+        "posefield": tuple(error(0.01, duration=0.1) for _ in TAKES),
+        "gp": tuple(error(0.01, duration=0.2 + 0.01 * (take % 2)) for take in TAKES),
+    }
+    one = equal_information.facts(replace(own, errors=far))["open"]["best"]["duration"]
+    assert one["posefield"] == pytest.approx(10.0)
+    assert 20.0 < one["error"] < 21.0
+    assert one["verdict"] == equal_information.BETTER
+    assert one["standard_error"] > 0.0
+
+
+def test_the_tables_say_who_knows_the_performer():
+    rows = {"posefield": OURS, "posefield_no_performer": OURS, "gp": OURS, "gp_no_performer": OURS}
+    text = equal_information.table(result(rows))
+    assert all(title in text for title in equal_information.TITLES.values())
+    assert text.count("within one standard error") >= 4
