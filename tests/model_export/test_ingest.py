@@ -251,7 +251,8 @@ def test_closing_the_loop_leaves_the_middle_frame_alone(read):
     source = small_clip(frames=21)
     loop = first(read(source, motion={"cyclic": True}))
     moved = np.abs(around_root(loop) - around_root(source)).max(axis=(1, 2))
-    assert moved[10] < WRITTEN
+    # All of it but a fifth of the cycle at either end.
+    assert moved[4:17].max() < WRITTEN
     assert moved[0] > 0.01 and moved[-1] > 0.01
 
 
@@ -264,7 +265,8 @@ def test_a_cyclic_clip_sets_out_along_the_line_of_its_heading(read):
     rotations[:, 0] = swing
     loop = first(read(replace(source, rotations=rotations), motion={"cyclic": True}))
     _, at_start = np.polyfit(t, ingest.heading(loop), 1)
-    assert abs(at_start) < WRITTEN
+    # What closes the seam may turn the line by a small part of a degree.
+    assert abs(at_start) < 1e-3
     assert ingest.heading(loop)[0] > 0.3
 
 

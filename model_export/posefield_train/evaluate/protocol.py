@@ -171,7 +171,11 @@ def _run_fold(
     asked = Queries(np.stack([e.controls for e in held]), [e.row.labels for e in held])
     events = [methods.captured_event(recipe, made.trained, e.landmarks) for e in held]
     pairs = zip(held, events, strict=True)
-    captured = [compared_motion.motion_of_clip(example.clip, event) for example, event in pairs]
+    # As captured: closing a cycle moves joints, which would favour what closes the same way.
+    captured = [
+        compared_motion.motion_of_clip(example.captured or example.clip, event)
+        for example, event in pairs
+    ]
     if protocol == "clip":
         more: ExtraPredictions = new_performers.predict_unnamed(recipe, made.trained, asked)
     else:

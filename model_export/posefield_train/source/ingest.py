@@ -12,7 +12,6 @@ from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
-from posefield.motion.curves import CurveValues, clamp
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source import (
     bvh,
@@ -26,6 +25,7 @@ from posefield_train.source import (
 from posefield_train.source.bvh import end_sites
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.curve_files import CurveReader
+from posefield_train.source.cycles import cycle_closing
 from posefield_train.source.half_turns import Finding
 from posefield_train.source.recipe import Recipe, Source
 from posefield_train.source.rigs import rig_normalization
@@ -45,7 +45,8 @@ class Example:
     clip, in order. jumps: removed jumps of small joints between two frames. shift: share of a cycle
     by which the clip was shifted to begin later. take: name of the take; examples of one take are
     left out together. facing: degrees from the root's +z to the body's facing in the file, to the
-    left; None for a motion without a facing.
+    left; None for a motion without a facing. captured: the clip of a cycle before its seam
+    was closed; None where nothing was closed.
     """
 
     row: ClipRow
@@ -56,6 +57,7 @@ class Example:
     shift: float = 0.0
     take: str = ""
     facing: float | None = 0.0
+    captured: Clip | None = None
 
     @property
     def offsets(self) -> Floats:
@@ -179,13 +181,13 @@ def _example(
     recipe: Recipe, row: ClipRow, captured: Clip, last: int, facing: float | None
 ) -> _FoundExample:
     """Return the example of a row."""
-    motion = recipe.motion
-    clip, jumps, stretch = canonicalize(
-        captured, motion.cyclic, motion.root == "in_place", facing is not None
-    )
+    motion, has_facing = recipe.motion, facing is not None
+    in_place = motion.root == "in_place"
+    before = captured_cycle(captured, in_place, has_facing) if motion.cyclic else None
+    clip, jumps, stretch = canonicalize(captured, motion.cyclic, in_place, has_facing)
     marks = (*landmarks(row, last, recipe.clips.landmarks), *_found_landmark(recipe, row, clip))
     values = measured_controls.control_values(recipe, row, clip, marks)
-    example = Example(row, clip, values, marks, jumps, facing=facing)
+    example = Example(row, clip, values, marks, jumps, facing=facing, captured=before)
     return _FoundExample(example, stretch, captured.positions())
 
 
@@ -229,12 +231,21 @@ def canonicalize(
     stretch = float(np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0))
     # Before the cycle is closed, because closing it would spread a jump over all frames.
     clip, jumps = half_turns.remove_jumps(clip, 0)
-    if not has_facing:
-        clip = place(clip, _horizontal(clip.root_path[0]), np.zeros(()))
-    else:
-        clip = straighten_gait(clip) if cyclic else _start_at_origin(clip)
-    clip = _close_cycle(clip) if cyclic else clip
+    clip = _from_origin(clip, cyclic, has_facing)
+    clip = cycle_closing.close_cycle(clip, heading(clip)) if cyclic else clip
     return remove_drift(clip) if in_place else clip, tuple(jumps), stretch
+
+
+def _from_origin(clip: Clip, cyclic: bool, has_facing: bool) -> Clip:
+    if not has_facing:
+        return place(clip, _horizontal(clip.root_path[0]), np.zeros(()))
+    return straighten_gait(clip) if cyclic else _start_at_origin(clip)
+
+
+def captured_cycle(clip: Clip, in_place: bool, has_facing: bool = True) -> Clip:
+    """Return a cycle with heading and origin removed as by `canonicalize`, its seam left open."""
+    clip = _from_origin(half_turns.remove_jumps(clip, 0)[0], True, has_facing)
+    return remove_drift(clip) if in_place else clip
 
 
 def _drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
@@ -420,30 +431,3 @@ def remove_drift(clip: Clip) -> Clip:
     travel = _horizontal(clip.root_path[-1] - clip.root_path[0])
     translations[:, 0] -= np.linspace(0.0, 1.0, len(clip))[:, None] * travel
     return replace(clip, translations=translations)
-
-
-def _close_cycle(clip: Clip) -> Clip:
-    """Close a cycle: make the last pose equal the first except for travel and heading.
-
-    Half of the gap is added at either end and fades linearly to zero in the middle.
-    """
-    share = np.linspace(0.5, -0.5, len(clip))
-    line = np.polynomial.Polynomial.fit(np.arange(len(clip)), heading(clip), 1)
-    walking = quat.from_axis_angle(UP, line(np.arange(len(clip))))
-    rotations = clip.rotations.copy()
-    rotations[:, 0] = quat.mul(quat.conj(walking), rotations[:, 0])
-    gap = quat.log(quat.mul(quat.conj(rotations[0]), rotations[-1]))
-    rotations = quat.mul(rotations, quat.exp(share[:, None, None] * gap))
-    rotations[:, 0] = quat.mul(walking, rotations[:, 0])
-    translations = clip.translations.copy()
-    rise = (clip.root_path[-1] - clip.root_path[0]) @ UP
-    translations[:, 0] += share[:, None] * rise * UP
-    closed = replace(clip, rotations=rotations, translations=translations)
-    return closed if clip.curves is None else replace(closed, curves=_close_curves(clip.curves))
-
-
-def _close_curves(own: CurveValues) -> CurveValues:
-    """Close the curves of a cycle as `_close_cycle` closes its poses, within their limits."""
-    share = np.linspace(0.5, -0.5, len(own.values))[:, None]
-    values = own.values + share * (own.values[-1] - own.values[0])
-    return replace(own, values=clamp(own.curves, values))

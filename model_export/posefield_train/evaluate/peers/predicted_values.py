@@ -54,7 +54,7 @@ def predict(samples: SamplePoints, values: Values, queries: Floats) -> PeerPredi
                 for key, own in values.items()
             }
     found[GP] = _each(gaussian_process.gp_with_performers, samples, values, queries)
-    if samples.labelled:
+    if samples.labels:
         alone = gaussian_process.gp_without_performers
         found[GP + OPEN] = _each(alone, samples, values, queries)
         nearest = interpolation_peers.nearest_of_performer
@@ -74,7 +74,7 @@ def _linear(
     queries: Floats,
 ) -> dict[str, Values]:
     alone = {key: linear_smoothers.predict(choices, own) for key, own in values.items()}
-    if not samples.labelled:
+    if not samples.labels:
         return {name: alone}
     told = {
         key: linear_smoothers.predict_with_performers(choices, samples, own, queries)

@@ -1,0 +1,1 @@
+"""Cycles: the closing of their seam."""

@@ -1,0 +1,74 @@
+"""Tests of the closing of a cycle: it meets itself smoothly, and most frames stay as captured."""
+
+import numpy as np
+import pytest
+from minimal import small_clip
+
+from posefield.common.units import UP
+from posefield.motion import quat
+from posefield_train.source import ingest
+from posefield_train.source.cycles import cycle_closing
+
+FRAMES = 121
+
+
+@pytest.fixture
+def opened():
+    """A gait whose last pose is not its first."""
+    return ingest.straighten_gait(small_clip(frames=FRAMES))
+
+
+@pytest.fixture
+def closed(opened):
+    return cycle_closing.close_cycle(opened, ingest.heading(opened))
+
+
+def faded_linearly(clip):
+    """Closed as before: half of the gap at either end, fading to zero in the middle."""
+    share = np.linspace(0.5, -0.5, len(clip))
+    gap = quat.log(quat.mul(quat.conj(clip.rotations[0]), clip.rotations[-1]))
+    return quat.mul(clip.rotations, quat.exp(share[:, None, None] * gap))
+
+
+def moved(before, after):
+    """Mean angle by which each joint but the root was turned, rad."""
+    apart = quat.log(quat.mul(quat.conj(before[:, 1:]), after[:, 1:]))
+    return np.linalg.norm(apart, axis=-1).mean(axis=0)
+
+
+def test_joints_move_at_most_half_as_far_as_by_a_linear_fade(opened, closed):
+    own = moved(opened.rotations, closed.rotations)
+    linear = moved(opened.rotations, faded_linearly(opened))
+    far = linear > 1e-3
+    assert far.any() and (own[far] < 0.5 * linear[far]).all()
+
+
+def test_only_the_ends_of_a_cycle_move(opened, closed):
+    kept = slice(int(cycle_closing.FADE * FRAMES) + 1, -int(cycle_closing.FADE * FRAMES) - 1)
+    assert np.abs(closed.rotations[kept] - opened.rotations[kept]).max() < 1e-12
+    # Negative control: the ends do.
+    assert np.abs(closed.rotations[0] - opened.rotations[0]).max() > 1e-3
+
+
+def turning(rotations, frame):
+    """Rotation vector from a frame to the next, of every joint but the root."""
+    return quat.log(quat.mul(quat.conj(rotations[frame, 1:]), rotations[frame + 1, 1:]))
+
+
+def test_the_seam_has_no_corner(opened, closed):
+    def corner(rotations):
+        return np.abs(turning(rotations, 0) - turning(rotations, -2)).max()
+
+    assert corner(closed.rotations) < 0.35 * corner(opened.rotations)
+    # Negative control: a linear fade leaves the corner.
+    assert corner(faded_linearly(opened)) > 0.9 * corner(opened.rotations)
+
+
+def test_a_closed_cycle_nearly_stays_as_it_is(opened, closed):
+    again = cycle_closing.close_cycle(closed, ingest.heading(closed))
+    gap = quat.log(quat.mul(quat.conj(closed.rotations[0, 1:]), closed.rotations[-1, 1:]))
+    assert np.abs(gap).max() < 1e-9
+    own, first, raw = (clip.positions() for clip in (again, closed, opened))
+    # Differences do not tell rates exactly.
+    assert np.abs(own - first).max() < 0.1 * np.abs(first - raw).max()
+    assert (closed.root_path[-1] - closed.root_path[0]) @ UP == pytest.approx(0.0, abs=1e-12)
