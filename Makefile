@@ -132,3 +132,19 @@ lock: $(ENV) ## choose versions anew
 .PHONY: clean
 clean: ## remove what was built, environments too
 	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer service/posefield/http/pages/offline clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+
+# Every family is held out take by take; finished folds are kept, so that a run that was stopped goes on.
+EVALUATED := cmu_walk hdm05_grab_high hdm05_deposit_floor hdm05_kick hdm05_hop bandai_raise_hand
+EVALUATIONS := docs/results/evaluation
+
+.PHONY: evaluate
+evaluate: $(SAMPLE)/recipe.toml ## measure all families on held-out clips and write the results pages; DATA: folder of the motion
+	test -d "$(DATA)" || { echo "make evaluate needs DATA=folder of the motion data"; exit 2; }
+	mkdir -p $(EVALUATIONS)
+	for family in $(EVALUATED); do \
+		$(BIN)/posefield evaluate $$family --data "$(DATA)" --resume build/evaluation \
+			--json-file $(EVALUATIONS)/$$family.json >/dev/null || exit 1; \
+	done
+	$(BIN)/posefield evaluate $(SAMPLE)/recipe.toml --resume build/evaluation \
+		--json-file $(EVALUATIONS)/reaching.json >/dev/null
+	$(BIN)/python docs/generate.py

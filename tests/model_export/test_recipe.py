@@ -14,7 +14,14 @@ from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.source import control_sources, recipe
 
 RECIPES = Path(recipe.__file__).parents[1] / "recipes"
-SHIPPED = ("hdm05_grab_high", "hdm05_deposit_floor", "cmu_walk")
+SHIPPED = (
+    "hdm05_grab_high",
+    "hdm05_deposit_floor",
+    "hdm05_kick",
+    "hdm05_hop",
+    "bandai_raise_hand",
+    "cmu_walk",
+)
 MINIMAL = TOML.replace("metres_per_unit = 1.0", "metres_per_unit = 0.01")
 SECOND = """[[controls]]
 name = "speed"
@@ -569,7 +576,7 @@ def test_the_schema_is_itself_valid(schema):
     jsonschema.Draft202012Validator.check_schema(schema)
 
 
-def test_what_ships_is_the_three_recipes():
+def test_what_ships_is_the_recipes_of_this_list():
     assert {path.stem for path in RECIPES.glob("*.toml")} == set(SHIPPED)
 
 

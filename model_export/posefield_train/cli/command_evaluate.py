@@ -1,6 +1,7 @@
 """Command `posefield evaluate`: errors of a recipe's models on held-out motions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import zip_longest
@@ -20,9 +21,11 @@ from posefield_train.cli.executors import Scheduler
 from posefield_train.source import shipped_recipes
 
 if TYPE_CHECKING:
+    from posefield.console.progress import ProgressBar
     from posefield_train.evaluate.learning_curves import Learning
-    from posefield_train.evaluate.protocol import EvaluationResult
+    from posefield_train.evaluate.protocol import EvaluationResult, ProgressCallback
     from posefield_train.evaluate.support_flags import SupportFlags
+    from posefield_train.parallel.jobs import Jobs
     from posefield_train.source.ingest import Example
     from posefield_train.source.recipe import Recipe
 
@@ -70,6 +73,29 @@ class EvaluateOptions:
         ),
     ] = False
     scheduler: Scheduler = None
+    jobs: Annotated[int | None, typer.Option(help="number of processes; default: one per core")] = (
+        None
+    )
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            help="folder of finished folds: those of equal data, code and settings are read "
+            "instead of computed, and new ones are kept; it holds pickles, use your own only",
+            metavar="FOLDER",
+        ),
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise InvalidField("jobs", f"{self.jobs}, expected 1 or more")
+
+    @contextmanager
+    def executor(self) -> "Iterator[Jobs]":
+        """Open the executor of the folds."""
+        from posefield_train.parallel.finished_jobs import FinishedJobs
+
+        with executors.jobs(self.scheduler, self.jobs) as own:
+            yield FinishedJobs(own, self.resume) if self.resume else own
 
     @property
     def protocols(self) -> list[str]:
@@ -213,13 +239,18 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
     from posefield.console.progress import ProgressBar
     from posefield_train.evaluate import corrections, evaluation_summary, protocol
 
-    can = protocol.protocols(own.recipe, own.examples)
+    names = wanted.protocols or protocol.protocols(own.recipe, own.examples)
+    counts = [protocol.count_jobs(own.examples, name) for name in names]
     results = []
-    with executors.jobs(wanted.scheduler) as jobs:
-        for name in wanted.protocols or can:
-            with ProgressBar(name) as bar:
+    with wanted.executor() as jobs:
+        for place, name in enumerate(names):
+            before, total = sum(counts[:place]), sum(counts)
+            # One bar for all protocols, so that the estimate is that of the command.
+            with ProgressBar(f"{own.recipe.name}, {name}", total, before) as bar:
                 results.append(
-                    protocol.run_protocol(own.recipe, own.examples, name, jobs, bar.update)
+                    protocol.run_protocol(
+                        own.recipe, own.examples, name, jobs, _after(bar, before, total)
+                    )
                 )
             trust = "\n".join(evaluation_summary.trust_text(results[-1]))
             wanted.print(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
@@ -228,6 +259,11 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
     for text in evaluation_summary.performer_text(results):
         wanted.print(text)
     return results
+
+
+def _after(bar: "ProgressBar", before: int, total: int) -> "ProgressCallback":
+    """Return a callback that shows folds after `before` others, of `total`."""
+    return lambda done, _: bar.update(before + done, total)
 
 
 def _extra_results(
@@ -259,5 +295,5 @@ def _learning(wanted: EvaluateOptions) -> "Learning | None":
 
     if not wanted.learning:
         return None
-    with executors.jobs(wanted.scheduler) as jobs, ProgressBar("learning") as bar:
+    with wanted.executor() as jobs, ProgressBar("learning") as bar:
         return learning_curves.measure_curves(jobs, bar.update)

@@ -1,7 +1,7 @@
 """Errors of a synthesised motion against a captured one, and their means over clips."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -101,6 +101,21 @@ def compare_all(
         )
         for motion, found, jerk, joints in zip(made, spreads, jerks, squares, strict=True)
     ]
+
+
+def compare_methods(
+    motions: Mapping[str, Sequence[ComparedMotion | None]],
+    captured: Sequence[ComparedMotion],
+    feet: tuple[int, ...],
+) -> dict[str, list[MotionErrors | None]]:
+    """Return the errors of every method by clip; None for clips that it did not predict."""
+    found: dict[str, list[MotionErrors | None]] = {name: [] for name in motions}
+    for place, true in enumerate(captured):
+        made = {name: own for name, listed in motions.items() if (own := listed[place])}
+        errors = dict(zip(made, compare_all(list(made.values()), true, feet), strict=True))
+        for name, own in found.items():
+            own.append(errors.get(name))
+    return found
 
 
 def _effector(made: Floats | None, captured: Floats | None) -> float:

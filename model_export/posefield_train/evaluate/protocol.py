@@ -112,6 +112,17 @@ def protocols(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
     return known + ["clip"] + (["performer"] if several else [])
 
 
+def count_jobs(examples: Sequence[Example], protocol: str) -> int:
+    """Return the number of jobs that a protocol is run in."""
+    if protocol == "truth":
+        return -(-ground_truth.POINTS // BATCH)
+    return len(_folds(examples, protocol))
+
+
+def _folds(examples: Sequence[Example], protocol: str) -> list[Fold]:
+    return folds.clip_folds(examples) if protocol == "clip" else folds.performer_folds(examples)
+
+
 def run_protocol(
     recipe: Recipe, examples: Sequence[Example], protocol: str, jobs: Jobs, report: ProgressCallback
 ) -> EvaluationResult:
@@ -121,7 +132,7 @@ def run_protocol(
     """
     if protocol == "truth":
         return run_against_truth(recipe, examples, ground_truth.truth_points(), jobs, report)
-    own = folds.clip_folds(examples) if protocol == "clip" else folds.performer_folds(examples)
+    own = _folds(examples, protocol)
     each = [(fold, protocol) for fold in own]
     names = [f"{e.row.place.name} (line {e.row.line})" for e in examples]
     controls = np.stack([example.controls for example in examples])
@@ -230,7 +241,7 @@ def _compare_methods(
         corrected = corrected_answers.correct_motions(recipe, trained, made.file, asked, wanted)
         ours[EXACT], corrections = corrected.motions, corrected.corrections
     motions = {**ours, **held.more, **rest}
-    compared = _compare_all(motions, held.captured, feet)
+    compared = motion_errors.compare_methods(motions, held.captured, feet)
     named = {
         CAPTURED: held.captured,
         **{name: motions[name] for name in motions if name in CHARTED_METHODS},
@@ -243,21 +254,6 @@ def _compare_methods(
     parents = trained.skeleton.parents
     trust = found.sigma, found.joint_sigma
     return _PartialResult(places, compared, *trust, corrections, looks, parents)
-
-
-def _compare_all(
-    motions: ExtraPredictions, captured: Sequence[ComparedMotion], feet: tuple[int, ...]
-) -> dict[str, list[MotionErrors | None]]:
-    """Return the errors of every method by clip; None for clips that it did not predict."""
-    found: dict[str, list[MotionErrors | None]] = {name: [] for name in motions}
-    for place, true in enumerate(captured):
-        made = {name: own for name, listed in motions.items() if (own := listed[place])}
-        errors = dict(
-            zip(made, motion_errors.compare_all(list(made.values()), true, feet), strict=True)
-        )
-        for name, own in found.items():
-            own.append(errors.get(name))
-    return found
 
 
 @dataclass(frozen=True)

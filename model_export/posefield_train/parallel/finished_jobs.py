@@ -1,0 +1,96 @@
+"""Results of finished jobs in a folder, so that a run that was stopped goes on where it was.
+
+A result is found again by a key over the code of both packages, the versions of the libraries, the
+function and all of its arguments. Its file is written as a whole or not at all, and begins with a
+checksum. Results are pickles, which run code when they are read: use no folder of a stranger.
+"""
+
+import hashlib
+import pickle
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import joblib
+
+import posefield
+import posefield_train
+from posefield.common import atomic_files
+from posefield_train.parallel.jobs import Arguments, Jobs
+
+LIBRARIES = ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn")
+"""Libraries whose versions determine a result."""
+SUFFIX = ".result"
+CHECKSUM_BYTES = hashlib.sha256().digest_size
+
+
+@dataclass(frozen=True)
+class FinishedJobs:
+    """Jobs whose results are kept. jobs: executor of those without one. folder: of the results."""
+
+    jobs: Jobs
+    folder: Path
+
+    def run(
+        self,
+        function: Callable[..., Any],
+        arguments: Iterable[Arguments],
+        shared: Arguments = (),
+    ) -> Iterator[Any]:
+        """Yield the results of jobs as `Jobs.run` does, kept ones first.
+
+        Raises FileError if a result cannot be written.
+        """
+        common = joblib.hash((code_key(), f"{function.__module__}.{function.__name__}", shared))
+        listed = list(arguments)
+        files = [self.folder / f"{joblib.hash((common, own))}{SUFFIX}" for own in listed]
+        left = []
+        for number, file in enumerate(files):
+            kept = read_result(file)
+            if kept:
+                yield kept[0]
+            else:
+                left.append((number, listed[number]))
+        for number, result in self.jobs.run(_run_numbered, left, (function, shared)):
+            write_result(result, files[number])
+            yield result
+
+
+def _run_numbered(
+    function: Callable[..., Any], shared: Arguments, number: int, own: Arguments
+) -> tuple[int, Any]:
+    return number, function(*shared, *own)
+
+
+def write_result(result: Any, file: Path) -> None:
+    """Write a result with its checksum. Raises FileError if that cannot be done."""
+    content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
+    atomic_files.write(hashlib.sha256(content).digest() + content, file)
+
+
+def read_result(file: Path) -> tuple[Any] | None:
+    """Return a kept result; None if there is none, or its checksum is wrong."""
+    if not file.exists():
+        return None
+    content = file.read_bytes()
+    checksum, content = content[:CHECKSUM_BYTES], content[CHECKSUM_BYTES:]
+    if hashlib.sha256(content).digest() != checksum:
+        return None
+    return (pickle.loads(content),)
+
+
+@cache
+def code_key() -> str:
+    """Return a key over the sources of both packages and the versions of the libraries."""
+    found = hashlib.sha256()
+    for package in (posefield, posefield_train):
+        (place,) = package.__path__
+        for file in sorted(Path(place).rglob("*.py")):
+            found.update(file.relative_to(place).as_posix().encode())
+            found.update(hashlib.sha256(file.read_bytes()).digest())
+    for name in LIBRARIES:
+        found.update(f"{name} {version(name)}".encode())
+    return found.hexdigest()
