@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from evaluation_tables import TABLES
+from evaluation_tables import transcribed
 from page_parts import code, page, table
+from result_tables import REMARKS, TABLES
 
 ROOT = Path(__file__).resolve().parents[1]
 SCHEMA = ROOT / "model_export/posefield_train/recipes/recipe.schema.json"
@@ -170,11 +171,14 @@ def results(name: str) -> str:
     """Return a page of measured results."""
     found = json.loads((ROOT / f"docs/results/{name}.json").read_text(encoding="utf-8"))
     parts = [found["intro"], f"Measured: {found['measured']}. Machine: {found['machine']}."]
+    if any("from" in each for each in found["tables"]) and (said := transcribed()):
+        parts.append(said)
     for each in found["tables"]:
         parts.append(f"## {each['title']}")
         parts += [each["about"]] if each["about"] else []
         columns, rows = TABLES[each["from"]]() if "from" in each else (each["columns"], ())
         parts.append(table(columns, [*rows, *each["rows"]]))
-        if each["remarks"]:
-            parts.append("\n".join(f"- {remark}" for remark in each["remarks"]))
+        made = [REMARKS[each["from"]]()] if each.get("from") in REMARKS else []
+        if remarks := [*made, *each["remarks"]]:
+            parts.append("\n".join(f"- {remark}" for remark in remarks))
     return page(found["title"], f"docs/results/{name}.json", parts)

@@ -8,18 +8,27 @@ from pathlib import Path
 from typing import Any
 
 FOLDER = Path(__file__).parent / "results/evaluation"
-FAMILIES = {
+ALL_FAMILIES = {
     "cmu_walk": "walk",
     "hdm05_grab_high": "grab",
     "hdm05_deposit_floor": "deposit",
+    "hdm05_kick": "kick",
+    "hdm05_hop": "hop",
+    "bandai_raise_hand": "raise hand",
     "reaching": "procedural",
 }
-"""Files of the folder, and the heading of each one's column."""
+"""Families, and the heading of each one's column."""
+FAMILIES = {
+    family: name for family, name in ALL_FAMILIES.items() if (FOLDER / f"{family}.json").exists()
+}
+"""Those with a file in the folder, as `make evaluate` writes them."""
 CLIPS, PERFORMERS, TRUTH = (
     "leave_one_clip_out",
     "leave_one_performer_out",
     "truth",
 )
+OPEN = "_no_performer"
+"""End of the name of a method that is not told the performer."""
 GOALS = "required, desired"
 BEYOND = "detected 25 % beyond a control, worst control"
 SHOWN = (1, 3, 5)
@@ -32,7 +41,17 @@ Found = dict[str, Any]
 def protocols(family: str) -> Found:
     """Return the results of a family by protocol."""
     found = json.loads((FOLDER / f"{family}.json").read_text(encoding="utf-8"))
-    return {each["protocol"]: each for each in (found, *found["others"])}
+    by_name = {each["protocol"]: each for each in (found, *found["others"])}
+    # The file's own figures, on all protocols, stand beside those of the first.
+    return {**by_name, "first": found}
+
+
+def transcribed() -> str:
+    """Return a sentence on families whose figures are not those of `make evaluate`; else empty."""
+    old = [name for family, name in FAMILIES.items() if "note" in protocols(family)["first"]]
+    missing = [name for family, name in ALL_FAMILIES.items() if family not in FAMILIES]
+    said = [f"Transcribed by hand: {', '.join(old)}."] if old else []
+    return " ".join([*said, *([f"Not measured yet: {', '.join(missing)}."] if missing else [])])
 
 
 def known_performer(family: str) -> Found:
@@ -42,8 +61,8 @@ def known_performer(family: str) -> Found:
 
 
 def new_performer(family: str) -> Found:
-    """Return the results with performers held out."""
-    return protocols(family)[PERFORMERS]
+    """Return the results with performers held out; without methods where that was not run."""
+    return protocols(family).get(PERFORMERS) or {"clips": 0, "methods": {}}
 
 
 def headings(first: str, results: Callable[[str], Found]) -> list[str]:
@@ -52,31 +71,43 @@ def headings(first: str, results: Callable[[str], Found]) -> list[str]:
     return [first, *shown]
 
 
-def errors(results: Callable[[str], Found]) -> Rows:
-    """Yield root-relative, global and effector error of each method, cm."""
-    methods = {name: None for family in FAMILIES for name in results(family)["methods"]}
+def errors(results: Callable[[str], Found], is_open: bool = False) -> Rows:
+    """Yield root-relative, global and effector error of each method, cm.
+
+    is_open: of methods that are not told the performer; those of a family without labels are there
+    in either case.
+    """
+    methods = dict.fromkeys(
+        name.removesuffix(OPEN) for family in FAMILIES for name in results(family)["methods"]
+    )
     for method in methods:
-        cells = [_errors(results(family)["methods"].get(method)) for family in FAMILIES]
+        cells = [_errors(_row(results(family)["methods"], method, is_open)) for family in FAMILIES]
+        if not any(cells):
+            continue
         name = method.replace("_", " ")
         yield (
             [f"**{name}**", *(f"**{cell}**" for cell in cells)]
             if method == "posefield"
-            else [
-                name,
-                *cells,
-            ]
+            else [name, *cells]
         )
+
+
+def _row(methods: Found, name: str, is_open: bool) -> Found | None:
+    labelled = f"posefield{OPEN}" in methods
+    return methods.get(name + OPEN if is_open and labelled else name)
 
 
 def _errors(found: Found | None) -> str:
     if not found or "relative_cm" not in found:
         return ""
-    return f"{found['relative_cm']:.2f} / {found['global_cm']:.1f} / {found['effector_cm']:.1f}"
+    distances = [f"{found['relative_cm']:.2f}", f"{found['global_cm']:.1f}"]
+    effector = found.get("effector_cm")
+    return " / ".join(distances if effector is None else [*distances, f"{effector:.1f}"])
 
 
 def adapted() -> Rows:
     """Yield the root-relative error after adaptation by some clips, cm, and its excess."""
-    found = [protocols(family)[CLIPS]["performers"] for family in _adapted_families().values()]
+    found = [protocols(family)["first"]["performers"] for family in adapted_families().values()]
     label = "posefield_adapt_{}".format
     yield ["none (an unseen performer)", *(f"{f[label(1)]['shown_none_cm']:.2f}" for f in found)]
     for count in SHOWN:
@@ -91,9 +122,9 @@ def adapted() -> Rows:
     ]
 
 
-def _adapted_families() -> dict[str, str]:
+def adapted_families() -> dict[str, str]:
     """Return the families with adapted models, by heading."""
-    found = {name: protocols(family).get(CLIPS, {}) for family, name in FAMILIES.items()}
+    found = {name: protocols(family)["first"] for family, name in FAMILIES.items()}
     families = dict(zip(FAMILIES.values(), FAMILIES, strict=True))
     return {name: families[name] for name, each in found.items() if each.get("performers")}
 
@@ -101,6 +132,7 @@ def _adapted_families() -> dict[str, str]:
 def exact() -> Rows:
     """Yield how exactly targets at captured places are met, and what becomes of those beyond."""
     found = {family: known_performer(family)["methods"] for family in FAMILIES}
+    found = {family: own for family, own in found.items() if "posefield_exact" in own}
     before = [each["posefield"]["effector_cm"] for each in found.values()]
     after = [each["posefield_exact"]["exact"] for each in found.values()]
     pairs = zip(before, after, strict=True)
@@ -159,13 +191,3 @@ def support() -> Rows:
             controls = f"{found['clips']} clips, {len(found['support']['beyond'])} controls"
             false_alarms = f"{100 * found['support']['false_alarms']:.1f} %"
             yield [f"{name} ({controls})", false_alarms, f"{100 * beyond:.0f} %", ""]
-
-
-TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
-    "clips": lambda: (headings("method", known_performer), errors(known_performer)),
-    "performers": lambda: (headings("method", new_performer), errors(new_performer)),
-    "adapted": lambda: (["clips given to `posefield adapt`", *_adapted_families()], adapted()),
-    "exact": lambda: ([*headings("target at the event", known_performer), GOALS], exact()),
-    "support": lambda: (["family", "false alarms", BEYOND, "in the gap"], support()),
-}
-"""Columns and rows of each table, by the name that a file of results refers to it by."""
