@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from evaluation_tables import FAMILIES, known_performer, protocols
+from evaluation_tables import FAMILIES, OPEN, known_performer, protocols
 
 BEST_COLUMNS = [
     "family (takes)",
@@ -43,7 +43,7 @@ def best(information: str) -> Rows:
                 f"{FAMILIES[family]} ({own['takes']:,})",
                 f"{measure}, {unit}",
                 f"{row['posefield']:.2f}",
-                _plain_name(row["peer"]),
+                _plain_name(row["peer"], information),
                 f"{row['error']:.2f}",
                 f"{row['difference']:+.2f} ± {row['standard_error']:.2f}",
                 verdict,
@@ -77,7 +77,11 @@ def pooled(information: str) -> Rows:
         ratio, error = ratios[name]
         share = ratio - 1.0
         verdict = BETTER if share < -error else f"**{WORSE}**" if share > error else WITHIN
-        cells = [measure, _plain_name(name), f"{100 * share:+.1f} ± {100 * error:.1f} %"]
+        cells = [
+            measure,
+            _plain_name(name, information),
+            f"{100 * share:+.1f} ± {100 * error:.1f} %",
+        ]
         yield [*cells, verdict, goal]
 
 
@@ -89,8 +93,10 @@ def _pooled_ratio(found: dict[str, Found], measure: str, name: str) -> tuple[flo
     return ratio, ratio * math.sqrt(sum(share**2 for share in shares)) / len(rows)
 
 
-def _plain_name(name: str) -> str:
-    return name.replace("_no_performer", " without the performer").replace("_", " ")
+def _plain_name(name: str, information: str) -> str:
+    """Return a peer's name; where it could have known the performer, that it does not."""
+    end = " without the performer" if information == "known" and name.endswith(OPEN) else ""
+    return name.removesuffix(OPEN).replace("_", " ") + end
 
 
 def calibration() -> Rows:

@@ -13,6 +13,7 @@ from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from posefield import cli
 from posefield.common.errors import TrainingError
+from posefield.common.units import UP
 from posefield_train.evaluate import (
     compared_motion,
     corrected_answers,
@@ -408,6 +409,21 @@ def test_a_recipe_says_what_can_be_asked(recipe, family):
     assert protocol.protocols(known, alone) == ["truth", "clip"]
 
 
+def test_errors_of_a_cycle_are_those_to_the_open_one(recipe, family):
+    """Where the seam was closed, the motion before that is the truth."""
+    away = [
+        replace(e, captured=replace(e.clip, translations=e.clip.translations + UP))
+        for e in family[:6]
+    ]
+    plain = recipe.model_copy(update={"event": None})
+    fold = folds.Fold((2,))
+    closed, opened = (
+        protocol.run_fold(plain, own, fold, "clip").errors["mean"][0] for own in (family[:6], away)
+    )
+    assert abs(opened.absolute.mean - closed.absolute.mean) > 0.3
+    assert opened.duration == closed.duration
+
+
 def test_facts_are_what_was_measured(results):
     result = results[0][0]
     facts = evaluation_summary.facts(result)
@@ -538,11 +554,27 @@ def test_the_command_writes_what_it_prints(tmp_path, folder, monkeypatch, capsys
     assert page.read_text().startswith("<!DOCTYPE html>")
 
 
+def test_a_second_run_reads_finished_folds(tmp_path, folder, monkeypatch, capsys):
+    path, kept = tmp_path / "tiny.toml", tmp_path / "folds"
+    path.write_text(LABELLED)
+    words = ("evaluate", path, "--data", folder, "--protocol", "performer", "--resume", kept)
+    found = []
+    for name in ("first.json", "second.json"):
+        assert run(monkeypatch, *words, "--json-file", tmp_path / name) == 0
+        files = sorted(kept.iterdir())
+        found.append(((tmp_path / name).read_bytes(), [file.stat().st_mtime_ns for file in files]))
+    # Times of solver steps are measured, and equal only where they are read.
+    assert found[0] == found[1]
+    assert len(found[0][1]) == 3
+    assert capsys.readouterr().out.count("| posefield ") >= 2
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("--protocol", "truth"), "tiny can only: clip, performer"),
         (("--report", "page.txt"), "expected a name that ends in .html"),
+        (("--jobs", "0"), "jobs: 0, expected 1 or more"),
         (("--learning",), "tiny has no truth, expected the procedural family"),
         (("--joined", "none.toml"), "none.toml: cannot be read"),
         (("--joined", "tiny.toml"), "joined: both families overlap in speed"),

@@ -1,4 +1,4 @@
-"""Comparisons in which everybody knows the performer, or nobody does.
+"""Comparisons in which every method knows the performer, or none does.
 
 A method that knows who moves has an advantage over one that does not, so they are compared apart.
 Where the performer is known, a method may ignore it: such peers are rivals too. Standard errors are
@@ -20,8 +20,8 @@ from posefield_train.report.drawing import markdown_table, significant_digits
 
 KNOWN, LEFT_OPEN = "known", "open"
 TITLES = {
-    KNOWN: "everybody knows the performer",
-    LEFT_OPEN: "nobody knows the performer",
+    KNOWN: "every method knows the performer",
+    LEFT_OPEN: "no method knows the performer",
 }
 """What the methods of a table know, by its name in the JSON."""
 BETTER, WITHIN, WORSE = "better", "within one standard error", "worse"

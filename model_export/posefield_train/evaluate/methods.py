@@ -40,9 +40,9 @@ DEFINITIONS = {
 }
 """Definition of each method."""
 TOLD = (
-    "Where performers have labels, everybody is told the performer: as columns (gp), by the choice "
-    "of examples (nearest_same_performer), or as an offset of each performer, estimated from "
-    "left-out takes and shrunk as far as they advise (all others; naive has the offsets of "
+    "Where performers have labels, every method is told the performer: as columns (gp), by the "
+    "choice of examples (nearest_same_performer), or as an offset of each performer, estimated "
+    "from left-out takes and shrunk as far as they advise (all others; naive has the offsets of "
     "thin_plate_smoothed). The same methods with controls alone end in _no_performer."
 )
 """What the methods know of performers, for people."""

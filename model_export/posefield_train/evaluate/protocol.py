@@ -80,7 +80,7 @@ class EvaluationResult:
 
 
 @dataclass(frozen=True)
-class _PartialResult:
+class PartialResult:
     """Result for some of the clips. places: their indices."""
 
     places: tuple[int, ...]
@@ -141,7 +141,7 @@ def run_protocol(
     )
     joints, takes = examples[0].clip.skeleton.names, sample_points.take_numbers(examples)
     asked = _ResultNames(f"leave_one_{protocol}_out", names, joints, takes.tolist())
-    parts = with_progress(jobs.run(_run_fold, each, (recipe, examples)), len(each), report)
+    parts = with_progress(jobs.run(run_fold, each, (recipe, examples)), len(each), report)
     return replace(_merge_parts(recipe, asked, parts), flags=found)
 
 
@@ -170,9 +170,10 @@ def with_progress(results: Iterator[Any], count: int, report: ProgressCallback) 
 
 
 @single_thread.single_threaded()
-def _run_fold(
+def run_fold(
     recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol: str
-) -> _PartialResult:
+) -> PartialResult:
+    """Return the result for the clips of one fold. Raises TrainingError as `run_protocol` does."""
     rest, held = fold.split(examples)
     try:
         made = _evaluated_model(recipe, rest)
@@ -208,7 +209,7 @@ class _ReferenceMotions:
 
 
 @single_thread.single_threaded()
-def _run_truth_batch(made: _EvaluatedModel, points: Floats, start: int) -> _PartialResult:
+def _run_truth_batch(made: _EvaluatedModel, points: Floats, start: int) -> PartialResult:
     event = methods.captured_event(made.recipe, made.trained, ())
     captured = ground_truth.truth_motions(points, event)
     places = tuple(range(start, start + len(points)))
@@ -229,7 +230,7 @@ def _compare_methods(
     places: tuple[int, ...],
     asked: Queries,
     held: _ReferenceMotions,
-) -> _PartialResult:
+) -> PartialResult:
     recipe, trained = made.recipe, made.trained
     feet = tuple(map(trained.skeleton.names.index, recipe.motion.feet))
     found = methods.predict_all(recipe, trained, asked)
@@ -253,7 +254,7 @@ def _compare_methods(
     }
     parents = trained.skeleton.parents
     trust = found.sigma, found.joint_sigma
-    return _PartialResult(places, compared, *trust, corrections, looks, parents)
+    return PartialResult(places, compared, *trust, corrections, looks, parents)
 
 
 @dataclass(frozen=True)
@@ -267,7 +268,7 @@ class _ResultNames:
 
 
 def _merge_parts(
-    recipe: Recipe, asked: _ResultNames, parts: Iterator[_PartialResult]
+    recipe: Recipe, asked: _ResultNames, parts: Iterator[PartialResult]
 ) -> EvaluationResult:
     """Merge parts into one result, in the order of the clips."""
     listed = sorted(parts, key=lambda part: part.places)

@@ -1,7 +1,7 @@
 """Peers whose predictions are weighted sums of the samples, and what the performer adds to them.
 
 Such a peer is described by its weights alone, which are the same for every predicted quantity. A
-library's interpolator knows controls only. Where everybody may know the performer, it gets the
+library's interpolator knows controls only. Where every method may know the performer, it gets the
 performer in the way of a mixed model: an offset of each performer, estimated from the residuals of
 samples that are left out and shrunk as far as these residuals advise, is taken from the samples,
 the peer predicts the rest, and the offset of the asked performer is added.
