@@ -206,6 +206,7 @@ class AsyncModel:
     suggest = _ask_model(questions.suggest)
     sigma = _ask_model(questions.sigma)
     read_card = _ask_model(questions.card)
+    character = _ask_model(questions.character)
     clip = _lazy(AsyncClip, files.clip)
     clips = _lazy(AsyncSaving, files.clips)
     crowd = _lazy(AsyncCrowd, files.crowd)

@@ -218,6 +218,7 @@ class Model:
     suggest = _ask_model(questions.suggest)
     sigma = _ask_model(questions.sigma)
     read_card = _ask_model(questions.card)
+    character = _ask_model(questions.character)
     clip = _lazy(Clip, files.clip)
     clips = _lazy(Saving, files.clips)
     crowd = _lazy(Crowd, files.crowd)

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "3.1.0"
+CONTRACT = "3.2.0"
 """Version of the contract that this client was made for."""
 
 
@@ -528,6 +528,9 @@ OPERATIONS = {
     for operation in (
         Operation("listModels", "GET", "/v1/models", ("application/json",), {}),
         Operation("getModel", "GET", "/v1/models/{model}", ("application/json",), {}),
+        Operation(
+            "getCharacter", "GET", "/v1/models/{model}/character.glb", ("model/gltf-binary",), {}
+        ),
         Operation(
             "getPose",
             "GET",

@@ -57,6 +57,11 @@ def card(model: str, /) -> Call[ModelCard]:
     return Call(asking.plain("getModel", model), _CARD)
 
 
+def character(model: str, /) -> Call[bytes]:
+    """Return the character at rest as binary glTF: joints and the body skinned to them."""
+    return Call(asking.plain("getCharacter", model), _content)
+
+
 def pose(
     model: str,
     /,
@@ -160,3 +165,7 @@ _SUGGESTIONS = _Json(Suggestions)
 def _models(reply: Reply) -> tuple[ModelSummary, ...]:
     found: ModelList = _LIST(reply)
     return found.models
+
+
+def _content(reply: Reply) -> bytes:
+    return reply.content

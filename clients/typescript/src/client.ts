@@ -112,6 +112,12 @@ export class Client {
     return this.#read(get(under(model, "")), (found) => read("ModelCard", found), signal);
   }
 
+  /** The character at rest as binary glTF: its joints and the body of all files. */
+  async character(model: string, signal?: AbortSignal): Promise<Download> {
+    const asked = asFile(get(under(model, "/character.glb")), "glb");
+    return this.#file(asked, `${model}.glb`, { signal });
+  }
+
   async pose(model: string, question: PoseQuestion, signal?: AbortSignal): Promise<Poses> {
     const asked = this.#request(model, "/pose.msgpack", "PoseQuestion", question);
     return this.#read(asked, poses, signal);

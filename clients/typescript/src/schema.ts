@@ -43,6 +43,32 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/models/{model}/character.glb": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description Model name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        /**
+         * Get a model's character
+         * @description The character of the model at rest as binary glTF 2.0: its joints and the body of all files, skinned to them, without motion. The vertex attributes `_ANCHORS` (two joints) and `_SHARE` fit the body to bones of other lengths, such as another performer's: a vertex moves by `1 - _SHARE` of the displacement of the first joint at rest, and `_SHARE` of the second's. The mesh `BodyCoarse`, which no node draws, has fewer triangles on the same vertices.
+         */
+        get: operations["getCharacter"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/models/{model}/pose": {
         parameters: {
             query?: never;
@@ -2302,6 +2328,50 @@ export interface operations {
             503: components["responses"]["Overloaded"];
         };
     };
+    getCharacter: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
+                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
+            };
+            path: {
+                /**
+                 * @description Model name, or name@hash.
+                 * @example reach
+                 */
+                model: components["parameters"]["model"];
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The character. */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    "Cache-Control": components["headers"]["CacheControl"];
+                    ETag: components["headers"]["ETag"];
+                    "Content-Disposition": components["headers"]["Disposition"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "model/gltf-binary": string;
+                };
+            };
+            304: components["responses"]["NotModified"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
     getPose: {
         parameters: {
             query: {
@@ -3716,7 +3786,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "3.1.0";
+export const CONTRACT = "3.2.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {

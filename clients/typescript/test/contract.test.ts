@@ -63,6 +63,7 @@ const PAGE = "a page, for browsers";
 const ASKED: Record<string, Ask | string | ByFormat> = {
   listModels: async (client) => ({ models: await client.models() }),
   getModel: (client, model) => client.card(model),
+  getCharacter: (client, model) => client.character(model),
   getPose: NEGOTIATED,
   queryPose: NEGOTIATED,
   getPoseInFormat: POSES,

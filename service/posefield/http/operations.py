@@ -5,6 +5,7 @@ from functools import partial
 from starlette.requests import Request
 from starlette.responses import Response
 
+from posefield.encode import character_file
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import (
     clip_operations,
@@ -13,6 +14,7 @@ from posefield.http import (
     responses,
     trust_operations,
 )
+from posefield.http.concurrency import worker_threads
 from posefield.http.service import Service
 from posefield.http.steps import Handler
 from posefield.http.telemetry import metrics
@@ -26,6 +28,15 @@ async def list_models(service: Service, request: Request) -> Response:
 async def get_model(service: Service, request: Request) -> Response:
     """Return the card of a model."""
     return responses.json_document(responses.card_document(request.scope["model"]))
+
+
+async def get_character(service: Service, request: Request) -> Response:
+    """Return the character of a model at rest, made in a thread: that takes tenths of a second."""
+    model = request.scope["model"]
+    content = await worker_threads.run_in_thread(
+        character_file.character_glb, model.session.card.skeleton, model.identity
+    )
+    return responses.attachment(content, CLIP_ENCODERS["glb"], model.name)
 
 
 async def live(service: Service, request: Request) -> Response:
@@ -70,6 +81,7 @@ _FORMATTED: dict[str, Handler] = {
 OPERATIONS: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
+    "getCharacter": get_character,
     "getWhy": trust_operations.GET_WHY,
     "queryWhy": trust_operations.QUERY_WHY,
     "getSuggestions": trust_operations.GET_SUGGESTIONS,

@@ -114,6 +114,7 @@ CALLS = {
     ("getLiveness", None): lambda client, r: client.live(),
     ("getReadiness", None): lambda client, r: client.ready(),
     ("getModel", None): lambda client, r: model(client, r).card,
+    ("getCharacter", None): lambda client, r: model(client, r).character(),
     ("getPoseInFormat", "msgpack"): pose,
     ("queryPoseInFormat", "msgpack"): pose,
     ("getWhy", None): why,

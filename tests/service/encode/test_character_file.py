@@ -1,0 +1,130 @@
+"""Tests of the character at rest: body of the clips, bones of any length, coarse faces."""
+
+import json
+import struct
+
+import conftest
+import numpy as np
+import pytest
+import test_mannequin as bodies
+
+from posefield.encode import character_file
+from posefield.encode.body import coarse_mesh, mannequin
+from posefield.encode.character import character
+from posefield.encode.formats import CLIP_ENCODERS, METRES
+from posefield.motion.skeleton import Skeleton
+
+KINDS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+def document(content):
+    """The document and the buffer of a binary glTF file."""
+    (length,) = struct.unpack_from("<L", content, 12)
+    return json.loads(content[20 : 20 + length]), content[28 + length :]
+
+
+def array(content, index):
+    """One accessor of a file."""
+    said, buffer = document(content)
+    accessor = said["accessors"][index]
+    view = said["bufferViews"][accessor["bufferView"]]
+    kind, width = KINDS[accessor["componentType"]], WIDTHS[accessor["type"]]
+    start = view["byteOffset"] + accessor.get("byteOffset", 0)
+    found = np.frombuffer(buffer, kind, accessor["count"] * width, start)
+    return found.reshape(-1, width)
+
+
+def part(content, name, mesh=0):
+    """An attribute, or the corners, of a mesh of a file."""
+    (primitive,) = document(content)[0]["meshes"][mesh]["primitives"]
+    return array(content, primitive["attributes"].get(name, primitive["indices"]))
+
+
+@pytest.fixture(scope="module")
+def person():
+    return conftest.person()
+
+
+@pytest.fixture(scope="module")
+def content(person):
+    return character_file.character_glb(person, "reach@0123456789abcdef")
+
+
+@pytest.mark.parametrize("name", ["NORMAL", "JOINTS_0", "WEIGHTS_0", "corners"])
+def test_the_body_is_that_of_the_clips(walk, name):
+    clip = CLIP_ENCODERS["glb"].encode(walk, METRES)
+    rest = character_file.character_glb(walk.clip.skeleton, "walk@0123456789abcdef")
+    assert np.array_equal(part(rest, name), part(clip, name))
+    assert not np.array_equal(part(rest, "POSITION"), part(rest, "NORMAL"))
+
+
+def test_anchors_fit_the_body_to_other_bones(person, content):
+    longer = person.offsets * np.linspace(0.8, 1.3, len(person))[:, None]
+    longer[0] = person.offsets[0]
+    wanted = character.rest_pose(character.rig(person), longer[None]).points[0]
+    moved = person.at_rest(longer - person.offsets)
+    anchors, share = part(content, "_ANCHORS"), part(content, "_SHARE")
+    points = part(content, "POSITION")
+    start, end = moved[anchors[:, 0]], moved[anchors[:, 1]]
+    np.testing.assert_allclose(points + start + share * (end - start), wanted, atol=1e-6)
+    assert np.abs(points + start - wanted).max() > 0.01
+
+
+def test_the_file_says_its_model_and_has_no_motion(content):
+    said, _ = document(content)
+    assert said["asset"]["extras"]["posefield"] == {"model": "reach@0123456789abcdef"}
+    assert "animations" not in said
+    assert [node["mesh"] for node in said["nodes"] if "mesh" in node] == [0]
+
+
+def test_the_coarse_mesh_has_the_same_points(content):
+    fine, coarse = (document(content)[0]["meshes"][mesh]["primitives"][0] for mesh in (0, 1))
+    assert fine["attributes"] == coarse["attributes"]
+    corners = part(content, "corners", mesh=1)
+    assert len(corners) == 3 * coarse_mesh.FACES
+    assert len(part(content, "corners")) > 4 * len(corners)
+    assert set(corners.flat) < set(part(content, "corners").flat)
+
+
+class Faces:
+    """A mesh with coarse faces, for the checks of other meshes."""
+
+    def __init__(self, mesh, faces):
+        self.points, self.joints, self.weights = mesh.points, mesh.joints, mesh.weights
+        self.counts = np.full(len(faces), 3, np.int32)
+        self.corners = faces.reshape(-1)
+
+
+@pytest.mark.parametrize("name", bodies.BODIES)
+def test_coarse_faces_are_closed_and_as_large(name):
+    mesh = mannequin.mannequin(bodies.BODIES[name])
+    coarse = Faces(mesh, coarse_mesh.coarse_faces(mesh))
+    assert bodies.closed(coarse)
+    assert 0.85 < bodies.volume(coarse) / bodies.volume(mesh) < 1.1
+
+
+def test_coarse_limbs_bend_where_the_fine_ones_do(person):
+    """Each joint that moves a ring of the fine skin most also moves some of the coarse one most."""
+    mesh = mannequin.mannequin(person)
+    fine = np.bincount(mesh.joints[:, 0], minlength=len(person))
+    kept = sorted(set(coarse_mesh.coarse_faces(mesh).flat))
+    coarse = np.bincount(mesh.joints[kept, 0], minlength=len(person))
+    assert np.sum(fine >= 12) >= 15
+    assert np.all(coarse[fine >= 12] >= 3)
+    assert np.any(coarse[fine < 12] < 3)
+
+
+def test_equal_skeletons_have_equal_files(person, content):
+    again = Skeleton(
+        person.names,
+        person.parents,
+        person.offsets.copy(),
+        person.tip_joints,
+        person.tip_offsets.copy(),
+    )
+    mesh = mannequin.mannequin(again)
+    found = coarse_mesh.coarse_faces(mesh).reshape(-1, 1)
+    assert np.array_equal(found, part(content, "corners", mesh=1))
+    assert character_file.character_glb(again, "reach@0123456789abcdef") == content
+    assert character_file.character_glb(again, "other@0123456789abcdef") != content
