@@ -41,7 +41,7 @@ def test_the_folder_holds_the_page_its_parts_and_the_model(model_path, tmp_path,
     parts = {name.removesuffix(".gz") for name in command_page.OFFLINE_FILES}
     found = {path.name: path.read_bytes() for path in folder.iterdir()}
     levels = {f"level-{level}.onnx" for level in range(4)}
-    assert found.keys() == parts | levels | {"index.html", "model.json"}
+    assert found.keys() == parts | levels | {"index.html", "model.json", "character.glb"}
     assert json.loads(said)["files"] == {name: len(content) for name, content in found.items()}
     opened = session.load(model_path)
     tables = json.loads(found["model.json"])

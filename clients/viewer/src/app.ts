@@ -2,6 +2,7 @@
 
 import { type ModelCard, type ModelSummary, Problem, Unexpected } from "@posefield/client";
 
+import { type Character, read } from "./character.ts";
 import { understood } from "./faults.ts";
 import { type Address, address, restored } from "./hash.ts";
 import { Header } from "./header.ts";
@@ -18,9 +19,14 @@ import * as sync from "./sync.ts";
 import { still } from "./theme.ts";
 import { Watch } from "./watch.ts";
 
-interface Open {
-  readonly model: string;
+/** A model as it is shown. */
+interface Shape {
   readonly card: ModelCard;
+  readonly character: Character;
+}
+
+interface Open extends Shape {
+  readonly model: string;
   readonly store: Store;
   readonly end: AbortController;
 }
@@ -88,16 +94,20 @@ export class App {
     try {
       const [models, hoped] = await Promise.all([
         this.#source.models(),
-        wanted.model ? this.#card(wanted.model) : null,
+        wanted.model ? this.#hoped(wanted.model) : null,
       ]);
       const found = hoped && listed(models, wanted.model!) ? hoped : null;
       const model = found ? wanted.model! : models[0]?.name;
       if (!model) throw none(wanted.model);
-      const card = found ?? (await this.#source.card(model));
+      const shape = found ?? (await this.#shape(model));
       if (turn !== this.#turn) return;
       const missing = wanted.model && !found ? gone(wanted.model, model) : "";
-      const { state, faults } = restored(missing ? { model, entries: [] } : wanted, model, card);
-      this.#show(model, card, new Store(calm(state, wanted)), models);
+      const { state, faults } = restored(
+        missing ? { model, entries: [] } : wanted,
+        model,
+        shape.card,
+      );
+      this.#show(model, shape, new Store(calm(state, wanted)), models);
       this.#wanted = null;
       this.#notice.fault(null);
       this.#notice.remark("model", [missing, ...faults].filter(Boolean).join(" · ") || null);
@@ -107,28 +117,37 @@ export class App {
   }
 
   /** null where there is no such model; other faults do not say that. */
-  async #card(model: string): Promise<ModelCard | null> {
+  async #hoped(model: string): Promise<Shape | null> {
     try {
-      return await this.#source.card(model);
+      return await this.#shape(model);
     } catch (fault) {
       if (lacks(fault)) return null;
       throw fault;
     }
   }
 
-  #show(model: string, card: ModelCard, store: Store, models: readonly ModelSummary[]): void {
+  async #shape(model: string): Promise<Shape> {
+    const [card, { content }] = await Promise.all([
+      this.#source.card(model),
+      this.#source.character(model),
+    ]);
+    return { card, character: read(content) };
+  }
+
+  #show(model: string, shape: Shape, store: Store, models: readonly ModelSummary[]): void {
+    const { card } = shape;
     this.#open?.end.abort();
     if (this.#open?.model !== model) this.#scene!.frame();
     const end = new AbortController();
     const page = {
       store,
       source: this.#source,
-      card,
+      ...shape,
       scene: this.#scene!,
       notice: (fault: unknown) => this.#fault(fault),
       signal: end.signal,
     };
-    this.#open = { model, card, store, end };
+    this.#open = { model, ...shape, store, end };
     this.#header.list(models, model);
     this.#header.follow(store, end.signal);
     const player = new Player(page);
@@ -173,7 +192,8 @@ export class App {
 
   async #renew(open: Open, models: readonly ModelSummary[]): Promise<void> {
     const { model, store } = open;
-    const card = await this.#source.card(model);
+    const shape = await this.#shape(model);
+    const { card } = shape;
     if (open !== this.#open || this.#wanted) return;
     const known = new Set(card.controls.map(({ name }) => name));
     const entries = Object.entries(store.state.controls)
@@ -182,7 +202,7 @@ export class App {
     const { state } = restored({ model, entries }, model, card);
     const { playing, body, ghost, feet, loop, speed, view } = store.state;
     const kept = { playing, body, ghost, feet, loop, speed, view };
-    this.#show(model, card, new Store({ ...state, ...kept }), models);
+    this.#show(model, shape, new Store({ ...state, ...kept }), models);
     this.#notice.remark("model", `${model} has been replaced on the service: this is the new one.`);
   }
 

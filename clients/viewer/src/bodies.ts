@@ -9,8 +9,8 @@ import * as theme from "./theme.ts";
 /** Largest extent of a person's joints at rest, m. */
 const PERSON = 1.5;
 
-export function mount({ card, player, scene, signal, store }: Session): void {
-  const figure = new Figure(card, false);
+export function mount({ card, character, player, scene, signal, store }: Session): void {
+  const figure = new Figure(card, character, false);
   scene.root.add(figure.group);
   const dress = () => {
     figure.wear(store.state.body);

@@ -2,10 +2,11 @@
 
 import type { CrowdPoses, CrowdQuestion, ModelCard } from "@posefield/client";
 
+import { standing } from "./character.ts";
+import { SIZE } from "./crowd-mesh.ts";
 import { labelsOf, mover, otherSets } from "./examples.ts";
 import type { Source } from "./page.ts";
-import { Rig, SIZE } from "./rig.ts";
-import { place, placed } from "./skeleton.ts";
+import { type Placed, place, placed } from "./skeleton.ts";
 
 /** Motions, and frames of each: what lies between two frames is mixed from them. */
 export const [MOTIONS, FRAMES] = [24, 24];
@@ -13,13 +14,12 @@ export const [MOTIONS, FRAMES] = [24, 24];
 const [TRIED, SHARPEST] = [120, 0.2];
 
 export interface Library {
-  readonly rig: Rig;
   readonly levels: number;
   readonly count: number;
   /** Whether characters go somewhere; else they stay and repeat their clip there and back. */
   readonly walks: boolean;
-  /** SIZE numbers for each level, motion, frame (FRAMES + 1) and bone. */
-  readonly laid: Float32Array;
+  /** SIZE numbers for each level, motion, frame (FRAMES + 1) and joint: what moves the skin. */
+  readonly poses: Float32Array;
   /** For each motion: seconds, metres a second, rad to the left of the heading, rad a second. */
   readonly seconds: Float32Array;
   readonly speeds: Float32Array;
@@ -61,9 +61,9 @@ export async function library(
   const ways = await journeys(tried, ask);
   const gentle = tried.map((_, i) => i).filter((i) => Math.abs(ways.turning[i]!) <= SHARPEST);
   const chosen = spread(walks && gentle.length >= 6 ? gentle : tried.map((_, i) => i), MOTIONS);
-  const rig = new Rig(card);
-  const size = chosen.length * (FRAMES + 1) * rig.bones.length * SIZE;
-  const laid = new Float32Array(card.levels.length * size);
+  const rest = standing(card, Float32Array.from(card.skeleton.offsets.flat()));
+  const size = chosen.length * (FRAMES + 1) * card.skeleton.names.length * SIZE;
+  const all = new Float32Array(card.levels.length * size);
   const own = chosen.map((i) => tried[i]!);
   await Promise.all(
     card.levels.map(async (_, level) => {
@@ -73,18 +73,17 @@ export async function library(
         (_, i) => (duration[Math.floor(i / (FRAMES + 1))]! * (i % (FRAMES + 1))) / FRAMES,
       );
       const poses = await ask(repeated, { time, level, root: walks ? "in_place" : "travelling" });
-      lay(laid.subarray(level * size, (level + 1) * size), rig, poses, walks);
+      lay(all.subarray(level * size, (level + 1) * size), rest, poses, walks);
     }),
   );
   const pick = (all: Float32Array) => Float32Array.from(chosen, (i) => all[i]!);
   const [seconds, speeds] = [pick(ways.seconds), pick(ways.speeds)];
   const [drifts, turning] = [pick(ways.drifts), pick(ways.turning)];
   return {
-    rig,
     levels: card.levels.length,
     count: chosen.length,
     walks,
-    laid,
+    poses: all,
     seconds,
     speeds,
     drifts,
@@ -165,8 +164,8 @@ function turned(from: Float32Array, to: Float32Array, at: number): number {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 }
 
-/** Bones of all poses where they lie; a walker's way begins at the origin. */
-function lay(out: Float32Array, rig: Rig, poses: CrowdPoses, walks: boolean): void {
+/** Joints' matrices of all poses; a walker's way begins at the origin. */
+function lay(out: Float32Array, rest: Float32Array, poses: CrowdPoses, walks: boolean): void {
   const joints = poses.names.length;
   const frame = placed(joints);
   const [turns, shifts] = [4 * joints, 3 * joints];
@@ -180,6 +179,31 @@ function lay(out: Float32Array, rig: Rig, poses: CrowdPoses, walks: boolean): vo
     const offsets = poses.boneOffsets.subarray(shifts * row, shifts * (row + 1));
     const rotations = poses.rotations.subarray(turns * row, turns * (row + 1));
     place(frame, poses.parents, offsets, rotations, root, 0);
-    rig.lay(out, row * rig.bones.length * SIZE, rig.shape(offsets), frame);
+    for (let joint = 0; joint < joints; joint++) {
+      matrix(out, SIZE * (row * joints + joint), rest, frame, joint);
+    }
   }
 }
+
+/** What takes a point of the skin at rest to where a joint has it: three rows of four numbers. */
+function matrix(
+  out: Float32Array,
+  at: number,
+  rest: Float32Array,
+  { positions, rotations }: Placed,
+  joint: number,
+): void {
+  const [w, x, y, z] = rotations.subarray(4 * joint, 4 * joint + 4) as unknown as Four;
+  const [a, b, c] = rest.subarray(3 * joint, 3 * joint + 3) as unknown as Four;
+  const rows = [
+    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+  ] as const;
+  rows.forEach(([i, j, k], row) => {
+    const shift = positions[3 * joint + row]! - i * a - j * b - k * c;
+    out.set([i, j, k, shift], at + 4 * row);
+  });
+}
+
+type Four = readonly [number, number, number, number];

@@ -1,128 +1,200 @@
 /**
- * All bones of a crowd as one mesh whose corners are written anew for every frame.
+ * A crowd drawn in two calls: who is near with all triangles of the skin, who is far with few.
  *
- * Not as instances: software rendering draws each instance by itself, which for thousands of bones
- * costs more than their triangles.
+ * The graphics card moves the skins by matrices of the joints, which are written to a texture for
+ * every frame. Not as instances: software rendering draws each instance by itself, half as fast as
+ * one mesh of them all.
  */
 
 import {
   BufferAttribute,
   BufferGeometry,
   Color,
-  DynamicDrawUsage,
+  DataTexture,
+  FloatType,
+  Group,
   Mesh,
-  MeshBasicMaterial,
+  RGBAFormat,
+  ShaderMaterial,
 } from "three";
 
-import { SIZE } from "./rig.ts";
+import type { Character } from "./character.ts";
 
-/** Corners of a bone: four at its start and four at its end. */
-const CORNERS = 8;
-/** Shades of a colour, from that turned away from the light to that turned to it. */
-const SHADES = 32;
-const SUN = [0.42, 0.78, 0.46] as const;
-const SIDES = [0, 1, 5, 0, 5, 4, 1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7];
-// A bone begins within the one before it: only its end is seen.
-const FACES = [...SIDES, 4, 5, 6, 4, 6, 7];
+/** Numbers of a joint's matrix: three rows of four. */
+export const SIZE = 12;
+/** Most characters that have all triangles. */
+export const NEAREST = 64;
+/** Texels of a row of a texture. */
+const WIDE = 1024;
+const MOST_LEVELS = 8;
 
-export class CrowdMesh {
-  readonly mesh: Mesh<BufferGeometry, MeshBasicMaterial>;
-  readonly #places: BufferAttribute;
-  readonly #colours: BufferAttribute;
-  readonly #at: Float32Array;
-  readonly #tints: Uint32Array;
-  #palette = new Uint32Array();
-  #bones = 0;
+const VERTEX = `
+attribute vec4 skinIndex;
+attribute vec4 skinWeight;
+uniform highp sampler2D crowd;
+uniform int texels;
+uniform vec3 tints[${MOST_LEVELS}];
+varying vec3 tint;
+vec4 texel(int at) { return texelFetch(crowd, ivec2(at % ${WIDE}, at / ${WIDE}), 0); }
+void main() {
+  int own = gl_VertexID / POINTS * texels;
+  vec4 rest = vec4(position, 1.0);
+  vec3 place = vec3(0.0);
+  vec3 facing = vec3(0.0);
+  float whole = 0.0;
+  for (int i = 0; i < INFLUENCES; i++) {
+    float weight = skinWeight[i];
+    if (weight == 0.0) break;
+    int at = own + 3 * int(skinIndex[i]);
+    vec4 x = texel(at);
+    vec4 y = texel(at + 1);
+    vec4 z = texel(at + 2);
+    place += weight * vec3(dot(x, rest), dot(y, rest), dot(z, rest));
+    facing += weight * vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));
+    whole += weight;
+  }
+  int level = int(texel(own + texels - 1).x);
+  float lit = 0.5 + 0.5 * dot(normalize(facing), vec3(0.42, 0.78, 0.46));
+  tint = min(vec3(1.0), tints[level] * (0.32 + 0.9 * lit));
+  gl_Position = projectionMatrix * viewMatrix * vec4(place / whole, 1.0);
+}`;
+const FRAGMENT = `
+varying vec3 tint;
+void main() {
+  gl_FragColor = vec4(tint, 1.0);
+  #include <colorspace_fragment>
+}`;
 
-  constructor(most: number) {
-    this.#at = new Float32Array(3 * CORNERS * most);
-    const bytes = new Uint8Array(4 * CORNERS * most);
-    this.#tints = new Uint32Array(bytes.buffer);
-    this.#places = new BufferAttribute(this.#at, 3).setUsage(DynamicDrawUsage);
-    this.#colours = new BufferAttribute(bytes, 4, true).setUsage(DynamicDrawUsage);
-    const faces = new Uint32Array(FACES.length * most);
-    for (let i = 0; i < faces.length; i++) {
-      faces[i] = FACES[i % FACES.length]! + CORNERS * Math.floor(i / FACES.length);
-    }
-    const geometry = new BufferGeometry()
-      .setAttribute("position", this.#places)
-      .setAttribute("color", this.#colours)
-      .setIndex(new BufferAttribute(faces, 1));
-    this.mesh = new Mesh(geometry, new MeshBasicMaterial({ vertexColors: true }));
+/** Characters of one skin. */
+class Part {
+  readonly mesh: Mesh<BufferGeometry, ShaderMaterial>;
+  readonly #corners: number;
+  readonly #numbers: Float32Array;
+  readonly #texture: DataTexture;
+  /** Numbers of a character: its joints' matrices, and four for its level. */
+  readonly #size: number;
+  #count = 0;
+
+  /** corners: of the triangles; influences: how many joints move a point. */
+  constructor(
+    character: Character,
+    corners: Character["fine"],
+    joints: number,
+    most: number,
+    influences: number,
+    tints: Color[],
+  ) {
+    const used = [...new Set(corners)].sort((a, b) => a - b);
+    this.#corners = corners.length;
+    this.#size = SIZE * joints + 4;
+    const high = Math.ceil((most * this.#size) / (4 * WIDE));
+    this.#numbers = new Float32Array(4 * WIDE * high);
+    this.#texture = new DataTexture(this.#numbers, WIDE, high, RGBAFormat, FloatType);
+    const material = new ShaderMaterial({
+      vertexShader: VERTEX,
+      fragmentShader: FRAGMENT,
+      defines: { INFLUENCES: influences, POINTS: used.length },
+      uniforms: {
+        crowd: { value: this.#texture },
+        texels: { value: this.#size / 4 },
+        tints: { value: tints },
+      },
+    });
+    this.mesh = new Mesh(repeated(character, corners, used, most), material);
     this.mesh.frustumCulled = false;
   }
 
-  /** Colours of the levels from now on. */
-  paint(colours: readonly string[]): void {
-    const bytes = new Uint8Array(4 * SHADES * colours.length);
-    colours.forEach((colour, level) => {
-      for (let shade = 0; shade < SHADES; shade++) {
-        const light = 0.32 + (0.9 * shade) / (SHADES - 1);
-        const { r, g, b } = new Color(colour).multiplyScalar(light);
-        const own = [r, g, b, 1].map((part) => Math.min(255, Math.round(255 * part)));
-        bytes.set(own, 4 * (SHADES * level + shade));
-      }
-    });
-    this.#palette = new Uint32Array(bytes.buffer);
+  get count(): number {
+    return this.#count;
   }
 
   begin(): void {
-    this.#bones = 0;
+    this.#count = 0;
   }
 
-  /** One bone more, as SIZE numbers from a place on, in a level's colour. */
-  add(laid: Float32Array, at: number, level: number, taper: number): void {
-    for (let corner = 0; corner < 4; corner++) {
-      // Corners lie where the x and z axes of a bone point, and opposite.
-      const axis = at + (corner & 1 ? 6 : 0);
-      const sign = corner & 2 ? -1 : 1;
-      const x = sign * laid[axis]!;
-      const y = sign * laid[axis + 1]!;
-      const z = sign * laid[axis + 2]!;
-      const length = Math.sqrt(x * x + y * y + z * z);
-      const lit = (x * SUN[0] + y * SUN[1] + z * SUN[2]) / length;
-      const tint = this.#palette[SHADES * level + Math.round((SHADES - 1) * (0.5 + 0.5 * lit))]!;
-      const first = CORNERS * this.#bones + corner;
-      this.#corner(first, laid, at, 1, x, y, z);
-      this.#corner(first + 4, laid, at, taper, x, y, z);
-      const to = 3 * (first + 4);
-      for (let i = 0; i < 3; i++) this.#at[to + i]! += laid[at + 3 + i]!;
-      this.#tints[first] = tint;
-      this.#tints[first + 4] = tint;
-    }
-    this.#bones++;
+  /** Room for the matrices of one character more. */
+  add(level: number): Float32Array {
+    const start = this.#size * this.#count;
+    this.#count++;
+    this.#numbers[start + this.#size - 4] = Math.min(level, MOST_LEVELS - 1);
+    return this.#numbers.subarray(start, start + this.#size - 4);
   }
 
-  #corner(
-    corner: number,
-    laid: Float32Array,
-    at: number,
-    wide: number,
-    x: number,
-    y: number,
-    z: number,
-  ): void {
-    const to = 3 * corner;
-    this.#at[to] = laid[at + SIZE - 3]! + wide * x;
-    this.#at[to + 1] = laid[at + SIZE - 2]! + wide * y;
-    this.#at[to + 2] = laid[at + SIZE - 1]! + wide * z;
-  }
-
-  /** Only what was written goes to where it is drawn. */
   end(): void {
-    this.mesh.geometry.setDrawRange(0, FACES.length * this.#bones);
-    sent(this.#places, 3 * CORNERS * this.#bones);
-    sent(this.#colours, 4 * CORNERS * this.#bones);
+    this.mesh.visible = this.#count > 0;
+    this.mesh.geometry.setDrawRange(0, this.#corners * this.#count);
+    this.#texture.needsUpdate = true;
   }
 
   dispose(): void {
     this.mesh.geometry.dispose();
     this.mesh.material.dispose();
+    this.#texture.dispose();
   }
 }
 
-function sent(attribute: BufferAttribute, numbers: number): void {
-  attribute.clearUpdateRanges();
-  attribute.addUpdateRange(0, numbers);
-  attribute.needsUpdate = true;
+export class CrowdMesh {
+  readonly group = new Group();
+  readonly #near: Part;
+  readonly #far: Part;
+  readonly #tints = Array.from({ length: MOST_LEVELS }, () => new Color());
+
+  /** most: characters. */
+  constructor(character: Character, joints: number, most: number) {
+    this.#near = new Part(character, character.fine, joints, NEAREST, 4, this.#tints);
+    this.#far = new Part(character, character.coarse, joints, most, 1, this.#tints);
+    this.group.add(this.#near.mesh, this.#far.mesh);
+  }
+
+  /** Colours of the levels from now on. */
+  paint(colours: readonly string[]): void {
+    colours.forEach((colour, level) => void this.#tints[level]?.set(colour));
+  }
+
+  begin(): void {
+    for (const part of [this.#near, this.#far]) part.begin();
+  }
+
+  /** Where to write SIZE numbers for each joint of one character more, in a level's colour. */
+  add(near: boolean, level: number): Float32Array {
+    const part = near && this.#near.count < NEAREST ? this.#near : this.#far;
+    return part.add(level);
+  }
+
+  end(): void {
+    for (const part of [this.#near, this.#far]) part.end();
+  }
+
+  dispose(): void {
+    for (const part of [this.#near, this.#far]) part.dispose();
+  }
+}
+
+/** The same skin again and again, with those points that its triangles use. */
+function repeated(
+  { points, normals, joints, weights }: Character,
+  corners: Character["fine"],
+  used: readonly number[],
+  most: number,
+): BufferGeometry {
+  const place = new Map(used.map((point, at) => [point, at]));
+  const count = used.length;
+  const index = new Uint32Array(corners.length * most);
+  for (let i = 0; i < index.length; i++) {
+    index[i] = place.get(corners[i % corners.length]!)! + count * Math.floor(i / corners.length);
+  }
+  const attribute = (own: Float32Array | Uint8Array | Uint16Array, width: number, unit = false) => {
+    const all = new (own.constructor as typeof Float32Array)(width * count * most);
+    used.forEach((point, at) => {
+      all.set(own.subarray(width * point, width * (point + 1)), width * at);
+    });
+    for (let i = 1; i < most; i++) all.copyWithin(width * count * i, 0, width * count);
+    return new BufferAttribute(all, width, unit);
+  };
+  return new BufferGeometry()
+    .setAttribute("position", attribute(points, 3))
+    .setAttribute("normal", attribute(normals, 3))
+    .setAttribute("skinIndex", attribute(joints, 4))
+    .setAttribute("skinWeight", attribute(weights, 4, true))
+    .setIndex(new BufferAttribute(index, 1));
 }

@@ -1,10 +1,10 @@
-/** Characters of a crowd: where each is, what it does, and its bones; typed arrays, filled in place. */
+/** Characters of a crowd: where each is, what it does, and its joints; typed arrays, filled in place. */
 
 import type { Vector3 } from "three";
 
 import { FRAMES, type Library } from "./crowd-library.ts";
+import { SIZE } from "./crowd-mesh.ts";
 import { choose, type Ladder, type Lens, pixels } from "./detail.ts";
-import { SIZE } from "./rig.ts";
 
 /** Square metres to a character. */
 const ROOM = 9;
@@ -86,26 +86,27 @@ export class Crowd {
     }
   }
 
-  /** Where character `i`'s bones lie in the world, SIZE numbers each, written into `out`. */
+  /** The matrices of character `i`'s joints in the world, SIZE numbers each, written into `out`. */
   lay(out: Float32Array, i: number): void {
-    const { laid, rig, count } = this.#library;
-    const bones = rig.bones.length;
+    const { poses, count } = this.#library;
     const [cos, sin] = [Math.cos(this.heading[i]!), Math.sin(this.heading[i]!)];
     const phase = this.#phase[i]! > 1 ? 2 - this.#phase[i]! : this.#phase[i]!;
     const frame = Math.min(FRAMES - 1, Math.floor(phase * FRAMES));
     const share = phase * FRAMES - frame;
-    const size = bones * SIZE;
+    const size = out.length;
     const at = ((this.level[i]! * count + this.#motion[i]!) * (FRAMES + 1) + frame) * size;
-    for (let part = 0; part < size; part += 3) {
-      const from = at + part;
-      const x = laid[from]! + share * (laid[from + size]! - laid[from]!);
-      const y = laid[from + 1]! + share * (laid[from + size + 1]! - laid[from + 1]!);
-      const z = laid[from + 2]! + share * (laid[from + size + 2]! - laid[from + 2]!);
-      // The fourth of each bone's four is its origin.
-      const origin = part % SIZE === SIZE - 3;
-      out[part] = cos * x + sin * z + (origin ? this.x[i]! : 0);
-      out[part + 1] = y;
-      out[part + 2] = cos * z - sin * x + (origin ? this.z[i]! : 0);
+    for (let joint = 0; joint < size; joint += SIZE) {
+      for (let column = 0; column < 4; column++) {
+        const to = joint + column;
+        const from = at + to;
+        const x = poses[from]! + share * (poses[from + size]! - poses[from]!);
+        const y = poses[from + 4]! + share * (poses[from + 4 + size]! - poses[from + 4]!);
+        const z = poses[from + 8]! + share * (poses[from + 8 + size]! - poses[from + 8]!);
+        // The fourth column is where the joint is.
+        out[to] = cos * x + sin * z + (column === 3 ? this.x[i]! : 0);
+        out[to + 4] = y;
+        out[to + 8] = cos * z - sin * x + (column === 3 ? this.z[i]! : 0);
+      }
     }
   }
 }

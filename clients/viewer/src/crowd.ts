@@ -18,9 +18,8 @@ import { type Library, library } from "./crowd-library.ts";
 import { CrowdMesh } from "./crowd-mesh.ts";
 import { Panel } from "./crowd-panel.ts";
 import { Crowd, half, REACH } from "./crowd-walk.ts";
-import { type Ladder, ladder, lens } from "./detail.ts";
+import { type Ladder, ladder, lens, pixels } from "./detail.ts";
 import { understood } from "./faults.ts";
-import { SIZE } from "./rig.ts";
 import type { Session } from "./session.ts";
 import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
@@ -28,8 +27,8 @@ import * as theme from "./theme.ts";
 export const MOST = 1000;
 /** Metres between lines of the ground, and seconds between two readings of numbers. */
 const [GROUND, READING] = [5, 0.25];
-/** Metres from which on small bones are left out. */
-const FAR = 12;
+/** Pixels to a metre from which on a character has all triangles. */
+const FINE = 90;
 
 export function mount(host: HTMLElement, session: Session): void {
   new CrowdView(host, session).begin();
@@ -46,7 +45,6 @@ class CrowdView {
   #loading = false;
   #crowd: Crowd | null = null;
   #mesh: CrowdMesh | null = null;
-  #laid = new Float32Array();
   #ground: LineSegments<BufferGeometry, LineBasicMaterial> | null = null;
   #before: { position: Vector3; target: Vector3 } | null = null;
   #since = 0;
@@ -72,7 +70,6 @@ class CrowdView {
       for (const end of ends) end();
       this.#leave();
       this.#group.removeFromParent();
-      this.#mesh?.dispose();
       this.#bare();
     });
     theme.listen(() => this.#paint(), signal);
@@ -153,20 +150,19 @@ class CrowdView {
 
   #people(): void {
     const own = this.#library!;
-    const bones = own.rig.bones.length;
+    const { card, character } = this.#page;
     this.#crowd = new Crowd(own, Math.min(MOST, this.#page.store.state.crowd));
-    if (!this.#mesh) {
-      this.#mesh = new CrowdMesh(MOST * bones);
-      this.#laid = new Float32Array(SIZE * bones);
-      this.#group.add(this.#mesh.mesh);
-    }
     this.#bare();
+    this.#mesh = new CrowdMesh(character, card.skeleton.names.length, this.#crowd.count);
+    this.#group.add(this.#mesh.group);
     this.#ground = ground(this.#crowd.half);
     this.#group.add(this.#ground);
     this.#paint();
   }
 
   #bare(): void {
+    this.#mesh?.group.removeFromParent();
+    this.#mesh?.dispose();
     this.#ground?.geometry.dispose();
     this.#ground?.material.dispose();
     this.#ground?.removeFromParent();
@@ -191,27 +187,21 @@ class CrowdView {
     return playing;
   }
 
-  /** Writes the bones of all who may be seen; gives how many they are. */
+  /** Writes where all are who may be seen; gives how many they are. */
   #fill(): number {
     const [crowd, mesh] = [this.#crowd!, this.#mesh!];
-    const { bones } = this.#library!.rig;
-    const { camera } = this.#page.scene;
+    const { camera, renderer } = this.#page.scene;
     this.#frustum.setFromProjectionMatrix(
       VIEW.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
     );
+    const near = (renderer.getPixelRatio() * pixels(lens(camera.fov, renderer.domElement))) / FINE;
     let seen = 0;
     mesh.begin();
     for (let i = 0; i < crowd.count; i++) {
       this.#sphere.center.set(crowd.x[i]!, 0.9, crowd.z[i]!);
       if (!this.#frustum.intersectsSphere(this.#sphere)) continue;
-      crowd.lay(this.#laid, i);
-      const level = crowd.level[i]!;
       const [x, z] = [crowd.x[i]! - camera.position.x, crowd.z[i]! - camera.position.z];
-      const far = x * x + z * z > FAR * FAR;
-      for (let bone = 0; bone < bones.length; bone++) {
-        if (far && bones[bone]!.minor) continue;
-        mesh.add(this.#laid, SIZE * bone, level, bones[bone]!.taper);
-      }
+      crowd.lay(mesh.add(x * x + z * z < near * near, crowd.level[i]!), i);
       seen++;
     }
     mesh.end();

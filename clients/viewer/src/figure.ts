@@ -3,8 +3,9 @@
 import type { ModelCard } from "@posefield/client";
 import { Group, type Material, MeshLambertMaterial } from "three";
 
-import { Mannequin } from "./mannequin.ts";
+import type { Character } from "./character.ts";
 import type { Shown } from "./player.ts";
+import { SkinnedBody } from "./skinned-body.ts";
 import type { State } from "./state.ts";
 import { Stick } from "./stick.ts";
 import * as theme from "./theme.ts";
@@ -18,15 +19,17 @@ const GHOST = { skin: "--ghost", stick: "--ghost", joint: "--ghost" } as const;
 export class Figure {
   readonly group = new Group();
   readonly #card: ModelCard;
+  readonly #character: Character;
   readonly #materials: Readonly<Record<keyof typeof SOLID, MeshLambertMaterial>>;
   readonly #colours: typeof SOLID | typeof GHOST;
   readonly #before: readonly Material[];
-  #body: Stick | Mannequin | null = null;
+  #body: Stick | SkinnedBody | null = null;
   #kind: Body | null = null;
   #shown: Shown | null = null;
 
-  constructor(card: ModelCard, ghost: boolean) {
+  constructor(card: ModelCard, character: Character, ghost: boolean) {
     this.#card = card;
+    this.#character = character;
     this.#colours = ghost ? GHOST : SOLID;
     const made = () => (ghost ? pale() : new MeshLambertMaterial());
     this.#materials = { skin: made(), stick: made(), joint: made() };
@@ -42,7 +45,7 @@ export class Figure {
     this.#body =
       kind === "stick"
         ? new Stick(this.#card, stick, joint)
-        : new Mannequin(this.#card, [...this.#before, skin]);
+        : new SkinnedBody(this.#card, this.#character, [...this.#before, skin]);
     this.group.add(this.#body);
     if (this.#shown) this.show(this.#shown);
   }

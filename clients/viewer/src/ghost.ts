@@ -31,9 +31,9 @@ class Ghost {
   #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(session: Session) {
-    const { card, player, scene, signal, store } = session;
+    const { card, character, player, scene, signal, store } = session;
     this.#session = session;
-    this.#figure = new Figure(card, true);
+    this.#figure = new Figure(card, character, true);
     this.#pose = pose(card.skeleton.names.length);
     scene.root.add(this.#figure.group);
     theme.listen(() => this.#figure.tint(), signal);

@@ -1,15 +1,7 @@
 /** All levels of detail side by side: the same moment, and how far each is off as seen from here. */
 
 import type { ClipQuestion, Motion } from "@posefield/client";
-import {
-  Color,
-  Group,
-  InstancedMesh,
-  type LatheGeometry,
-  MeshStandardMaterial,
-  type PerspectiveCamera,
-  Vector3,
-} from "three";
+import { Color, Group, MeshStandardMaterial, type PerspectiveCamera, Vector3 } from "three";
 
 import "./levels.css";
 import { levelColour } from "./colours.ts";
@@ -19,8 +11,8 @@ import { Ghost } from "./ghost-lines.ts";
 import { Latest } from "./latest.ts";
 import { type Apart, Note } from "./level-notes.ts";
 import type { Mount, Page } from "./page.ts";
-import { boneShape, Rig, SIZE } from "./rig.ts";
 import { type Placed, place, placed } from "./skeleton.ts";
+import { SkinnedBody } from "./skinned-body.ts";
 import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
 
@@ -35,12 +27,12 @@ export const mount: Mount = (host, page) => new Levels(host, page).begin();
 
 /** One level's character, and where its joints are now. */
 interface Figure {
-  readonly mesh: InstancedMesh<LatheGeometry, MeshStandardMaterial>;
+  readonly body: SkinnedBody;
+  readonly material: MeshStandardMaterial;
   readonly ghost: Ghost;
   readonly joints: Placed;
   readonly note: Note;
   motion: Motion | null;
-  shape: Float32Array;
 }
 
 class Levels {
@@ -51,18 +43,14 @@ class Levels {
     "aria-label": "Levels of detail",
   });
   readonly #group = new Group();
-  readonly #rig: Rig;
   readonly #ladder: Ladder;
   readonly #figures: Figure[];
   readonly #asking: Latest<ClipQuestion>;
-  readonly #laid: Float32Array;
   #since = READING;
 
   constructor(host: HTMLElement, page: Page) {
     this.#page = page;
-    this.#rig = new Rig(page.card);
     this.#ladder = ladder(page.card);
-    this.#laid = new Float32Array(SIZE * this.#rig.bones.length);
     this.#figures = page.card.levels.map((_, level) => this.#figure(level));
     this.#group.visible = false;
     this.#host.append(...this.#figures.map(({ note }) => note.host));
@@ -82,10 +70,9 @@ class Levels {
       if (this.#group.visible) scene.camera.clearViewOffset();
       this.#host.remove();
       this.#group.removeFromParent();
-      for (const { mesh, ghost } of this.#figures) {
-        mesh.dispose();
-        mesh.geometry.dispose();
-        mesh.material.dispose();
+      for (const { body, ghost, material } of this.#figures) {
+        body.dispose();
+        material.dispose();
         ghost.dispose();
       }
     });
@@ -96,18 +83,19 @@ class Levels {
 
   #figure(level: number): Figure {
     const material = new MeshStandardMaterial({ roughness: 0.75 });
-    const mesh = new InstancedMesh(boneShape(10), material, this.#rig.bones.length);
-    mesh.frustumCulled = false;
-    const ghost = new Ghost(this.#page.card, level > 0);
-    this.#group.add(mesh, ghost.lines);
-    const joints = placed(this.#page.card.skeleton.parents.length);
-    const note = new Note(level, this.#page.card);
-    return { mesh, ghost, joints, note, motion: null, shape: new Float32Array() };
+    const { card, character } = this.#page;
+    const body = new SkinnedBody(card, character, [material]);
+    // The light's shadows reach as far as one body does.
+    for (const skin of body.children) skin.castShadow = false;
+    const ghost = new Ghost(card, level > 0);
+    this.#group.add(body, ghost.lines);
+    const joints = placed(card.skeleton.parents.length);
+    return { body, material, ghost, joints, note: new Note(level, card), motion: null };
   }
 
   #paint(): void {
-    this.#figures.forEach(({ mesh, ghost }, level) => {
-      mesh.material.color = new Color(levelColour(level));
+    this.#figures.forEach(({ material, ghost }, level) => {
+      material.color = new Color(levelColour(level));
       ghost.paint();
     });
     this.#page.scene.redraw();
@@ -139,9 +127,7 @@ class Levels {
         source.clip(store.state.model, { ...question, level }, signal),
       );
       (await Promise.all(asked)).forEach((motion, level) => {
-        const figure = this.#figures[level]!;
-        figure.motion = motion;
-        figure.shape = this.#rig.shape(motion.boneOffsets);
+        this.#figures[level]!.motion = motion;
       });
       this.#page.scene.redraw();
     } catch (fault) {
@@ -170,10 +156,14 @@ class Levels {
     const frame = Math.min(motion.frames - 1, Math.max(0, Math.round(time * motion.rate)));
     const { rotations, rootPosition, boneOffsets, parents } = motion;
     place(figure.joints, parents, boneOffsets, rotations, rootPosition, frame);
-    this.#rig.lay(this.#laid, 0, figure.shape, figure.joints);
+    const [turns, root] = [4 * parents.length, 3 * frame];
+    figure.body.show({
+      rotations: rotations.subarray(frame * turns, (frame + 1) * turns),
+      root: rootPosition.subarray(root, root + 3),
+      offsets: boneOffsets,
+    });
     const shift = aside.clone().multiplyScalar(level - (this.#figures.length - 1) / 2);
-    figure.mesh.position.copy(shift);
-    fill(figure.mesh, this.#laid);
+    figure.body.position.copy(shift);
     figure.ghost.place(this.#figures[0]!.joints, shift);
   }
 
@@ -182,9 +172,9 @@ class Levels {
     camera.updateMatrixWorld();
     const seen = lens(camera.fov, renderer.domElement);
     const size = [seen.height * camera.aspect, seen.height] as const;
-    for (const { joints, note, mesh } of this.#figures) {
+    for (const { joints, note, body } of this.#figures) {
       note.show(
-        apart(camera, size, this.#figures[0]!.joints, joints, mesh.position),
+        apart(camera, size, this.#figures[0]!.joints, joints, body.position),
         this.#ladder,
         seen,
       );
@@ -207,17 +197,6 @@ function beside(camera: PerspectiveCamera, target: Vector3, count: number): Vect
     .setY(0)
     .normalize()
     .multiplyScalar(width / count);
-}
-
-function fill(mesh: InstancedMesh, laid: Float32Array): void {
-  const out = mesh.instanceMatrix.array;
-  for (let bone = 0; bone < mesh.count; bone++) {
-    for (let axis = 0; axis < 4; axis++) {
-      for (let i = 0; i < 3; i++) out[16 * bone + 4 * axis + i] = laid[SIZE * bone + 3 * axis + i]!;
-    }
-    out[16 * bone + 15] = 1;
-  }
-  mesh.instanceMatrix.needsUpdate = true;
 }
 
 const [ONE, OTHER] = [new Vector3(), new Vector3()];

@@ -1,12 +1,18 @@
 /** What every part of the page is given. A part is a module with `mount(host, page)`. */
 
-import type { Client, ModelCard } from "@posefield/client";
+import type { Client, Download, ModelCard } from "@posefield/client";
 
+import type { Character } from "./character.ts";
 import type { Scene } from "./scene.ts";
 import type { Store } from "./state.ts";
 
 /** Who answers: a service, or a model in the browser itself (offline/). */
-export type Source = Pick<Client, "models" | "card" | "pose" | "clip" | "crowd" | "sigma" | "why">;
+export type Source = Pick<
+  Client,
+  "models" | "card" | "pose" | "clip" | "crowd" | "sigma" | "why"
+> & {
+  character(model: string, signal?: AbortSignal): Promise<Pick<Download, "content">>;
+};
 
 /** A service also gives files and says what an answer is made of; a model in the browser does not. */
 export function served(source: Source): source is Source & Pick<Client, "file"> {
@@ -18,6 +24,7 @@ export interface Page {
   readonly source: Source;
   /** Of the model that is shown; parts are mounted anew when another is chosen. */
   readonly card: ModelCard;
+  readonly character: Character;
   readonly scene: Scene;
   /** Says what happened and goes on; `null` when all is well again. */
   readonly notice: (fault: unknown) => void;

@@ -21,6 +21,7 @@ export class Service implements Source {
 
   readonly models: Source["models"] = (...words) => this.#client.models(...words);
   readonly card: Source["card"] = (...words) => this.#client.card(...words);
+  readonly character: Source["character"] = (...words) => this.#client.character(...words);
   readonly pose: Source["pose"] = (...words) => this.#client.pose(...words);
   readonly clip: Source["clip"] = (...words) => this.#client.clip(...words);
   readonly crowd: Source["crowd"] = (...words) => this.#client.crowd(...words);

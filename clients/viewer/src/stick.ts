@@ -12,25 +12,27 @@ import {
   Vector3,
 } from "three";
 
-import * as build from "./build.ts";
+import { type Bone, bones } from "./bones.ts";
 import type { Shown } from "./player.ts";
 import { type Placed, place, placed } from "./skeleton.ts";
 
 const UP = new Vector3(0, 1, 0);
 const BALL = 0.017;
 const STICK = 0.0095;
+/** Thickest stick, as a share of its length. */
+const SLENDER = 0.15;
 
 export class Stick extends Object3D {
   readonly #card: ModelCard;
   readonly #placed: Placed;
-  readonly #bones: readonly build.Bone[];
+  readonly #bones: readonly Bone[];
   readonly #sticks: InstancedMesh;
   readonly #balls: InstancedMesh;
 
   constructor(card: ModelCard, bone: Material, joint: Material) {
     super();
     this.#card = card;
-    this.#bones = build.bones(card);
+    this.#bones = bones(card);
     this.#placed = placed(card.skeleton.names.length);
     const cone = new CylinderGeometry(0.55, 1, 1, 8).translate(0, 0.5, 0);
     this.#sticks = new InstancedMesh(cone, bone, this.#bones.length);
@@ -62,7 +64,7 @@ export class Stick extends Object3D {
     }
   }
 
-  #end(bone: build.Bone, out: Vector3): void {
+  #end(bone: Bone, out: Vector3): void {
     const { positions, rotations } = this.#placed;
     if (bone.to >= 0) {
       out.fromArray(positions, 3 * bone.to);
@@ -73,21 +75,21 @@ export class Stick extends Object3D {
     out.applyQuaternion(turn.set(x!, y!, z!, w!)).add(at);
   }
 
-  #stick(i: number, { shape }: build.Bone): void {
+  #stick(i: number, bone: Bone): void {
     way.subVectors(to, at);
     const long = way.length();
     turn.setFromUnitVectors(UP, way.divideScalar(long || 1));
-    const thick = Math.min(STICK, 0.5 * shape.radii[0]);
+    const thick = Math.min(STICK, SLENDER * bone.long);
     this.#sticks.setMatrixAt(i, matrix.compose(at, turn, size.set(thick, long, thick)));
   }
 
   #ball(i: number, centre: Vector3, joint: number): void {
-    const radius = joint < 0 ? 0.5 * STICK : Math.min(BALL, 0.8 * this.#thickness(i));
+    const radius = joint < 0 ? 0.5 * STICK : Math.min(BALL, 2 * SLENDER * this.#length(i));
     this.#balls.setMatrixAt(i, matrix.makeScale(radius, radius, radius).setPosition(centre));
   }
 
-  #thickness(i: number): number {
-    return i ? this.#bones[i - 1]!.shape.radii[2] : BALL;
+  #length(i: number): number {
+    return i ? this.#bones[i - 1]!.long : 1;
   }
 }
 

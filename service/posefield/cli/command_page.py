@@ -17,6 +17,7 @@ from posefield.common.errors import FileError
 from posefield.console.arguments import Json, ModelPath
 from posefield.console.late_progress import LateProgress
 from posefield.console.output import as_json
+from posefield.encode import character_file
 from posefield.inference import session
 from posefield.inference.session import Session
 from posefield.kriging import support
@@ -26,6 +27,8 @@ PAGES_FOLDER = Path(__file__).parents[1] / "http/pages"
 OFFLINE_FILES = ("offline.js", "ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm.gz")
 MODEL_TABLES = "model.json"
 """File of the model's card and of the numbers that tell whether a point is supported."""
+CHARACTER = "character.glb"
+"""File of the model's character at rest, which the page draws."""
 _HEAD, _PRESSED = b"<head>", ".gz"
 
 
@@ -73,6 +76,7 @@ def browser_files(content: bytes, opened: Session, identity: str) -> Iterator[tu
     for level in range(len(card.levels)):
         graph = subgraph.require_inputs(subgraph.fix_level(content, level))
         yield f"level-{level}.onnx", graph
+    yield CHARACTER, character_file.character_glb(card.skeleton, identity)
     tables = {
         "card": {"identity": identity, **model_card.plain_values(card)},
         "support": support.fit_support(np.array(card.examples)).table(),

@@ -8,7 +8,7 @@ import { Offline, type Tables } from "./source.ts";
 /**
  * A model as a source of answers; what onnxruntime-web needs lies beside this script.
  *
- * tables: address of the model's tables, beside which its graphs lie.
+ * tables: address of the model's tables, beside which its graphs and its character lie.
  */
 export async function open(tables: string): Promise<Source> {
   ort.env.wasm.numThreads = 1;
@@ -17,11 +17,12 @@ export async function open(tables: string): Promise<Source> {
   ort.env.wasm.wasmPaths = { mjs: mjs!, wasm: wasm! };
   const read = (await (await got(tables)).json()) as Tables;
   const address = new URL(tables, document.baseURI);
-  const level = async (level: number) => {
-    const graph = await got(new URL(`level-${level}.onnx`, address).href);
-    return new Uint8Array(await graph.arrayBuffer());
+  const file = async (name: string) => {
+    const found = await got(new URL(name, address).href);
+    return new Uint8Array(await found.arrayBuffer());
   };
-  return new Offline(ort, level, read);
+  const level = (level: number) => file(`level-${level}.onnx`);
+  return new Offline(ort, level, () => file("character.glb"), read);
 }
 
 async function got(address: string): Promise<Response> {

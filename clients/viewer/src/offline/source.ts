@@ -50,8 +50,16 @@ export class Offline implements Source {
   readonly #card: ModelCard;
   readonly #support: Support;
   readonly #graph: Graph;
+  readonly #body: () => Promise<Uint8Array<ArrayBuffer>>;
 
-  constructor(ort: Ort, levels: (level: number) => Promise<Uint8Array>, tables: Tables) {
+  /** levels: the graph of each level; body: the character's file. */
+  constructor(
+    ort: Ort,
+    levels: (level: number) => Promise<Uint8Array>,
+    body: () => Promise<Uint8Array<ArrayBuffer>>,
+    tables: Tables,
+  ) {
+    this.#body = body;
     this.#card = tables.card;
     this.#support = new Support(tables.support);
     this.#graph = new Graph(ort, levels, this.#card);
@@ -64,6 +72,10 @@ export class Offline implements Source {
 
   async card(): Promise<ModelCard> {
     return this.#card;
+  }
+
+  async character(): Promise<{ content: Uint8Array<ArrayBuffer> }> {
+    return { content: await this.#body() };
   }
 
   async pose(_: string, question: PoseQuestion): Promise<Poses> {
