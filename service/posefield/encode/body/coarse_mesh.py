@@ -14,7 +14,7 @@ import numpy as np
 from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, Integers, SkinnedMesh
 
-FACES = 240
+FACES = 300
 """Number of triangles of coarse faces."""
 BEND = 0.5
 """Distance, as a share of an edge's length, that counts as error where joints differ wholly."""

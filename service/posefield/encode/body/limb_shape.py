@@ -37,11 +37,13 @@ class Girth(NamedTuple):
 
 
 THIGH = (
-    Girth(0.24, 0.086, 0.094, 0.004),
+    Girth(0.24, 0.086, 0.096, 0.002),
     Girth(0.45, 0.077, 0.085, 0.006),
     Girth(0.70, 0.063, 0.070, 0.006),
     Girth(0.90, 0.053, 0.057, 0.004),
 )
+SEAT = 1.03
+"""Width of the ring between trunk and thigh beside the mean of its neighbours."""
 SHIN = (
     Girth(0.0, 0.051, 0.055, 0.004),
     Girth(0.10, 0.048, 0.052, 0.000),
@@ -90,7 +92,7 @@ def build_leg(mesh: MeshBuilder, plan: PersonPlan, leg: Limb, loop: Sequence[int
     sole = sole_height(plan, leg)
     rings += _foot(plan, leg, sole)
     tip = rings[-1].middle + 0.012 * plan.scale * plan.front
-    _tube(mesh, leg.chain, loop, rings, tip, floor=sole)
+    _tube(mesh, leg.chain, _hip_ring(mesh, leg, loop, rings[0]), rings, tip, floor=sole)
 
 
 def build_arm(mesh: MeshBuilder, plan: PersonPlan, arm: Limb, loop: Sequence[int]) -> None:
@@ -102,6 +104,17 @@ def build_arm(mesh: MeshBuilder, plan: PersonPlan, arm: Limb, loop: Sequence[int
     made = _tube(mesh, arm.chain, loop, [*rings, *hand], tip)
     palm, knuckles = made[-4], made[-3]
     _thumb(mesh, plan, arm, (palm, knuckles))
+
+
+def _hip_ring(mesh: MeshBuilder, leg: Limb, loop: Sequence[int], below: Ring) -> list[int]:
+    """Return a ring half-way from the slanted edge of the trunk to the first ring of a leg."""
+    start = np.array([mesh.points[point] for point in loop])
+    half = 0.5 * (start + _around(below, _angles(start, below)))
+    centre = half.mean(axis=0)
+    mark = 0.5 * (leg.chain.marks[leg.root] + _mark(leg.chain, below.place))
+    made = mesh.add_ring(centre + SEAT * (half - centre), leg.chain, leg.chain.at(mark))
+    mesh.join(loop, made)
+    return made
 
 
 def sole_height(plan: PersonPlan, leg: Limb) -> float:
@@ -204,11 +217,7 @@ def _tube(
     for index, ring in enumerate(rings):
         share = EVEN[index] if index < len(EVEN) else 1.0
         angles = (1.0 - share) * given + share * even
-        points = (
-            ring.middle
-            + np.multiply.outer(np.cos(angles), ring.first)
-            + np.multiply.outer(np.sin(angles), ring.second)
-        )
+        points = _around(ring, angles)
         if floor is not None:
             points[:, 1] = np.maximum(points[:, 1], floor)
         made.append(mesh.add_ring(points, chain, ring.place))
@@ -244,6 +253,20 @@ def _thumb(
         for far, r in THUMB
     ]
     _tube(mesh, arm.chain, face, rings, rings[-1].middle + 0.006 * plan.scale * out)
+
+
+def _around(ring: Ring, angles: Floats) -> Floats:
+    """Return the points (N, 3) of a ring at angles (N,)."""
+    first, second = np.cos(angles)[:, None] * ring.first, np.sin(angles)[:, None] * ring.second
+    points: Floats = ring.middle + first + second
+    return points
+
+
+def _mark(chain: BoneChain, place: ChainPlace) -> float:
+    """Return the distance of a place from the start of its chain, m."""
+    marks = chain.marks
+    step = marks[place.segment + 1] - marks[place.segment]
+    return float(marks[place.segment] + place.share * step)
 
 
 def _angles(points: Floats, ring: Ring) -> Floats:

@@ -5,12 +5,14 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.encode.body import (
     body_plan,
+    hip_weights,
     limb_shape,
     skinned_mesh,
     trunk_shape,
     tube_body,
 )
 from posefield.encode.body.body_plan import PersonPlan
+from posefield.encode.body.bone_chain import BoneChain
 from posefield.encode.body.mesh_builder import MeshBuilder
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, Bytes, Integers, SkinnedMesh
 from posefield.motion.skeleton import Skeleton
@@ -28,13 +30,17 @@ def mannequin(skeleton: Skeleton) -> SkinnedMesh:
     mesh, plan = MeshBuilder(), body_plan.person(tree)
     if plan is None:
         tube_body.build(mesh, tree)
-    else:
-        build_person(mesh, plan)
-    return finish(mesh, len(skeleton))
+        mesh.drop_unused()
+        return finish(mesh, along_chains(mesh, len(skeleton)))
+    trunk = build_person(mesh, plan)
+    mesh.drop_unused()
+    weights = along_chains(mesh, len(skeleton))
+    hip_weights.set_weights(weights, mesh, plan, trunk)
+    return finish(mesh, weights)
 
 
-def build_person(mesh: MeshBuilder, plan: PersonPlan) -> None:
-    """Add a person, and tubes along bones that no person has."""
+def build_person(mesh: MeshBuilder, plan: PersonPlan) -> BoneChain:
+    """Add a person, and tubes along bones that no person has; return the chain of the trunk."""
     trunk = trunk_shape.build(mesh, plan)
     for leg, left in zip(plan.legs, (True, False), strict=True):
         limb_shape.build_leg(mesh, plan, leg, trunk_shape.leg_loop(trunk, left))
@@ -43,17 +49,17 @@ def build_person(mesh: MeshBuilder, plan: PersonPlan) -> None:
     for chain in plan.others:
         shares = chain.marks / chain.marks[-1]
         tube_body.add_tube(mesh, chain, plan.scale * TAIL * (1.0 - 0.7 * shares))
+    return trunk.chain
 
 
-def finish(mesh: MeshBuilder, joints: int) -> SkinnedMesh:
-    """Return the mesh that was built, with normals and weights of its points."""
-    mesh.drop_unused()
+def finish(mesh: MeshBuilder, given: Floats) -> SkinnedMesh:
+    """Return the mesh that was built, with normals; given (P, J): weights, not yet smooth."""
     points: Floats = np.array(mesh.points)
     counts = np.array([len(face) for face in mesh.faces], np.int32)
     corners = np.array([point for face in mesh.faces for point in face], np.int32)
     cut = skinned_mesh.triangles(counts, corners)
     shares = np.array([place.share for place in mesh.places])
-    chosen, weights = _weights(mesh, joints)
+    chosen, weights = _weights(mesh, given)
     return SkinnedMesh(
         points.astype(np.float32),
         skinned_mesh.vertex_normals(points, cut),
@@ -74,13 +80,13 @@ def _anchors(mesh: MeshBuilder) -> Integers:
     return np.array(pairs, np.int32)
 
 
-def _weights(mesh: MeshBuilder, joints: int) -> tuple[Integers, Bytes]:
+def _weights(mesh: MeshBuilder, given: Floats) -> tuple[Integers, Bytes]:
     """Return the joints (P, 4) that move each point, heaviest first, and their weights.
 
-    The weights of a point sum to FULL_WEIGHT; those along chains of bones are smoothed over the
-    mesh, so that they are continuous where two chains meet.
+    The weights of a point sum to FULL_WEIGHT. given (P, J): they are smoothed over the mesh, so
+    that they are continuous where two chains of bones meet.
     """
-    smooth = _smoothed(mesh, _along_chains(mesh, joints))
+    joints, smooth = given.shape[1], _smoothed(mesh, given)
     chosen = np.argsort(-smooth, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
     if joints < INFLUENCES:
         chosen = np.pad(chosen, ((0, 0), (0, INFLUENCES - joints)))
@@ -93,7 +99,8 @@ def _weights(mesh: MeshBuilder, joints: int) -> tuple[Integers, Bytes]:
     return chosen, whole.astype(np.uint8)
 
 
-def _along_chains(mesh: MeshBuilder, joints: int) -> Floats:
+def along_chains(mesh: MeshBuilder, joints: int) -> Floats:
+    """Return the weights (P, J) that each point has along its chain of bones."""
     found = np.zeros((len(mesh.points), joints))
     for point, (chain, place) in enumerate(zip(mesh.chains, mesh.places, strict=True)):
         for joint, share in chain.weights(place).items():

@@ -29,7 +29,8 @@ class RingShape(NamedTuple):
 
 # Heights above the hips as shares of the way to the shoulders.
 TORSO = (
-    RingShape(0.11, 0.160, 0.104, 0.118),
+    RingShape(0.05, 0.162, 0.098, 0.120),
+    RingShape(0.12, 0.160, 0.104, 0.120),
     RingShape(0.26, 0.148, 0.098, 0.102),
     RingShape(0.42, 0.132, 0.094, 0.084),
     RingShape(0.60, 0.148, 0.106, 0.094),
