@@ -29,7 +29,7 @@ class RingShape(NamedTuple):
 
 # Heights above the hips as shares of the way to the shoulders.
 TORSO = (
-    RingShape(0.05, 0.162, 0.098, 0.120),
+    RingShape(0.05, 0.160, 0.091, 0.114),
     RingShape(0.12, 0.160, 0.104, 0.120),
     RingShape(0.26, 0.148, 0.098, 0.102),
     RingShape(0.42, 0.132, 0.094, 0.084),
