@@ -112,7 +112,7 @@ def _label(
 
 def _row(path: Path, labels: Mapping[str, str]) -> ClipRow:
     who, others = _split(labels)
-    return ClipRow(path, str(path), None, who, 0, None, np.zeros(0), (), others)
+    return ClipRow(path, str(path), None, who, 0, None, np.zeros(0), (), other_labels=others)
 
 
 def _split(labels: Labels) -> tuple[str, dict[str, str]]:
@@ -138,7 +138,7 @@ def _table_row(
         raise RecipeError(own.name, f"column 'file': {fault.message}", line) from fault
     marks = tuple(own.frame(line, record, column) for column in landmarks)
     who, others = _split(labels)
-    return ClipRow(place, own.name, line, who, first, last, np.zeros(0), marks, others)
+    return ClipRow(place, own.name, line, who, first, last, np.zeros(0), marks, other_labels=others)
 
 
 def _examples(

@@ -74,16 +74,11 @@ def compare_all(
     apart = _joint_distances(warped, true)
     shell = np.linalg.norm(_root_relative(warped) - _root_relative(true), axis=-1)
     spreads = zip(
-        *map(
-            _distances,
-            (
-                _joint_distances(_root_relative(warped), _root_relative(true)),
-                apart,
-                _joint_distances(_root_relative(own), _root_relative(true)),
-                _joint_distances(own, true),
-                shell[..., 1:].max(axis=-1),
-            ),
-        ),
+        _distances(_joint_distances(_root_relative(warped), _root_relative(true))),
+        _distances(apart),
+        _distances(_joint_distances(_root_relative(own), _root_relative(true))),
+        _distances(_joint_distances(own, true)),
+        _distances(shell[..., 1:].max(axis=-1)),
         strict=True,
     )
     jerks = acceleration(own) / acceleration(true)
@@ -113,8 +108,8 @@ def compare_methods(
     for place, true in enumerate(captured):
         made = {name: own for name, listed in motions.items() if (own := listed[place])}
         errors = dict(zip(made, compare_all(list(made.values()), true, feet), strict=True))
-        for name, own in found.items():
-            own.append(errors.get(name))
+        for name, results in found.items():
+            results.append(errors.get(name))
     return found
 
 

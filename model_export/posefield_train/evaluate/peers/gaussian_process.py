@@ -88,5 +88,6 @@ class MarginalLikelihood:
         self, unused: Callable[..., Any], start: Floats, bounds: Floats
     ) -> tuple[Floats, float]:
         """Return the best theta and its value; an optimizer of scikit-learn's regressor."""
-        found = minimize(self.negative, start, method="L-BFGS-B", jac=True, bounds=bounds)
+        limits = [(float(low), float(high)) for low, high in bounds]
+        found = minimize(self.negative, start, method="L-BFGS-B", jac=True, bounds=limits)
         return found.x, float(found.fun)
