@@ -127,9 +127,13 @@ def test_a_root_that_faces_elsewhere_is_told(clip, written):
     """Findings: animals that travel along -x had `forward` and `left` swapped without a word."""
     turned = facing_x(clip)
     assert np.abs(turned.positions() - clip.positions()).max() < 1e-9
-    found = proposed(written(turned), "facing")
+    report = probe_report.probe([written(turned)])
+    found = report.proposed["facing"]
     assert found.value == pytest.approx(90.0, abs=10.0) and found.confidence == "low"
-    assert "left and forward are not the body's" in found.evidence[1]
+    assert "say motion.facing = 'hips'" in found.evidence[1]
+    assert 'facing = "hips"' in recipe_draft.recipe_text(report, "x", None).splitlines()
+    straight = probe_report.probe([written(clip)])
+    assert 'facing = "hips"' not in recipe_draft.recipe_text(straight, "x", None)
 
 
 def test_a_root_that_stays_while_its_child_moves_is_told(clip, tmp_path, written):

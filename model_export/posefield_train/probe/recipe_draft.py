@@ -12,6 +12,7 @@ from posefield.common.errors import RecipeError
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.source import clip_table
 from posefield_train.source.clip_table import ClipTable
+from posefield_train.source.rigs.facing import LARGEST_ANGLE
 
 TABLE, RECIPE = "clips.csv", "recipe.toml"
 FRAME_NAME = re.compile(r"frame(?!s\b)|_frame$|^frame_")
@@ -204,6 +205,7 @@ def _motion(report: ProbeReport) -> list[str]:
         *[f"# {said} (confidence: {feet.confidence})" for said in feet.evidence],
         f"feet = {_list(feet.value)}",
         *[f"# facing: {said} (confidence: {facing.confidence})" for said in facing.evidence],
+        *(['facing = "hips"'] if abs(facing.value or 0.0) > LARGEST_ANGLE else []),
         "",
     ]
 
