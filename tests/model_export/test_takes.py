@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import newcomers
 import numpy as np
 import pytest
 from minimal import recipe_with, small_clip, write_clips
@@ -12,6 +13,8 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
 from posefield_train import train
+from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
+from posefield_train.adapt.adapted_file import NewPerformer
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import sample_points
 from posefield_train.source import ingest
@@ -225,3 +228,20 @@ def test_the_model_file_keeps_takes_that_are_no_files(read, tmp_path):
         assert trained.samples.groups.tolist() == list(expected or range(8))
         exported = onnx_export.export_model(recipe, trained, notes)
         assert exported.card.making.takes == expected
+
+
+def test_an_adapted_model_keeps_its_takes_and_adds_those_of_new_clips(tmp_path):
+    folder, recipe = newcomers.write(tmp_path / "family"), newcomers.recipe()
+    examples = [
+        replace(example, take=f"{example.row.performer} {i // 6}")
+        for i, example in enumerate(ingest.ingest(recipe, folder)[0])
+    ]
+    trained = train.train(recipe, examples, lambda _: None)
+    content = onnx_export.export_model(recipe, trained, []).content
+    reopened = model_reconstruction.reconstruct(content, "a model")
+    before = reopened.card.making.takes
+    assert len(before) == newcomers.CLIPS and len(set(before)) == 9
+    table = newcomers.write_newcomer(tmp_path / "cy", (2.0, 7.0))
+    found, _ = new_clips.examples_of_table(reopened, table, recipe.source, "cy")
+    adapted = adapted_file.export_adapted(reopened, NewPerformer("cy", found, "CC0"))
+    assert adapted.card.making.takes == (*before, max(before) + 1, max(before) + 2)
