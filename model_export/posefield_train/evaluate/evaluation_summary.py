@@ -10,7 +10,7 @@ from posefield.common.units import Floats
 from posefield_train.evaluate import corrections, equal_information, motion_errors
 from posefield_train.evaluate.methods import EXACT, OURS, TOLD, definition
 from posefield_train.evaluate.motion_errors import MotionErrors
-from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS, NO_PERFORMER
+from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS, ASKED_OPEN
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.report.drawing import markdown_table, significant_digits
 
@@ -227,10 +227,10 @@ def performer_facts(results: Sequence[EvaluationResult]) -> dict[str, Any]:
     """
     by_name = {result.protocol: result for result in results}
     clips, others = (by_name.get(f"leave_one_{held}_out") for held in ("clip", "performer"))
-    if not clips or not others or NO_PERFORMER not in clips.errors:
+    if not clips or not others or ASKED_OPEN not in clips.errors:
         return {}
-    everyone = clips.asked(NO_PERFORMER)
-    named, unnamed = (_mean_relative(clips, name, everyone) for name in (OURS, NO_PERFORMER))
+    everyone = clips.asked(ASKED_OPEN)
+    named, unnamed = (_mean_relative(clips, name, everyone) for name in (OURS, ASKED_OPEN))
     adapted = {
         name: _adaptation_facts(clips, others, name)
         for name in ADAPTATION_COUNTS

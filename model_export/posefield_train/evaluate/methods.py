@@ -27,7 +27,9 @@ DEFINITIONS = {
     OURS: "the model as exported: truncated, with its own bone lengths and timing",
     EXACT: "the same, with the event's joint moved by the service's constraint solver to its "
     "captured position at the event",
-    OURS + OPEN: "the same model, asked with the performer left open",
+    OURS + OPEN: "a model of the same recipe, trained without performers",
+    OURS + "_open": "the model trained with performers, asked with the performer left open: it "
+    "then answers for a person whom it has not seen",
     **{
         f"posefield_adapt_{count}": f"the same model adapted to the performer with {shown} from "
         "different takes, far apart in the controls and not from the take of the predicted clip; "

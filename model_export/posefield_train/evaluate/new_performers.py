@@ -16,8 +16,9 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import PERFORMER, Recipe
+from posefield_train.train import train
 
-NO_PERFORMER = OURS + OPEN
+NO_PERFORMER, ASKED_OPEN = OURS + OPEN, OURS + "_open"
 ADAPTATION_COUNTS = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
 """Number of clips that each method adapts with."""
 MIN_OTHER_TAKES = 3
@@ -25,16 +26,27 @@ MIN_OTHER_TAKES = 3
 
 
 def predict_unnamed(
-    recipe: Recipe, trained: TrainedModel, asked: Queries
+    recipe: Recipe, trained: TrainedModel, shown: Sequence[Example], asked: Queries
 ) -> dict[str, list[ComparedMotion]]:
-    """Return the answers without performers; empty if the model does not distinguish them."""
+    """Return answers without performers: of a model trained without them, and of the same model.
+
+    shown: examples of the training. Empty if the model does not distinguish performers.
+    """
     if PERFORMER not in trained.model.bank.labels:
         return {}
     others = [
         {name: label for name, label in labels.items() if name != PERFORMER}
         for labels in asked.labels
     ]
-    return {NO_PERFORMER: methods.predict_posefield(recipe, trained, replace(asked, labels=others))}
+    unnamed = replace(asked, labels=others)
+    alone = [name for name in recipe.kriging.label if name != PERFORMER]
+    kriging = recipe.kriging.model_copy(update={"label": alone})
+    plain = recipe.model_copy(update={"kriging": kriging})
+    untold = train(plain, shown, lambda _: None)
+    return {
+        NO_PERFORMER: methods.predict_posefield(plain, untold, unnamed),
+        ASKED_OPEN: methods.predict_posefield(recipe, trained, unnamed),
+    }
 
 
 def predict_adapted(

@@ -189,7 +189,7 @@ def run_fold(
         for example, event in pairs
     ]
     if protocol == "clip":
-        more: ExtraPredictions = new_performers.predict_unnamed(recipe, made.trained, asked)
+        more: ExtraPredictions = new_performers.predict_unnamed(recipe, made.trained, rest, asked)
     else:
         more = new_performers.predict_adapted(recipe, made.trained, held)
     return _compare_methods(made, fold.held, asked, _ReferenceMotions(captured, events, more))

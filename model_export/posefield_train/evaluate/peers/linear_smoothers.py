@@ -8,7 +8,7 @@ the peer predicts the rest, and the offset of the asked performer is added.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def smoother(peer: Interpolator, samples: SamplePoints, queries: Floats) -> Line
     count = len(samples.points)
     left_out = np.zeros((count, count))
     for out in left_out_parts(samples):
-        rest = SamplePoints(samples.points[~out], samples.controls, samples.groups[~out])
+        rest = replace(samples, points=samples.points[~out], groups=samples.groups[~out])
         left_out[np.ix_(out, ~out)] = peer(rest, np.eye(len(rest.points)), samples.points[out])
     return LinearSmoother(peer(samples, np.eye(count), queries), left_out)
 
