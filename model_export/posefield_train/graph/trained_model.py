@@ -42,7 +42,7 @@ class TrainedModel:
     mean squared joint distance (N,), m², of each clip from its leave-one-out prediction on
     canonical time. warped_errors: the same of whole motions after time warping, by which sigma is
     scaled. explained: share of the variation between clips that leave-one-out predicts from the
-    controls, by quantity; without a significant gain the quantity is constant. residuals:
+    controls, by quantity; one that they do not explain is constant. residuals:
     leave-one-out residuals (N, m) of each quantity but the pose. truncation_errors: of the reduced
     tensor. joints: leave-one-out error (J,) of each joint as a share of the root mean square of
     all. outliers: evidence against clips that do not fit.

@@ -20,8 +20,8 @@ from posefield_train.tensor.decoder import Proportions
 SAME_BONE = 5e-4
 # A Gaussian covariance is conditioned worse than Matérn's; it must reduce the error to this share.
 CLEAR_IMPROVEMENT = 0.95
-# Standard errors by which a model of the controls must beat the constant.
-SIGNIFICANCE = 2.0
+# Shares of a model that count as none, and as the whole of it.
+NEGLIGIBLE, WHOLE = 0.05, 0.95
 
 
 @dataclass(frozen=True)
@@ -56,20 +56,27 @@ def choose_covariance(
 
 
 def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleValues) -> FittedModel:
-    """Return a model of values (N, m) with the scales of the pose's model.
+    """Return a model of values (N, m) with the scales of the pose's model, shrunk to their mean.
 
-    It is their mean if the controls do not explain them.
+    Leave-one-out predictions tell by how much: their differences from the mean are multiplied by
+    the share that fits the values best. A choice between model and mean does worse than either: a
+    sample that is left out pulls the choice away from itself.
     """
     if np.ptp(values, axis=0).max() == 0.0:
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
     problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
     found = kriging_tuning.tune_beside(problem, pose)
-    explained = 1.0 - found.unexplained
+    from_mean, mean = samples.from_mean(values), values.mean(axis=0)
+    predicted = from_mean - found.residuals
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.
-    if not _is_significant(found, samples, values) and settings.nugget is None:
-        return FittedModel(ConstantModel(values.mean(axis=0)), explained, samples.from_mean(values))
+    share = 1.0 if settings.nugget is not None else _explained_share(predicted, from_mean)
+    if share == 0.0:
+        return FittedModel(ConstantModel(mean), 0.0, from_mean)
+    residuals = from_mean - share * predicted
+    explained = 1.0 - float(np.sum(np.square(residuals)) / np.sum(np.square(from_mean)))
+    shrunk = mean + share * (values - mean)
     return FittedModel(
-        universal_kriging.solve(found.hyper, samples.points, values), explained, found.residuals
+        universal_kriging.solve(found.hyper, samples.points, shrunk), explained, residuals
     )
 
 
@@ -87,14 +94,14 @@ def factor_of(
     return FittedModel(solved, explained, found.residuals)
 
 
-def _is_significant(found: TunedKriging, samples: SamplePoints, values: SampleValues) -> bool:
-    """Return True if the gain over the mean of the other samples exceeds SIGNIFICANCE errors.
+def _explained_share(predicted: SampleValues, from_mean: SampleValues) -> float:
+    """Return the share of predictions (N, m) that fits differences from the mean (N, m) best.
 
-    Scales and nugget were chosen to maximize this gain, so that a small one can be chance.
+    From 0 to 1; next to either end it is the end.
     """
-    from_mean = np.sum(np.square(samples.from_mean(values)), axis=1)
-    gains = from_mean - np.sum(np.square(found.residuals), axis=1)
-    return bool(gains.mean() > SIGNIFICANCE * gains.std(ddof=1) / np.sqrt(len(gains)))
+    total = float(np.sum(np.square(predicted)))
+    share = float(np.sum(predicted * from_mean)) / total if total > 0.0 else 0.0
+    return 0.0 if share < NEGLIGIBLE else min(share, 1.0) if share < WHOLE else 1.0
 
 
 def fit_proportions(offsets: ClipBones) -> tuple[Proportions, Annotated[Floats, "clips rank"]]:

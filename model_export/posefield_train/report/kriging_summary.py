@@ -76,8 +76,8 @@ class KrigingSummary:
         """Return a table with a row for each quantity."""
         paragraphs = (
             "Explained is the share of the variation between clips that kriging predicts from the "
-            "controls, with each clip left out in turn. A quantity that is not predicted better "
-            "than by the mean of the clips (by two standard errors) gets that mean.",
+            "controls, with each clip left out in turn. All quantities but "
+            "the pose are shrunk to the mean of the clips, as far as these predictions advise.",
             "The scale of a control is its weight in the distance between clips, per half-range. "
             "All quantities share the scales. The nugget is the share of the variance that remains "
             "between clips with equal controls, and the trend the variance of the slope along a "
