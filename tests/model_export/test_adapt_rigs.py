@@ -16,6 +16,8 @@ from posefield_train.sample import sample_files
 from posefield_train.sample.figures import quadruped_walk
 from posefield_train.source import bvh, ingest, recipe
 
+WOLF = {"performer": "wolf"}
+
 
 @pytest.fixture(scope="module")
 def family(tmp_path_factory):
@@ -56,13 +58,13 @@ def test_new_clips_are_turned_and_collapsed_as_the_family_was(family, tmp_path, 
             (tmp_path / path.name).write_bytes(content)
         paths = [tmp_path / path.name for path in paths]
     reopened = model_reconstruction.load(model)
-    found, _ = new_clips.examples_of_files(reopened, paths, own.source, "wolf")
+    found, _ = new_clips.examples_of_files(reopened, paths, own.source, WOLF)
     for one, other in zip(wanted, found, strict=True):
         assert other.facing == -90.0 and other.clip.skeleton.names == one.clip.skeleton.names
         assert np.abs(one.clip.positions() - other.clip.positions()).max() < 1e-5
         assert one.controls == pytest.approx(other.controls, abs=1e-3)
     making = replace(reopened.making, facing=0.0)
     plain, _ = new_clips.examples_of_files(
-        replace(reopened, making=making), paths, own.source, "wolf"
+        replace(reopened, making=making), paths, own.source, WOLF
     )
     assert np.abs(plain[0].clip.positions() - wanted[0].clip.positions()).max() > 0.1

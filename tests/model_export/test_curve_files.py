@@ -205,5 +205,5 @@ def test_curves_that_never_change_are_no_motion(folder):
         (folder / f"{clip}.curves.csv").write_text(still)
     recipe = recipe_with(curves={"rate": 25.0})
     examples = ingest.ingest(recipe, folder)[0]
-    with pytest.raises(TrainingError, match="no joint and no curve that moves"):
+    with pytest.raises(TrainingError, match="all 3 clips have the same motion"):
         train.train(recipe, examples, lambda _: None)

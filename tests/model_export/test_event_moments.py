@@ -126,7 +126,7 @@ def test_a_new_performers_clips_are_aligned_by_the_same_moment(read, tmp_path):
     (tmp_path / "new").mkdir()
     write_clips(tmp_path / "new", [raised(0.6, 0.9)])
     found, _ = new_clips.examples_of_files(
-        reopened, [tmp_path / "new" / "0.bvh"], recipe.source, "c"
+        reopened, [tmp_path / "new" / "0.bvh"], recipe.source, {"performer": "c"}
     )
     assert found[0].landmarks == (pytest.approx(0.6),)
     assert reopened.card.controls[0].measure == Measure("height", (HAND,), "highest")

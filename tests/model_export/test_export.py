@@ -299,7 +299,7 @@ def test_onnxruntime_alone_reads_the_metadata(model_path):
     runtime = onnxruntime.InferenceSession(model_path, providers=["CPUExecutionProvider"])
     entries = runtime.get_modelmeta().custom_metadata_map
     card = {k: json.loads(v) for k, v in entries.items() if k.startswith("posefield.")}
-    assert card["posefield.format"] == 3
+    assert card["posefield.format"] == 4
     assert card["posefield.units"] == {
         "length": "m",
         "time": "s",

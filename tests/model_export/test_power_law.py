@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from running import outputs
-from test_label import HIGH, LOW, asked, labelled_bank, mixed
+from test_graph_labels import HIGH, LOW, asked, labelled_bank, mixed
 
 from posefield_train.kriging import kriging_graph, power_law, thinning
 from posefield_train.kriging.power_law import PowerLaw
@@ -105,7 +105,7 @@ def test_the_graph_multiplies_the_duration_by_the_law_at_every_level(level):
         ends = LevelTables(kriging_graph.entries(own, list(RANKS))).onnx(net)
         return tuple(kriging_graph.onnx(own, net, controls, ends).values())
 
-    found = outputs(build, (2, 2, 2, 1), level=level, controls=controls, performer=labels)
+    found = outputs(build, (2, 2, 2, 1), level=level, controls=controls, labels=labels)
     points = own.points(controls, labels)
     variance, *values = own.numpy(points, level).values()
     for one, other in zip(found, [*values, own.sigma(variance)], strict=True):

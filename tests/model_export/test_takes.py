@@ -242,6 +242,6 @@ def test_an_adapted_model_keeps_its_takes_and_adds_those_of_new_clips(tmp_path):
     before = reopened.card.making.takes
     assert len(before) == newcomers.CLIPS and len(set(before)) == 9
     table = newcomers.write_newcomer(tmp_path / "cy", (2.0, 7.0))
-    found, _ = new_clips.examples_of_table(reopened, table, recipe.source, "cy")
+    found, _ = new_clips.examples_of_table(reopened, table, recipe.source, {"performer": "cy"})
     adapted = adapted_file.export_adapted(reopened, NewPerformer("cy", found, "CC0"))
     assert adapted.card.making.takes == (*before, max(before) + 1, max(before) + 2)

@@ -202,7 +202,7 @@ def test_sigma_says_how_far_the_truth_may_lie(trained, examples, rng):
     gaps = answer.positions(figure.parents) - expected
     errors = np.array([rms(gap) for gap in gaps])
     assert np.mean(errors < 2 * answer.sigma) > 0.95
-    assert 0.4 < np.median(errors / answer.sigma) < 1.1
+    assert 0.4 < np.median(errors / answer.sigma) < 1.2
 
 
 @pytest.mark.system
@@ -288,7 +288,7 @@ def test_a_control_that_follows_from_another_is_refused(small_recipe, few):
 def test_fewer_samples_than_the_drift_needs_are_refused(small_recipe, few):
     message = "5 samples, expected at least 6 for 4 controls and a drift of degree 1"
     with pytest.raises(TrainingError, match=message):
-        train.train(with_drift(small_recipe, 1), few[:5], quiet)
+        train.train(with_drift(small_recipe, 1), few[:: len(few) // 5 + 1][:5], quiet)
     with pytest.raises(TrainingError, match="1 samples, expected at least 2"):
         train.train(small_recipe, few[:1], quiet)
     assert train.train(small_recipe, few[::5], quiet).model

@@ -88,7 +88,8 @@ def test_alternatives_go_from_fine_to_coarse(facts, small_recipe):
     ]
     for finer, coarser in pairwise(others):
         assert finer["times_budget"] < coarser["times_budget"]
-        assert finer["rms_m"] < coarser["rms_m"] and finer["numbers"] > coarser["numbers"]
+        assert finer["rms_m"] <= coarser["rms_m"] and finer["numbers"] >= coarser["numbers"]
+    assert others[0]["rms_m"] < 0.1 * others[-1]["rms_m"], "and not all are the same"
     budget = small_recipe.size.budgets["rms"]
     # Levels are tried with some questions, and measured with others.
     kept = [own["rms_m"] <= 1.05 * own["times_budget"] * budget for own in others]
@@ -100,7 +101,9 @@ def test_alternatives_go_from_fine_to_coarse(facts, small_recipe):
 def test_an_alternative_answers_as_coarsely_as_its_figures_say(trained, exported, alternatives):
     found = alternatives
     low, high = exported.model.bank.low, exported.model.bank.high
-    points, times = np.linspace(low, high, 200), np.full((200, 1), 0.5)
+    points = np.linspace(low, high, 200)
+    # At the event, where only the finest level has a second prediction.
+    times = exported.model.durations(points, np.zeros((200, 0)))[:, None]
     best = exported.model.evaluate(points, times).positions(trained.skeleton.parents)
 
     def off(level):
@@ -112,7 +115,7 @@ def test_an_alternative_answers_as_coarsely_as_its_figures_say(trained, exported
 
     errors = [off(1 + number) for number in range(len(found.levels))]
     # The model keeps tighter limits than the recipe's budgets, which the first alternative keeps.
-    assert off(0) < 1e-4 < errors[0] < errors[1]
+    assert off(0) < 1e-4 < errors[0] < errors[-1]
     assert errors == sorted(errors)
 
 
