@@ -187,7 +187,7 @@ def test_sample_writes_the_face(posefield, tmp_path, models_trained):
 
 def test_sample_of_the_face_has_no_truth_to_write(refused, tmp_path):
     said = refused(2, "sample", "face", "--truth", "-o", tmp_path / "truth.bvh")
-    assert said == "truth: given with 'face', expected with reaching only"
+    assert said == "truth: found for 'face', expected for reaching only"
 
 
 def test_sample_says_what_to_do_next(posefield, reaching_folder):

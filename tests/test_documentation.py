@@ -23,7 +23,7 @@ from posefield_train.source.recipe import Recipe
 
 README = ROOT / "README.md"
 GENERATE = [sys.executable, str(DOCS / "generate.py")]
-MOST_LINES, MOST_WORDS = 150, 900
+MOST_LINES, MOST_WORDS, MOST_PAGE_LINES = 150, 900, 165
 VARIABLE = re.compile(r"\bPOSEFIELD_[A-Z_]+[A-Z]\b")
 
 
@@ -54,7 +54,9 @@ def test_the_readme_is_short():
 def test_architecture_is_ten_short_pages():
     pages = sorted((DOCS / "architecture").glob("*.md"))
     assert [path.name[:2] for path in pages] == [f"{number:02d}" for number in range(10)]
-    assert [path.name for path in pages if len(path.read_text().splitlines()) > MOST_LINES] == []
+    assert [
+        path.name for path in pages if len(path.read_text().splitlines()) > MOST_PAGE_LINES
+    ] == []
 
 
 def test_every_package_is_on_an_architecture_page():

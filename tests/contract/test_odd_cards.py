@@ -181,7 +181,7 @@ def test_all_odd_cards_are_refused_or_answer(tried):
     assert counts["refused"] > 4000 and counts["opened"] > 400
 
 
-@pytest.mark.parametrize("lost", ["joint_sigma", "sources", "examples"])
+@pytest.mark.parametrize("lost", ["joint_sigma", "examples"])
 def test_a_card_that_was_not_checked_fails_when_asked(tried, lost):
     """Negative control of both: the questions do reach the values of the card."""
     card = replace(tried.session.card, **{lost: getattr(tried.session.card, lost)[:-1]})

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats, Singles
-from posefield.encode import glb_buffer, glb_character, glb_curves
+from posefield.encode import glb_buffer, glb_character
 from posefield.encode.character import character
 from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import METRES, Convention
@@ -33,7 +33,7 @@ def glb(answer: ClipAnswer, said: Convention) -> bytes:
     resting = character.rest_pose(rig, clip.translations[:1])
     parts = glb_character.character_parts(store, resting)
     if clip.curves is not None:
-        parts = glb_curves.with_curves(parts, store, clip.curves)
+        parts = glb_character.with_curves(parts, store, clip.curves)
     document = {
         "asset": glb_buffer.asset(answer.trust.facts()),
         **parts,

@@ -37,13 +37,17 @@ class CurveValues:
         return [curve.name for curve in self.curves]
 
 
-def clamp(curves: Sequence[Curve], values: Annotated[Floats, "*batch curves"]) -> Floats:
+def clamp(
+    curves: Sequence[Curve], values: Annotated[Floats, "*batch curves"]
+) -> Annotated[Floats, "*batch curves"]:
     """Return values (..., C) within the limits of their curves."""
     low, high = limits(curves)
     return np.clip(values, low, high)
 
 
-def limits(curves: Sequence[Curve]) -> tuple[Floats, Floats]:
+def limits(
+    curves: Sequence[Curve],
+) -> tuple[Annotated[Floats, "curves"], Annotated[Floats, "curves"]]:
     """Return the smallest and the largest value (C,) of each curve."""
     ends = np.array([(curve.minimum, curve.maximum) for curve in curves]).reshape(-1, 2)
     return ends[:, 0], ends[:, 1]
@@ -54,7 +58,9 @@ def distances(curves: Sequence[Curve]) -> Annotated[Floats, "curves"]:
     return np.array([curve.distance for curve in curves], dtype=np.float64)
 
 
-def as_points(curves: Sequence[Curve], values: Annotated[Floats, "*batch curves"]) -> Floats:
+def as_points(
+    curves: Sequence[Curve], values: Annotated[Floats, "*batch curves"]
+) -> Annotated[Floats, "*batch curves 3"]:
     """Return values (..., C) as points (..., C, 3), m, on a line.
 
     Distances between them are those that the curves count as, beside distances of joints.

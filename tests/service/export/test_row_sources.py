@@ -92,7 +92,7 @@ def test_a_file_that_cannot_be_read_is_refused(model, tmp_path, name, said):
 
 def test_every_option_but_name_and_format_is_a_field_of_a_question():
     fields = {*NamedClipQuestion.__struct_fields__, "format"}
-    assert fields - set(OPTION_KINDS) == {"controls", "joint_sigma"}
+    assert fields - set(OPTION_KINDS) == {"controls", "joint_sigma", "labels"}
     assert set(OPTION_KINDS) <= fields
 
 

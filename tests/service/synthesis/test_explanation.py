@@ -79,11 +79,13 @@ def test_the_file_s_poses_are_the_weighted_sum_of_the_captured_clips(case, rng):
         _, place = stages.timing.numpy(fields["duration"], fields["warp"], time)
         weights = in_the_card_s_order(card, explain_result(model, asked(card, point)))
         turns = model.session.run(point[None], time, "rotations")[0]
-        told, _ = stages.decoder.numpy((weights @ captured)[None], place)
+        # What the event's prediction adds to them is the same for all weights.
+        more = fields["pose"][:, captured.shape[1] :]
+        told, _ = stages.decoder.numpy(np.hstack([(weights @ captured)[None], more]), place)
         np.testing.assert_allclose(told, turns, atol=1e-4)
         # Negative control: the weights of another answer tell another pose.
         other = in_the_card_s_order(card, explain_result(model, asked(card, 0.98 * point)))
-        wrong, _ = stages.decoder.numpy((other @ captured)[None], place)
+        wrong, _ = stages.decoder.numpy(np.hstack([(other @ captured)[None], more]), place)
         assert np.abs(wrong - turns).max() > 1e-3
 
 

@@ -192,7 +192,8 @@ def test_the_measure_is_that_of_the_evaluation(own, strides):
     clips = [
         foot_skate.mean_skate_speed(e.clip.positions()[:, [3, 6]], e.clip.rate) for e in strides
     ]
-    assert np.max(clips) < 1e-5
+    # Closing the cycle moves a planted foot by less than a millimetre a second.
+    assert np.max(clips) < 1e-3
 
 
 def test_a_straight_route_is_walked_at_its_speed(own):

@@ -60,7 +60,7 @@ def test_what_is_near_is_met_in_a_few_steps(name, end, request, rng):
         far = begun.bench.distance(begun.held, [unit])
         aim = begun.place(end, frame, 0.02 * way / far)
         held = begun.bench.solve(begun.held, [aim])
-        assert held.results[0].reached and held.results[0].miss < 1e-5
+        assert held.results[0].reached and held.results[0].miss < 2e-5
         assert held.steps <= 5
         joint = begun.joint(end)
         assert (
