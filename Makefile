@@ -36,10 +36,10 @@ $(NODE): clients/package.json clients/package-lock.json clients/docs/package.jso
 .PHONY: node
 node: $(NODE) ## install into clients/node_modules what its lock file names
 
-# The service's answer to `/`: one file, made of the page's sources and of nothing else; and the files that
-# `posefield page` lays beside it for hosts without a service.
+# The service's answer to `/`: one file, made of the page's sources and of nothing else; `posefield page` writes
+# copies of it with computed answers.
 PAGE := service/posefield/http/pages/viewer/index.html
-$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.offline.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
+$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
 
 # The service's answer to `/docs`: one file with Swagger UI in it, which reads the contract from the service.
@@ -131,7 +131,7 @@ lock: $(ENV) ## choose versions anew
 
 .PHONY: clean
 clean: ## remove what was built, environments too
-	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer service/posefield/http/pages/offline clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf build dist .cache service/posefield/http/pages/docs service/posefield/http/pages/viewer clients/node_modules .venv .venv-3.* .venv-blender .venv-blender-5 .venv-engines .pytest_cache .mypy_cache .ruff_cache .hypothesis
 
 # Every family is held out take by take; finished folds are kept, so that a run that was stopped goes on.
 EVALUATED := cmu_walk hdm05_grab_high hdm05_deposit_floor hdm05_kick hdm05_hop bandai_raise_hand

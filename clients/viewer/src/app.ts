@@ -52,7 +52,7 @@ export class App {
       // A copy without a service has its answers in itself.
       this.#source = (await offline()) ?? this.#service;
     } catch (fault) {
-      this.#fault(`The model of this page cannot be opened: ${fault}`);
+      this.#fault(`The answers in this page cannot be opened: ${fault}`);
       return;
     }
     void this.#go(address(location.hash));

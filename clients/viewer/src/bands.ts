@@ -1,29 +1,22 @@
-/** The bands of sigma, on one scale for all models: those of the contract's `Band`. */
-
-/** Largest sigma of each band, m; beyond the last one an answer is a guess. */
-const BANDS = [
-  ["close", 0.03],
-  ["near", 0.075],
-  ["rough", 0.15],
-] as const;
+/** The bands of sigma in words, on one scale for all models; the service says which it is. */
 
 /** End of the scale, m: bars are full from here on. */
 export const SCALE = 0.2;
 
-export type Band = (typeof BANDS)[number][0] | "guess";
-
-export function band(sigma: number): Band {
-  return BANDS.find(([, most]) => sigma <= most)?.[0] ?? "guess";
-}
-
-const WORDS: Readonly<Record<Band, string>> = {
-  close: "close: up to 3 cm",
-  near: "near: 3 to 7.5 cm",
-  rough: "rough: 7.5 to 15 cm",
-  guess: "a guess: more than 15 cm",
+/** With the limits of the contract's `Band`. */
+const WORDS: Readonly<Record<string, string>> = {
+  close: "up to 3 cm",
+  near: "3 to 7.5 cm",
+  rough: "7.5 to 15 cm",
+  guess: "more than 15 cm",
 };
 
-/** A band in words, with its limits. */
-export function worded(sigma: number): string {
-  return WORDS[band(sigma)];
+/** A band with its limits; a newer service may have others. */
+export function worded(band: string): string {
+  const limits = WORDS[band];
+  return limits ? `${named(band)}: ${limits}` : band;
+}
+
+export function named(band: string): string {
+  return band === "guess" ? "a guess" : band;
 }

@@ -8,7 +8,7 @@ import type { Session } from "./session.ts";
 import { Slider, title } from "./slider.ts";
 
 export function mount(host: HTMLElement, page: Session): void {
-  const { card, player, signal, store } = page;
+  const { card, player, signal, source, store } = page;
   const row = presets(page);
   const sliders = card.controls.map((control, column) => {
     const examples = card.examples.map((row) => row[column]!);
@@ -28,7 +28,10 @@ export function mount(host: HTMLElement, page: Session): void {
     ...sliders.map(([, slider]) => slider.element),
   );
   if (card.performers.length) host.append(performers(card.performers, store, signal));
-  for (const set of otherSets(card)) host.append(labels(set, store, signal));
+  for (const set of otherSets(card)) {
+    const open = source.open?.includes(set.name) ?? false;
+    host.append(labels(set, open, store, signal));
+  }
   show();
   const leave = store.listen((_, changed) => {
     if (changed.has("controls")) show();
@@ -49,9 +52,10 @@ function performers(names: readonly string[], store: Store, signal: AbortSignal)
   return shown("Performer", select, () => store.state.performer ?? "", { store, signal });
 }
 
-/** A selector of one name of a label set, such as a style. */
+/** A selector of one name of a label set, such as a style; open: all answers leave it open. */
 function labels(
   { name, names }: { readonly name: string; readonly names: readonly string[] },
+  open: boolean,
   store: Store,
   signal: AbortSignal,
 ): HTMLElement {
@@ -59,6 +63,8 @@ function labels(
     const { [name]: _, ...others } = store.state.labels;
     store.set({ labels: label ? { ...others, [name]: label } : others });
   });
+  select.disabled = open;
+  if (open) select.title = "This copy has no answers for single names; a service has";
   return shown(title(name), select, () => store.state.labels[name] ?? "", { store, signal });
 }
 

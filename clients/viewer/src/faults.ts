@@ -19,7 +19,7 @@ export function understood(fault: unknown): Fault | null {
   if (fault instanceof Unreachable) return DOWN;
   if (fault instanceof Problem) return refused(fault);
   if (fault instanceof Unexpected) return { text: unexpected(fault), remedy: "wait" };
-  // What a model in the browser cannot be asked, or is not.
+  // What a copy without a service cannot be asked.
   if (fault instanceof PosefieldError) return { text: fault.message, remedy: "none" };
   return { text: `Something in this page went wrong: ${fault}`, remedy: "none" };
 }

@@ -67,7 +67,7 @@ export function mount(host: HTMLElement, session: Session): void {
 }
 
 const NONE =
-  "Animation files need a service: this page runs without one, on the model file alone. A video can be recorded.";
+  "Animation files need a service: this page runs without one, on answers computed beforehand. A video can be recorded.";
 
 function titled(...content: readonly HTMLElement[]): HTMLElement {
   return el(

@@ -1,20 +1,17 @@
-/** Whether this copy of the page works without a service, and on which model. */
+/** Whether this copy of the page works without a service, on answers computed beforehand. */
 
+import { unpacked } from "./offline/read.ts";
+import { Offline } from "./offline/source.ts";
+import { Table } from "./offline/table.ts";
 import type { Source } from "./page.ts";
 
-interface Part {
-  open(tables: string): Promise<Source>;
-}
-
-/**
- * The source that a copy written by `posefield page` names in its head; null in a service's page.
- *
- * The part lies beside the copy and is no part of the page, which a service serves without it.
- */
+/** The source that a copy written by `posefield page` holds; null in a service's page. */
 export async function offline(): Promise<Source | null> {
-  const meta = document.querySelector<HTMLMetaElement>('meta[name="posefield-model"]');
-  if (!meta) return null;
-  const beside = (name: string) => new URL(name, document.baseURI).href;
-  const part = (await import(/* @vite-ignore */ beside("offline.js"))) as Part;
-  return part.open(beside(meta.content));
+  const mark = document.querySelector("#posefield-copy");
+  if (!mark) return null;
+  const { tables, numbers, character } = await unpacked(mark.textContent ?? "");
+  const source = new Offline(tables, new Table(tables, numbers), character);
+  // For the browser's console, and for tests.
+  Object.assign(globalThis, { posefieldCopy: source });
+  return source;
 }

@@ -6,15 +6,19 @@ import type { Character } from "./character.ts";
 import type { Scene } from "./scene.ts";
 import type { Store } from "./state.ts";
 
-/** Who answers: a service, or a model in the browser itself (offline/). */
+/** Who answers: a service, or a table in the page itself (offline/), which leaves some things out. */
 export type Source = Pick<
   Client,
   "models" | "card" | "pose" | "clip" | "crowd" | "sigma" | "why"
 > & {
   character(model: string, signal?: AbortSignal): Promise<Pick<Download, "content">>;
+  /** What is to be known of the answers. */
+  readonly remark?: string;
+  /** Label sets that all answers leave open. */
+  readonly open?: readonly string[];
 };
 
-/** A service also gives files and says what an answer is made of; a model in the browser does not. */
+/** A service also gives files and says what an answer is made of; a table in the page does not. */
 export function served(source: Source): source is Source & Pick<Client, "file"> {
   return "file" in source;
 }

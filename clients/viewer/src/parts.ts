@@ -2,6 +2,7 @@
 
 import * as bodies from "./bodies.ts";
 import * as controls from "./controls.ts";
+import * as copy from "./copy-note.ts";
 import * as crowd from "./crowd.ts";
 import * as curves from "./curves.ts";
 import * as detail from "./detail-panel.ts";
@@ -32,6 +33,7 @@ const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<st
   side: {
     jumps: jumps.mount,
     welcome: welcome.mount,
+    copy: copy.mount,
     controls: controls.mount,
     trust: trust.mount,
     curves: curves.mount,

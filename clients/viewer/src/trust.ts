@@ -3,7 +3,7 @@
 
 import type { ModelCard, Reasons, Trust } from "@posefield/client";
 
-import { SCALE, worded } from "./bands.ts";
+import { named, SCALE, worded } from "./bands.ts";
 import { el } from "./dom.ts";
 import { Latest } from "./latest.ts";
 import { items, marks } from "./marks.ts";
@@ -56,7 +56,8 @@ export function mount(host: HTMLElement, session: Session): void {
   signal.addEventListener("abort", () => clearTimeout(timer));
   player.onTrust((trust) => {
     sigma.textContent = written.centimetres(trust.sigma);
-    band.textContent = worded(trust.sigma).split(":")[0]!;
+    // Services older than 3.1.0, and single poses in place, say no band.
+    band.textContent = trust.band ? named(trust.band) : "";
     meter.value = Math.min(1, trust.sigma / SCALE);
     known.replaceChildren(...items(trust));
     sentence.textContent = says(trust);
@@ -75,7 +76,7 @@ function says(trust: Trust): string {
   const found = `A captured clip here would lie about ${written.centimetres(trust.sigma)} away, joint by joint.`;
   // Services older than 2.2.0 warn of what lies outside, and say no more.
   if (!(trust.supported ?? !trust.warnings.length)) return `${found} That is a guess.`;
-  return `${found} That is ${worded(trust.sigma)}.`;
+  return trust.band ? `${found} That is ${worded(trust.band)}.` : found;
 }
 
 function item(clip: Captured, card: ModelCard, { store }: Session): HTMLElement {

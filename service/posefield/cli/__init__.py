@@ -163,7 +163,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
     "check": (command_check.check, ASK, ["check walk.usda", "check walk.usda --json"]),
     "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
     "key": (command_serve.key, SERVE, ["key anna --model walk >> keys.txt"]),
-    "page": (command_page.page, SERVE, ["page walk.onnx -o site"]),
+    "page": (command_page.page, SERVE, ["page walk.onnx -o walk.html"]),
 }
 """Functions of the commands, their groups and examples."""
 

@@ -1,17 +1,15 @@
-"""The `page` command: the web page and a model as a folder for static hosting.
+"""The `page` command: the web page with computed answers of a model, as one file."""
 
-Poses are then computed in the browser, by onnxruntime-web, which the container image leaves out.
-"""
-
-import gzip
-from collections.abc import Iterator, Mapping
+import math
+from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-import numpy as np
-import orjson
 import typer
 
+from posefield.answer_table import accuracy, interpolated_answers, row_compression
+from posefield.answer_table.accuracy import Accuracy
+from posefield.answer_table.interpolated_answers import AnswerTable
 from posefield.common import atomic_files
 from posefield.common.errors import FileError
 from posefield.console.arguments import Json, ModelPath
@@ -20,99 +18,91 @@ from posefield.console.output import as_json
 from posefield.encode import character_file
 from posefield.inference import session
 from posefield.inference.session import Session
-from posefield.kriging import support
-from posefield.model_file import checked_file, model_card, subgraph
+from posefield.model_file import checked_file, model_card
+from posefield.question import results
 
-PAGES_FOLDER = Path(__file__).parents[1] / "http/pages"
-OFFLINE_FILES = ("offline.js", "ort-wasm-simd-threaded.mjs", "ort-wasm-simd-threaded.wasm.gz")
-MODEL_TABLES = "model.json"
-"""File of the model's card and of the numbers that tell whether a point is supported."""
-CHARACTER = "character.glb"
-"""File of the model's character at rest, which the page draws."""
-_HEAD, _PRESSED = b"<head>", ".gz"
+VIEWER_PAGE = Path(__file__).parents[1] / "http/pages/viewer/index.html"
+_BODY_END = b"</body>"
 
 
 def page(
     model: ModelPath,
-    output: Annotated[Path, typer.Option("--output", "-o", help="output folder")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="output file, HTML")],
+    answers: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            help="largest number of computed answers for each level of detail; those at the ends "
+            "of the ranges are always there",
+        ),
+    ] = interpolated_answers.MAX_ROWS,
     json: Json = False,
 ) -> None:
-    """Write the viewer page with a model, for static web hosting."""
-    content = checked_file.read(model)
-    opened = session.load_bytes(content, str(model))
+    """Write the viewer page with computed answers of a model, as one file without a service.
+
+    The page interpolates linearly between the answers. Fewer answers make a smaller file and larger
+    errors.
+    """
+    if output.is_dir():
+        raise FileError(output, "is a folder, expected the name of a file")
+    before = built_page(VIEWER_PAGE)
+    opened = session.load_bytes(checked_file.read(model), str(model))
+    with LateProgress("answers", len(opened.card.levels) + 1) as bar:
+        found = interpolated_answers.build(opened, answers, bar.update)
+        errors = accuracy.measure(opened, found)
     identity = f"{model.stem}@{opened.digest}"
-    with LateProgress("files", len(opened.card.levels) + 1) as bar:
-        model_files = dict(bar.count(browser_files(content, opened, identity)))
-    written = write_files(page_files(model_files, identity), output)
+    content = page_content(before, copy_data(opened, identity, found, errors), identity)
+    atomic_files.write(content, output)
+    facts = {"model": identity, "file": str(output), "bytes": len(content)}
     if json:
-        plain = {"folder": str(output), "model": identity, "files": written}
-        typer.echo(as_json(plain))
+        typer.echo(as_json({**facts, "answers": found.answers, "errors": asdict(errors)}))
         return
-    size = sum(written.values()) / 1e6
-    typer.echo(
-        f"{output}: {identity}, {len(written)} files, {size:.1f} MB; any web server shows it:"
+    typer.echo(f"{output}: {identity}, {len(content) / 1e6:.1f} MB; any browser opens it")
+    typer.echo(f"  {described(found, errors)}")
+
+
+def described(found: AnswerTable, errors: Accuracy) -> str:
+    """Return a sentence on the answers of a copy and their errors."""
+    worst, beyond, typical = (
+        f"{100 * value:.1f} cm" for value in (errors.worst, errors.beyond, errors.typical)
     )
-    typer.echo(f"  python3 -m http.server --directory {output}")
+    return (
+        f"interpolated between {found.answers:,} answers; at {errors.points:,} others, joints lie "
+        f"at most {worst} off ({typical} in the median), outside the sampled ranges {beyond}"
+    )
 
 
-def write_files(contents: Iterator[tuple[str, bytes]], folder: Path) -> dict[str, int]:
-    """Write files by name, each atomically, and return their sizes in bytes.
+def copy_data(opened: Session, identity: str, found: AnswerTable, errors: Accuracy) -> str:
+    """Return the text from which a copy of the page answers.
 
-    Raises FileError if a file cannot be written.
+    Tables, numbers, and the model's character at rest, which the page draws.
     """
-    sizes = {}
-    for name, content in contents:
-        atomic_files.write(content, folder / name)
-        sizes[name] = len(content)
-    return sizes
-
-
-def browser_files(content: bytes, opened: Session, identity: str) -> Iterator[tuple[str, bytes]]:
-    """Yield names and contents of the files that a browser needs to run a model.
-
-    The graph of each level has no defaults, and the tables hold what a browser cannot read from it.
-    """
-    card = opened.card
-    for level in range(len(card.levels)):
-        graph = subgraph.require_inputs(subgraph.fix_level(content, level))
-        yield f"level-{level}.onnx", graph
-    yield CHARACTER, character_file.character_glb(card.skeleton, identity)
-    tables = {
-        "card": {"identity": identity, **model_card.plain_values(card)},
-        "support": support.fit_support(np.array(card.examples)).table(),
+    body = character_file.character_glb(opened.card.skeleton, identity)
+    tables: dict[str, Any] = {
+        "card": {"identity": identity, **model_card.plain_values(opened.card)},
+        "bands": [*results.BANDS, (results.band(math.inf), None)],
+        "accuracy": asdict(errors),
+        "answers": found.head,
+        "character": {"offset": sum(map(len, found.contents)), "size": len(body)},
     }
-    yield MODEL_TABLES, orjson.dumps(tables)
+    return row_compression.pack(tables, [*found.contents, body])
 
 
-def page_files(
-    model_files: Mapping[str, bytes], identity: str, web: Path = PAGES_FOLDER
-) -> Iterator[tuple[str, bytes]]:
-    """Yield names and contents of the folder's files; the page itself is last.
+def page_content(before: bytes, data: str, identity: str) -> bytes:
+    """Return the page with a copy's data at the end of its body.
 
-    The page refers to the other files. model_files: contents by name. web: folder of the built page
-    and its parts. Raises FileError if one of them is missing.
+    Not in its head: browsers look for the encoding in the first kilobyte.
     """
-    page = web / "viewer/index.html"
-    shown = _with_model_mark(_read(page), MODEL_TABLES, identity)
-    for part in OFFLINE_FILES:
-        content = _read(web / "offline" / part)
-        plain = gzip.decompress(content) if part.endswith(_PRESSED) else content
-        yield part.removesuffix(_PRESSED), plain
-    yield from model_files.items()
-    yield page.name, shown
-
-
-def _with_model_mark(content: bytes, model: str, identity: str) -> bytes:
-    """Return the page with the mark that makes it use the model instead of a service."""
     # Imported here, since other commands need no Jinja.
     from posefield.http.pages import templates
 
-    mark = templates.render("model.html", model=model, identity=identity)
-    before, head, after = content.partition(_HEAD)
-    return before + head + mark.encode() + after
+    mark = templates.render("model.html", content=data, identity=identity)
+    start, end, rest = before.rpartition(_BODY_END)
+    return start + mark.encode() + end + rest
 
 
-def _read(path: Path) -> bytes:
+def built_page(path: Path) -> bytes:
+    """Return the page that `make page` has built; FileError if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as fault:

@@ -40,14 +40,6 @@ def fix_level(model: bytes, level: int) -> bytes:
     return _replace_graph(model, lambda graph: _freeze_level(graph, level))
 
 
-def require_inputs(model: bytes) -> bytes:
-    """Return the model without defaults of inputs; ValueError for bad bytes.
-
-    onnxruntime-web cannot be given values of inputs that have a default.
-    """
-    return _replace_graph(model, _drop_defaults)
-
-
 def select_outputs(model: bytes, *outputs: str) -> bytes:
     """Return the model with these outputs, and the nodes, weights and inputs that they need.
 
@@ -132,21 +124,6 @@ def _freeze_level(graph: bytes, level: int) -> bytes:
     )
     kept = (field.encoded for field in protobuf_wire.fields(graph) if not _is_level(field))
     return b"".join(kept) + protobuf_wire.encode_bytes(INITIALIZER, fixed)
-
-
-def _drop_defaults(graph: bytes) -> bytes:
-    fields = list(protobuf_wire.fields(graph))
-    inputs = {
-        name
-        for field in fields
-        if field.number == INPUT
-        for name in _field_names(field.content, VALUE_NAME)
-    }
-    return b"".join(
-        field.encoded
-        for field in fields
-        if field.number != INITIALIZER or not inputs & _field_names(field.content, TENSOR_NAME)
-    )
 
 
 def _is_level(field: Field) -> bool:

@@ -1,4 +1,4 @@
-/** What a model in the browser can be asked: checked as the service checks it, in fewer words. */
+/** What a copy of the page can be asked: checked as the service checks it, in fewer words. */
 
 import { type ModelCard, PosefieldError } from "@posefield/client";
 
@@ -13,35 +13,44 @@ export class NeedsService extends PosefieldError {
   override readonly name = "NeedsService";
 
   constructor(what: string) {
-    super(`${what} needs a service: this page runs without one, on the model file alone`);
+    super(`${what} needs a service: this page runs without one, on answers computed beforehand`);
   }
 }
 
 type Control = ModelCard["controls"][number];
 
-/** Clips so many times longer or shorter than any that was captured are no motion any more. */
-const FARTHEST = 10;
-const REACH = 100;
+/** Share of a range by which a control at its end may lie outside by rounding. */
 const SLACK = 1e-6;
 
-/** The controls' values in the card's order. */
-export function point(card: ModelCard, given: Readonly<Record<string, number>>): number[] {
+/** The controls' values in the card's order.
+ *
+ * axes: of each control, the values in the table.
+ */
+export function point(
+  card: ModelCard,
+  axes: readonly (readonly number[])[],
+  given: Readonly<Record<string, number>>,
+): number[] {
   for (const name of Object.keys(given)) {
     if (!card.controls.some((control) => control.name === name)) {
       throw new Refused(`${name}: this model has no such control`);
     }
   }
-  return card.controls.map((control) => value(control, given[control.name]));
+  return card.controls.map((control, i) => value(control, axes[i]!, given[control.name]));
 }
 
-export function value(control: Control, given: number | undefined): number {
-  const { name, unit, minimum, maximum } = control;
-  const room = REACH * (maximum - minimum);
+/** A value in the table's range. */
+export function value(
+  { name, unit }: Control,
+  axis: readonly number[],
+  given: number | undefined,
+): number {
   if (given === undefined) throw new Refused(`${name}: missing, expected a number in ${unit}`);
-  if (!(given >= minimum - room && given <= maximum + room)) {
-    throw new Refused(`${name}: ${given} ${unit}, expected ${minimum} to ${maximum} or near it`);
-  }
-  return given;
+  const [low, high] = [axis[0]!, axis.at(-1)!];
+  const slack = SLACK * (high - low);
+  if (given >= low - slack && given <= high + slack) return Math.min(high, Math.max(low, given));
+  const range = `${short(low)} to ${short(high)} ${unit}`;
+  throw new Refused(`${name}: ${short(given)} ${unit}, expected ${range}: this copy has no others`);
 }
 
 /** A sentence for each control outside what was sampled. */
@@ -69,36 +78,51 @@ export interface Named {
   readonly labels?: Readonly<Record<string, Label | null>>;
 }
 
-/** A weight for each name of all label sets, in the graph's order; zeros where a set is open. */
-export function weights(card: ModelCard, { performer = null, labels = {} }: Named): number[] {
-  const sets = card.labels ?? [];
-  const asked = performer === null ? labels : { ...labels, performer };
-  for (const name of Object.keys(asked)) {
-    if (!sets.some((set) => set.name === name))
-      throw new Refused(`${name}: this model has no such label set`);
-  }
-  return sets.flatMap(({ name, names }) => setWeights(name, names, asked[name] ?? {}));
+/** What a question names: of the set whose names are in the table, and of those that it lacks. */
+export interface Names {
+  /** Place in the named set, -1 where it is left open. */
+  readonly who: number;
+  /** As an answer repeats it. */
+  readonly performer: string | null;
+  readonly labels: Readonly<Record<string, string>>;
+  /** A sentence for each label that the answer leaves out. */
+  readonly left: readonly string[];
 }
 
-function setWeights(set: string, names: readonly string[], label: Label): number[] {
-  const given: Readonly<Record<string, number>> =
-    typeof label === "string" ? { [label]: 1 } : label;
-  const unknown = Object.keys(given).find((name) => !names.includes(name));
-  if (unknown !== undefined)
-    throw new Refused(`${set}: ${unknown}, expected one of ${names.join(", ")}`);
-  return names.map((name) => given[name] ?? 0);
+/** named: the label set whose names are in the table. */
+export function names(
+  { labels: sets = [] }: ModelCard,
+  named: string | null,
+  { performer, labels = {} }: Named,
+): Names {
+  const short = performer ?? null;
+  if (short !== null && labels["performer"])
+    throw new Refused("performer: expected once, by itself or in labels");
+  let found = { who: -1, performer: null as string | null, labels: {} };
+  const left: string[] = [];
+  for (const [set, label] of Object.entries({ ...labels, ...(short !== null && { performer }) })) {
+    if (label === null || label === undefined) continue;
+    const known = sets.find(({ name }) => name === set);
+    if (!known) throw new Refused(`${set}: this model has no such label set`);
+    const who = index(set, known.names, label);
+    const name = known.names[who]!;
+    if (set !== named) left.push(`${set}: ${name} was left out, this copy has no answers for it`);
+    else if (set === "performer") found = { who, performer: name, labels: {} };
+    else found = { who, performer: null, labels: { [set]: name } };
+  }
+  return { ...found, left };
+}
+
+function index(set: string, names: readonly string[], label: Label): number {
+  if (typeof label !== "string") throw new NeedsService(`a mixture of names of ${set}`);
+  const found = names.indexOf(label);
+  if (found >= 0) return found;
+  throw new Refused(`${set}: ${label}, expected one of ${names.join(", ")}`);
 }
 
 export function level(card: ModelCard, asked: number): number {
   if (Number.isInteger(asked) && asked >= 0 && asked < card.levels.length) return asked;
   throw new Refused(`level: ${asked}, expected 0 to ${card.levels.length - 1}`);
-}
-
-/** A duration, s, that extrapolation has not lost all sense in. */
-export function sensible(card: ModelCard, duration: number): number {
-  const [shortest, longest] = [card.durations[0]!, card.durations[1]!];
-  if (duration >= shortest / FARTHEST && duration <= longest * FARTHEST) return duration;
-  throw new Refused(`controls: so far outside that the clip would last ${short(duration)} s`);
 }
 
 export function within(name: string, value: number, low: number, high: number): number {

@@ -1,4 +1,4 @@
-/** The model in the browser itself, which answers as a service does, to the rounding of float32. */
+/** A source of answers without a service: those of a table, and what lies between them. */
 
 import type {
   ClipQuestion,
@@ -14,55 +14,43 @@ import type {
   Trust,
 } from "@posefield/client";
 
+import { curvesAt } from "../curves.ts";
 import type { Source } from "../page.ts";
-import { type Deviation, deviations, merged, told } from "./bounds.ts";
-import { type Course, closed, inPlace, times, type Way } from "./course.ts";
-import { crowd } from "./crowd.ts";
+import { pose as posture, sample } from "../playback.ts";
+import * as columns from "./columns.ts";
 import * as door from "./door.ts";
-import { type Answers, Graph, type Ort } from "./graph.ts";
-import { sigma } from "./grid.ts";
-import { straightened } from "./plane.ts";
-import { Support, type SupportTable } from "./support.ts";
+import type { Tables } from "./read.ts";
+import { remark } from "./remark.ts";
+import { sigma } from "./sigma.ts";
+import type { Answer, Table } from "./table.ts";
 
-/** The graph takes a time after the end for the end, s. */
-const AFTER = 1e9;
+/** A clip's time that a caller has rounded, as a share of it; levels differ in how long it takes. */
+const [ROUNDING, COARSE] = [1e-5, 0.1];
 
 /** A question about one character that has passed the door. */
 interface Asked {
-  readonly controls: Readonly<Record<string, number>>;
-  readonly point: Float32Array;
-  readonly weights: Float32Array;
-  readonly performer: string | null;
-  readonly labels: NonNullable<ClipQuestion["labels"]>;
+  readonly question: Pick<ClipQuestion, "controls" | "extrapolate"> & door.Named;
+  readonly values: readonly number[];
+  readonly names: door.Names;
   readonly level: number;
-  readonly warnings: string[];
-  readonly supported: boolean;
-  readonly deviations: readonly Deviation[];
-}
-
-/** What `posefield page` writes beside the graphs. */
-export interface Tables {
-  readonly card: ModelCard;
-  readonly support: SupportTable;
 }
 
 export class Offline implements Source {
-  readonly #card: ModelCard;
-  readonly #support: Support;
-  readonly #graph: Graph;
-  readonly #body: () => Promise<Uint8Array<ArrayBuffer>>;
+  readonly #tables: Tables;
+  readonly #table: Table;
+  readonly #body: () => Uint8Array<ArrayBuffer>;
+  readonly remark: string;
+  readonly open: readonly string[];
 
-  /** levels: the graph of each level; body: the character's file. */
-  constructor(
-    ort: Ort,
-    levels: (level: number) => Promise<Uint8Array>,
-    body: () => Promise<Uint8Array<ArrayBuffer>>,
-    tables: Tables,
-  ) {
+  /** body: the character's file. */
+  constructor(tables: Tables, table: Table, body: () => Uint8Array<ArrayBuffer>) {
+    this.#tables = tables;
+    this.#table = table;
     this.#body = body;
-    this.#card = tables.card;
-    this.#support = new Support(tables.support);
-    this.#graph = new Graph(ort, levels, this.#card);
+    this.remark = remark(tables);
+    const { named } = tables.answers;
+    const sets = (tables.card.labels ?? []).map(({ name }) => name);
+    this.open = sets.filter((name) => name !== named);
   }
 
   async models(): Promise<readonly ModelSummary[]> {
@@ -75,25 +63,24 @@ export class Offline implements Source {
   }
 
   async character(): Promise<{ content: Uint8Array<ArrayBuffer> }> {
-    return { content: await this.#body() };
+    return { content: this.#body() };
   }
 
   async pose(_: string, question: PoseQuestion): Promise<Poses> {
-    const asked = this.#asked(question);
-    const when = Float64Array.from(question.times);
-    const found = await this.#run(asked, when);
-    const duration = door.sensible(this.#card, found.duration[0]!);
-    for (const time of when) door.within("times", time, 0, duration);
+    const clip = this.#motion(this.#asked(question), "travelling");
+    for (const time of question.times) door.within("times", time, 0, clip.trust.duration);
+    const found = question.times.map((time) => at(clip, time));
     return {
-      trust: this.#trust(asked, found),
-      times: when,
-      rotations: found.rotations,
-      rootPosition: found.root_position,
-      boneOffsets: found.bone_offsets,
-      curves: found.curves ?? null,
+      trust: clip.trust,
+      times: Float64Array.from(question.times),
+      rotations: columns.joined(found.map(({ rotations }) => rotations)),
+      rootPosition: columns.joined(found.map(({ root }) => root)),
+      boneOffsets: clip.boneOffsets,
+      curves: clip.curves && columns.joined(question.times.map((time) => curvesAt(clip, time)!)),
     };
   }
 
+  /** The frames of the table, evenly over the clip, at whatever rate they are asked for. */
   async clip(_: string, question: ClipQuestion): Promise<Motion> {
     if (question.loop && !this.#card.cyclic) {
       throw new door.Refused("loop: this model's last pose does not lead into its first");
@@ -101,106 +88,118 @@ export class Offline implements Source {
     if (question.unit || question.up || (question.names ?? "own") !== "own") {
       throw new door.NeedsService("another unit, up axis or naming");
     }
-    const asked = this.#asked(question);
-    const ends = await this.#run(asked, Float64Array.of(0, AFTER));
-    const duration = door.sensible(this.#card, ends.duration[0]!);
-    const when = times(question, duration);
-    const found = await this.#run(asked, when);
-    const poses = { times: when, rotations: found.rotations, rootPosition: found.root_position };
-    const { names, parents } = this.#card.skeleton;
-    const routed = this.#routed(poses, question, ends, duration);
+    return this.#motion(this.#asked(question), question.root ?? "travelling");
+  }
+
+  async crowd(_: string, question: CrowdQuestion): Promise<CrowdPoses> {
+    const rows = columns.rows(question).map((row) => this.#row(row, question.root));
+    const { skeleton, identity } = this.#card;
     return {
-      trust: this.#trust(asked, found),
-      ...routed,
-      boneOffsets: found.bone_offsets,
-      curves: found.curves ? curvesOf(found.curves, when, routed) : null,
-      curveNames: this.#card.curves?.map(({ name }) => name) ?? [],
-      names,
-      parents,
-      rate: question.fps ?? 30,
-      frames: routed.times.length,
-      units: {},
-    } as Motion;
+      model: identity,
+      names: skeleton.names,
+      parents: skeleton.parents,
+      warnings: [...new Set(rows.flatMap(({ asked }) => asked.names.left))],
+      rotations: columns.joined(rows.map(({ now }) => now.rotations)),
+      rootPosition: columns.joined(rows.map(({ now }) => now.root)),
+      boneOffsets: columns.joined(rows.map(({ clip }) => clip.boneOffsets)),
+      duration: Float32Array.from(rows, ({ clip }) => clip.trust.duration),
+      sigma: Float32Array.from(rows, ({ clip }) => clip.trust.sigma),
+      supported: rows.map(({ clip }) => clip.trust.supported ?? false),
+      levels: Int32Array.from(rows, ({ clip }) => clip.trust.level),
+      errorPx: null,
+    };
   }
 
-  crowd(_: string, question: CrowdQuestion): Promise<CrowdPoses> {
-    return crowd(this.#graph, this.#card, this.#support, question);
-  }
-
-  sigma(_: string, question: SigmaQuestion): Promise<SigmaGrid> {
-    return sigma(this.#graph, this.#card, this.#support, question);
+  async sigma(_: string, question: SigmaQuestion): Promise<SigmaGrid> {
+    return sigma(this.#tables, this.#table, question);
   }
 
   async why(): Promise<never> {
     throw new door.NeedsService("what an answer is made of");
   }
 
-  /** The poses in place, or closed, as asked for. */
-  #routed(poses: Course, asked: ClipQuestion, ends: Answers, duration: number): Course {
-    const way = this.#card.cyclic ? stride(ends) : straight(ends);
-    const stays = asked.root === "in_place" && this.#card.root === "travelling";
-    const placed = stays ? inPlace(poses, way, duration) : poses;
-    return asked.loop ? closed(placed, stays ? null : way, duration) : placed;
+  get #card(): ModelCard {
+    return this.#tables.card;
   }
 
-  #asked(
-    question: Pick<ClipQuestion, "controls" | "performer" | "labels" | "level" | "extrapolate">,
-  ): Asked {
-    const values = door.point(this.#card, question.controls);
-    const policy = question.extrapolate ?? "warn";
-    const found = door.warnings(this.#card, values);
-    const supported = this.#support.holds(values);
-    const said = found.length || supported ? found : [door.GAP];
-    if (policy === "refuse" && said.length) throw new door.Refused(said.join("; "));
-    const apart = deviations(this.#card, values);
+  #row(row: columns.Row, root: CrowdQuestion["root"]) {
+    const asked = this.#asked(row);
+    const clip = this.#motion(asked, root ?? "travelling");
+    const slack = 1 + (asked.level ? COARSE : ROUNDING);
+    door.within("time", row.time, 0, clip.trust.duration * slack);
+    return { asked, clip, now: at(clip, row.time) };
+  }
+
+  #asked(question: Asked["question"] & { readonly level?: number }): Asked {
+    const card = this.#card;
     return {
-      controls: question.controls,
-      point: Float32Array.from(values),
-      weights: Float32Array.from(door.weights(this.#card, question)),
-      performer: question.performer ?? null,
-      labels: question.labels ?? {},
-      level: door.level(this.#card, question.level ?? 0),
-      warnings: policy === "warn" ? merged(said, apart) : [],
-      supported,
-      deviations: apart,
+      question,
+      values: door.point(card, this.#tables.answers.axes, question.controls),
+      names: door.names(card, this.#tables.answers.named, question),
+      level: door.level(card, question.level ?? 0),
     };
   }
 
-  #run(asked: Asked, when: Float64Array): Promise<Answers> {
-    const times = Float32Array.from(when);
-    const { level, point, weights } = asked;
-    return this.#graph.run({ count: 1, controls: point, times, labels: weights }, level);
+  #motion(asked: Asked, root: "travelling" | "in_place"): Motion {
+    const { names, parents } = this.#card.skeleton;
+    const found = this.#table.answer(asked.values, asked.names.who, asked.level);
+    const frames = found.roots.length / 3;
+    const times = Float64Array.from({ length: frames }, (_, i) => along(i, frames, found));
+    const stays = root === "in_place";
+    return {
+      trust: this.#trust(asked, found),
+      times,
+      rotations: stays ? placed(found, parents.length) : found.rotations,
+      rootPosition: stays ? found.placed_roots : found.roots,
+      boneOffsets: found.bones,
+      curves: found.curves.length ? found.curves : null,
+      curveNames: this.#card.curves?.map(({ name }) => name) ?? [],
+      names,
+      parents,
+      rate: (frames - 1) / found.duration,
+      frames,
+      units: {},
+    };
   }
 
-  #trust(asked: Asked, found: Answers): Trust {
-    const { controls, performer, level, supported, warnings } = asked;
-    const [duration, sigma] = [found.duration[0]!, found.sigma[0]!];
-    const model = this.#card.identity;
-    const seen = this.#card.performers.length ? { performer_seen: performer !== null } : {};
-    const own = { model, controls, performer, level, duration, sigma, supported, warnings };
-    const labels = Object.keys(asked.labels).length ? { labels: asked.labels } : {};
-    return { ...own, ...labels, ...seen, ...told(asked.deviations, sigma) } as Trust;
+  #trust({ question, values, names, level }: Asked, { duration, sigma }: Answer): Trust {
+    const card = this.#card;
+    const supported = this.#table.supported(values);
+    const outside = door.warnings(card, values);
+    const range = outside.length || supported ? outside : [door.GAP];
+    const said = [...(question.extrapolate === "ok" ? [] : range), ...names.left];
+    if (question.extrapolate === "refuse" && said.length) throw new door.Refused(said.join("; "));
+    const { performer, labels } = names;
+    const band = this.#tables.bands.find(([, most]) => most === null || sigma <= most);
+    return {
+      model: card.identity,
+      controls: question.controls,
+      performer,
+      level,
+      duration,
+      sigma,
+      supported,
+      warnings: said,
+      ...(Object.keys(labels).length ? { labels } : {}),
+      ...(card.performers.length ? { performer_seen: performer !== null } : {}),
+      band: band![0],
+    } as Trust;
   }
 }
 
-/** The curves of the frames, and of the first again where a loop repeats it. */
-function curvesOf(curves: Float32Array, when: Float64Array, routed: Course): Float32Array {
-  if (routed.times.length === when.length) return curves;
-  const width = curves.length / when.length;
-  return new Float32Array([...curves, ...curves.subarray(0, width)]);
+function at(clip: Motion, time: number) {
+  return sample(posture(clip.names.length), clip, time);
 }
 
-/** What one cycle does, as its end says (service/posefield/locomotion/stride.py). */
-function stride(ends: Answers): Way {
-  const { travel, root_position: roots } = ends;
-  const gap = { x: travel[3]!, z: travel[4]! };
-  const turn = travel[5]!;
-  const start = { x: roots[3]! - gap.x, z: roots[5]! - gap.z };
-  return { way: straightened(gap, turn), turn, start };
+function along(frame: number, frames: number, { duration }: Answer): number {
+  return (duration * frame) / (frames - 1);
 }
 
-/** The straight way from the first pose to the last. */
-function straight({ root_position: roots }: Answers): Way {
-  const start = { x: roots[0]!, z: roots[2]! };
-  return { way: { x: roots[3]! - start.x, z: roots[5]! - start.z }, turn: 0, start };
+/** The joints' rotations with those of a root that stays where it is. */
+function placed({ rotations, placed_turns: turns }: Answer, joints: number): Float32Array {
+  const out = rotations.slice();
+  for (let frame = 0; frame < turns.length / 4; frame++) {
+    out.set(turns.subarray(4 * frame, 4 * frame + 4), 4 * joints * frame);
+  }
+  return out;
 }

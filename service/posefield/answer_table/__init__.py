@@ -1,0 +1,1 @@
+"""Tables of answers, for copies of the page that run without a service."""
