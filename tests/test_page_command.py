@@ -12,6 +12,7 @@ import pytest
 
 from posefield.cli import command_page
 from posefield.common.errors import FileError
+from posefield.encode import character_file
 from posefield.inference import session
 from posefield.question import results
 
@@ -50,7 +51,11 @@ def test_the_file_holds_the_page_and_the_model(model_path, copy, tmp_path, posef
     assert told["answers"] == tables["answers"]["answers"] <= 300 * len(opened.card.levels)
     assert told["errors"] == tables["accuracy"]
     last = tables["answers"]["support"]
-    assert len(blocks) == last["offset"] + 2 * last["rows"] * last["columns"]
+    body = tables["character"]
+    assert body["offset"] == last["offset"] + 2 * last["rows"] * last["columns"]
+    assert len(blocks) == body["offset"] + body["size"]
+    expected = character_file.character_glb(opened.card.skeleton, identity)
+    assert blocks[body["offset"] :] == expected
     before = command_page.VIEWER_PAGE.read_text()
     assert copy.read_text().startswith(before.rpartition("</body>")[0])
 

@@ -1,8 +1,8 @@
-"""Grid over the controls: its points, linear interpolation between them, and its refinement."""
+"""Grid over the controls: its points, cubic interpolation between them, and its refinement."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise, permutations, product
 from typing import Annotated
 
 import numpy as np
@@ -10,6 +10,9 @@ import numpy as np
 from posefield.common.array_shapes import PointControls
 from posefield.common.units import Floats, Indices
 from posefield.model_file.answer_bounds import AnswerBounds
+
+NODES = 4
+"""Values of a control through which interpolation lays a polynomial: two on each side of a point."""
 
 IntervalError = Callable[[int, float, float], float]
 """Error of interpolation in the middle of an interval: axis, lower end and upper end."""
@@ -39,24 +42,33 @@ class ControlGrid:
     ) -> tuple[Annotated[Indices, "points corners"], Annotated[Floats, "points corners"]]:
         """Return the indices of the grid's points around points (B, d), and their weights.
 
-        Multilinear interpolation: the weights of a point sum to one.
+        The weights are products of those of each control (`_nodes`); those of a point sum to one.
         """
-        cells, shares = zip(*map(_interval, self.axes, points.T), strict=True)
+        firsts, parts = zip(*map(_nodes, self.axes, points.T), strict=True)
         indices, weights = [], []
-        for corner in product((0, 1), repeat=len(self.axes)):
-            at = [cell + upper for cell, upper in zip(cells, corner, strict=True)]
+        for corner in product(*(range(part.shape[1]) for part in parts)):
+            at = [first + node for first, node in zip(firsts, corner, strict=True)]
             indices.append(np.ravel_multi_index(at, self.shape))
-            parts = [s if upper else 1.0 - s for s, upper in zip(shares, corner, strict=True)]
-            weights.append(np.prod(parts, axis=0))
+            own = [part[:, node] for part, node in zip(parts, corner, strict=True)]
+            weights.append(np.prod(own, axis=0))
         return np.stack(indices, axis=1), np.stack(weights, axis=1)
 
 
-def _interval(
+def _nodes(
     axis: Annotated[Floats, "_"], values: Annotated[Floats, "points"]
-) -> tuple[Annotated[Indices, "points"], Annotated[Floats, "points"]]:
-    """Return the interval of an axis that holds each value, and the share of it that lies below."""
-    at = np.clip(np.searchsorted(axis, values, side="right") - 1, 0, len(axis) - 2)
-    return at, (values - axis[at]) / (axis[at + 1] - axis[at])
+) -> tuple[Annotated[Indices, "points"], Annotated[Floats, "points nodes"]]:
+    """Return the first of an axis's values around each point, and the weights of these values.
+
+    Weights of Lagrange's polynomial through NODES values, or all of a shorter axis.
+    """
+    count = min(NODES, len(axis))
+    below = np.searchsorted(axis, values, side="right") - 1
+    first = np.clip(below - (count - 1) // 2, 0, len(axis) - count)
+    nodes = axis[first[:, None] + np.arange(count)]
+    weights = np.ones(nodes.shape)
+    for i, j in permutations(range(count), 2):
+        weights[:, i] *= (values - nodes[:, j]) / (nodes[:, i] - nodes[:, j])
+    return first, weights
 
 
 def even(bounds: AnswerBounds, count: int) -> ControlGrid:
@@ -66,7 +78,7 @@ def even(bounds: AnswerBounds, count: int) -> ControlGrid:
 
 
 def refined(bounds: AnswerBounds, error: IntervalError, tolerance: float, most: int) -> ControlGrid:
-    """Return a grid that is halved where its error is largest.
+    """Return a grid that is halved where the error of linear interpolation is largest.
 
     It ends where each error is at most the tolerance, or where another value would make it larger
     than `most` points. The first grid has the limits and the ends of the sampled ranges, where

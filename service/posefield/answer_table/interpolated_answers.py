@@ -22,15 +22,15 @@ PROBES = 48
 """Random points at which the interpolation along a control is measured."""
 TOLERANCE = 0.01
 """Error of a joint, m, below which the grid is not refined."""
-MAX_ROWS = 12_000
+MAX_ROWS = 8_000
 """Largest number of rows of a level: points of the grid times names."""
-BASIS_ROWS = 600
+BASIS_ROWS = 1000
 """Rows from which a level's components are computed; then as many of the furthest are added."""
-COMPONENT = 0.015
+COMPONENT = 0.008
 """Distance along a component below which it is left out: a few tenths of a millimetre a number."""
-COEFFICIENT_STEP = 3e-3
+COEFFICIENT_STEP = 2e-3
 """Step of a coefficient; the components of a row of some thousand numbers are orthonormal."""
-NUMBER_STEP = 6e-4
+NUMBER_STEP = 2e-4
 """Largest step of a number, in metres or of a quaternion, that a component contributes."""
 SUPPORT_ROWS = 200_000
 """Largest number of points at which support is tabulated."""
@@ -62,7 +62,7 @@ class LevelTable:
 
 @dataclass(frozen=True)
 class AnswerTable:
-    """Answers between which a reader interpolates linearly.
+    """Answers between which a reader interpolates.
 
     grid: of the controls. levels: one table for each level of detail. card: of the model.
     support_grid: of `support` (points, 1), 1 where similar clips were captured.

@@ -40,7 +40,7 @@ def page(
 ) -> None:
     """Write the viewer page with computed answers of a model, as one file without a service.
 
-    The page interpolates linearly between the answers. Fewer answers make a smaller file and larger
+    The page interpolates between the answers. Fewer answers make a smaller file and larger
     errors.
     """
     if output.is_dir():

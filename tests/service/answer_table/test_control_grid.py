@@ -11,7 +11,7 @@ GRID = ControlGrid((np.array([0.0, 1.0, 4.0]), np.array([-1.0, 2.0])))
 BOUNDS = AnswerBounds(np.array([0.0, 0.0]), np.array([1.0, 2.0]), (1.0, 2.0))
 
 
-def test_interpolation_is_exact_for_what_is_linear_in_each_control():
+def test_interpolation_is_exact_for_polynomials():
     rng = np.random.default_rng(5)
     points = rng.uniform([0.0, -1.0], [4.0, 2.0], (200, 2))
 
@@ -22,14 +22,21 @@ def test_interpolation_is_exact_for_what_is_linear_in_each_control():
     found = np.sum(weights * bilinear(GRID.points)[indices], axis=1)
     np.testing.assert_allclose(found, bilinear(points), atol=1e-12)
     np.testing.assert_allclose(weights.sum(axis=1), 1.0)
-    # Negative control: a square is not linear.
     squares = np.sum(weights * np.square(GRID.points[:, 0])[indices], axis=1)
-    assert np.abs(squares - np.square(points[:, 0])).max() > 1.0
+    np.testing.assert_allclose(squares, np.square(points[:, 0]), atol=1e-12)
+    # Negative control: three values hold no cube, and four do.
+    cubes = np.sum(weights * (GRID.points[:, 0] ** 3)[indices], axis=1)
+    assert np.abs(cubes - points[:, 0] ** 3).max() > 1.0
+    wider = ControlGrid((np.array([0.0, 0.5, 1.0, 2.0, 4.0]),))
+    indices, weights = wider.corners(points[:, :1])
+    np.testing.assert_allclose(
+        np.sum(weights * wider.points[indices, 0] ** 3, axis=1), points[:, 0] ** 3, atol=1e-12
+    )
 
 
 def test_points_of_the_grid_are_their_own_corners():
     indices, weights = GRID.corners(GRID.points)
-    assert indices[weights > 0.0].tolist() == list(range(len(GRID)))
+    assert indices[weights != 0.0].tolist() == list(range(len(GRID)))
 
 
 def test_the_grid_is_refined_where_the_error_is():

@@ -8,7 +8,7 @@ export function remark({ accuracy, answers, card }: Tables): string {
   const open = (card.labels ?? []).map(({ name }) => name).filter((name) => name !== answers.named);
   const left = open.length ? ` Left open: ${open.join(", ")}.` : "";
   return (
-    `This copy works without a service: it interpolates linearly between ${whole(answers.answers)} answers ` +
+    `This copy works without a service: it interpolates between ${whole(answers.answers)} answers ` +
     `that were computed when it was made. At ${whole(points)} other points, the joint furthest off ` +
     `lay ${centimetres(typical)} from the computed answer in the median and ${centimetres(worst)} ` +
     `at most, ${centimetres(beyond)} outside the sampled ranges. ` +

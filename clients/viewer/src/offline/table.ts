@@ -1,4 +1,4 @@
-/** Answers between those of a table, by linear interpolation. */
+/** Answers between those of a table, by interpolation. */
 
 import { type Corner, corners } from "./grid.ts";
 import type { LevelHead, Numbers, RowPart, Tables } from "./read.ts";
