@@ -18,7 +18,7 @@ from posefield.question import results
 
 README = Path(__file__).parents[1] / "clients/viewer/README.md"
 BANDS_TS = Path(__file__).parents[1] / "clients/viewer/src/bands.ts"
-FEW = ("--answers", 300)
+FEW = ("--answers", 1)
 
 
 def data(path):
@@ -31,24 +31,24 @@ def data(path):
 
 
 @pytest.fixture(scope="module")
-def copy(model_path, tmp_path_factory):
+def copy(styled_path, tmp_path_factory):
     """A copy of the page with few answers."""
-    path = tmp_path_factory.mktemp("copy") / "reaching.html"
-    command_page.page(model_path, path, 300)
+    path = tmp_path_factory.mktemp("copy") / "styled.html"
+    command_page.page(styled_path, path, 1)
     return path
 
 
-def test_the_file_holds_the_page_and_the_model(model_path, copy, tmp_path, posefield):
-    code, said, _ = posefield("page", model_path, "-o", tmp_path / "own.html", "--json", *FEW)
+def test_the_file_holds_the_page_and_the_model(styled_path, copy, tmp_path, posefield):
+    code, said, _ = posefield("page", styled_path, "-o", tmp_path / "own.html", "--json", *FEW)
     assert code == 0
     assert (tmp_path / "own.html").read_bytes() == copy.read_bytes()
-    opened = session.load(model_path)
+    opened = session.load(styled_path)
     identity, tables, blocks = data(copy)
     told = json.loads(said)
-    assert identity == tables["card"]["identity"] == f"reaching@{opened.digest}"
+    assert identity == tables["card"]["identity"] == f"styled@{opened.digest}"
     assert tables["card"]["name"] == opened.card.name
     assert told["bytes"] == copy.stat().st_size
-    assert told["answers"] == tables["answers"]["answers"] <= 300 * len(opened.card.levels)
+    assert told["answers"] == tables["answers"]["answers"] == 4**2 * 3 * len(opened.card.levels)
     assert told["errors"] == tables["accuracy"]
     last = tables["answers"]["support"]
     body = tables["character"]
@@ -61,24 +61,24 @@ def test_the_file_holds_the_page_and_the_model(model_path, copy, tmp_path, posef
 
 
 def test_the_readmes_example_runs_and_says_how_far_answers_are_off(
-    model_path, tmp_path, posefield, monkeypatch
+    styled_path, tmp_path, posefield, monkeypatch
 ):
     (command,) = re.findall(r"^posefield (page .*)$", README.read_text(), re.MULTILINE)
     monkeypatch.chdir(tmp_path)
     odd = Path('a "b".onnx')
-    odd.write_bytes(model_path.read_bytes())
+    odd.write_bytes(styled_path.read_bytes())
     words = [str(odd) if word == "reaching.onnx" else word for word in shlex.split(command)]
     code, said, _ = posefield(*words, *FEW)
     identity, tables, _ = data(Path("reaching.html"))
     assert code == 0
-    assert identity == f'a "b"@{session.load(model_path).digest}'
+    assert identity == f'a "b"@{session.load(styled_path).digest}'
     answers, worst = tables["answers"]["answers"], 100 * tables["accuracy"]["worst"]
     assert f"interpolated between {answers:,} answers" in said
     assert f"at most {worst:.1f} cm off" in said
 
 
-def test_a_folder_is_refused(model_path, tmp_path, posefield):
-    code, _, said = posefield("page", model_path, "-o", tmp_path)
+def test_a_folder_is_refused(styled_path, tmp_path, posefield):
+    code, _, said = posefield("page", styled_path, "-o", tmp_path)
     assert (code, "expected the name of a file" in said) == (3, True)
 
 

@@ -4,6 +4,8 @@ import { execFileSync } from "node:child_process";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 
+import type { Accuracy } from "../src/offline/read.ts";
+
 export const MODELS = process.env["POSEFIELD_MODELS"] ?? "../../build/models";
 export const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "../../.venv/bin/posefield";
 
@@ -11,7 +13,7 @@ export const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "../../.venv/bin/pose
 export interface Copy {
   readonly address: string;
   readonly answers: number;
-  readonly errors: { readonly worst: number; readonly points: number };
+  readonly errors: Accuracy;
 }
 
 /** Writes a copy with a model's answers, few of them for a test. */

@@ -11,16 +11,20 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion import curves, quat, skeleton
 
 
-def gaps(
-    card: ModelCard, one: Answers, other: Answers
-) -> Annotated[Singles, "points frames points"]:
-    """Return the distances (B, F, J + C) of joints and curves between two sets of answers, m.
+def gaps(card: ModelCard, one: Answers, other: Answers) -> Annotated[Singles, "points"]:
+    """Return the largest distance (B,) of a joint in any frame between two sets of answers, m."""
+    apart = joint_positions(card, one) - joint_positions(card, other)
+    return np.asarray(np.linalg.norm(apart, axis=-1).max(axis=(1, 2)), np.float32)
 
-    Curves count with the distance that one unit of them stands for.
+
+def curve_gaps(card: ModelCard, one: Answers, other: Answers) -> Annotated[Singles, "points"]:
+    """Return the largest difference (B,) of a curve between answers, as a share of its range.
+
+    Zero without curves.
     """
-    joints = np.linalg.norm(joint_positions(card, one) - joint_positions(card, other), axis=-1)
-    apart = np.abs(one.curves - other.curves) * curves.distances(card.curves)
-    return np.concatenate([joints, apart], axis=-1).astype(np.float32)
+    low, high = curves.limits(card.curves)
+    shares = np.abs(one.curves - other.curves) / (high - low)
+    return np.asarray(shares.max(axis=(1, 2), initial=0.0), np.float32)
 
 
 def joint_positions(card: ModelCard, found: Answers) -> Singles:

@@ -12,8 +12,7 @@ from posefield.common.units import Floats, Indices
 from posefield.model_file.answer_bounds import AnswerBounds
 
 NODES = 4
-"""Values of a control through which interpolation lays a polynomial: two on each side of a point."""
-
+"""Values of a control through which a polynomial is laid: two on each side of a point."""
 IntervalError = Callable[[int, float, float], float]
 """Error of interpolation in the middle of an interval: axis, lower end and upper end."""
 

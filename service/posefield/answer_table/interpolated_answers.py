@@ -22,7 +22,9 @@ PROBES = 48
 """Random points at which the interpolation along a control is measured."""
 TOLERANCE = 0.01
 """Error of a joint, m, below which the grid is not refined."""
-MAX_ROWS = 8_000
+CURVE_RANGE = 0.2
+"""Error of a joint, m, that the refinement takes for an error by the range of a curve."""
+MAX_ROWS = 10_000
 """Largest number of rows of a level: points of the grid times names."""
 BASIS_ROWS = 1000
 """Rows from which a level's components are computed; then as many of the furthest are added."""
@@ -248,9 +250,9 @@ def _interval_error(session: Session) -> control_grid.IntervalError:
         points[:, axis] = np.tile([lower, 0.5 * (lower + upper), upper], PROBES)
         found = vars(samples.sample(session, Queries(points, who), FRAMES // 2))
         ends = [Answers(*(part[row::3] for part in found.values())) for row in range(3)]
-        return float(
-            answer_gaps.gaps(session.card, answer_gaps.midway(ends[0], ends[2]), ends[1]).max()
-        )
+        between = session.card, answer_gaps.midway(ends[0], ends[2]), ends[1]
+        shares = CURVE_RANGE * answer_gaps.curve_gaps(*between)
+        return float(np.maximum(answer_gaps.gaps(*between), shares).max())
 
     return error
 

@@ -66,9 +66,10 @@ def described(found: AnswerTable, errors: Accuracy) -> str:
     worst, beyond, typical = (
         f"{100 * value:.1f} cm" for value in (errors.worst, errors.beyond, errors.typical)
     )
+    curves = f", curves {100 * errors.curves:.1f} % of their range" if found.card.curves else ""
     return (
         f"interpolated between {found.answers:,} answers; at {errors.points:,} others, joints lie "
-        f"at most {worst} off ({typical} in the median), outside the sampled ranges {beyond}"
+        f"at most {worst} off ({typical} in the median), outside the sampled ranges {beyond}{curves}"
     )
 
 

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from posefield.answer_table import accuracy, interpolated_answers, samples
+from posefield.answer_table import accuracy, answer_gaps, interpolated_answers, samples
 from posefield.answer_table.samples import Queries
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
@@ -20,33 +20,21 @@ ANSWERS = 600
 
 
 @pytest.fixture(scope="module")
-def model(labelled_path):
-    """A model with performers."""
-    return Synthesizer("labelled", session.load(labelled_path))
+def model(styled_path):
+    """A walk with performers and styles."""
+    return Synthesizer("styled", session.load(styled_path))
 
 
 @pytest.fixture(scope="module")
 def own(model):
-    """Its smallest table."""
-    return interpolated_answers.build(model.session, 1)
-
-
-@pytest.fixture(scope="module")
-def walk(walk_path):
-    """A model that travels."""
-    return Synthesizer("walk", session.load(walk_path))
-
-
-@pytest.fixture(scope="module")
-def walked(walk):
     """Its table."""
-    return interpolated_answers.build(walk.session, ANSWERS)
+    return interpolated_answers.build(model.session, ANSWERS)
 
 
 @pytest.fixture(scope="module")
-def errors(walk, walked):
-    """The measured errors of the walk's table."""
-    return accuracy.measure(walk.session, walked)
+def errors(model, own):
+    """The measured errors of the table."""
+    return accuracy.measure(model.session, own)
 
 
 def asked(model, points, who=None, level=0):
@@ -58,13 +46,10 @@ def asked(model, points, who=None, level=0):
 def apart(model, one, other):
     """The largest distance between joints of two answers, m."""
     card = model.session.card
-    gaps = interpolated_answers.joint_positions(card, one) - interpolated_answers.joint_positions(
-        card, other
-    )
-    return float(np.linalg.norm(gaps, axis=-1).max())
+    return float(answer_gaps.gaps(card, one, other).max())
 
 
-def named(model, point):
+def named_controls(model, point):
     """A point by the names of the controls."""
     return {
         each.name: float(value)
@@ -81,7 +66,7 @@ def test_points_of_the_grid_have_the_answers_of_the_service(model, own):
         times = np.linspace(0.0, float(found.durations[0]), interpolated_answers.FRAMES)[:-1]
         performer = card.performers[who] if who >= 0 else None
         question = PoseQuestion(
-            controls=named(model, point),
+            controls=named_controls(model, point),
             times=times.tolist(),
             performer=performer,
             level=level,
@@ -90,7 +75,7 @@ def test_points_of_the_grid_have_the_answers_of_the_service(model, own):
         exact = synthesize_poses(model, question)
         np.testing.assert_allclose(found.durations[0], exact.trust.duration, rtol=1e-4)
         np.testing.assert_allclose(found.sigmas[0], exact.trust.sigma, atol=1e-4)
-        moving = {name: getattr(found, name)[:, :-1] for name in interpolated_answers.MOVING}
+        moving = {name: getattr(found, name)[:, :-1] for name in samples.MOVING}
         cut = replace(found, **moving)
         service = replace(
             cut,
@@ -114,12 +99,13 @@ def test_the_comparison_notices_another_point_performer_and_level(model, own):
     assert abs(performer.durations[0] / one.durations[0] - 1.0) > 1e-3
 
 
-def test_poses_in_place_are_those_of_a_clip_in_place(walk, walked):
-    model, own = walk, walked
+def test_poses_in_place_are_those_of_a_clip_in_place(model, own):
     (point,) = model.session.card.sampled_ranges[0][None]
     found = own.interpolate(asked(model, [point]))
     rate = (interpolated_answers.FRAMES - 1) / float(found.durations[0])
-    question = ClipQuestion(controls=named(model, point), fps=rate, root="in_place", exact="none")
+    question = ClipQuestion(
+        controls=named_controls(model, point), fps=rate, root="in_place", exact="none"
+    )
     clip = synthesize_clip(model, question).clip
     count = min(len(clip), interpolated_answers.FRAMES)
     turns = np.abs(np.sum(found.placed_turns[0, :count] * clip.rotations[:count, 0], axis=-1))
@@ -129,17 +115,17 @@ def test_poses_in_place_are_those_of_a_clip_in_place(walk, walked):
     assert np.abs(found.roots[0, :count] - clip.root_path[:count]).max() > NEAR
 
 
-def test_other_points_lie_about_as_far_off_as_was_measured(walk, walked, errors):
-    again = accuracy.measure(walk.session, walked, seed=7)
-    assert errors.points == again.points == accuracy.POINTS * len(walked.levels)
+def test_other_points_lie_about_as_far_off_as_was_measured(model, own, errors):
+    again = accuracy.measure(model.session, own, seed=7)
+    assert errors.points == again.points == accuracy.POINTS * len(own.levels)
     for name in ("worst", "beyond", "typical"):
         assert 0.5 < getattr(again, name) / getattr(errors, name) < 2.0
     assert errors.typical < errors.worst
     assert again.support < 0.05
 
 
-def test_fewer_answers_are_measured_as_further_off(walk, errors):
-    coarse = accuracy.measure(walk.session, interpolated_answers.build(walk.session, 1))
+def test_fewer_answers_are_measured_as_further_off(model, errors):
+    coarse = accuracy.measure(model.session, interpolated_answers.build(model.session, 1))
     assert coarse.worst > 2.0 * errors.worst
     assert coarse.typical > 2.0 * errors.typical
 
@@ -159,3 +145,53 @@ def test_support_is_that_of_the_service_at_its_grid(model, own):
     expected = model.validator.support.supported(points)
     assert own.supported(points).tolist() == expected.tolist()
     assert {True, False} == set(expected.tolist())
+
+
+def test_names_of_one_set_have_rows_and_others_are_open(model, own):
+    card = model.session.card
+    named = samples.named_set(card)
+    assert named is not None
+    assert (named.name, len(card.labels)) == ("performer", 2)
+    assert own.head["named"] == "performer"
+    assert own.answers == len(card.levels) * len(own.grid) * (len(named.names) + 1)
+    low, high = card.sampled_ranges
+    question = PoseQuestion(
+        controls=named_controls(model, 0.5 * (low + high)),
+        times=[0.0],
+        labels={"style": card.labels[1].names[0]},
+        exact="none",
+    )
+    styled = synthesize_poses(model, question).trust
+    found = own.interpolate(asked(model, [0.5 * (low + high)]))
+    assert abs(found.durations[0] / styled.duration - 1.0) > 1e-3
+
+
+def test_the_set_of_performers_is_named_before_others(model):
+    card = model.session.card
+    performers, styles = card.labels
+    assert samples.named_set(replace(card, labels=(styles, performers))) == performers
+    assert samples.named_set(replace(card, labels=(styles,))) == styles
+    assert samples.named_set(replace(card, labels=())) is None
+
+
+def test_curves_are_interpolated_as_poses_are(model_file):
+    curved = Synthesizer("curves", session.load(model_file("curves")))
+    card, found = curved.session.card, interpolated_answers.build(curved.session, 300)
+    low, high = card.sampled_ranges
+    point = low + 0.37 * (high - low)
+    answer = found.interpolate(asked(curved, [point]))
+    # At the same shares of the clip: durations differ by some percent.
+    length = curved.session.durations(point[None])[0]
+    times = np.linspace(0.0, float(length), interpolated_answers.FRAMES)[:-1]
+    question = PoseQuestion(
+        controls=named_controls(curved, point), times=times.tolist(), exact="none"
+    )
+    exact = synthesize_poses(curved, question).curves
+    span = np.ptp([(each.minimum, each.maximum) for each in card.curves], axis=1)
+    assert np.abs((answer.curves[0, :-1] - exact) / span).max() < 0.03
+    # Negative control: another point.
+    other = found.interpolate(asked(curved, [low]))
+    assert np.abs((other.curves[0, :-1] - exact) / span).max() > 0.1
+    measured = accuracy.measure(curved.session, found)
+    coarse = accuracy.measure(curved.session, interpolated_answers.build(curved.session, 1))
+    assert 0.0 < measured.curves < 0.5 * coarse.curves

@@ -24,7 +24,11 @@ export interface Accuracy {
   readonly points: number;
   readonly worst: number;
   readonly beyond: number;
+  /** At points of the table. */
+  readonly stored: number;
   readonly typical: number;
+  /** As a share of a curve's range. */
+  readonly curves: number;
   readonly duration: number;
   readonly sigma: number;
   readonly support: number;
