@@ -27,8 +27,8 @@ class Accuracy:
     largest distance of a joint in any frame within the ranges, m; beyond: the same outside them;
     stored: at points of the table, where only its compression tells. typical: median over the
     answers within of their largest distance, m. curves: largest difference of a curve within the
-    ranges, as a share of the curve's. duration: largest difference, as a share. sigma: largest difference, m. support: share of the
-    answers whose support differs.
+    ranges, as a share of the curve's. duration: largest difference, as a share. sigma: largest
+    difference, m. support: share of the answers whose support differs.
     """
 
     points: int

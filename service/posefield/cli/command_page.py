@@ -69,7 +69,8 @@ def described(found: AnswerTable, errors: Accuracy) -> str:
     curves = f", curves {100 * errors.curves:.1f} % of their range" if found.card.curves else ""
     return (
         f"interpolated between {found.answers:,} answers; at {errors.points:,} others, joints lie "
-        f"at most {worst} off ({typical} in the median), outside the sampled ranges {beyond}{curves}"
+        f"at most {worst} off ({typical} in the median), {beyond} outside the sampled ranges"
+        f"{curves}"
     )
 
 
