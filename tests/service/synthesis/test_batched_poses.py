@@ -42,9 +42,9 @@ PLACE = st.tuples(st.tuples(*[SHARE] * 4), st.floats(0.0, 0.5), st.integers(0, 9
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
-@given(places=st.lists(PLACE, min_size=2, max_size=40), data=st.data())
-def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places, data):
-    level = data.draw(st.integers(0, len(model.session.card.levels) - 1))
+@given(places=st.lists(PLACE, min_size=2, max_size=40), number=st.integers(0, 11))
+def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places, number):
+    level = number % len(model.session.card.levels)
     asked = [question(model, place, level) for place in places]
     for each, row in zip(asked, poses.run_batch(model, asked), strict=True):
         (own,) = poses.run_batch(model, [each])
