@@ -38,9 +38,9 @@ def page(
     ] = interpolated_answers.MAX_ROWS,
     json: Json = False,
 ) -> None:
-    """Write the viewer page with computed answers of a model, as one file without a service.
+    """Write the viewer page of a model as one file, without a service.
 
-    The page interpolates between the answers. Fewer answers make a smaller file and larger
+    The page holds computed answers and interpolates between them. Fewer answers make a smaller file and larger
     errors.
     """
     if output.is_dir():
