@@ -40,8 +40,8 @@ def page(
 ) -> None:
     """Write the viewer page of a model as one file, without a service.
 
-    The page holds computed answers and interpolates between them. Fewer answers make a smaller file and larger
-    errors.
+    The page holds computed answers and interpolates between them. Fewer answers make a smaller
+    file and larger errors.
     """
     if output.is_dir():
         raise FileError(output, "is a folder, expected the name of a file")
