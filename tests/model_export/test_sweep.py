@@ -73,10 +73,10 @@ def test_a_cluster_trains_the_same_models(folder, alone, tmp_path):
 
 def test_a_recipe_that_makes_no_model_stops_no_other(folder, alone, tmp_path):
     few = folder / "few.toml"
-    few.write_text(TOML + "[clips.where]\nv = { maximum = 1 }\n")
+    few.write_text(TOML + "[clips.where]\nv = { maximum = 0 }\n")
     done = train(few, *recipes(folder), "-o", tmp_path / "made")
     assert done.returncode == 4
-    assert re.search(r"^few: 2 samples, expected at least 3", done.stderr, re.MULTILINE)
+    assert re.search(r"^few: 1 samples, expected at least 2", done.stderr, re.MULTILINE)
     assert done.stderr.endswith("posefield: few of 4 made no model\n")
     assert contents(tmp_path / "made") == alone
 
