@@ -224,8 +224,8 @@ class LeaveOneOutLoss:
         hyper = self.read(x)
         squares, slope = self._squares(hyper)
         groups = self._count
-        apart = (x - [prior.mean for prior in self.priors]) / [p.deviation for p in self.priors]
         deviations = np.array([prior.deviation for prior in self.priors])
+        apart = (x - [prior.mean for prior in self.priors]) / deviations
         strength = self.problem.strength
         value = 0.5 * groups * np.log(squares) + 0.5 * strength * float(apart @ apart)
         changes = np.array([np.sum(slope * change) for change in self._changes(hyper)])
@@ -239,20 +239,12 @@ class LeaveOneOutLoss:
         """
         block = self._inverse(hyper)
         product = block @ self._values
-        residuals = self._divided(block, product)
+        residuals = leave_one_out.divide_groups(block, product, self._takes)
         weighted = self._weighted(residuals)
-        backward = self._divided(block, weighted)
+        backward = leave_one_out.divide_groups(block, weighted, self._takes)
         paired = np.where(self._together, backward @ residuals.T, 0.0)
         slope = block @ (paired @ block - backward @ product.T)
         return float(np.sum(weighted * residuals)), slope + slope.T
-
-    def _divided(self, block: Floats, rows: Floats) -> Floats:
-        """Return rows (n, m), each group's multiplied by the inverse of its part of a block."""
-        found = rows / np.diagonal(block)[:, None]
-        for own in self._takes:
-            among = block[own[:, :, None], own[:, None, :]]
-            found[own] = np.linalg.solve(among, rows[own])
-        return found
 
     def _inverse(self, hyper: Hyper) -> Floats:
         """Return the sample block (n, n) of the inverse of the kriging system."""
@@ -261,9 +253,7 @@ class LeaveOneOutLoss:
             np.linalg.inv(universal_kriging.noisy(hyper, points)), dtype=np.float64
         )
         functions = universal_kriging.drift(points, len(hyper.scales), degree)
-        weighed = inverse @ functions
-        block: Floats = inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
-        return block
+        return leave_one_out.sample_block(inverse, functions)
 
     def _weighted(self, residuals: Floats) -> Floats:
         """Return the residuals (n, m) with the weight of the event's joint added."""

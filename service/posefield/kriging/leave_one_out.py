@@ -25,14 +25,36 @@ def residual_matrix(
     the covariances of measured samples. functions (n, k): the drift's. groups (n,): samples of one
     group, such as strides cut from one take, are left out together.
     """
+    block = sample_block(inverse, functions)
+    return divide_groups(block, block, equal_sized_groups(groups))
+
+
+def sample_block(
+    inverse: SampleMatrix, functions: Annotated[Floats, "samples functions"]
+) -> SampleMatrix:
+    """Return the sample block (n, n) of the inverse of the whole system [[C, F], [Fᵀ, 0]].
+
+    inverse (n, n): of the covariances C. functions (n, k): the drift's, F.
+    """
     weighed = inverse @ functions
-    # The sample block of the inverse of the whole system [[C, F], [Fᵀ, 0]].
-    block = inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
-    residuals: Floats = block / np.diagonal(block)[:, None]
-    for own in equal_sized_groups(groups):
+    block: Floats = inverse - weighed @ np.linalg.solve(functions.T @ weighed, weighed.T)
+    return block
+
+
+def divide_groups(
+    block: SampleMatrix,
+    rows: Annotated[Floats, "samples _"],
+    several: list[Annotated[Indices, "_ _"]],
+) -> Annotated[Floats, "samples _"]:
+    """Return rows (n, m), each group's multiplied by the inverse of its part of a block (n, n).
+
+    several: of the groups of more than one sample, as `equal_sized_groups` returns them.
+    """
+    found: Floats = rows / np.diagonal(block)[:, None]
+    for own in several:
         among = block[own[:, :, None], own[:, None, :]]
-        residuals[own] = np.linalg.solve(among, block[own])
-    return residuals
+        found[own] = np.linalg.solve(among, rows[own])
+    return found
 
 
 def equal_sized_groups(

@@ -12,6 +12,7 @@ from posefield.common.units import Floats
 from posefield.encode.body.body_plan import Limb, PersonPlan
 from posefield.encode.body.bone_chain import BoneChain
 from posefield.encode.body.mesh_builder import MeshBuilder
+from posefield.motion import blend
 
 # Beside the hip joint, along the thigh, m: where the thigh begins to move the skin, and from where
 # on it does so alone; for points ahead of the joint and for those behind it.
@@ -73,7 +74,4 @@ def _set_leg(found: Floats, leg: Limb, own: npt.NDArray[np.bool_], share: Floats
 
 
 def _smooth(share: Floats) -> Floats:
-    """Return smooth shares, from 0 to 1."""
-    x = np.clip(share, 0.0, 1.0)
-    found: Floats = x * x * (3.0 - 2.0 * x)
-    return found
+    return blend.smoothstep(np.clip(share, 0.0, 1.0))
