@@ -75,7 +75,8 @@ def test_what_follows_a_jump_keeps_its_own_motion(smooth):
 
 def test_jump_of_an_arm_is_left_alone(smooth):
     broken = smooth.copy()
-    broken[20:, ARM] = quat.mul(broken[20:, ARM], HALF_TURN)
+    across = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi))
+    broken[20:, ARM] = quat.mul(broken[20:, ARM], across)
     clean, findings = half_turns.remove_jumps(clip(broken), 0)
     assert np.array_equal(clean.rotations, broken)
     assert findings == []
@@ -125,3 +126,65 @@ def test_clip_that_only_passes_half_a_turn_is_no_flip(family):
     sweep = quat.from_axis_angle(AXIS, np.linspace(0.0, 3.0, 50))
     family[4, :, FINGER] = quat.mul(family[4, :, FINGER], sweep)
     assert half_turns.remove_flips(family, half_turns.small_joints(PARENTS, OFFSETS))[1] == []
+
+
+def twisted(smooth, joint, frames):
+    """The motion with half a turn about a joint's bone, which its child turns back."""
+    broken = smooth.copy()
+    bone = OFFSETS[joint + 1] / np.linalg.norm(OFFSETS[joint + 1])
+    half = quat.from_axis_angle(bone, np.array(np.pi))
+    broken[frames, joint] = quat.mul(broken[frames, joint], half)
+    broken[frames, joint + 1] = quat.mul(quat.conj(half), broken[frames, joint + 1])
+    return broken
+
+
+def test_a_twist_about_the_bone_moves_to_the_child_and_moves_no_joint(smooth):
+    broken = clip(twisted(smooth, ARM, slice(30, None)))
+    clean, (finding,) = half_turns.move_twists(broken, 7)
+    assert steps(broken.rotations)[:, ARM].max() > 3.0
+    assert (finding.kind, finding.joint, finding.clip) == ("twist", ARM, 7)
+    assert steps(clean.rotations).max() < 0.1
+    assert np.abs(clean.positions() - broken.positions()).max() < 1e-12
+    # The larger part of the clip is as it was, here before the jump.
+    assert apart(clean.rotations[:30], smooth[:30]) < 1e-7
+    # Only the twist from the frame before to that after the jump is lost.
+    assert apart(clean.rotations, smooth) < 0.2
+
+
+@pytest.mark.parametrize("frames", [slice(20), slice(20, 24)])
+def test_the_longest_part_without_a_jump_tells_the_side(smooth, frames):
+    clean, _ = half_turns.move_twists(clip(twisted(smooth, ARM, frames)), 0)
+    assert steps(clean.rotations).max() < 0.1
+    assert apart(clean.rotations[30:], smooth[30:]) < 0.1
+
+
+def test_twists_of_a_whole_chain_are_taken_out_by_removing_jumps(smooth):
+    broken = smooth.copy()
+    # What nothing turns back moves on along the chain until a small joint loses it.
+    bone = OFFSETS[HAND] / np.linalg.norm(OFFSETS[HAND])
+    broken[30:, ARM] = quat.mul(broken[30:, ARM], quat.from_axis_angle(bone, np.array(np.pi)))
+    clean, findings = half_turns.remove_jumps(clip(broken), 0)
+    assert [finding.kind for finding in findings][0] == "twist"
+    assert steps(clean.rotations)[:, ARM].max() < 0.1
+
+
+def test_a_jump_across_the_bone_is_not_a_twist(smooth):
+    broken = smooth.copy()
+    across = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi))
+    broken[30:, ARM] = quat.mul(broken[30:, ARM], across)
+    clean, findings = half_turns.move_twists(clip(broken), 0)
+    assert findings == []
+    assert np.array_equal(clean.rotations, broken)
+
+
+def test_a_joint_whose_bones_point_apart_keeps_its_twist(smooth):
+    broken = twisted(smooth, ARM, slice(30, None))
+    forked = Skeleton(
+        ("hips", "arm", "hand", "thumb"),
+        (-1, 0, 1, 1),
+        np.array([[0, 0.9, 0], [0, 0.4, 0], [0.3, 0, 0], [0, 0.1, 0]]),
+        (),
+        np.zeros((0, 3)),
+    )
+    own = Clip(forked, broken, np.tile(forked.offsets, (len(broken), 1, 1)), 60.0)
+    assert half_turns.move_twists(own, 0)[1] == []

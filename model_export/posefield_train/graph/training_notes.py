@@ -26,6 +26,7 @@ MEANINGS = {
     "far": "close to half a turn from the family's mean",
     "wrap": "followed past half a turn from the family's mean",
     "jump": "jumps between two frames taken out",
+    "twist": "jumps about the bone moved to the joint's children",
     "flip": "half turns taken out",
 }
 """Kinds of findings in joints, those that say the most about the model first."""

@@ -2,14 +2,18 @@
 
 An occluded marker leaves the twist of a finger or a toe undetermined, and the solver can be half a
 turn off afterwards, between two frames or for a whole take. Only joints that move little are
-corrected, so that no joint position changes by more than a few centimetres; each correction is
-reported.
+corrected, so that no joint position changes by more than a few centimetres. A solver also turns a
+thigh half about its own axis when the knee is bent far, and the shin against it. Such a twist is
+moved on to the joint's children, which changes no position at all. Each correction is reported.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
+from posefield.common.array_shapes import Vector
 from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
@@ -18,6 +22,10 @@ from posefield.motion.clip import Clip
 HAND_SIZE = 0.15
 # Angle between two frames above which a rotation is a jump, rad.
 JUMP_ANGLE = 1.5
+# Bones that are shorter have no direction, m; bones count as along one axis above this cosine.
+SHORTEST_BONE, ALONG = 1e-6, 0.999
+# Largest rotation, rad, besides the twist about the bone, of a jump that is such a twist.
+MOST_SWING = 0.5
 # Angle from the family's mean above which a whole clip counts as flipped, rad.
 FLIP_ANGLE = 0.75 * np.pi
 
@@ -26,8 +34,9 @@ FLIP_ANGLE = 0.75 * np.pi
 class Finding:
     """A correction or warning for one joint of one clip. angle: rad.
 
-    kind: "jump" corrected between two frames, "flip" corrected for the whole clip, "wrap" unwrapped
-    past half a turn from the mean, or "far", close to half a turn.
+    kind: "jump" corrected between two frames, "twist" moved to the children between two frames,
+    "flip" corrected for the whole clip, "wrap" unwrapped past half a turn from the mean, or "far",
+    close to half a turn.
     """
 
     kind: str
@@ -46,17 +55,69 @@ def small_joints(parents: tuple[int, ...], offsets: Floats) -> Floats:
 
 
 def remove_jumps(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
-    """Return the clip with jumps of small joints removed, and the corrections."""
-    steps = quat.mul(quat.conj(clip.rotations[:-1]), clip.rotations[1:])
-    turned = np.linalg.norm(quat.log(steps), axis=-1)
+    """Return the clip with jumps of twists and of small joints removed, and the corrections."""
+    clip, findings = move_twists(clip, index)
+    turned = _step_angles(clip.rotations)
     small = small_joints(clip.skeleton.parents, clip.translations[0])
-    rotations, findings = clip.rotations.copy(), []
+    rotations = clip.rotations.copy()
     for joint in np.flatnonzero(small & (turned.max(axis=0, initial=0.0) > JUMP_ANGLE)):
-        kept = np.where(turned[:, joint, None] > JUMP_ANGLE, quat.IDENTITY, steps[:, joint])
+        steps = _steps(clip.rotations[:, joint])
+        kept = np.where(turned[:, joint, None] > JUMP_ANGLE, quat.IDENTITY, steps)
         for frame, step in enumerate(kept):
             rotations[frame + 1, joint] = quat.mul(rotations[frame, joint], step)
         findings.append(Finding("jump", int(joint), index, float(turned[:, joint].max())))
     return replace(clip, rotations=rotations), findings
+
+
+def move_twists(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
+    """Return the clip with jumps about a bone moved from its joint to the joint's children.
+
+    The longest part of a clip without such a jump stays as it is. Positions do not change.
+    """
+    rotations, findings = clip.rotations.copy(), []
+    for joint, axis in _bone_axes(clip):
+        steps = _steps(rotations[:, joint])
+        angles = np.linalg.norm(quat.log(steps), axis=-1)
+        twists = quat.twist(steps, axis)
+        swings = quat.mul(steps, quat.from_axis_angle(axis, -twists))
+        swung = np.linalg.norm(quat.log(swings), axis=-1)
+        jumps = np.flatnonzero((angles > JUMP_ANGLE) & (swung < MOST_SWING))
+        if not len(jumps):
+            continue
+        moved = np.concatenate(
+            [[0.0], np.cumsum(np.where(np.isin(np.arange(len(steps)), jumps), twists, 0.0))]
+        )
+        parts = np.split(np.arange(len(moved)), jumps + 1)
+        moved -= moved[max(parts, key=len)[0]]
+        own = quat.from_axis_angle(axis, moved)
+        rotations[:, joint] = quat.mul(rotations[:, joint], quat.conj(own))
+        for child in np.flatnonzero(np.array(clip.skeleton.parents) == joint):
+            rotations[:, child] = quat.mul(own, rotations[:, child])
+        findings.append(Finding("twist", joint, index, float(np.abs(twists[jumps]).max())))
+    return (replace(clip, rotations=rotations) if findings else clip), findings
+
+
+def _bone_axes(clip: Clip) -> Iterator[tuple[int, Vector]]:
+    """Yield each joint that carries bones along one axis only, with that unit axis."""
+    parents = np.array(clip.skeleton.parents)
+    offsets = clip.translations.mean(axis=0)
+    lengths = np.linalg.norm(offsets, axis=-1)
+    for joint in range(len(parents)):
+        children = np.flatnonzero((parents == joint) & (lengths > SHORTEST_BONE))
+        if not len(children):
+            continue
+        axes = offsets[children] / lengths[children, None]
+        if np.abs(axes @ axes[0]).min() > ALONG:
+            yield joint, axes[0]
+
+
+def _steps(rotations: Annotated[Floats, "*frames 4"]) -> Annotated[Floats, "*steps 4"]:
+    """Return the rotations (F - 1, ...) from each frame to the next."""
+    return quat.mul(quat.conj(rotations[:-1]), rotations[1:])
+
+
+def _step_angles(rotations: Floats) -> Floats:
+    return np.asarray(np.linalg.norm(quat.log(_steps(rotations)), axis=-1))
 
 
 def remove_flips(rotations: Floats, small: Floats) -> tuple[Floats, list[Finding]]:
