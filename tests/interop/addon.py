@@ -70,8 +70,13 @@ def faults() -> list[str]:
 
 
 def _models() -> Models:
-    """By name: the procedural family, the procedural walk, and a real one if there is any."""
-    found = {"reaching": trained.family()[1], "stroll": trained.walk(), WALK: trained.real(WALK)}
+    """By name: the procedural family, the procedural walks, and a real one if there is any."""
+    found = {
+        "reaching": trained.family()[1],
+        "stroll": trained.walk(),
+        WALK: trained.real(WALK),
+        "styled": trained.styled_walk(),
+    }
     return {
         name: (Synthesizer(name, session.open_bytes(content, name)), content)
         for name, content in found.items()
@@ -98,7 +103,9 @@ def _driven(python: Path, archive: Path, folder: Path, models: Models) -> dict[s
     try:
         assert service.stdout is not None
         address = service.stdout.readline().split()[-1]
-        walks = json.dumps([_walk(name, models[name][0]) for name in models if name != "reaching"])
+        walks = json.dumps(
+            [_walk(name, models[name][0]) for name in ("stroll", WALK) if name in models]
+        )
         given = (archive, address, str(service.pid), result, ADDON / "README.md", walks)
         _run(python, HERE / "addon_drive.py", *given, **told)
     finally:

@@ -76,6 +76,7 @@ if __name__ == "__main__":
     addon_motion.rates()
     for given in json.loads(walks):
         addon_motion.walking(*given)
+    addon_motion.styles("styled")
     addon_trouble.undone()
     addon_trouble.refused()
     addon_trouble.another_model(*json.loads(walks)[0][:2])

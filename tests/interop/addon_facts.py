@@ -79,6 +79,19 @@ FACTS: dict[str, Any] = {
         "Outside: stature is 2.5", "A captured clip would lie", "'Nothing like it was captured'"
     )(rows),
     "by hash": _is(""),
+    "drawn mixture": lambda rows: (
+        _holds("'Performer'", "'ann'", "'Style'", "Moves as a mixture of performers")(rows)
+        and "weights" not in str(rows)
+    ),
+    "drawn open": _holds("0.1 of 1 is left open", "A captured clip would lie"),
+    "drawn too much": _holds("The weights' sum is 1.1, expected", "(422): labels/style"),
+    "no such label set": _holds("no label set is named mood; there are performer, style"),
+    "no such label": _holds("marchng", "did you mean", "marching"),
+    "no labels": _holds("expected a name, weights by name or null by label set"),
+    "weights above one": _holds("sum of 1.4", "at most 1"),
+    "unfit labels: unchanged": _is(True),
+    "refresh keeps labels": _is(True),
+    "performer of an older file": _is({"performer": "ben"}),
     "drawn preferences": _holds("plain text", "Without https"),
     "slider": lambda found: found[2] < found[0] < found[1] < found[3],
     "slider words": _holds("stature (m)", "sampled: "),
@@ -91,7 +104,7 @@ FACTS: dict[str, Any] = {
     "another model, no fit": _holds("33 bones, the clip 7 joints"),
     "another model: unchanged": _is(True),
     "another model: taken": _is(["stroll", False]),
-    "another model, live": _is([[None, 0, False]]),
+    "another model, live": _is([[0, False]]),
     "another model, live: controls": _is(True),
     "unforeseen": _holds("an error in the add-on: AttributeError"),
     "unforeseen: afterwards": _is([]),

@@ -4,14 +4,17 @@ import time
 
 import bpy
 import numpy as np
+from addon_layout import drawn
 from addon_stage import (
     afresh,
+    choose,
     curves,
     edit,
     facts,
     key,
     part,
     record,
+    said,
     settings,
     slide,
     snapshot,
@@ -151,9 +154,9 @@ def walking(model, performer, straight):
         afresh(model, root=root)
         bpy.ops.posefield.import_clip()
         record(f"{model} {root}", {"root": other})
-    afresh(model, performer=performer)
+    afresh(model, {"performer": performer})
     bpy.ops.posefield.import_clip()
-    record(f"{model} as {performer}", {"performer": None})
+    record(f"{model} as {performer}", {"labels": {}})
     afresh(model, loop=True, root="in_place")
     bpy.ops.posefield.import_clip()
     period = len(part("session").current.clip) - 1
@@ -174,3 +177,46 @@ def walking(model, performer, straight):
     facts[f"{model} repeated"] = repeated
     count = 2 * period + 1 if repeated else period + 1
     record(f"{model} travelling loop", {"root": "in_place"}, count, cycles=2 if repeated else 1)
+
+
+def styles(model):
+    """A model of two walkers in three styles."""
+    afresh(model, {"style": "sneaking"})
+    bpy.ops.posefield.import_clip()
+    record("a style", {"labels": {"style": "plain"}})
+    afresh(model, {"performer": {"ann": 0.25, "ben": 0.75}, "style": "marching"})
+    bpy.ops.posefield.import_clip()
+    mixed = {"performer": {"ann": 0.25, "ben": 0.75}, "style": "marching"}
+    record("a mixture of performers", {"labels": mixed | {"performer": "ben"}})
+    facts["drawn mixture"] = drawn()
+    settings().live = True
+    choose("style", {"marching": 0.7, "sneaking": 0.2})
+    wait()
+    record("a mixture of styles, live", {"labels": mixed})
+    facts["drawn open"] = drawn()
+    choose("style", {"marching": 0.9})
+    wait()
+    facts["drawn too much"] = drawn()
+    afresh(model)
+    bpy.ops.posefield.import_clip(labels='{"style": {"marching": 0.5}, "performer": "ann"}')
+    record("labels of a script", {"labels": {"performer": "ann"}})
+    before = snapshot()
+    for name, labels in UNFIT_LABELS.items():
+        facts[name] = said(bpy.ops.posefield.import_clip, labels=labels)
+    facts["unfit labels: unchanged"] = snapshot() == before
+    bpy.ops.posefield.refresh()
+    facts["refresh keeps labels"] = snapshot() == before
+    bpy.ops.posefield.import_clip(labels='{"style": null}')
+    record("a style left open again", {"labels": {"style": "plain"}})
+    settings().labels["performer"].choice = ":OPEN"
+    settings().performer_name = "ben"
+    bpy.ops.posefield.refresh()
+    facts["performer of an older file"] = part("questions").question(bpy.context.scene).labels
+
+
+UNFIT_LABELS = {
+    "no such label set": '{"mood": "glad"}',
+    "no such label": '{"style": "marchng"}',
+    "no labels": '["marching"]',
+    "weights above one": '{"style": {"marching": 0.7, "plain": 0.7}}',
+}

@@ -50,13 +50,23 @@ def preferences():
     return bpy.context.preferences.addons[PACKAGE].preferences
 
 
-def afresh(model, **told):
-    """An empty scene in which a model is picked."""
+def afresh(model, labels=None, **told):
+    """An empty scene in which a model is picked, and perhaps names or weights by label set."""
     empty()
     bpy.ops.posefield.refresh()
     settings().model = model
+    for name, value in (labels or {}).items():
+        choose(name, value)
     for name, value in told.items():
         setattr(settings(), name, value)
+
+
+def choose(name, value):
+    """Choose a name of a label set, or weights of several, as in the panel."""
+    choice = settings().labels[name]
+    choice.choice = ":MIXTURE" if isinstance(value, dict) else value
+    for label, weight in value.items() if isinstance(value, dict) else ():
+        choice.weights[label].weight = weight
 
 
 def record(name, wrong, frames=None, **more):
@@ -72,7 +82,7 @@ def record(name, wrong, frames=None, **more):
     question = {
         "controls": asked.controls,
         "fps": asked.fps,
-        "performer": asked.performer,
+        "labels": asked.labels,
         "level": asked.level,
         "root": asked.root,
         "loop": asked.loop,
@@ -149,7 +159,14 @@ def values(group):
     """Return a group's properties by name; for a pointer, its target's name."""
     found = {name: getattr(group, name) for name in group.bl_rna.properties.keys()}
     del found["rna_type"]
-    return {name: getattr(value, "name", value) for name, value in found.items()}
+    return {name: plain(value) for name, value in found.items()}
+
+
+def plain(value):
+    """Return a value that can be compared later: a collection's entries, a pointer's name."""
+    if hasattr(value, "foreach_set"):
+        return [values(each) for each in value]
+    return getattr(value, "name", value)
 
 
 def made():

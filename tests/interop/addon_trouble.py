@@ -102,7 +102,7 @@ def another_model(model, performer):
     bpy.ops.posefield.import_clip(model=model)
     facts["another model: taken"] = [settings().model, snapshot() == before]
     record("another model", {"root": "in_place"})
-    afresh(model, performer=performer, level="1", loop=True)
+    afresh(model, {"performer": performer}, level="1", loop=True)
     bpy.ops.posefield.import_clip()
     settings().live = True
     wait()
@@ -113,7 +113,8 @@ def another_model(model, performer):
     settings().model = "reaching"
     part("live").stop()
     newest = asked[-1].question
-    chosen = {(each.question.performer, each.question.level, each.question.loop) for each in asked}
+    questions = [each.question for each in asked]
+    chosen = {(*each.labels.values(), each.level, each.loop) for each in questions}
     facts["another model, live"] = [list(each) for each in chosen]
     facts["another model, live: controls"] = newest.controls == card().defaults
 

@@ -73,6 +73,14 @@ def walk() -> bytes:
 
 
 @cache
+def styled_walk() -> bytes:
+    """File of the model of the procedural walk in several styles."""
+    with tempfile.TemporaryDirectory() as name:
+        sample_walk.write_styled_walk(Path(name))
+        return _of(sample_walk.styled_recipe(), Path(name))[1]
+
+
+@cache
 def _trained(path: Path, data: Path) -> tuple[Synthesizer, bytes]:
     return _of(recipe.read(path), data)
 

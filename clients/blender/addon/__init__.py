@@ -4,9 +4,15 @@ The panel is in the sidebar of the 3D view. `without_blender` has the code witho
 `action` write a clip to an armature, `live` updates it when a slider moves.
 """
 
-from . import handlers, live, operators, panel, preferences, properties, sliders
+from . import handlers, label_sets, live, operators, panel, preferences, properties, sliders
 
-CLASSES = (*preferences.CLASSES, *properties.CLASSES, *operators.CLASSES, *panel.CLASSES)
+CLASSES = (
+    *preferences.CLASSES,
+    *label_sets.CLASSES,
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *panel.CLASSES,
+)
 
 
 def register() -> None:

@@ -6,9 +6,9 @@ import math
 import bpy
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 
-from . import action, placing, preferences, questions, rig, session, sliders
+from . import action, label_sets, placing, preferences, questions, rig, session, sliders
 from .questions import Picked
-from .without_blender import bones, cards, clips, faults
+from .without_blender import bones, cards, clips, faults, label_choice
 from .without_blender.cards import Card
 from .without_blender.clips import Clip
 from .without_blender.service import Service
@@ -67,6 +67,11 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         name="Controls",
         description="JSON object of values by control; the panel's for those it leaves out",
     )
+    labels: StringProperty(
+        name="Labels",
+        description="JSON object of a name, weights by name, or null for unknown, by label set; "
+        "the panel's for those it leaves out",
+    )
     onto: EnumProperty(
         name="Onto",
         items=[
@@ -94,7 +99,8 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             asked = preferences.service(context).in_all()
             picked = self._picked(asked, context.scene)
             others = self._controls(picked.card)
-            question = questions.question_of(context.scene, picked, others)
+            labels = label_choice.of_json(self.labels, picked.card.labels)
+            question = questions.question_of(context.scene, picked, others, labels)
             clip = clips.ask(asked, question)
             _check(armature, clip)
         except faults.Fault as fault:
@@ -103,6 +109,7 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             questions.take(context.scene, picked)
         said = self._put(context, armature, clip, question.loop)
         session.current.clip = clip
+        label_sets.put(context.scene.posefield, labels)
         sliders.put(context.scene, picked.card, others)
         return _ended(self, said)
 

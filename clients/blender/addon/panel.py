@@ -4,7 +4,7 @@ import textwrap
 
 import bpy
 
-from . import preferences, questions, session, sliders
+from . import label_sets, preferences, questions, session, sliders
 from .without_blender import faults, marks
 
 WIDTH = 44
@@ -29,6 +29,7 @@ class VIEW3D_PT_posefield(bpy.types.Panel):
             draw_text(layout, str(fault), "INFO")
             return draw_said(layout)
         draw_controls(layout, scene, card)
+        draw_labels(layout, scene.posefield)
         draw_choices(layout, scene.posefield, card)
         draw_import(layout, context)
         draw_trust(layout, scene, card)
@@ -53,10 +54,19 @@ def draw_controls(layout, scene, card) -> None:
     layout.operator("posefield.reset")
 
 
+def draw_labels(layout, own) -> None:
+    """Draw the choice in each label set, and the weights of a mixture."""
+    for choice in own.labels:
+        layout.prop(choice, "choice", text=choice.name.capitalize())
+        if choice.mixed:
+            column = layout.column(align=True)
+            for each in choice.weights:
+                column.prop(each, "weight", text=each.name, slider=True)
+            draw_mark(layout, marks.weights(choice.value), "INFO", "ERROR")
+
+
 def draw_choices(layout, own, card) -> None:
     """Draw the other settings of a request."""
-    if card.performers:
-        layout.prop(own, "performer")
     layout.prop(own, "level")
     layout.prop(own, "root")
     row = layout.row()
@@ -85,9 +95,9 @@ def draw_import(layout, context) -> None:
 def draw_trust(layout, scene, card) -> None:
     """Draw the clip's sigma and support, and controls outside the sampled range."""
     clip, now = session.current.clip, sliders.values(scene, card)
-    who = scene.posefield.performer_name or None
-    # Sigma holds for the clip's controls only; hide it when the sliders differ.
-    if clip is not None and clip.answers(card.identity, now, who):
+    labels = label_sets.values(scene.posefield)
+    # Sigma holds for the clip's controls and labels only; hide it when the settings differ.
+    if clip is not None and clip.answers(card.identity, now, labels):
         far = f"{100 * clip.sigma:.1f} cm"
         draw_text(layout, f"A captured clip would lie about {far} from this", "INFO")
         draw_mark(layout, marks.support(clip.trust), "CHECKMARK", "ERROR")
@@ -97,7 +107,7 @@ def draw_trust(layout, scene, card) -> None:
 
 
 def draw_mark(layout, mark, good: str, other: str) -> None:
-    """Draw a mark with its icon; nothing if the service does not report it."""
+    """Draw a mark with its icon; nothing without a mark."""
     if mark is not None:
         draw_text(layout, mark.words, good if mark.held else other)
 

@@ -3,6 +3,7 @@
 import bpy
 from bpy.props import (
     BoolProperty,
+    CollectionProperty,
     EnumProperty,
     FloatProperty,
     IntProperty,
@@ -10,9 +11,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from . import live, questions, session
-
-ANYBODY = "ANYBODY"
+from . import label_sets, live, questions, session
 
 # Blender keeps no reference to the strings of dynamic enum items, so they are kept here.
 _kept: dict[str, list[tuple[str, str, str]]] = {}
@@ -31,15 +30,6 @@ def _models(own, _context):
         # The file's model is shown even if the service no longer has it.
         found.append((own.model_name, own.model_name, "Not known: refresh"))
     return _items("models", found)
-
-
-def _performers(own, _context):
-    card = session.current.card
-    found = [(name, name, f"As {name} moves") for name in (card.performers if card else ())]
-    nobody = (ANYBODY, "Anybody", "An unseen performer")
-    if own.performer_name and all(name != own.performer_name for name, _, _ in found):
-        found.append((own.performer_name, own.performer_name, "Not known to this model"))
-    return _items("performers", [nobody, *found])
 
 
 def _levels(own, _context):
@@ -66,15 +56,6 @@ def _set_model(own, place):
     own.model_name = "" if name == "NONE" else name
 
 
-def _get_performer(own):
-    return _place(_performers(own, None), own.performer_name or ANYBODY)
-
-
-def _set_performer(own, place):
-    name = _performers(own, None)[place][0]
-    own.performer_name = "" if name == ANYBODY else name
-
-
 def _get_level(own):
     return own.level_number
 
@@ -99,7 +80,9 @@ class PosefieldSettings(bpy.types.PropertyGroup):
     """Model, request settings, and imported armature of a scene."""
 
     model_name: StringProperty(options={"HIDDEN"})
-    performer_name: StringProperty(options={"HIDDEN"})
+    performer_name: StringProperty(
+        description="Performer in a file of an add-on without label sets", options={"HIDDEN"}
+    )
     level_number: IntProperty(min=0, options={"HIDDEN"})
     sliders_of: StringProperty(
         description="Model that the controls' values belong to", options={"HIDDEN"}
@@ -113,14 +96,7 @@ class PosefieldSettings(bpy.types.PropertyGroup):
         set=_set_model,
         update=_picked,
     )
-    performer: EnumProperty(
-        name="Performer",
-        description="Who moves",
-        items=_performers,
-        get=_get_performer,
-        set=_set_performer,
-        update=_changed,
-    )
+    labels: CollectionProperty(type=label_sets.PosefieldLabelChoice)
     level: EnumProperty(
         name="Detail",
         description="Level of detail; 0 is the finest",

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
-from . import preferences, session, sliders
+from . import label_sets, preferences, session, sliders
 from .without_blender import cards, faults, rates, service
 from .without_blender.cards import Card
 from .without_blender.clips import Question
+from .without_blender.label_choice import LabelValue
 from .without_blender.service import Service
 
 
@@ -53,9 +54,10 @@ def take(scene, picked: Picked) -> None:
     session.current.models = picked.models or session.current.models
     sliders.make(picked.card)
     own.model_name = own.sliders_of = picked.name
+    label_sets.make(own, picked.card, fresh)
     if fresh:
         # Reset the sliders last, because each change can send a live request.
-        own.performer_name, own.level_number, own.loop = "", 0, False
+        own.level_number, own.loop = 0, False
         sliders.reset(scene, picked.card)
 
 
@@ -76,11 +78,13 @@ def card_of(scene) -> Card:
 
 def question(scene) -> Question:
     """Return the panel's request for a clip."""
-    return question_of(scene, Picked(scene.posefield.model_name, card_of(scene)), {})
+    return question_of(scene, Picked(scene.posefield.model_name, card_of(scene)), {}, {})
 
 
-def question_of(scene, picked: Picked, others: dict[str, float]) -> Question:
-    """Return the request for a model with the panel's settings and some other control values."""
+def question_of(
+    scene, picked: Picked, others: dict[str, float], labels: dict[str, LabelValue | None]
+) -> Question:
+    """Return the request for a model with the panel's settings but some controls and labels."""
     card, own, had = picked.card, scene.posefield, _has(scene, picked)
     if had and own.loop and not card.cyclic:
         raise faults.Fault(f"{card.name} is no cycle, and cannot be a loop")
@@ -88,7 +92,7 @@ def question_of(scene, picked: Picked, others: dict[str, float]) -> Question:
         model=card.identity,
         controls=(_values(scene, card) if had else card.defaults) | others,
         fps=fps(scene),
-        performer=(own.performer_name or None) if had else None,
+        labels=_labels(own, had, labels),
         level=own.level_number if had else 0,
         root=own.root,
         loop=had and own.loop,
@@ -100,6 +104,11 @@ def _values(scene, card: Card) -> dict[str, float]:
         # The sliders' values in a file are readable only after the sliders are made.
         sliders.make(card)
     return sliders.values(scene, card)
+
+
+def _labels(own, had: bool, others: dict[str, LabelValue | None]) -> dict[str, LabelValue]:
+    chosen = (label_sets.values(own) if had else {}) | others
+    return {name: value for name, value in chosen.items() if value is not None}
 
 
 def fps(scene) -> float:

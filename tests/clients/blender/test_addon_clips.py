@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from without_blender import cards, clips, faults, marks
 from without_blender.cards import Control
+from without_blender.clips import Question
 
 UNITS = {"length": "metre", "up": "Y"}
 TRUST = {"model": "reach@0123", "controls": {"turn": 20.0}, "sigma": 0.017}
@@ -57,6 +58,8 @@ def test_whether_who_moves_was_captured_is_said_where_performers_are_told_apart(
     nobody = told(supported=True, performer=None, performer_seen=False)
     assert nobody[1] == (False, "Moves as an unseen performer")
     assert told(performer="kim", performer_seen=True)[1] == (True, "kim was captured")
+    mixed = told(performer=None, performer_seen=True, labels={"performer": {"kim": 0.5}})
+    assert mixed[1] == (True, "Moves as a mixture of performers")
     assert told(supported=True, performer=None)[1] is None
 
 
@@ -66,10 +69,25 @@ def test_of_what_an_older_service_does_not_say_nothing_is_said():
 
 def test_a_clip_is_no_answer_to_another_question():
     clip = clips.decode(packed(plain(trust=np.array(json.dumps(TRUST | {"performer": "kim"})))))
-    assert clip.answers("reach@0123", {"turn": 20.0}, "kim")
-    assert not clip.answers("reach@4567", {"turn": 20.0}, "kim")
-    assert not clip.answers("reach@0123", {"turn": 20.5}, "kim")
-    assert not clip.answers("reach@0123", {"turn": 20.0}, None)
+    kim = {"performer": "kim"}
+    assert clip.answers("reach@0123", {"turn": 20.0}, kim)
+    assert not clip.answers("reach@4567", {"turn": 20.0}, kim)
+    assert not clip.answers("reach@0123", {"turn": 20.5}, kim)
+    assert not clip.answers("reach@0123", {"turn": 20.0}, {})
+    assert not clip.answers("reach@0123", {"turn": 20.0}, kim | {"style": "calm"})
+    styled = plain(trust=np.array(json.dumps(TRUST | {"labels": {"style": {"calm": 0.5}}})))
+    clip = clips.decode(packed(styled))
+    assert clip.answers("reach@0123", {"turn": 20.0}, {"style": {"calm": 0.5}})
+    assert not clip.answers("reach@0123", {"turn": 20.0}, {"style": "calm"})
+
+
+def test_a_request_has_the_performer_and_the_other_labels():
+    body = Question("reach", {}, labels={"performer": "kim", "style": {"calm": 0.5}}).body()
+    assert (body["performer"], body["labels"]) == ("kim", {"style": {"calm": 0.5}})
+    mixed = Question("reach", {}, labels={"performer": {"kim": 0.5}}).body()
+    assert (mixed["performer"], mixed["labels"]) == (None, {"performer": {"kim": 0.5}})
+    # Services older than 3.1.0 refuse a field that they do not know.
+    assert "labels" not in Question("reach", {}, labels={"performer": "kim"}).body()
 
 
 def test_neighbouring_quaternions_lie_close():
@@ -100,6 +118,7 @@ def test_neighbouring_quaternions_lie_close():
         ({"trust": np.array(json.dumps(TRUST | {"controls": None}))}, "its controls"),
         ({"trust": np.array(json.dumps(TRUST | {"supported": "no"}))}, "supported is 'no'"),
         ({"trust": np.array(json.dumps(TRUST | {"performer_seen": 2}))}, "performer_seen is 2"),
+        ({"trust": np.array(json.dumps(TRUST | {"labels": ["calm"]}))}, r"labels are \['calm'\]"),
         ({"trust": np.array("[]")}, "cannot be read"),
         ({"names": np.array([object(), 1], dtype=object)}, "allow_pickle"),
     ],

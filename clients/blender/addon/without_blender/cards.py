@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from . import faults
+from . import faults, label_choice
+from .label_choice import LabelSet
 from .service import Service, fetch, path_of
 
 WIDTHS = 100.0
@@ -63,7 +64,7 @@ class Card:
 
     identity: name@hash, for which responses never change. parents: of each joint by name. tips: end
     point (3,) of some joints, m, Y up. rate: frames per second. errors: of each level of detail,
-    root mean square, m.
+    root mean square, m. labels: label sets, such as performer and style.
     """
 
     identity: str
@@ -74,7 +75,7 @@ class Card:
     tips: dict[str, tuple[float, float, float]]
     cyclic: bool
     rate: float
-    performers: tuple[str, ...]
+    labels: tuple[LabelSet, ...]
     errors: tuple[float, ...]
 
     @property
@@ -120,7 +121,7 @@ def _card(plain: dict[str, Any]) -> Card:
         tips={names[joint]: (float(x), float(y), float(z)) for joint, (x, y, z) in found},
         cyclic=bool(plain["cyclic"]),
         rate=float(plain["rate"]),
-        performers=tuple(str(each) for each in plain["performers"]),
+        labels=label_choice.of_card(plain),
         errors=tuple(float(level["rms"]) for level in plain["levels"]),
     )
 

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import axes, faults
+from . import axes, faults, label_choice
 from .cards import parents_by_name
+from .label_choice import LabelValue
 from .service import Service, fetch, path_of
 
 Floats = npt.NDArray[np.float64]
@@ -25,13 +26,14 @@ class Question:
     """Request for a clip of a model.
 
     model: name, or name@hash. controls: in the units of its card. fps: frames per second.
-    performer: None for an unseen performer. level: of detail, 0 is the finest.
+    labels: name or weights by label set, `performer` among them; sets that are not given are left
+    open. level: of detail, 0 is the finest.
     """
 
     model: str
     controls: dict[str, float]
     fps: float = 30.0
-    performer: str | None = None
+    labels: dict[str, LabelValue] = field(default_factory=dict)
     level: int = 0
     root: str = "travelling"
     loop: bool = False
@@ -41,7 +43,7 @@ class Question:
         return {
             "controls": self.controls,
             "fps": self.fps,
-            "performer": self.performer,
+            **label_choice.fields(self.labels),
             "level": self.level,
             "root": self.root,
             "loop": self.loop,
@@ -77,10 +79,12 @@ class Clip:
         """Return the standard deviation of a captured clip from this one, m."""
         return float(self.trust["sigma"])
 
-    def answers(self, model: str, controls: dict[str, float], performer: str | None) -> bool:
+    def answers(
+        self, model: str, controls: dict[str, float], labels: dict[str, LabelValue]
+    ) -> bool:
         """Return True if the clip is the result for these arguments."""
-        said = self.trust["model"], self.trust["controls"], self.trust.get("performer")
-        return said == (model, controls, performer)
+        said = self.trust["model"], self.trust["controls"], label_choice.of_trust(self.trust)
+        return said == (model, controls, labels)
 
     def __len__(self) -> int:
         return len(self.path)
@@ -145,3 +149,5 @@ def _check_said(rate: float, trust: dict[str, Any]) -> None:
     for flag in ("supported", "performer_seen"):
         if trust.get(flag) not in (None, True, False):
             raise ValueError(f"{flag} is {trust[flag]!r}, expected true or false")
+    if not isinstance(trust.get("labels", {}), dict):
+        raise ValueError(f"labels are {trust['labels']!r}, expected values by label set")

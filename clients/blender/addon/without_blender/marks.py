@@ -1,7 +1,9 @@
-"""Support and performer of a clip's trust in words; None from services that do not report them."""
+"""Support and performer of a clip's trust, and weights of labels, in words."""
 
 from dataclasses import dataclass
 from typing import Any
+
+from .label_choice import PERFORMER
 
 
 @dataclass(frozen=True)
@@ -10,6 +12,18 @@ class Mark:
 
     held: bool
     words: str
+
+
+ROUNDING = 1e-6
+"""Excess of a sum of weights over one that the service takes for rounding."""
+
+
+def weights(given: dict[str, float]) -> Mark | None:
+    """Return the mark of the sum of weights: out of range, or partly open; None for a sum of 1."""
+    total = sum(given.values())
+    if not 0 < total <= 1 + ROUNDING:
+        return Mark(False, f"The weights' sum is {total:g}, expected one above 0 and at most 1")
+    return Mark(True, f"{1 - total:.3g} of 1 is left open") if total < 1 - ROUNDING else None
 
 
 def support(trust: dict[str, Any]) -> Mark | None:
@@ -28,5 +42,7 @@ def performer(trust: dict[str, Any]) -> Mark | None:
     found = trust.get("performer_seen")
     if found is None:
         return None
+    if PERFORMER in trust.get("labels", {}):
+        return Mark(found, "Moves as a mixture of performers")
     known = f"{trust['performer']} was captured"
     return Mark(found, known if found else "Moves as an unseen performer")
