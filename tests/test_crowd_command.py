@@ -43,6 +43,27 @@ def test_the_same_seed_writes_the_same_bytes(walk_path, tmp_path):
     assert first == again != other
 
 
+def test_labels_are_those_of_all_characters(walk_path, tmp_path):
+    written = {}
+    for words in ([], ["performer=ann"], ["performer=ann:1"], ["performer=ann:0.5,ben:0.5"]):
+        path = tmp_path / f"{len(written)}.npz"
+        given = [part for word in words for part in ("--label", word)]
+        done = run(walk_path, "--count", 5, "--seconds", 1, "-o", path, *given)
+        assert done.exit_code == 0, done.output
+        written[tuple(words)] = path.read_bytes()
+    free, ann, weighed, mixed = written.values()
+    assert ann == weighed
+    assert len({free, ann, mixed}) == 3
+
+
+def test_a_label_that_the_model_does_not_have_is_refused(walk_path, tmp_path):
+    path = tmp_path / "crowd.npz"
+    done = run(walk_path, "--label", "performer=bob", "-o", path)
+    assert isinstance(done.exception, InvalidField)
+    assert "labels/performer: 'bob', expected one of ann, ben" in str(done.exception)
+    assert not path.exists()
+
+
 def test_routes_are_followed(walk_path, tmp_path):
     routes = tmp_path / "routes.json"
     plain = [

@@ -197,6 +197,18 @@ def test_the_same_seed_is_the_same_crowd(ask):
     assert once == again != other
 
 
+def test_a_walk_has_the_labels_that_are_asked_for(ask):
+    path = f"{WALK}.usda?count=4&seconds=0.3"
+    free, ann, ben, mixed = (
+        ask("GET", path + more).content
+        for more in ("", *(f"&label=performer={who}" for who in ("ann", "ben", "ann:0.5,ben:0.5")))
+    )
+    assert len({free, ann, ben, mixed}) == 4
+    # Layers name the labels, so that a mixture of one name differs there alone.
+    alone = ask("GET", f"{path}&label=performer=ann:1").content
+    assert alone.split(b"def ", 1)[1] == ann.split(b"def ", 1)[1] != ben.split(b"def ", 1)[1]
+
+
 def test_shared_motions_are_sent_once(ask):
     own, shared = (
         len(ask("GET", f"{WALK}.usdz?count=20&seconds=1{more}").content)
@@ -208,6 +220,11 @@ def test_shared_motions_are_sent_once(ask):
 @pytest.mark.parametrize(
     ("query", "status", "parameter"),
     [
+        ("label=performer=bob", 422, "label"),
+        ("label=mood=glad", 422, "label"),
+        ("label=performer=ann:0.8,ben:0.8", 422, "label"),
+        ("label=ann", 400, "label"),
+        ("label=performer=ann&label=performer=ben", 400, "label"),
         ("count=0", 422, "count"),
         ("count=x", 400, "count"),
         ("count=5&motions=6", 422, "motions"),

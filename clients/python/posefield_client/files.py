@@ -182,6 +182,7 @@ def walk(
     seconds: float | None = None,
     fps: float | None = None,
     seed: int | None = None,
+    labels: Labels | None = None,
     level: int | None = None,
     camera: Place | None = None,
     fov: float | None = None,
@@ -190,7 +191,7 @@ def walk(
     instancing: Instancing | None = None,
     body: Body | None = None,
 ) -> Files:
-    """Return a walking crowd. camera: position x, y, z, m."""
+    """Return a walking crowd. camera: position x, y, z, m. labels: of all characters."""
     place = (
         None if camera is None else ",".join(map(asking.digits, asking.numbers("camera", camera)))
     )
@@ -198,6 +199,7 @@ def walk(
         **asking.said(count=count, motions=motions, seconds=seconds, fps=fps, seed=seed),
         **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),
         **asking.said(instancing=instancing, body=body),
+        **asking.label_words(labels or {}),
     }
     said = "".join(f", {name}={value!r}" for name, value in words.items())
     return Files(

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "3.2.0"
+CONTRACT = "3.3.0"
 """Version of the contract that this client was made for."""
 
 

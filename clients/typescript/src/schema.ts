@@ -737,9 +737,9 @@ export interface components {
         };
         /**
          * @description Name or weights by label set, one of `labels` on the model's card: `{"style": "angry"}` or
-         *     `{"style": {"angry": 0.7, "happy": 0.3}}`. Weights sum to at most 1; what is left to 1 stays
-         *     open, as do sets that are not given. `performer` is short for the label set of that name;
-         *     only one of both may be given. Since 3.1.0.
+         *     `{"style": {"angry": 0.7, "happy": 0.3}}`. The sum of the weights is above 0 and at most 1; what
+         *     is left to 1 stays open, as do sets that are not given. `performer` is short for the label set
+         *     of that name; only one of both may be given. Since 3.1.0.
          * @default {}
          * @example {
          *       "performer": "tall"
@@ -2168,14 +2168,24 @@ export interface components {
         performer: string;
         /**
          * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-         *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-         *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-         *     short for the label set of that name. Since 3.1.0.
+         *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+         *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+         *     open. `performer` is short for the label set of that name. Since 3.1.0.
          * @example [
          *       "performer=tall"
          *     ]
          */
         label: string[];
+        /**
+         * @description Name of all characters in one of `labels` on the model's card, `label=style=angry`, or weights
+         *     of names, `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and
+         *     at most 1; what is left to 1 stays open. One parameter for each label set. In sets without one
+         *     each character has the names of a captured clip. Since 3.3.0.
+         * @example [
+         *       "performer=tall"
+         *     ]
+         */
+        walkLabel: string[];
     };
     requestBodies: {
         /** @description Default limits: 32 MiB and 100,000 characters. */
@@ -2413,9 +2423,9 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /**
                  * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-                 *     short for the label set of that name. Since 3.1.0.
+                 *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+                 *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+                 *     open. `performer` is short for the label set of that name. Since 3.1.0.
                  * @example [
                  *       "performer=tall"
                  *     ]
@@ -2550,9 +2560,9 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /**
                  * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-                 *     short for the label set of that name. Since 3.1.0.
+                 *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+                 *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+                 *     open. `performer` is short for the label set of that name. Since 3.1.0.
                  * @example [
                  *       "performer=tall"
                  *     ]
@@ -2693,9 +2703,9 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /**
                  * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-                 *     short for the label set of that name. Since 3.1.0.
+                 *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+                 *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+                 *     open. `performer` is short for the label set of that name. Since 3.1.0.
                  * @example [
                  *       "performer=tall"
                  *     ]
@@ -2836,9 +2846,9 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /**
                  * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-                 *     short for the label set of that name. Since 3.1.0.
+                 *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+                 *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+                 *     open. `performer` is short for the label set of that name. Since 3.1.0.
                  * @example [
                  *       "performer=tall"
                  *     ]
@@ -3029,6 +3039,16 @@ export interface operations {
                 fps?: components["parameters"]["crowdFps"];
                 /** @description Seed of all random numbers. */
                 seed?: components["parameters"]["seed"];
+                /**
+                 * @description Name of all characters in one of `labels` on the model's card, `label=style=angry`, or weights
+                 *     of names, `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and
+                 *     at most 1; what is left to 1 stays open. One parameter for each label set. In sets without one
+                 *     each character has the names of a captured clip. Since 3.3.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["walkLabel"];
                 /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
@@ -3123,6 +3143,16 @@ export interface operations {
                 fps?: components["parameters"]["crowdFps"];
                 /** @description Seed of all random numbers. */
                 seed?: components["parameters"]["seed"];
+                /**
+                 * @description Name of all characters in one of `labels` on the model's card, `label=style=angry`, or weights
+                 *     of names, `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and
+                 *     at most 1; what is left to 1 stays open. One parameter for each label set. In sets without one
+                 *     each character has the names of a captured clip. Since 3.3.0.
+                 * @example [
+                 *       "performer=tall"
+                 *     ]
+                 */
+                label?: components["parameters"]["walkLabel"];
                 /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
                 level?: components["parameters"]["level"];
                 /**
@@ -3247,9 +3277,9 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /**
                  * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-                 *     short for the label set of that name. Since 3.1.0.
+                 *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+                 *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+                 *     open. `performer` is short for the label set of that name. Since 3.1.0.
                  * @example [
                  *       "performer=tall"
                  *     ]
@@ -3398,9 +3428,9 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /**
                  * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-                 *     short for the label set of that name. Since 3.1.0.
+                 *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+                 *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+                 *     open. `performer` is short for the label set of that name. Since 3.1.0.
                  * @example [
                  *       "performer=tall"
                  *     ]
@@ -3503,9 +3533,9 @@ export interface operations {
                 performer?: components["parameters"]["performer"];
                 /**
                  * @description Name in one of `labels` on the model's card, `label=style=angry`, or weights of names,
-                 *     `label=style=angry:0.7,happy:0.3`. Weights are above 0 and sum to at most 1; what is left to 1
-                 *     stays open. One parameter for each label set; sets without one are left open. `performer` is
-                 *     short for the label set of that name. Since 3.1.0.
+                 *     `label=style=angry:0.7,happy:0.3`. Each weight is 0 to 1, and their sum is above 0 and at most
+                 *     1; what is left to 1 stays open. One parameter for each label set; sets without one are left
+                 *     open. `performer` is short for the label set of that name. Since 3.1.0.
                  * @example [
                  *       "performer=tall"
                  *     ]
@@ -3786,7 +3816,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "3.2.0";
+export const CONTRACT = "3.3.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -4024,6 +4054,7 @@ export const KEYS = {
     "seconds",
     "fps",
     "seed",
+    "labels",
     "level",
     "camera",
     "fov",

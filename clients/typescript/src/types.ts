@@ -25,8 +25,9 @@ export type CrowdQuestion = Asked<Schemas["CrowdQuestion"], "controls" | "time">
 export type SigmaQuestion = Asked<Schemas["SigmaQuestion"], "across" | "along">;
 export type WhyQuestion = Asked<Schemas["WhyQuestion"], "controls">;
 
-/** Characters that walk; the camera as three numbers, m. */
-export type WalkQuestion = Omit<Walk, "camera"> & {
+/** Characters that walk; the camera as three numbers, m, and labels of all of them by label set. */
+export type WalkQuestion = Omit<Walk, "camera" | "label"> & {
+  readonly labels?: Schemas["Labels"];
   readonly camera?: readonly [x: number, y: number, z: number];
 };
 

@@ -34,6 +34,16 @@ test("a file that is cut while something compresses it is broken", async () => {
   });
 });
 
+test("walkers have the labels that are asked for", async () => {
+  const { client, sent } = observed();
+  const labels = { performer: { ann: 0.75, ben: 0.25 } };
+  await client.crowdFile("walk", "usda", { count: 2, seconds: 0.2, labels });
+  const asked = new URL(sent[0]!.path, "http://any").searchParams;
+  assert.equal(asked.get("label"), "performer=ann:0.75,ben:0.25");
+  const wrong = { labels: { performer: "bob" } };
+  await assert.rejects(client.crowdFile("walk", "usda", wrong), /'bob', expected one of ann, ben/);
+});
+
 test("files are asked for as they are, documents and poses in any coding", async () => {
   const { client, sent } = observed();
   const controls = await defaults(client);

@@ -1,7 +1,7 @@
 """Order of a walking crowd: validated parameters, and the crowd they result in."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from posefield.locomotion.level_transitions import LevelSchedule
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.routes import Route
 from posefield.motion.crowd_clip import CrowdClip
+from posefield.question.motion_question import LabelValue
 from posefield.question.walk_question import DEFAULT_FOV, DEFAULT_HEIGHT, WalkQuestion
 
 MAX_CHARACTERS = 1_000_000
@@ -29,6 +30,7 @@ class CrowdOrder:
     motions: number of distinct motions that the characters share, None for one each. seconds:
     duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
     if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
+    labels: name or weights of all characters by label set.
     """
 
     count: int
@@ -40,6 +42,7 @@ class CrowdOrder:
     level: int | None = None
     camera: Camera | None = None
     pixels: float = DEFAULT_PIXELS
+    labels: Mapping[str, LabelValue] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MAX_CHARACTERS:
@@ -75,6 +78,7 @@ def from_question(asked: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrd
         level=asked.level,
         camera=camera,
         pixels=DEFAULT_PIXELS if asked.pixels is None else asked.pixels,
+        labels=asked.labels,
     )
 
 
@@ -83,6 +87,7 @@ def build_crowd(model: NamedModel, gait: Gait, order: CrowdOrder) -> CrowdClip:
 
     Raises InvalidField for parameters that the model or the limits do not permit.
     """
+    gait = gait.with_labels(order.labels)
     plan = _build_plan(gait, order)
     return _build_motions(gait, plan, _build_schedule(model, plan, order), order)
 

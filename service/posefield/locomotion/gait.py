@@ -4,7 +4,8 @@ Names and units of controls are the recipe's, so their effect is measured on the
 speed and rate of turning.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -13,8 +14,10 @@ from posefield.common.array_shapes import PerClip, PerPoint, PointControls
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.inference.session import Session
-from posefield.locomotion import gait_region, stride
+from posefield.locomotion import gait_region, stride, walker_labels
 from posefield.locomotion.gait_region import GaitRegion
+from posefield.locomotion.walker_labels import WalkerLabels
+from posefield.question.motion_question import LabelValue
 
 # A lower speed does not count as travel, and speeds closer than this count as equal, m/s.
 MIN_SPEED = 0.05
@@ -29,7 +32,7 @@ class Gait:
     rates: (N, 2), speed, m/s, and rate of turning, rad/s, of each captured clip as the model
     synthesises it. slopes: (3, d), regression of controls on 1 and rates. performer_offsets: (p +
     1, d), mean residual of each performer; zeros at the end, for an unseen performer. region:
-    convex hull of the rates, extended by walking straight at all speeds.
+    convex hull of the rates, extended by walking straight at all speeds. labels: of walkers.
     """
 
     session: Session
@@ -37,6 +40,14 @@ class Gait:
     slopes: Annotated[Floats, "3 controls"]
     performer_offsets: Annotated[Floats, "offsets controls"]
     region: GaitRegion
+    labels: WalkerLabels
+
+    def with_labels(self, asked: Mapping[str, LabelValue]) -> "Gait":
+        """Return the gait of walkers with requested labels, by label set.
+
+        Raises InvalidField for a label that the model does not have, and for invalid weights.
+        """
+        return replace(self, labels=walker_labels.requested_labels(self.session.card, asked))
 
     def mean_controls(
         self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
@@ -53,7 +64,7 @@ class Gait:
         self, speeds: PerPoint, turning: PerPoint, who: Annotated[Indices, "points"]
     ) -> PointControls:
         """Return the controls (K, d), along the regression, that lead to these rates."""
-        labels = stride.RowLabels(self.session, who)
+        labels = stride.RowLabels(self.labels.weights, who)
         speed, turn = speeds, turning
         for _ in range(ITERATIONS):
             done = stride.strides(self.session, self.mean_controls(speed, turn, who), labels)
@@ -80,9 +91,8 @@ def fit_gait(session: Session) -> Gait:
     manners = mean_residuals(
         controls - _design_matrix(*rates.T) @ slopes, who, len(stride.label_rows(card))
     )
-    return Gait(
-        session, rates, slopes, manners, gait_region.convex_hull(_add_straight_rates(rates))
-    )
+    region = gait_region.convex_hull(_add_straight_rates(rates))
+    return Gait(session, rates, slopes, manners, region, walker_labels.captured_labels(card))
 
 
 def _check_speeds(name: str, speeds: PerClip) -> None:

@@ -18,6 +18,7 @@ from posefield.locomotion.floor_plane import FloorVectors
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.paths import POINT_SPACING, Paths
 from posefield.locomotion.stride import RelativePoses, Strides
+from posefield.locomotion.walker_labels import WalkerLabels
 
 Numbers = TypeVar("Numbers", Floats, FloorVectors)
 
@@ -26,9 +27,9 @@ Numbers = TypeVar("Numbers", Floats, FloorVectors)
 class LocomotionPlan:
     """Locomotion of N characters at F frames, without their poses.
 
-    controls: (N, F, d). who: (N,), labels by index in `stride.label_rows` or -1. phases: (N, F), of
-    the cycle, in [0, 1). places: (N, F) and headings: (N, F), rad, of the frames that travel with
-    the characters. rate: frames a second.
+    controls: (N, F, d). who: (N,), index into `labels`. phases: (N, F), of the cycle, in [0, 1).
+    places: (N, F) and headings: (N, F), rad, of the frames that travel with the characters. rate:
+    frames a second.
     """
 
     controls: Annotated[Floats, "characters frames controls"]
@@ -37,6 +38,7 @@ class LocomotionPlan:
     places: Annotated[FloorVectors, "characters frames"]
     headings: CharacterFrames
     rate: float
+    labels: WalkerLabels
 
     @property
     def roots(self) -> Annotated[Floats, "characters frames 3"]:
@@ -68,7 +70,8 @@ def plan_from_controls(
     headings = starts[1][:, None] + _cumulative_sums(turns)
     steps = floor_plane.unit_vectors(headings[:, :-1]) * floor_plane.arc_displacement(ways, turns)
     places = starts[0][:, None] + _cumulative_sums(steps)
-    return LocomotionPlan(controls, who, _phases(own, phases, rate), places, headings, rate)
+    began = _phases(own, phases, rate)
+    return LocomotionPlan(controls, who, began, places, headings, rate, gait.labels)
 
 
 def plan_along_paths(
@@ -88,16 +91,15 @@ def plan_along_paths(
     everyone = np.repeat(who, known[1])
     turning = (paths.speeds * paths.curvatures).ravel()
     wanted = gait.controls(paths.speeds.ravel(), turning, everyone)
-    labels = stride.RowLabels(gait.session, everyone)
+    labels = stride.RowLabels(gait.labels.weights, everyone)
     speeds = stride.strides(gait.session, wanted, labels).speeds.reshape(known)
     gone = _distances(speeds, frames, rate)
     _check_path_lengths(paths, gone, (frames - 1) / rate)
     controls = paths.interpolate(wanted.reshape(*known, -1), gone)
     own = _measure_strides(gait, controls, who)
     places, tangents = paths.at(gone)
-    return LocomotionPlan(
-        controls, who, _phases(own, phases, rate), places, tangents - own.drifts, rate
-    )
+    headings, began = tangents - own.drifts, _phases(own, phases, rate)
+    return LocomotionPlan(controls, who, began, places, headings, rate, gait.labels)
 
 
 def synthesize_poses(
@@ -108,11 +110,9 @@ def synthesize_poses(
     level: int = 0,
 ) -> RelativePoses:
     """Return the poses of K pairs of a character (K,) and a frame (K,) of the plan."""
-    performers = stride.labels(session, plan.who[who])
+    labels = plan.labels.weights[plan.who[who]]
     pair = who, frames
-    own = stride.synthesize_poses(
-        session, plan.controls[pair], performers, plan.phases[pair], level
-    )
+    own = stride.synthesize_poses(session, plan.controls[pair], labels, plan.phases[pair], level)
     headings = plan.headings[pair]
     places = plan.places[pair] + own.places * floor_plane.unit_vectors(headings)
     return RelativePoses(floor_plane.turn_roots(own.rotations, headings), own.heights, places)
@@ -125,7 +125,7 @@ def _measure_strides(
 ) -> Strides:
     """Return the cycles of controls (N, F, d), with fields (N, F)."""
     frames = controls.shape[:2]
-    labels = stride.RowLabels(gait.session, np.repeat(who, frames[1]))
+    labels = stride.RowLabels(gait.labels.weights, np.repeat(who, frames[1]))
     own = stride.strides(gait.session, controls.reshape(-1, controls.shape[2]), labels)
     return Strides(*(value.reshape(frames) for value in vars(own).values()))
 

@@ -44,9 +44,7 @@ class Characters:
 def draw_characters(gait: Gait, count: int, seed: int) -> Characters:
     """Return the characters of a seed."""
     table = _random_table(count, seed)
-    performers = len(stride.label_rows(gait.session.card))
-    who = (table[:, 0] * performers).astype(np.int64) if performers else np.full(count, -1)
-    return Characters(who, table[:, 1], table[:, 2:])
+    return Characters(gait.labels.draw(table[:, 0]), table[:, 1], table[:, 2:])
 
 
 def initial_placement(count: int, seed: int) -> Placement:

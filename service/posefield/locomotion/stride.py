@@ -59,15 +59,15 @@ class Strides:
 class RowLabels:
     """Weights (B, p) of the labels of performers (B,), computed for the requested rows.
 
-    who: labels by index in `label_rows`, -1 for open ones. All rows at once would take more memory
-    than the rest of a plan.
+    weights: (K, p), of K combinations of labels. who: (B,), combination by index. All rows at once
+    would take more memory than the rest of a plan.
     """
 
-    session: Session
+    weights: Annotated[Floats, "combinations labels"]
     who: Annotated[Indices, "points"]
 
     def __getitem__(self, rows: slice) -> Annotated[Floats, "rows labels"]:
-        return labels(self.session, self.who[rows])
+        return self.weights[self.who[rows]]
 
 
 @dataclass(frozen=True)
@@ -175,10 +175,14 @@ def labels(
     session: Session, who: Annotated[Indices, "*batch"]
 ) -> Annotated[Floats, "*batch labels"]:
     """Return the weights (..., p) of labels by index in `label_rows`; all zero for -1."""
-    card = session.card
+    return label_table(session.card)[who]
+
+
+def label_table(card: ModelCard) -> Annotated[Floats, "combinations labels"]:
+    """Return the weights (K + 1, p) of the labels of `label_rows`, with zeros at the end."""
     weights = card.clip_labels
     captured = weights[_first_clips(card)[0]] if card.labels else weights[:0]
-    return np.vstack([captured, np.zeros(weights.shape[1])])[who]
+    return np.vstack([captured, np.zeros(weights.shape[1])])
 
 
 def _first_clips(card: ModelCard) -> tuple[Indices, Annotated[Indices, "clips"]]:

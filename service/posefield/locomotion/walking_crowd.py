@@ -23,7 +23,7 @@ from posefield.locomotion.level_transitions import LevelSchedule
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.routes import Route
 from posefield.locomotion.stride import RelativePoses
-from posefield.model_file.model_card import PERFORMER, ModelCard
+from posefield.model_file.model_card import ModelCard
 from posefield.motion import blend, foot_skate, skeleton
 from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 
@@ -124,17 +124,9 @@ def _facts(session: Session, plan: LocomotionPlan) -> dict[str, Any]:
     card = session.card
     return {
         "model": f"{card.name}@{session.digest}",
-        **_labels(card, plan),
+        **plan.labels.facts(plan.who),
         "outside_share": _outside_share(card, plan),
     }
-
-
-def _labels(card: ModelCard, plan: LocomotionPlan) -> dict[str, Any]:
-    """Return the performer of each character, and its names in further label sets."""
-    captured = stride.label_rows(card)
-    found = {own.name: [captured[who][own.name] for who in plan.who] for own in card.labels}
-    performers = found.pop(PERFORMER, [None] * len(plan.who))
-    return {"performers": performers} | ({"labels": found} if found else {})
 
 
 def _level_shares(session: Session, shown: LevelSchedule) -> list[float]:
@@ -172,7 +164,7 @@ def motions(
         roots[rows] = floor_plane.at_height(posed.places, posed.heights)
     # Bone lengths must not vary with the speed: they are those at the mean controls.
     usual = plan.controls[who].mean(axis=1)
-    bones = stride.bones(session, usual, stride.labels(session, plan.who[who]))
+    bones = stride.bones(session, usual, plan.labels.weights[plan.who[who]])
     turns = rotations.reshape(*shape, joints, 4)
     return Motions(turns, roots.reshape(*shape, 3), bones, shown.levels)
 

@@ -7,6 +7,7 @@ from msgspec import Meta, Struct
 
 from posefield.common.errors import InvalidField
 from posefield.question.body_kind import Body
+from posefield.question.motion_question import LabelValue
 
 Instancing = Literal["references", "scenegraph", "flatten"]
 DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
@@ -28,6 +29,14 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     seconds: Annotated[float, Meta(description="duration, s", extra={"unit": "s"})] = 5.0
     fps: Annotated[float, Meta(description="frame rate, frames a second")] = 30.0
     seed: Annotated[int, Meta(description="seed of all random numbers")] = 0
+    labels: Annotated[
+        dict[str, LabelValue],
+        Meta(
+            description="name of all characters in a label set such as style, or weights of names "
+            "(angry:0.7,happy:0.3); in other sets each has captured names; may be repeated",
+            extra={"word": "label", "metavar": "SET=NAME"},
+        ),
+    ] = {}
     level: Annotated[
         int | None,
         Meta(description="level of detail; 0 is the finest; default: 0"),

@@ -45,6 +45,8 @@ def test_labels_are_a_parameter_each_and_weights_a_list():
     style, who = (("label", text) for text in ("style=angry:0.75,happy:0.25", "performer=kim"))
     assert parse_qsl(urlsplit(found).query) == [("time", "0"), style, who]
     assert parse_qsl(urlsplit(target(questions.suggest("m", labels=labels))).query) == [style, who]
+    walk = files.walk("m", count=3, labels=labels).request("usdc").target
+    assert parse_qsl(urlsplit(walk).query) == [("count", "3"), style, who]
     asked = questions.why("m", labels=labels, nearest=3)
     assert [*parse_qsl(urlsplit(target(asked)).query)][-2:] == [style, who]
     body = msgspec.json.decode(files.crowd("m", 0, labels=labels).request("npz").body)

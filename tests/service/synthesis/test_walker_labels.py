@@ -1,0 +1,156 @@
+"""Tests of the labels of walking crowds: by name and by weights, for each label set."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.locomotion import (
+    gait,
+    level_transitions,
+    random_paths,
+    stride,
+    walker_labels,
+    walking_crowd,
+)
+from posefield.motion import skeleton
+
+RATE, COUNT = 30.0, 60
+MIXED = {"style": {"marching": 0.7, "sneaking": 0.3}}
+
+
+@pytest.fixture(scope="module")
+def own(styled_path):
+    return gait.fit_gait(session.load(styled_path))
+
+
+def made(own, asked, count=COUNT, seed=3):
+    """Facts and motions of a crowd with labels, one second long."""
+    labelled = own.with_labels(asked)
+    plan = walking_crowd.plan_random(labelled, count, 1.0, RATE, seed)
+    shown = level_transitions.constant_schedule(0, plan.phases.shape)
+    crowd = walking_crowd.build_crowd(own.session, plan, shown)
+    return crowd.facts, np.concatenate([each.rotations for each in crowd.batches])
+
+
+def test_without_labels_the_crowd_is_the_same(own):
+    facts, rotations = made(own, {})
+    plan = walking_crowd.plan_random(own, COUNT, 1.0, RATE, 3)
+    shown = level_transitions.constant_schedule(0, plan.phases.shape)
+    crowd = walking_crowd.build_crowd(own.session, plan, shown)
+    assert facts == crowd.facts
+    assert np.array_equal(rotations, np.concatenate([each.rotations for each in crowd.batches]))
+    assert set(facts["performers"]) == {"ann", "ben"}
+    assert set(facts["labels"]["style"]) == {"plain", "marching", "sneaking"}
+
+
+def test_a_name_holds_for_all_and_the_other_sets_vary(own):
+    facts, _ = made(own, {"style": "marching"})
+    assert facts["labels"] == {"style": ["marching"] * COUNT}
+    assert set(facts["performers"]) == {"ann", "ben"}
+    facts, _ = made(own, {"performer": "ben"})
+    assert facts["performers"] == ["ben"] * COUNT
+    assert set(facts["labels"]["style"]) == {"plain", "marching", "sneaking"}
+
+
+def test_walkers_with_a_captured_combination_move_as_that_combination(own):
+    """A walker that draws a combination moves as one that is asked for it by name."""
+    asked = {"performer": "ann", "style": "sneaking"}
+    labelled = own.with_labels(asked)
+    row = stride.label_rows(own.session.card).index(asked)
+    drawn = random_paths.draw_characters(labelled, COUNT, 3)
+    assert set(drawn.who) == {row}
+    assert np.array_equal(labelled.labels.weights[row], own.labels.weights[row])
+    # Other combinations have these labels, too, so that they were asked for whatever is drawn.
+    assert (labelled.labels.weights[:-1] == own.labels.weights[row]).all()
+    assert not (own.labels.weights[:-1] == own.labels.weights[row]).all(axis=1).all()
+
+
+def test_marching_lifts_the_feet_and_a_mixture_lies_between(own):
+    """The highest foot of each style, and of the mixture, at the same speeds."""
+    lifted = {}
+    for name in ("marching", "sneaking"):
+        lifted[name] = feet(own, {"style": name})
+    between = feet(own, MIXED)
+    assert lifted["sneaking"] + 0.02 < between < lifted["marching"] - 0.02
+
+
+def feet(own, asked):
+    """Mean over the walkers of the highest point of a foot, m."""
+    labelled = own.with_labels(asked)
+    card = own.session.card
+    weights = labelled.labels.weights[:1].repeat(21, axis=0)
+    controls = np.tile([control.default for control in card.controls], (21, 1))
+    phases = np.linspace(0.0, 1.0, 21)
+    poses = stride.synthesize_poses(own.session, controls, weights, phases)
+    bones = stride.bones(own.session, controls[:1], weights[:1])[0]
+    offsets = np.tile(bones.astype(float), (21, 1, 1))
+    offsets[:, 0] = 0.0
+    offsets[:, 0, 1] = poses.heights
+    joints = skeleton.positions(card.skeleton.parents, poses.rotations, offsets)
+    return float(joints[:, list(card.feet), 1].max())
+
+
+def test_a_mixture_draws_its_names_by_their_weights(own):
+    labelled = own.with_labels(MIXED)
+    drawn = random_paths.draw_characters(labelled, 4000, 5).who
+    styles = np.array([labelled.labels.rows[who]["style"] for who in drawn])
+    assert np.mean(styles == "marching") == pytest.approx(0.7, abs=0.03)
+    assert not np.any(styles == "plain")
+    # Without a request all styles are as frequent.
+    free = random_paths.draw_characters(own, 4000, 5).who
+    assert np.mean([own.labels.rows[who]["style"] == "plain" for who in free]) > 0.3
+    facts, _ = made(own, MIXED, count=2)
+    assert facts["labels"] == {"style": [MIXED["style"]] * 2}
+
+
+def test_a_mixture_of_performers_is_among_the_labels(own):
+    facts, _ = made(own, {"performer": {"ann": 0.5, "ben": 0.5}}, count=2)
+    assert facts["performers"] == [None, None]
+    assert facts["labels"]["performer"] == [{"ann": 0.5, "ben": 0.5}] * 2
+
+
+def test_a_combination_that_was_not_captured_has_clips_of_either_label(own):
+    rows = [row for row in own.labels.rows if row != {"performer": "ann", "style": "marching"}]
+    fewer = dataclasses.replace(own.labels, rows=tuple(rows), shares=np.ones(len(rows)))
+    assert len(rows) == 5
+    parts = np.array(
+        [
+            [float(row[name] == label) for row in rows]
+            for name, label in (("performer", "ann"), ("style", "marching"))
+        ]
+    )
+    shares = walker_labels.combination_shares(parts)
+    drawn = dataclasses.replace(fewer, shares=shares).draw(
+        np.linspace(0.0, 1.0, 50, endpoint=False)
+    )
+    found = {tuple(rows[who].values()) for who in drawn}
+    assert found == {("ann", "plain"), ("ann", "sneaking"), ("ben", "marching")}
+
+
+def test_the_largest_number_draws_a_combination_with_a_share(own):
+    last = dataclasses.replace(own.labels, shares=np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.0]))
+    assert last.draw(np.array([0.0, np.nextafter(1.0, 0.0)])).tolist() == [0, 3]
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"style": "marchng"}, "labels/style: 'marchng' (did you mean 'marching'?), expected"),
+        ({"mood": "glad"}, "labels/mood: 'mood', expected one of the label sets performer, style"),
+        ({"style": {"marching": 0.7, "plain": 0.7}}, "labels/style: weights with a sum of 1.4"),
+        ({"style": {"plain": 0.0}}, "labels/style: weights with a sum of 0"),
+    ],
+)
+def test_labels_that_the_model_does_not_have_are_refused(own, asked, said):
+    with pytest.raises(InvalidField, match=re.escape(said)):
+        own.with_labels(asked)
+
+
+def test_a_model_without_label_sets_refuses_every_label(model_file):
+    reaching = session.load(model_file("reaching")).card
+    with pytest.raises(InvalidField, match="this model has none"):
+        walker_labels.requested_labels(reaching, {"style": "plain"})
