@@ -1,6 +1,10 @@
 """Prints what posefield is measured by and writes build/bench.json.
 
     make bench
+    .venv/bin/python benchmarks/bench.py --record
+
+With --record it also writes the files of docs/results/speed that the page on speed is made of; run
+docs/generate.py afterwards.
 
 Needs wrk, which Debian has. Every ratio compares two things timed in turn in this one run; a row's
 baseline says in words what it is compared with. Medians, one thread inside onnxruntime; the whole
@@ -28,7 +32,7 @@ import serve_growth
 import serve_models
 import serve_rivals
 from paper import bench_rows, markdown, measurement
-from rows import Row, table, write
+from rows import record, table, write
 
 ROOT = Path(__file__).parents[1]
 
@@ -41,26 +45,35 @@ def main() -> None:
     print(markdown.text(table1), end="\n\n")
     model = ROOT / "build/bench/reaching.onnx"
     model.write_bytes(made.exported.content)
-    rows: list[Row] = [
-        *bench_rows.library_rows(made),
-        *runtime.rows(made),
-        *exact.rows(made),
-        *export_formats.rows(made),
-        *crowd.rows(made),
-        *crowd_usd.rows(),
-        *export.rows(model),
-        *export_cluster.rows(model),
-        *clips_http.rows(made),
-        *serve.rows(model),
-        *serve_rivals.rows(model),
-        *serve_models.rows(model),
-        *serve_growth.rows(model),
-        *client.rows(model),
-        *export_usd.rows(),
-        *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
-    ]
+    tables = {
+        "training": [
+            *bench_rows.library_rows(made),
+            *runtime.rows(made),
+            *exact.rows(made),
+            *newcomer.rows(ROOT, from_nothing="--no-install" not in sys.argv),
+        ],
+        "crowds": [*crowd.rows(made), *crowd_usd.rows()],
+        "files": [
+            *export_formats.rows(made),
+            *export.rows(model),
+            *export_cluster.rows(model),
+            *export_usd.rows(),
+        ],
+        "requests": [
+            *clips_http.rows(made),
+            *serve.rows(model),
+            *serve_rivals.rows(model),
+            *serve_models.rows(model),
+            *serve_growth.rows(model),
+            *client.rows(model),
+        ],
+    }
+    rows = [row for each in tables.values() for row in each]
     print(table(rows))
+    tables["training"] = [*bench_rows.rows(table1), *tables["training"]]
     write([*bench_rows.rows(table1), *rows], ROOT / "build/bench.json")
+    if "--record" in sys.argv:
+        record(tables, "python benchmarks/bench.py --record", ROOT / "docs/results/speed")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,10 @@
 """Rows of the benchmark's table."""
 
 import json
+import platform
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 
@@ -40,5 +43,18 @@ def table(rows: list[Row]) -> str:
 def write(rows: list[Row], path: Path) -> None:
     """The rows as JSON: a list of objects."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    listed = [{**asdict(row), "met": row.met} for row in rows]
-    path.write_text(json.dumps(listed, indent=2) + "\n")
+    path.write_text(json.dumps(_plain(rows), indent=2) + "\n")
+
+
+def record(tables: Mapping[str, list[Row]], command: str, folder: Path) -> None:
+    """Write the rows of tables of the documentation, a file NAME.json each, with their origin."""
+    machine = f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}"
+    day = f"{datetime.now(UTC):%Y-%m-%d}"
+    for name, rows in tables.items():
+        found = {"command": command, "date": day, "machine": machine, "rows": _plain(rows)}
+        text = json.dumps(found, indent=1, ensure_ascii=False)
+        (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+
+
+def _plain(rows: list[Row]) -> list[dict[str, object]]:
+    return [{**asdict(row), "met": row.met} for row in rows]

@@ -7,10 +7,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import measured_tables
 import yaml
 from evaluation_tables import transcribed
 from page_parts import code, page, table
-from result_tables import REMARKS, TABLES
+from result_tables import ORIGINS, REMARKS, TABLES
 
 ROOT = Path(__file__).resolve().parents[1]
 SCHEMA = ROOT / "model_export/posefield_train/recipes/recipe.schema.json"
@@ -171,14 +172,15 @@ def results(name: str) -> str:
     """Return a page of measured results."""
     found = json.loads((ROOT / f"docs/results/{name}.json").read_text(encoding="utf-8"))
     parts = [found["intro"], f"Measured: {found['measured']}. Machine: {found['machine']}."]
-    if any("from" in each for each in found["tables"]) and (said := transcribed()):
+    if any(each["from"] not in ORIGINS for each in found["tables"]) and (said := transcribed()):
         parts.append(said)
     for each in found["tables"]:
         parts.append(f"## {each['title']}")
         parts += [each["about"]] if each["about"] else []
-        columns, rows = TABLES[each["from"]]() if "from" in each else (each["columns"], ())
-        parts.append(table(columns, [*rows, *each["rows"]]))
-        made = [REMARKS[each["from"]]()] if each.get("from") in REMARKS else []
+        if each["from"] in ORIGINS:
+            parts.append(measured_tables.origin(ORIGINS[each["from"]]))
+        parts.append(table(*TABLES[each["from"]]()))
+        made = [REMARKS[each["from"]]()] if each["from"] in REMARKS else []
         if remarks := [*made, *each["remarks"]]:
             parts.append("\n".join(f"- {remark}" for remark in remarks))
     return page(found["title"], f"docs/results/{name}.json", parts)

@@ -1,11 +1,14 @@
 """Tables of results by the name that a file of docs/results refers to them by."""
 
 from collections.abc import Callable
+from itertools import chain
 
 import equal_tables
 import evaluation_tables as tables
+import measured_tables
 from evaluation_tables import Rows, known_performer, new_performer
 
+SPEED = tuple(f"speed/{name}" for name in ("training", "requests", "viewer", "crowds", "files"))
 TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "equal_known": lambda: (equal_tables.BEST_COLUMNS, equal_tables.best("known")),
     "equal_open": lambda: (equal_tables.BEST_COLUMNS, equal_tables.best("open")),
@@ -37,13 +40,26 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     ),
     "support": lambda: (
         ["family", "false alarms", tables.BEYOND, "in the gap"],
-        tables.support(),
+        chain(tables.support(), measured_tables.joined()),
     ),
+    "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
+    "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
+    "learning": measured_tables.learning,
+    **{
+        name: lambda name=name: (measured_tables.SPEED_COLUMNS, measured_tables.speed(name))
+        for name in SPEED
+    },
 }
 """Columns and rows of each table."""
 
 REMARKS: dict[str, Callable[[], str]] = {
     "equal_known": lambda: equal_tables.counts("known"),
     "equal_open": lambda: equal_tables.counts("open"),
+    "learning": measured_tables.learning_remark,
 }
 """A sentence made of the rows of a table, for some of them."""
+
+ORIGINS: dict[str, str] = {"recipes": "models", "levels": "models", "learning": "learning"} | {
+    name: name for name in SPEED
+}
+"""File of docs/results that names the command and the date of a table's figures."""

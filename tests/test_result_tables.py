@@ -1,16 +1,21 @@
 """Tests of the tables of results: equal information, pooled rows, and families without a file."""
 
 import json
+import re
 import sys
 from pathlib import Path
 
 import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
-sys.path.insert(0, str(DOCS))
+sys.path[:0] = [str(DOCS), str(DOCS.parent / "benchmarks")]
 
 import equal_tables  # noqa: E402
 import evaluation_tables  # noqa: E402
+import measure_models  # noqa: E402
+import measured_tables  # noqa: E402
+import result_tables  # noqa: E402
+from rows import Row, record  # noqa: E402
 
 
 def row(ours, theirs, error, verdict, peer="gp"):
@@ -85,3 +90,99 @@ def test_calibration_has_a_column_for_each_family(folder):
 def test_what_is_not_measured_is_said(folder, monkeypatch):
     monkeypatch.setattr(evaluation_tables, "ALL_FAMILIES", {"one": "first", "three": "third"})
     assert evaluation_tables.transcribed() == "Not measured yet: third."
+
+
+PAGES = ("quality", "speed", "targets", "support")
+
+
+def tables(name):
+    return json.loads((DOCS / f"results/{name}.json").read_text())["tables"]
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_table_of_a_page_is_made_of_a_file(name):
+    """A page's own file names tables, and has neither rows nor columns."""
+    for each in tables(name):
+        assert set(each) == {"title", "about", "from", "remarks"}
+        assert each["from"] in result_tables.TABLES
+
+
+@pytest.mark.parametrize("name", sorted(set(result_tables.ORIGINS.values()) | {"joined"}))
+def test_every_figure_has_an_origin(name):
+    found = json.loads((DOCS / f"results/{name}.json").read_text())
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d(/\d{4}-\d\d-\d\d)?", found["date"])
+    assert found["machine"]
+    # Commands of this project, whose files are there.
+    words = found["command"].split()
+    scripts = [word for word in words if word.endswith((".py", ".ts"))]
+    assert words[0] == "posefield" or all((DOCS.parent / each).exists() for each in scripts)
+
+
+FIGURE = re.compile(r"\d[\d,]*(?:\.\d+)?")
+
+
+@pytest.mark.parametrize("name", ["recipes", "levels", "learning", *result_tables.SPEED])
+def test_every_cell_of_a_measured_table_is_from_its_file(name, tmp_path, monkeypatch):
+    """A table shows other figures where its file has others."""
+    columns, rows = result_tables.TABLES[name]()
+    before = [columns, *rows]
+    source = result_tables.ORIGINS[name]
+    found = json.loads((DOCS / f"results/{source}.json").read_text())
+    (tmp_path / "speed").mkdir()
+    (tmp_path / f"{source}.json").write_text(json.dumps(scaled(found)))
+    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
+    columns, rows = result_tables.TABLES[name]()
+    changed = zip(before, [columns, *rows], strict=True)
+    # The first column names the row, and that of baselines has words of the file.
+    cells = [pair for old, new in changed for pair in [*zip(old, new, strict=True)][1:]]
+    words = {row.get("baseline") for row in found.get("rows", [])}
+    shown = [pair for pair in cells if FIGURE.match(pair[0]) and pair[0] not in words]
+    # 0 stays 0 when it is scaled.
+    assert shown and [old for old, new in shown if old == new and not old.startswith("0 ")] == []
+
+
+def test_the_words_of_a_table_of_speed_are_those_of_its_file():
+    for name in result_tables.SPEED:
+        rows = measured_tables.read(name)["rows"]
+        shown = list(measured_tables.speed(name))
+        assert [each[0] for each in shown if each[0] != "the same"] == list(
+            dict.fromkeys(row["name"] for row in rows)
+        )
+        assert [each[2] for each in shown] == [row["baseline"] for row in rows]
+
+
+def scaled(node):
+    """A file whose numbers are seven times as large, and whose words are the same."""
+    if isinstance(node, dict):
+        return {key: scaled(value) for key, value in node.items()}
+    if isinstance(node, list):
+        return [scaled(each) for each in node]
+    is_number = isinstance(node, int | float) and not isinstance(node, bool)
+    return 7 * node if is_number else node
+
+
+def test_rows_are_told_with_their_verdict_and_a_subject_once(tmp_path, monkeypatch):
+    (tmp_path / "speed").mkdir()
+    made = [
+        Row("a pose", 2.0, "µs", "ours before", 4.54, 5.0),
+        Row("a pose", 2.0, "µs", "theirs", 12.8, 5.0),
+        Row("clips", 1330.0, "clips/s", "", None, 1000.0),
+    ]
+    record({"training": made}, "python benchmarks/bench.py --record", tmp_path / "speed")
+    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
+    assert list(measured_tables.speed("speed/training")) == [
+        ["a pose", "2 µs", "ours before", "4.54", "5 times, **missed**"],
+        ["the same", "", "theirs", "12.8", "5 times, met"],
+        ["clips", "1,330 clips/s", "", "", "1,000 clips/s, **missed**"],
+    ]
+    assert measured_tables.origin("speed/training").startswith(
+        "Measured by `python benchmarks/bench.py --record`, 20"
+    )
+
+
+def test_the_figures_of_models_are_those_of_the_shipped_files():
+    """After a training: docs/measure_models.py, then docs/generate.py."""
+    found = {each["name"]: each for each in measured_tables.read("models")["models"]}
+    for file in (DOCS.parent / "service/posefield/shipped").glob("*.onnx"):
+        own = measure_models.figures(file)
+        assert json.loads(json.dumps(own)) == found[own["name"]]

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from posefield.common.errors import RecipeError
 from posefield_train.evaluate import learning_curves
 from posefield_train.evaluate.learning_curves import CHANCE, SUGGESTED, Learning
 from posefield_train.sample import sample_family, sample_files
+from posefield_train.sample.sample_family import SampleTrial
 from posefield_train.source import ingest, recipe
 
 SIZES = (40, 60, 80, 100)
@@ -54,6 +56,19 @@ def test_it_is_told_as_a_table_and_as_figures():
     }
     assert facts["trials"] == 2
     assert facts["samples"] == list(SIZES)
+
+
+def test_samples_of_a_trial_are_a_family_and_each_stature_is_a_performer(tmp_path):
+    """Bodies differ with the stature, and one performer has one body."""
+    rng = np.random.Generator(np.random.PCG64(1))
+    points = [[stature, 0.8, turn, 1.1] for stature in (1.65, 1.85) for turn in range(5)]
+    made = [learning_curves.noisy_sample(point, rng) for point in points]
+    file = sample_files.write_family(tmp_path / "drawn", made)
+    assert len(ingest.ingest(recipe.read(file), file.parent)[0]) == 10
+    alike = [SampleTrial("somebody", each.controls, each.clip) for each in made]
+    file = sample_files.write_family(tmp_path / "alike", alike)
+    with pytest.raises(RecipeError, match="two performers under the name"):
+        ingest.ingest(recipe.read(file), file.parent)
 
 
 def test_samples_of_ones_own_are_a_family(tmp_path):

@@ -120,7 +120,8 @@ def _sample_orders(seed: int) -> dict[str, list[SampleTrial]]:
         way: [candidates[i].tolist() for i in order[: END - START]] for way, order in ways.items()
     }
     return {
-        way: [*first, *(_sample(point, rng) for point in points)] for way, points in added.items()
+        way: [*first, *(noisy_sample(point, rng) for point in points)]
+        for way, points in added.items()
     }
 
 
@@ -135,9 +136,11 @@ def _control_row(own: SampleControls) -> list[float]:
     return [own.stature, own.hip_height, own.turn, own.target_height]
 
 
-def _sample(point: list[float], rng: np.random.Generator) -> SampleTrial:
+def noisy_sample(point: list[float], rng: np.random.Generator) -> SampleTrial:
+    """Return a noisy sample at controls (4,); each stature is a performer of its own."""
     rounded = SampleControls(*(round(value, 4) for value in point))
-    return SampleTrial("somebody", rounded, sample_family.noisy_trial(rounded, rng))
+    performer = f"of {rounded.stature} m"
+    return SampleTrial(performer, rounded, sample_family.noisy_trial(rounded, rng))
 
 
 def _trained_error(

@@ -1,0 +1,158 @@
+"""Tables of figures that a command has measured and written to a file of docs/results.
+
+Files of `speed` hold rows as benchmarks/rows.py writes them; `models.json` is by
+docs/measure_models.py, `learning.json` by docs/measure_learning.py, and `joined.json` holds what
+`posefield evaluate --joined` prints. Each file names the command,
+the date and the machine of its figures.
+"""
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).parent / "results"
+SPEED_COLUMNS = ["subject", "value", "baseline", "ratio", "goal"]
+RECIPE_COLUMNS = [
+    "recipe",
+    "clips",
+    "file",
+    "motion is stored in",
+    "truncation cost, cm",
+    "distance of a left-out clip, cm",
+]
+LEVEL_COLUMNS = [
+    "level",
+    "ranks",
+    "clips used",
+    "numbers",
+    "multiply-adds per pose",
+    "error (RMS)",
+    "worst pose",
+    "below a pixel from",
+]
+PIXELS, FIELD = 1080, math.pi / 3.0
+"""Height of the image, pixels, and vertical field of view, rad, for the distance of a level."""
+LEVELS_OF = "cmu_walk"
+Rows = Iterator[list[str]]
+Found = dict[str, Any]
+
+
+def read(name: str) -> Found:
+    """Return the content of a file of docs/results."""
+    found: Found = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
+    return found
+
+
+def origin(name: str) -> str:
+    """Return a sentence on the command, the date and the machine of a file's figures."""
+    found = read(name)
+    said = f"Measured by `{found['command']}`, {found['date']}. Machine: {found['machine']}."
+    return " ".join(filter(None, [said, found.get("note", "")]))
+
+
+def speed(name: str) -> Rows:
+    """Yield the rows of a benchmark; a subject or baseline that is repeated is left out."""
+    before = ""
+    for row in read(name)["rows"]:
+        subject = "the same" if row["name"] == before else row["name"]
+        value = "" if subject != row["name"] else _value(row)
+        yield [subject, value, row["baseline"], _ratio(row), _goal(row)]
+        before = row["name"]
+
+
+def recipes() -> Rows:
+    """Yield size and errors of each model."""
+    for own in read("models")["models"]:
+        yield [
+            f"`{own['name']}`",
+            f"{own['clips']}",
+            f"{own['bytes'] / 1000:.0f} kB",
+            f"1/{own['compression']:.0f} of its numbers",
+            f"{100 * own['truncation_rms_m']:.2f} ({100 * own['truncation_p99_m']:.1f})",
+            f"{100 * own['leave_one_out_rms_m']:.1f}",
+        ]
+
+
+def levels() -> Rows:
+    """Yield the levels of detail of one model."""
+    (own,) = [each for each in read("models")["models"] if each["name"] == LEVELS_OF]
+    for number, level in enumerate(own["levels"]):
+        far = level["pose"] * PIXELS / (2.0 * math.tan(0.5 * FIELD))
+        yield [
+            f"{number}",
+            " × ".join(map(str, level["ranks"])),
+            f"{level['samples']}",
+            f"{level['numbers']:,}",
+            f"{level['operations']:,}",
+            f"{100 * level['rms']:.2f} cm",
+            f"{100 * level['pose']:.1f} cm",
+            f"{far:.0f} m",
+        ]
+
+
+def learning() -> tuple[list[str], Rows]:
+    """Return columns and rows of the error with suggested and with random samples, cm."""
+    found = read("learning")["learning"]
+    return ["samples", *map(str, found["samples"])], _learning(found)
+
+
+def learning_remark() -> str:
+    """Return a sentence on the number of suggested clips with the error of all random ones."""
+    found = read("learning")["learning"]
+    fewer = found["samples"][-1] / found["reached"]
+    verdict = "met" if fewer >= 2.0 else "**missed**"
+    return (
+        f"The goal of reaching the same error with half the clips is {verdict}: suggested clips "
+        f"reach the error of {found['samples'][-1]} random ones with {fewer:.1f} times fewer, at "
+        f"{found['reached']:.0f}. Means of {found['trials']} trials, ± their standard errors."
+    )
+
+
+def joined() -> Rows:
+    """Yield the support flag on two families joined, and the required and desired shares."""
+    own = read("joined")
+    low, high = own["heights_m"]
+    yield [
+        f"{own['families']} ({own['clips']}, {own['controls']})",
+        f"{100 * own['false_alarms']:.1f} %",
+        f"{100 * own['beyond']:.0f} %",
+        f"{100 * own['gap']:.0f} % (heights from {low:g} to {high:g} m)",
+    ]
+    yield ["required, desired", "15, 12 %", "95, 100 %", "all"]
+
+
+def _learning(found: Found) -> Rows:
+    for key, name in (("suggested", "suggested"), ("at_random", "at random")):
+        own = found[key]
+        pairs = zip(own["global_cm"], own["global_standard_error_cm"], strict=True)
+        yield [name, *(f"{error:.2f} ± {doubt:.2f}" for error, doubt in pairs)]
+
+
+def _value(row: Found) -> str:
+    if row["value"] is None:
+        return ""
+    others = [_number(value) for value in row.get("other_runs", []) if row["ratio"] is None]
+    text = f"{_number(row['value'])} {row['unit']}"
+    return f"{text} ({' and '.join(others)} in other runs)" if others else text
+
+
+def _ratio(row: Found) -> str:
+    if row["ratio"] is None:
+        return ""
+    others = [_number(value) for value in row.get("other_runs", [])]
+    text = _number(row["ratio"])
+    return f"{text} ({' and '.join(others)} in other runs)" if others else text
+
+
+def _goal(row: Found) -> str:
+    if row["goal"] is None:
+        return ""
+    unit = row["unit"] if row["ratio"] is None else "times"
+    return f"{_number(row['goal'])} {unit}, {'met' if row['met'] else '**missed**'}"
+
+
+def _number(value: float) -> str:
+    """Return a number with three significant digits, and groups of thousands."""
+    return f"{float(f'{value:.3g}'):,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
