@@ -34,7 +34,7 @@ from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.outliers import family_check, outlier_detection
 from posefield_train.parallel import single_thread
-from posefield_train.source.half_turns import Finding
+from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import (

@@ -10,6 +10,8 @@ import numpy as np
 from posefield.motion import bvh_writer, quat
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
+from posefield_train.source import ingest
+from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
 TOML = """\
@@ -79,3 +81,18 @@ def write_clips(folder: Path, clips: Sequence[Clip], metres_per_unit: float = 1.
     rows = [f"{index}.bvh,{index}" for index in range(len(clips))]
     (folder / "clips.csv").write_text("\n".join(["file,v", *rows]) + "\n")
     return folder
+
+
+def ingested(
+    folder: Path,
+    motions: Sequence[Clip],
+    rows: Sequence[str] | None = None,
+    head: str = "file,v",
+    **sections: Mapping[str, Any],
+) -> tuple[Recipe, list[Example], list[str]]:
+    """Recipe, examples and notes of motions that are written to a folder, with a table of rows."""
+    write_clips(folder, motions)
+    if rows is not None:
+        (folder / "clips.csv").write_text("\n".join([head, *rows]) + "\n")
+    own = recipe_with(**sections)
+    return own, *ingest.ingest(own, folder)

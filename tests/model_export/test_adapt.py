@@ -24,6 +24,7 @@ from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import ConstantModel
 from posefield_train.sample import sample_walk
 from posefield_train.source import ingest
+from posefield_train.source.canonical import placement
 from posefield_train.tensor import hosvd
 
 SHOWN, ASKED = (2.0, 7.0, 12.0), (4.0, 9.5)
@@ -51,7 +52,7 @@ def examples(trained, who, controls):
     return [
         ingest.Example(
             replace(row, place=row.place.with_name(f"{who}{value:g}.bvh"), performer=who),
-            ingest.canonicalize(newcomers.clip(who, value), False, False)[0],
+            placement.canonicalize(newcomers.clip(who, value), False, False)[0],
             np.array([value]),
             (),
             (),

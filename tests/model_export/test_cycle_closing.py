@@ -6,7 +6,7 @@ from minimal import small_clip
 
 from posefield.common.units import UP
 from posefield.motion import quat
-from posefield_train.source import ingest
+from posefield_train.source.canonical import placement
 from posefield_train.source.cycles import cycle_closing
 
 FRAMES = 121
@@ -15,12 +15,12 @@ FRAMES = 121
 @pytest.fixture
 def opened():
     """A gait whose last pose is not its first."""
-    return ingest.straighten_gait(small_clip(frames=FRAMES))
+    return placement.straighten_gait(small_clip(frames=FRAMES))
 
 
 @pytest.fixture
 def closed(opened):
-    return cycle_closing.close_cycle(opened, ingest.heading(opened))
+    return cycle_closing.close_cycle(opened, placement.heading(opened))
 
 
 def faded_linearly(clip):
@@ -65,7 +65,7 @@ def test_the_seam_has_no_corner(opened, closed):
 
 
 def test_a_closed_cycle_nearly_stays_as_it_is(opened, closed):
-    again = cycle_closing.close_cycle(closed, ingest.heading(closed))
+    again = cycle_closing.close_cycle(closed, placement.heading(closed))
     gap = quat.log(quat.mul(quat.conj(closed.rotations[0, 1:]), closed.rotations[-1, 1:]))
     assert np.abs(gap).max() < 1e-9
     own, first, raw = (clip.positions() for clip in (again, closed, opened))

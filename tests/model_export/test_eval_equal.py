@@ -79,7 +79,7 @@ def test_rivals_have_the_information_of_posefield():
     }
     found = equal_information.facts(result(rows))
     assert found["known"]["posefield"] == "posefield"
-    # Whoever knows the performer may ignore it.
+    # Peers without the performer are in the table with performers, too.
     assert set(found["known"]["peers"]) == {
         "gp", "gp_no_performer", "mean", "mean_no_performer"
     }  # fmt: skip

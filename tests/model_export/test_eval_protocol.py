@@ -411,7 +411,7 @@ def test_a_recipe_says_what_can_be_asked(recipe, family):
 
 
 def test_errors_of_a_cycle_are_those_to_the_open_one(recipe, family):
-    """Where the seam was closed, the motion before that is the truth."""
+    """A prediction is compared with the captured cycle, before its seam was closed."""
     away = [
         replace(e, captured=replace(e.clip, translations=e.clip.translations + UP))
         for e in family[:6]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from minimal import SKELETON, recipe_with, write_clips
+from minimal import SKELETON, ingested, recipe_with, write_clips
 
 from posefield.common.errors import RecipeError
 from posefield.motion import quat
@@ -38,15 +38,7 @@ LIFTED = tuple(raised(peak, 0.6 + 0.1 * i) for i, peak in enumerate(PEAKS))
 @pytest.fixture
 def read(tmp_path):
     """Function that writes clips and their table, and returns the recipe and its examples."""
-
-    def of(motions, rows=None, head="file,v", **sections):
-        write_clips(tmp_path, motions)
-        if rows is not None:
-            (tmp_path / "clips.csv").write_text("\n".join([head, *rows]) + "\n")
-        own = recipe_with(**sections)
-        return own, ingest.ingest(own, tmp_path)[0]
-
-    return of
+    return lambda *given, **sections: ingested(tmp_path, *given, **sections)[:2]
 
 
 def test_the_highest_place_is_a_landmark_that_is_aligned(read):

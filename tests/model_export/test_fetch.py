@@ -14,6 +14,7 @@ from posefield.motion import clip as clips
 from posefield.motion.skeleton import Skeleton
 from posefield_train.fetch import cmu_trials, data_sets
 from posefield_train.source import bvh, data_folder, ingest, recipe, shipped_recipes
+from posefield_train.source.recipe_sections.data_sections import Condition
 
 UNIT = cmu_trials.METRES_PER_UNIT
 # Given files are written to four decimals of the unit: 5.3e-6 m was measured.
@@ -287,7 +288,7 @@ def test_the_help_names_the_subjects_of_the_table(posefield):
 
 def test_a_data_folder_without_a_table_takes_the_shipped_one_and_says_so(walks, tmp_path):
     own = recipe.read(shipped_recipes.FOLDER / "cmu_walk.toml")
-    performer = {"performer": recipe.Condition(among=["cmu_07"])}
+    performer = {"performer": Condition(among=["cmu_07"])}
     own = own.model_copy(update={"clips": own.clips.model_copy(update={"where": performer})})
     for row in data_sets.CMU.rows("strides.csv"):
         if row["performer"] == "cmu_07":

@@ -6,7 +6,7 @@ import pytest
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import half_turns
+from posefield_train.source.canonical import half_turns
 
 PARENTS = (-1, 0, 1, 2)
 OFFSETS = np.array([[0, 0.9, 0], [0, 0.4, 0], [0.3, 0, 0], [0.08, 0, 0]])

@@ -79,8 +79,8 @@ def test_covariance_is_stationary_with_an_offset_and_a_trend(hyper, laid):
         assert far(universal_kriging.covariances(other, laid, laid), expected) > 1e-2
 
 
-def test_linear_functions_and_stationary_covariances_hold_every_covariance(hyper, laid, rng):
-    """What the graph computes: one covariance for each sample, labels, one and controls."""
+def test_linear_functions_and_stationary_covariances_sum_to_every_covariance(hyper, laid, rng):
+    """The graph adds covariances of the samples to linear functions of labels and controls."""
     points = np.hstack([rng.uniform(-1.2, 1.2, (9, 2)), who(*(["ann", "bob", "eve"] * 3))])
     terms = kriging_model.linear_terms(hyper, laid)
     found = kriging_model.linear_functions(hyper, points) @ terms

@@ -8,7 +8,7 @@ import pytest
 from posefield.motion import quat
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.source.ingest import place
+from posefield_train.source.canonical.placement import place
 from posefield_train.source.takes import joint_sides
 
 # A clip from the middle of the family, and one of another performer far from it.

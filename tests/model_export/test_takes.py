@@ -5,7 +5,7 @@ from dataclasses import replace
 import newcomers
 import numpy as np
 import pytest
-from minimal import recipe_with, small_clip, write_clips
+from minimal import ingested, recipe_with, small_clip
 
 from posefield.common.errors import RecipeError
 from posefield.common.units import UP
@@ -119,11 +119,8 @@ def part(clip, first, last):
 def read(tmp_path):
     """Function that writes clips and their table, and returns takes and notes."""
 
-    def of(motions, rows=None, head="file,v", **sections):
-        write_clips(tmp_path, motions)
-        if rows is not None:
-            (tmp_path / "clips.csv").write_text("\n".join([head, *rows]) + "\n")
-        examples, notes = ingest.ingest(recipe_with(**sections), tmp_path)
+    def of(*given, **sections):
+        _, examples, notes = ingested(tmp_path, *given, **sections)
         return examples, sample_points.take_numbers(examples).tolist(), notes
 
     return of

@@ -18,8 +18,9 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.parallel import single_thread
-from posefield_train.source import bone_lengths, half_turns
-from posefield_train.source.half_turns import Finding
+from posefield_train.source import bone_lengths
+from posefield_train.source.canonical import half_turns
+from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error

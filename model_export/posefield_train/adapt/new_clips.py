@@ -19,18 +19,23 @@ from posefield.motion.skeleton import Skeleton
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
 from posefield_train.source import (
     bvh,
+    clip_joints,
+    clip_landmarks,
     clip_notes,
     clip_table,
     data_folder,
     ingest,
     measured_controls,
+    table_cells,
 )
 from posefield_train.source.bvh import end_sites
-from posefield_train.source.clip_table import ClipRow, ClipTable
-from posefield_train.source.control_sources import TIME_NAMES
+from posefield_train.source.canonical import placement
+from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.ingest import Example
-from posefield_train.source.recipe import Source
+from posefield_train.source.recipe_sections.control_sources import TIME_NAMES
+from posefield_train.source.recipe_sections.data_sections import Source
 from posefield_train.source.rigs import dummy_roots, facing
+from posefield_train.source.table_cells import ClipTable
 
 Labels = Mapping[str, str]
 """Names of clips by label set."""
@@ -69,7 +74,7 @@ def examples_of_table(
     not give the name of all clips. Raises RecipeError, naming line and
     column, for an invalid cell, and as `examples_of_files`.
     """
-    own = clip_table.open_table(path)
+    own = table_cells.open_table(path)
     landmarks, controls = _landmark_columns(reopened), reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
     sets = _open_sets(reopened, labels)
@@ -169,11 +174,11 @@ def _example(
     clip, notes = _reduce_to_skeleton(_without_dummies(cut, own.skeleton), own.skeleton, row)
     ahead = reopened.making.facing
     clip = facing.turn_basis(clip, ahead or 0.0)
-    clip, jumps, stretch = ingest.canonicalize(
+    clip, jumps, stretch = placement.canonicalize(
         clip, own.cyclic, own.root == "in_place", ahead is not None
     )
     marks = (
-        *ingest.landmarks(row, last, _landmark_columns(reopened)),
+        *clip_landmarks.landmarks(row, last, _landmark_columns(reopened)),
         *_found_landmarks(reopened, row, clip),
     )
     nothing = np.full(len(own.controls), np.nan)
@@ -204,7 +209,9 @@ def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Cli
             "same skeleton"
         )
     kept = [joint for joint, name in enumerate(own.names) if name in family.names]
-    smaller = ingest.keep_joints(clip, kept) if ingest.has_all_parents(own, kept) else None
+    smaller = (
+        clip_joints.keep_joints(clip, kept) if clip_joints.has_all_parents(own, kept) else None
+    )
     if smaller is None or not smaller.skeleton.same_tree(family):
         raise row.error(
             f"{row.place} has the model's joints in another order or hierarchy: expected a clip of "
@@ -267,7 +274,7 @@ def _found_landmarks(reopened: ReconstructedModel, row: ClipRow, clip: Clip) -> 
     for at in _found_names(reopened):
         share = measured_controls.moment_share(clip, event.joint, at)
         name = clip.skeleton.names[event.joint]
-        found.append(ingest.event_landmark(row, name, at, share))
+        found.append(clip_landmarks.event_landmark(row, name, at, share))
     return found
 
 

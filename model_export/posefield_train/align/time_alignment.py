@@ -24,7 +24,8 @@ from posefield.motion import blend, curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import dtw
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
-from posefield_train.source.ingest import Example, heading
+from posefield_train.source.canonical.placement import heading
+from posefield_train.source.ingest import Example
 
 # Numbers of frames for the medoid and for warps; more frames do not improve the result.
 COARSE, FINE = 25, 100

@@ -1,7 +1,7 @@
 """Comparisons in which every method knows the performer, or none does.
 
-A method that knows who moves has an advantage over one that does not, so they are compared apart.
-Where the performer is known, a method may ignore it: such peers are rivals too. Standard errors are
+A method with the performer's name has an advantage over one without it, so they are compared in
+two tables. The table with performers also has peers that ignore the performer. Standard errors are
 over takes, because clips of one take resemble each other.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats, Indices
-from posefield_train.evaluate.methods import OURS
+from posefield_train.evaluate.methods import NO_PERFORMER, OURS
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.peers.predicted_values import OPEN
 from posefield_train.evaluate.protocol import EvaluationResult
@@ -23,7 +23,7 @@ TITLES = {
     KNOWN: "every method knows the performer",
     LEFT_OPEN: "no method knows the performer",
 }
-"""What the methods of a table know, by its name in the JSON."""
+"""Title of each table by its name in the JSON."""
 BETTER, WITHIN, WORSE = "better", "within one standard error", "worse"
 HEAD = ("measure", "posefield", "best peer", "its error", "difference", "±", "verdict")
 
@@ -132,14 +132,14 @@ def rivals(result: EvaluationResult, information: str) -> tuple[str, list[str]]:
     told = any(name.endswith(OPEN) for name in peers)
     if information == LEFT_OPEN:
         alone = [name for name in peers if name.endswith(OPEN)]
-        return (OURS + OPEN if OURS + OPEN in result.errors else OURS), alone if told else peers
-    return OURS, peers if told and OURS + OPEN in result.errors else []
+        return (NO_PERFORMER if NO_PERFORMER in result.errors else OURS), alone if told else peers
+    return OURS, peers if told and NO_PERFORMER in result.errors else []
 
 
 def posefield_row(result: EvaluationResult, name: str) -> str:
     """Return posefield's row with the same information as a method."""
-    is_open = name.endswith(OPEN) and OURS + OPEN in result.errors
-    return OURS + OPEN if is_open else OURS
+    is_open = name.endswith(OPEN) and NO_PERFORMER in result.errors
+    return NO_PERFORMER if is_open else OURS
 
 
 def best_peers(result: EvaluationResult, information: str) -> dict[str, PairedDifference]:

@@ -8,9 +8,9 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield_train.evaluate import corrections, equal_information, motion_errors
-from posefield_train.evaluate.methods import EXACT, OURS, TOLD, definition
+from posefield_train.evaluate.methods import ASKED_OPEN, EXACT, OURS, TOLD, definition
 from posefield_train.evaluate.motion_errors import MotionErrors
-from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS, ASKED_OPEN
+from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.report.drawing import markdown_table, significant_digits
 

@@ -23,12 +23,14 @@ from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 
 OURS, EXACT, NAIVE = "posefield", "posefield_exact", "naive"
+NO_PERFORMER, ASKED_OPEN = OURS + OPEN, "posefield_open"
+"""Posefield trained without performers, and trained with them but asked without one."""
 DEFINITIONS = {
     OURS: "the model as exported: truncated, with its own bone lengths and timing",
     EXACT: "the same, with the event's joint moved by the service's constraint solver to its "
     "captured position at the event",
-    OURS + OPEN: "a model of the same recipe, trained without performers",
-    OURS + "_open": "the model trained with performers, asked with the performer left open: it "
+    NO_PERFORMER: "a model of the same recipe, trained without performers",
+    ASKED_OPEN: "the model trained with performers, asked with the performer left open: it "
     "then answers for a person whom it has not seen",
     **{
         f"posefield_adapt_{count}": f"the same model adapted to the performer with {shown} from "
@@ -47,7 +49,7 @@ TOLD = (
     "from left-out takes and shrunk as far as they advise (all others; naive has the offsets of "
     "thin_plate_smoothed). The same methods with controls alone end in _no_performer."
 )
-"""What the methods know of performers, for people."""
+"""Sentence for readers of the results on how each method is given the performer."""
 
 
 def definition(name: str) -> str:

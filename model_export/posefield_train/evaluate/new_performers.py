@@ -10,15 +10,14 @@ from posefield.kriging.kriging_model import half_ranges
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.evaluate import methods
 from posefield_train.evaluate.compared_motion import ComparedMotion
-from posefield_train.evaluate.methods import OURS, Queries
-from posefield_train.evaluate.peers.predicted_values import OPEN
+from posefield_train.evaluate.methods import ASKED_OPEN, NO_PERFORMER, Queries
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.source.ingest import Example
-from posefield_train.source.recipe import PERFORMER, Recipe
+from posefield_train.source.recipe import Recipe
+from posefield_train.source.recipe_sections.data_sections import PERFORMER
 from posefield_train.train import train
 
-NO_PERFORMER, ASKED_OPEN = OURS + OPEN, OURS + "_open"
 ADAPTATION_COUNTS = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
 """Number of clips that each method adapts with."""
 MIN_OTHER_TAKES = 3

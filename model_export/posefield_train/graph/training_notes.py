@@ -11,7 +11,7 @@ import numpy as np
 from posefield_train.align import phase_alignment
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
-from posefield_train.source.half_turns import Finding
+from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 

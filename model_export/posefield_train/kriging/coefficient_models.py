@@ -13,7 +13,7 @@ from posefield_train.kriging.kriging_tuning import OTHER_STRENGTH, TunedKriging,
 from posefield_train.kriging.power_law import PowerLawFit
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.source.recipe import Kriging
+from posefield_train.source.recipe_sections.training_sections import Kriging
 from posefield_train.tensor.decoder import Proportions
 
 # Largest error of bone offsets that a model may make, m.

@@ -3,7 +3,7 @@
 import csv
 import io
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import astuple
 from pathlib import Path
 
@@ -104,12 +104,12 @@ _BALL = "Zrotation Yrotation Xrotation"
 def _files(chosen: Iterable[SampleTrial]) -> dict[str, bytes]:
     """Return the contents of all files of some samples, by path relative to their directory."""
     files: dict[str, bytes] = {}
-    rows: list[list[str]] = []
+    rows = [["file", "performer", *RANGES, "event_frame"]]
     for number, sample in enumerate(chosen, start=1):
         path = f"bvh/reach_{number:03}.bvh"
         files[path] = bvh_text(sample.clip).encode()
         rows.append(_row(path, sample))
-    return files | {"clips.csv": _table(rows).encode(), "recipe.toml": _recipe().encode()}
+    return files | {"clips.csv": csv_text(rows).encode(), "recipe.toml": _recipe().encode()}
 
 
 def write_family(output: Path, chosen: Iterable[SampleTrial] | None = None) -> Path:
@@ -170,11 +170,10 @@ def _row(path: str, sample: SampleTrial) -> list[str]:
     return [path, sample.performer, *point, str(len(sample.clip) - 1)]
 
 
-def _table(rows: list[list[str]]) -> str:
+def csv_text(rows: Iterable[Sequence[str]]) -> str:
+    """Return rows as CSV with Unix line ends."""
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["file", "performer", *RANGES, "event_frame"])
-    writer.writerows(rows)
+    csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
 
 

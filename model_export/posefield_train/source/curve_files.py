@@ -13,10 +13,11 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import Curve, CurveValues
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import clip_table
-from posefield_train.source.clip_table import ClipRow, ClipTable
-from posefield_train.source.control_sources import Curves
+from posefield_train.source import table_cells
+from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.data_folder import FileLocation
+from posefield_train.source.recipe_sections.control_sources import Curves
+from posefield_train.source.table_cells import ClipTable
 
 FRAME = "frame"
 RESTING_JOINT = "Root"
@@ -36,7 +37,7 @@ class CurveReader:
         Raises RecipeError for a missing column or frame, and for a cell that is not a number within
         the curve's range.
         """
-        table = clip_table.open_table(place)
+        table = table_cells.open_table(place)
         _expect_frames(table)
         _expect_columns(table, [curve.name for curve in self.curves], self.keys)
         columns = [_column(table, curve) for curve in self.curves]
@@ -48,7 +49,7 @@ def reader(keys: Curves, rows: Sequence[ClipRow]) -> CurveReader:
 
     Raises RecipeError for keys of an unknown curve, and for a file without curves.
     """
-    first = clip_table.open_table(rows[0].curve_file)
+    first = table_cells.open_table(rows[0].curve_file)
     _expect_frames(first)
     found = [name for name in first.columns if name != FRAME]
     names = keys.names or found

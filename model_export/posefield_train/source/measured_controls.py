@@ -16,8 +16,13 @@ from posefield.motion.clip import Clip
 from posefield.motion.measures import Measure, MeasuredMotion, MeasureMoment
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source.clip_table import ClipRow
-from posefield_train.source.control_sources import TIME_NAMES, Auto, Control, ControlMeasured
 from posefield_train.source.recipe import Recipe
+from posefield_train.source.recipe_sections.control_sources import (
+    TIME_NAMES,
+    Auto,
+    Control,
+    ControlMeasured,
+)
 
 MOMENT_NAMES: dict[str, MeasureMoment] = {name: name for name in get_args(MeasureMoment)}
 """Moments by name."""

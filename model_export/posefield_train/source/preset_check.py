@@ -7,7 +7,8 @@ import numpy as np
 from posefield.common.errors import TrainingError
 from posefield.common.name_suggestion import did_you_mean
 from posefield_train.source.ingest import Example
-from posefield_train.source.recipe import PERFORMER, Recipe
+from posefield_train.source.recipe import Recipe
+from posefield_train.source.recipe_sections.data_sections import PERFORMER
 
 
 def check_presets(recipe: Recipe, examples: Sequence[Example]) -> None:

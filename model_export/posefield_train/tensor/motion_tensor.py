@@ -13,8 +13,8 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.motion.curves import Curve, distances
 from posefield_train.align.time_alignment import AlignedClips
-from posefield_train.source import half_turns
-from posefield_train.source.half_turns import Finding
+from posefield_train.source.canonical import half_turns
+from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.tensor import pose_metric
 from posefield_train.tensor import pose_vectors as chart
 from posefield_train.tensor.pose_vectors import PoseChart

@@ -20,7 +20,7 @@ from posefield.common.array_shapes import (
 from posefield.common.units import Booleans, Floats
 from posefield.motion import quat, quat_planes
 from posefield.motion.skeleton import POSES_PER_BLOCK
-from posefield_train.source.half_turns import Finding
+from posefield_train.source.canonical.half_turns import Finding
 
 # Angle from the mean, rad, above which a joint is reported: rotation vectors become ambiguous at π.
 REPORTED_ANGLE = 0.9 * np.pi

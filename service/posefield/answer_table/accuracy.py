@@ -11,7 +11,7 @@ from posefield.answer_table.interpolated_answers import FRAMES, AnswerTable
 from posefield.answer_table.samples import Queries
 from posefield.common.units import Singles
 from posefield.inference.session import Session
-from posefield.kriging.support import fit_support
+from posefield.kriging.support import Support, fit_support
 
 POINTS = 250
 """Points of each level at which a table is measured."""
@@ -63,8 +63,8 @@ def measure(session: Session, own: AnswerTable, seed: int = 1) -> Accuracy:
     Frames between those of the table are compared too. seed: of the random points.
     """
     rng = np.random.default_rng(seed)
-    levels = range(len(own.levels))
-    each = [vars(_differences(session, own, level, rng)) for level in levels]
+    levels, known = range(len(own.levels)), fit_support(np.array(session.card.examples))
+    each = [vars(_differences(session, own, known, level, rng)) for level in levels]
     found = _Differences(**{name: np.concatenate([one[name] for one in each]) for name in each[0]})
     stored = max(_compression(session, own, level, rng) for level in levels)
     within = ~found.outside
@@ -82,9 +82,12 @@ def measure(session: Session, own: AnswerTable, seed: int = 1) -> Accuracy:
 
 
 def _differences(
-    session: Session, own: AnswerTable, level: int, rng: np.random.Generator
+    session: Session, own: AnswerTable, known: Support, level: int, rng: np.random.Generator
 ) -> _Differences:
-    """Return the differences at random points, every second one within the sampled ranges."""
+    """Return the differences at random points, every second one within the sampled ranges.
+
+    known: support of the captured clips.
+    """
     card, bounds = session.card, session.bounds
     points = rng.uniform(*bounds.limits, (POINTS, len(bounds.low)))
     points[::2] = rng.uniform(bounds.low, bounds.high, points[::2].shape)
@@ -92,14 +95,13 @@ def _differences(
     exact = samples.sample(session, asked, 2 * FRAMES - 1)
     found = own.interpolate(asked)
     between = card, answer_gaps.halved(found), exact
-    known = fit_support(np.array(card.examples)).supported(points)
     return _Differences(
         bounds.outside(points),
         answer_gaps.gaps(*between),
         answer_gaps.curve_gaps(*between),
         np.abs(found.durations / exact.durations - 1.0),
         np.abs(found.sigmas - exact.sigmas),
-        own.supported(points) != known,
+        own.supported(points) != known.supported(points),
     )
 
 

@@ -85,7 +85,7 @@ def refined(bounds: AnswerBounds, error: IntervalError, tolerance: float, most: 
     """
     ends = zip(bounds.limits[0], bounds.low, bounds.high, bounds.limits[1], strict=True)
     axes = [list(map(float, values)) for values in ends]
-    errors = [[error(i, *pair) for pair in _pairs(axis)] for i, axis in enumerate(axes)]
+    errors = [[error(i, *pair) for pair in pairwise(axis)] for i, axis in enumerate(axes)]
     while True:
         worst, i, k = max((e, i, k) for i, own in enumerate(errors) for k, e in enumerate(own))
         size = np.prod([len(axis) + (j == i) for j, axis in enumerate(axes)])
@@ -95,7 +95,3 @@ def refined(bounds: AnswerBounds, error: IntervalError, tolerance: float, most: 
         middle = 0.5 * (low + high)
         axes[i].insert(k + 1, middle)
         errors[i][k : k + 1] = [error(i, low, middle), error(i, middle, high)]
-
-
-def _pairs(axis: list[float]) -> list[tuple[float, float]]:
-    return list(pairwise(axis))

@@ -3,8 +3,7 @@
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
-from types import TracebackType
-from typing import TYPE_CHECKING, Self, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from posefield.console.progress import ProgressBar
@@ -15,7 +14,7 @@ DELAY = 2.0
 """Seconds before anything is shown."""
 
 
-class LateProgress:
+class LateProgress(ExitStack):
     """Progress bar of `total` units of work that begins after `delay` seconds; else nothing.
 
     interval: seconds between two lines where standard error is not a terminal; None for those of
@@ -29,21 +28,10 @@ class LateProgress:
         delay: float = DELAY,
         interval: float | None = None,
     ) -> None:
+        super().__init__()
         self._label, self._total, self._interval = label, total, interval
         self._end = time.monotonic() + delay
         self._bar: ProgressBar | None = None
-        self._stack = ExitStack()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._stack.close()
 
     def update(self, done: int, total: int | None = None) -> None:
         """Show the number of finished units, and a new total if one is given."""
@@ -65,5 +53,5 @@ class LateProgress:
 
             interval = INTERVAL if self._interval is None else self._interval
             made = ProgressBar(self._label, self._total, interval=interval)
-            self._bar = self._stack.enter_context(made)
+            self._bar = self.enter_context(made)
         return self._bar

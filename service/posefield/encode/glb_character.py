@@ -146,7 +146,7 @@ def with_curves(parts: dict[str, Any], store: GlbBuffer, curves: CurveValues) ->
 
 
 def _carrier(store: GlbBuffer, curves: CurveValues) -> dict[str, Any]:
-    """Return a mesh of one triangle without area, which carries curves where there is no body."""
+    """Return a mesh for the curves of a file without a body: one triangle without area."""
     points = store.add_bounded(np.zeros((3, 3), np.float32), "VEC3", target=VERTICES)
     mesh = {"name": "Curves", "primitives": [{"attributes": {"POSITION": points}}]}
     return _with_targets(store, mesh, curves)

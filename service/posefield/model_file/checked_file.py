@@ -39,7 +39,7 @@ def _open_nonblocking(path: str, flags: int) -> int:
 
 
 def check_size(size: int, source: str | Path) -> None:
-    """Raise ModelError for a size above MOST_BYTES."""
+    """Raise ModelError for a size above MAX_BYTES."""
     if size > MAX_BYTES:
         raise ModelError(source, f"cannot be read: {size} bytes, expected at most {MAX_BYTES}")
 

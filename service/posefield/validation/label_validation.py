@@ -31,9 +31,8 @@ def label_weights(
         check_name("performer", performer, card.performers)
     for name in named:
         _check_set(card, name)
-    asked: Mapping[str, LabelValue] = {**named}
-    if performer is not None:
-        asked = {**named, PERFORMER: performer}
+    short = {} if performer is None else {PERFORMER: performer}
+    asked: Mapping[str, LabelValue] = {**named, **short}
     rows = [_set_weights(own, asked.get(own.name)) for own in card.labels]
     return np.array([[weight for row in rows for weight in row]], dtype=np.float64)
 

@@ -8,6 +8,7 @@ from posefield.motion import foot_skate
 from posefield_train.sample import sample_files
 from posefield_train.sample.figures import hand_grip, quadruped_walk
 from posefield_train.source import ingest, recipe
+from posefield_train.source.canonical import placement
 from posefield_train.source.rigs import facing, joint_recognition
 
 PAWS = [quadruped_walk.NAMES.index(paw) for paw in quadruped_walk.PAWS]
@@ -103,7 +104,7 @@ def test_every_call_writes_the_same_bytes(family, tmp_path):
 def test_the_quadruped_in_its_own_basis_is_the_one_that_faces_ahead(read):
     _, examples, _ = read(quadruped_walk)
     animal, clip = next(quadruped_walk.strides())
-    straight = ingest.canonicalize(clip, True, False)[0]
+    straight = placement.canonicalize(clip, True, False)[0]
     first = next(e for e in examples if e.row.place.name == "stride_01.bvh")
     assert first.row.performer == animal
     # A file lists the joints depth first.

@@ -1,7 +1,5 @@
 """Files of the family of a face: motion in BVH, curves in CSV, the table, and the recipe."""
 
-import csv
-import io
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
@@ -80,7 +78,7 @@ def write_family(output: Path, chosen: Iterable[FaceTrial] | None = None) -> Pat
         files[motion] = bvh_writer.dumps(each.clip, metres_per_unit=1.0)
         files[curves] = curve_text(face_motion.CURVE_NAMES, each.clip.curve_values).encode()
         rows.append([motion, curves, f"{each.smile:.4f}", f"{each.openness:.4f}"])
-    files |= {"clips.csv": _csv_text(rows).encode(), "recipe.toml": RECIPE.encode()}
+    files |= {"clips.csv": sample_files.csv_text(rows).encode(), "recipe.toml": RECIPE.encode()}
     return sample_files.write_folder(output, files)
 
 
@@ -89,10 +87,4 @@ def curve_text(names: Sequence[str], values: Floats) -> str:
     rows = [["frame", *names]]
     for frame, row in enumerate(values.tolist()):
         rows.append([str(frame), *(f"{value:.{DECIMALS}f}" for value in row)])
-    return _csv_text(rows)
-
-
-def _csv_text(rows: Sequence[Sequence[str]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
+    return sample_files.csv_text(rows)

@@ -9,8 +9,12 @@ from pydantic_core import ErrorDetails
 
 from posefield.common.errors import RecipeError
 from posefield.common.name_suggestion import did_you_mean
-from posefield_train.source.control_sources import COLUMN_TAG, MEASURED
-from posefield_train.source.toml_positions import Key, key_positions, nearest_position
+from posefield_train.source.recipe_sections.control_sources import COLUMN_TAG, MEASURED
+from posefield_train.source.recipe_sections.toml_positions import (
+    Key,
+    key_positions,
+    nearest_position,
+)
 
 SHOWN = 200
 """Characters of a value in a message."""

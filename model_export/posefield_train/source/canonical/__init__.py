@@ -1,0 +1,1 @@
+"""Canonical clips: jumps, heading and origin removed, seams closed."""

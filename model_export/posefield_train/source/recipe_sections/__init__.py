@@ -1,0 +1,1 @@
+"""Sections of a recipe, and checks between them."""

@@ -1,0 +1,220 @@
+"""Sections of a recipe on the training: alignment, kriging, event, size and presets."""
+
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import ConfigDict, Field, field_validator, model_validator
+
+from posefield_train.source.recipe_sections.control_sources import (
+    TIME_NAMES,
+    Name,
+    RecipePart,
+    Text,
+)
+from posefield_train.source.recipe_sections.data_sections import PERFORMER, Positive
+
+FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Alignment(RecipePart):
+    """Time warping."""
+
+    knots: Annotated[int, Field(ge=3, le=24)] = Field(
+        default=6, description="number of free increments of a time warp; few knots avoid jerk"
+    )
+    rounds: Annotated[int, Field(ge=0, le=8)] = Field(
+        default=2, description="number of re-alignments after the alignment to the medoid"
+    )
+    reference: Literal["prediction", "mean"] = Field(
+        default="prediction",
+        description="reference of the re-alignments: the prediction for a clip, or the mean clip",
+    )
+    begin: Literal["in_phase", "as_cut"] = Field(
+        default="as_cut",
+        description="start of a cyclic clip: as_cut at its first frame, or in_phase at the "
+        "family's common phase, for cycles that were cut at arbitrary phases",
+    )
+
+
+class Kriging(RecipePart):
+    """Kriging model of the control coefficients."""
+
+    covariance: Literal[
+        "matern52", "matern32", "gaussian", "exponential", "spherical", "chosen"
+    ] = Field(
+        default="chosen",
+        description="covariance of motions as a function of distance; chosen selects gaussian if "
+        "its leave-one-out error is more than 5 % below that of matern52, else matern52",
+    )
+    drift: Literal[0, 1, "chosen"] = Field(
+        default="chosen",
+        description="polynomial degree of the drift; chosen puts a linear trend into the "
+        "covariance, as strong as the leave-one-out error finds best: from none, as degree 0, to "
+        "free, as degree 1",
+    )
+    nugget: Annotated[float, Field(ge=0, le=10)] | None = Field(
+        default=None, description="nugget as a share of the sill; default: fitted by leave-one-out"
+    )
+    label: list[Text] = Field(
+        default=[],
+        description="label sets of clips besides their controls: 'performer' and names of "
+        "clips.labels. The names of each set have offsets of their own, and their motions a "
+        "correlation. One set may be given as a text",
+    )
+
+    @field_validator("label", mode="before", json_schema_input_type=Text | list[Text])
+    @classmethod
+    def _read_one_label(cls, found: object) -> object:
+        return [found] if isinstance(found, str) else found
+
+    @field_validator("label")
+    @classmethod
+    def _check_labels(cls, labels: list[str]) -> list[str]:
+        if len(set(labels)) < len(labels):
+            raise ValueError(f"found {labels}, expected each label set once")
+        return labels
+
+    @property
+    def degree(self) -> int:
+        """Return the degree of the drift; a trend within the covariance needs a constant only."""
+        return self.fixed_degree or 0
+
+    @property
+    def fixed_degree(self) -> Literal[0, 1] | None:
+        """Return the degree that the recipe asks for; None for a trend in the covariance."""
+        return None if self.drift == "chosen" else self.drift
+
+    @property
+    def covariances(self) -> tuple[str, ...]:
+        """Return the covariances that are tried."""
+        return ("matern52", "gaussian") if self.covariance == "chosen" else (self.covariance,)
+
+
+FOUND_MOMENTS = tuple(name for name in TIME_NAMES if name not in ("start", "end"))
+"""Moments of an event that are found in the motion, and differ from clip to clip."""
+
+
+class Event(RecipePart):
+    """Event of a motion: a joint and the moment at which its position matters."""
+
+    joint: Text = Field(description="joint of the event: a hand that reaches, a foot that lands")
+    at: Text = Field(
+        description="moment of the event: 'start', 'end', 'highest', 'lowest' or 'farthest' (from "
+        "the root) of its joint, or a column of clips.landmarks such as 'contact_frame'; all but "
+        "start and end are aligned to one time in all clips"
+    )
+
+    @property
+    def is_found(self) -> bool:
+        """Return True if the moment is found in each clip, as a landmark that needs no column."""
+        return self.at in FOUND_MOMENTS
+
+
+class Detail(RecipePart):
+    """Level of detail below the model's own size."""
+
+    times: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
+        description="factor on the budgets, or on the errors at the given ranks, for this level"
+    )
+    drop_joints: list[Text] = Field(
+        default=[],
+        description="joints that do not move, with all their descendants; their error does not "
+        "count against the budgets",
+    )
+
+
+# An image 1080 pixels high, with a horizontal field of view of 60 degrees, resolves 1 cm at 15 m.
+DEFAULT_LEVELS = (Detail(times=2.0), Detail(times=4.0), Detail(times=8.0))
+
+
+class Size(RecipePart):
+    """Size of the truncated tensor: ranks, or error budgets.
+
+    Errors are true distances between joints, by forward kinematics; all given budgets apply.
+    """
+
+    levels: list[Detail] | None = Field(
+        default=None,
+        description="coarser levels of detail, each coarser than the one before; default: three "
+        "levels of 2, 4 and 8 times the budgets",
+    )
+
+    ranks: (
+        Annotated[list[Annotated[int, Field(ge=1)]], Field(min_length=3, max_length=3)] | None
+    ) = Field(default=None, description="ranks of degrees of freedom, frames and samples")
+    rms_budget_cm: Positive | None = Field(
+        default=None, description="limit of the root-mean-square joint distance, cm"
+    )
+    p99_budget_cm: Positive | None = Field(
+        default=None,
+        description="limit of the 99th percentile of the joint distances over joints, frames and "
+        "clips, cm",
+    )
+    effector_budget_cm: Positive | None = Field(
+        default=None,
+        description="limit of the root-mean-square distance of the event's joint at its event, cm",
+    )
+    cost: Literal["numbers", "operations"] = Field(
+        default="numbers",
+        description="cost to minimise within the budgets: numbers stored in the file, or "
+        "multiply-adds per pose",
+    )
+
+    @property
+    def details(self) -> Sequence[Detail]:
+        """Return the coarser levels of detail."""
+        return DEFAULT_LEVELS if self.levels is None else self.levels
+
+    @field_validator("levels")
+    @classmethod
+    def _check_level_order(cls, levels: list[Detail] | None) -> list[Detail] | None:
+        times = [level.times for level in levels or []]
+        if times != sorted(set(times)):
+            raise ValueError(f"times {times}, expected each larger than the one before")
+        return levels
+
+    @property
+    def budgets(self) -> dict[str, float]:
+        """Return the given budgets, m, by name: rms, p99, effector."""
+        given = {
+            "rms": self.rms_budget_cm,
+            "p99": self.p99_budget_cm,
+            "effector": self.effector_budget_cm,
+        }
+        return {name: 0.01 * budget for name, budget in given.items() if budget is not None}
+
+    @model_validator(mode="after")
+    def _check_size(self) -> "Size":
+        keys = "rms_budget_cm, p99_budget_cm, effector_budget_cm"
+        if self.ranks is None and not self.budgets:
+            raise ValueError(f"found neither, expected either ranks or budgets ({keys})")
+        if self.ranks is not None and (self.budgets or "cost" in self.model_fields_set):
+            found = sorted(self.model_fields_set)
+            raise ValueError(f"found {found}, expected either ranks or budgets ({keys}) and a cost")
+        return self
+
+
+class Preset(RecipePart):
+    """Named point of the controls: a value for each control, by the control's name."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, strict=True)
+    __pydantic_extra__: dict[str, FiniteNumber] = Field(init=False)
+
+    performer: Text | None = Field(
+        default=None, description="performer of the motion; default: an unseen performer"
+    )
+    named: dict[Name, Text] = Field(
+        default={},
+        alias="labels",
+        description="name of the motion in further label sets; those not given are left open",
+    )
+
+    @property
+    def labels(self) -> dict[str, str]:
+        """Return the name of the motion in each label set that the preset names."""
+        return ({} if self.performer is None else {PERFORMER: self.performer}) | self.named
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Return the values of the controls by name."""
+        return dict(self.__pydantic_extra__)
