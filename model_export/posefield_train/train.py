@@ -16,6 +16,8 @@ from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
+from posefield_train.contacts import contact_model
+from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph import ranks, truncation_cost, warped_errors
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
@@ -280,6 +282,12 @@ def _assemble(
     )
 
 
+def _with_contacts(model: FloatModel, found: FittedContacts | None) -> FloatModel:
+    if found is None:
+        return model
+    return replace(model, bank=replace(model.bank, contacts=found.kriging), contacts=found.table)
+
+
 def _event_blend(
     recipe: Recipe, judge: TruncationReference, fits: _FittedModels, reduced: TuckerTensor
 ) -> EventBlend | None:
@@ -311,8 +319,12 @@ def _fit_and_truncate(
     reduced = full.truncated(ranks.choose_ranks(recipe.size, full, price, judge, limits))
     explained = {name: found.explained for name, found in fits.beside.items()}
     residuals = {name: found.residuals for name, found in fits.beside.items()}
+    model = _assemble(recipe, controls, moved, judge, fits, reduced)
+    warps = (model.timing, moved.aligned.logs)
+    hyper = fits.pose.hyper
+    contacts, notes = contact_model.fit_contacts(recipe, examples, moved.samples, hyper, warps)
     return TrainedModel(
-        _assemble(recipe, controls, moved, judge, fits, reduced),
+        _with_contacts(model, contacts),
         tuple(examples),
         moved.samples,
         _mean_skeleton(examples, moved.offsets),
@@ -328,6 +340,8 @@ def _fit_and_truncate(
         residuals,
         judge.evaluate(reduced),
         joint_error_shares(judge, full, fits.pose, residuals.get("travel")),
+        contacts=contacts,
+        contact_notes=tuple(notes),
     )
 
 

@@ -281,6 +281,16 @@ class Curve(Struct, frozen=True, kw_only=True):
     distance: float
 
 
+class FootContact(Struct, frozen=True, kw_only=True):
+    """Joint with contacts, and its swings between them in the captured clips."""
+
+    joint: int
+    height: float
+    swing: float
+    longest_swing: float
+    clearance: float
+
+
 class ModelCardKriging(Struct, frozen=True, kw_only=True):
     """Parameters of the kriging model that weights the captured clips."""
 
@@ -330,6 +340,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     event: ModelCardEvent | None = None
     presets: tuple[Preset, ...] = ()
     curves: tuple[Curve, ...] = ()
+    contacts: tuple[FootContact, ...] = ()
 
 
 class Deviation(Struct, frozen=True, kw_only=True):

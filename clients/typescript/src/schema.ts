@@ -1333,6 +1333,21 @@ export interface components {
             presets?: components["schemas"]["Preset"][];
             /** @description Curves of the answers, in their order. Absent for models without curves. */
             curves?: components["schemas"]["Curve"][];
+            /** @description Joints whose contacts with the ground, or with a thing, the model predicts. Absent for models without contacts. */
+            contacts?: components["schemas"]["FootContact"][];
+        };
+        /** @description Joint with contacts, and its swings between them in the captured clips. */
+        FootContact: {
+            /** @description Index of the joint. */
+            joint: number;
+            /** @description Median height of the joint in contact, in metres. */
+            height: number;
+            /** @description Median duration of a swing, in seconds. */
+            swing: number;
+            /** @description 90th percentile of the durations of swings, in seconds. */
+            longest_swing: number;
+            /** @description Height by which the joint is lifted in a swing, 75th percentile, in metres. */
+            clearance: number;
         };
         /** @description Names by which clips differ besides their controls. */
         LabelSet: {

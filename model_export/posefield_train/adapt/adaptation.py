@@ -11,8 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.adapt import canonical_clips, extended_models, tensor_extension
+from posefield_train.adapt import (
+    canonical_clips,
+    contact_extension,
+    extended_models,
+    tensor_extension,
+)
 from posefield_train.adapt.canonical_clips import AdaptableModel, CanonicalClips
+from posefield_train.adapt.contact_extension import ExtendedContacts
 from posefield_train.adapt.extended_models import ExtendedSamples
 from posefield_train.adapt.tensor_extension import ExtendedTensor
 from posefield_train.align import travel as travels
@@ -33,13 +39,14 @@ class AdaptedModel:
     """A model with one more performer, and intermediate results.
 
     left_out_errors: mean squared joint distance (k,), m², of each new clip from its leave-one-out
-    prediction.
+    prediction. contacts: None without contacts.
     """
 
     model: FloatModel
     new_clips: CanonicalClips
     extended: ExtendedTensor
     left_out_errors: Floats
+    contacts: ExtendedContacts | None = None
 
 
 def adapt(known: AdaptableModel, examples: Sequence[Example], performer: str) -> AdaptedModel:
@@ -85,11 +92,13 @@ def _solve(
     missed, sill = _left_out_errors(known, laid, moved, extended)
     ends = laid.low, laid.high
     event, blend = _event(laid, model, reduced)
-    bank = KrigingBank(*ends, laid.labels, pose, others, sill, (), law, event)
+    contacts = contact_extension.extend_contacts(known, moved, laid)
+    field, table = (contacts.kriging, contacts.table) if contacts else (None, None)
+    bank = KrigingBank(*ends, laid.labels, pose, others, sill, (), law, event, field)
     own = extended.tensor
     decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means, event=blend)
-    adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel)
-    return AdaptedModel(adapted, moved, extended, missed)
+    adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel, table)
+    return AdaptedModel(adapted, moved, extended, missed, contacts)
 
 
 def _event(

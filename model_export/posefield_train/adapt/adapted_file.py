@@ -13,7 +13,7 @@ from posefield.common.units import Floats
 from posefield.inference import residual_covariance
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard
-from posefield_train.adapt import adaptation, canonical_clips, new_clips
+from posefield_train.adapt import adaptation, canonical_clips, contact_extension, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
 from posefield_train.graph import level_errors, onnx_export, training_notes, truncation_cost
@@ -191,6 +191,7 @@ def _card(
         making=replace(reopened.making, fields=made, takes=_takes(old, clips)),
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
+        contacts=adapted.contacts.statistics if adapted.contacts else (),
     )
 
 
@@ -236,10 +237,12 @@ def _diagnostics(
 ) -> dict[str, Any]:
     """Return the parent's diagnostics with those updated that depend on the new clips.
 
-    `explained`, the truncation cost, `joint_sigma` and `beside` depend on the parent's data alone
-    and are copied.
+    `explained`, the truncation cost, `joint_sigma`, `beside` and the accuracy of contacts depend on
+    the parent's data alone and are copied.
     """
-    old, model = reopened.card.diagnostics, adapted.model
+    old, model = dict(reopened.card.diagnostics), adapted.model
+    if adapted.contacts is None:
+        old.pop("contacts", None)
     freedoms, frames, samples = old["tensor"]
     shape = freedoms, frames, samples + len(newcomer.examples)
     kept = model.decoder.reduced.core.shape
@@ -267,6 +270,7 @@ def _notes(
         adapting,
         *newcomer.notes,
         *training_notes.finding_notes(moved.findings, moved.examples, names),
+        *contact_extension.contact_notes(reopened.known, adapted.contacts),
     ]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats, Indices
 from posefield.motion.clip import assemble
+from posefield.motion.foot_contacts import FootContact
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment
 from posefield_train.align import travel as travels
@@ -40,7 +41,7 @@ class AdaptableModel:
     True if cycles were shifted to a common phase. in_place: True if the root does not travel.
     truncation: root mean square error of the truncated tensor, m. groups: group (n,) of each
     sample; a group is left out together. left_out: leave-one-out errors (n,) of the samples, m, on
-    canonical time.
+    canonical time. feet: joints whose contacts are detected. contacts: of the model's joints.
     """
 
     model: FloatModel
@@ -52,6 +53,8 @@ class AdaptableModel:
     truncation: float
     groups: Indices
     left_out: Floats
+    feet: tuple[int, ...] = ()
+    contacts: tuple[FootContact, ...] = ()
 
     @cached_property
     def canonical_excess(self) -> float:
@@ -84,6 +87,8 @@ def adaptable(recipe: Recipe, trained: TrainedModel) -> AdaptableModel:
         trained.truncation_errors.rms,
         trained.samples.groups,
         np.sqrt(trained.left_out_errors),
+        tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
+        trained.contacts.statistics if trained.contacts else (),
     )
 
 

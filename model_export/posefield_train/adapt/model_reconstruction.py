@@ -22,6 +22,7 @@ from posefield_train.adapt.canonical_clips import AdaptableModel
 from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
+from posefield_train.contacts.contact_table import ContactTable
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import (
@@ -103,7 +104,14 @@ def _as_float64(array: Any) -> Floats:
 def _adaptable(file: _ModelFile) -> AdaptableModel:
     card, making = file.card, file.making
     bank = _bank(file)
-    model = FloatModel(bank, _timing(file), _decoder(file, bank), _proportions(file), _travel(card))
+    model = FloatModel(
+        bank,
+        _timing(file),
+        _decoder(file, bank),
+        _proportions(file),
+        _travel(card),
+        ContactTable(file["contact_table"]) if card.contacts else None,
+    )
     names = card.skeleton.names
     return AdaptableModel(
         model,
@@ -115,6 +123,8 @@ def _adaptable(file: _ModelFile) -> AdaptableModel:
         float(card.diagnostics["truncation_rms_m"]),
         residual_covariance.leave_out_groups(card, bank.pose.samples),
         np.array(card.left_out),
+        card.feet,
+        card.contacts,
     )
 
 
@@ -143,7 +153,15 @@ def _bank(file: _ModelFile) -> KrigingBank:
     pose = _solve_kriging(file, POSE, (card.kriging, points, order))
     sill, law, event = file["sill"].item(), _power_law(file), _event_model(file, pose)
     names = {own.name: own.names for own in card.labels}
-    return KrigingBank(low, high, names, pose, others, sill, (), law, event)
+    contacts = _contacts(file, (card.kriging, points, order)) if card.contacts else None
+    return KrigingBank(low, high, names, pose, others, sill, (), law, event, contacts)
+
+
+def _contacts(file: _ModelFile, laid: tuple[Hyper, Floats, Indices]) -> UniversalKriging:
+    """Return the model of the contacts' coefficients, which has the parameters of the pose."""
+    weights = file["contact_weights"]
+    linear = len(weights) - file.card.samples
+    return _solve_recovered(laid, weights[:linear], weights[linear:])
 
 
 def _event_model(file: _ModelFile, pose: UniversalKriging) -> UniversalKriging | None:
@@ -209,15 +227,26 @@ def _solve_kriging(
     file: _ModelFile, name: str, laid: tuple[Hyper, Floats, Indices]
 ) -> UniversalKriging:
     """Return one kriging model, solved for the sample values recovered from its dual weights."""
-    hyper, points, order = laid
     columns = _columns(file, name)
     stored = file[f"{name}_weights"][:, : columns.stop - columns.start]
+    return _solve_recovered(laid, file["linear_weights"][:, columns], stored)
+
+
+def _solve_recovered(
+    laid: tuple[Hyper, Floats, Indices], straight: Floats, stored: Floats
+) -> UniversalKriging:
+    """Return the kriging model of the values with these weights.
+
+    straight: weights (p + 1 + d, m) of labels, one and controls. stored: weights (n, m) of the
+    covariances, in the order of the graph.
+    """
+    hyper, points, order = laid
     near = np.empty_like(stored)
     near[order] = stored
     covariances = kriging_model.stationary_covariances(hyper, points, points)
     covariances += hyper.nugget * np.eye(len(points))
     linear = kriging_model.linear_functions(hyper, points)
-    values = covariances @ near + linear @ file["linear_weights"][:, columns]
+    values = covariances @ near + linear @ straight
     return universal_kriging.solve(hyper, points, values)
 
 

@@ -1,7 +1,7 @@
 """Complete model in float64, the reference for the graph."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from posefield.motion import skeleton
 from posefield.motion.curves import Curve, as_points
 from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
+from posefield_train.contacts.contact_table import ContactTable
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_bank import POSE, VARIANCE, KrigingBank
 from posefield_train.onnx_graph.graph_builder import GraphBuilder, Shapes
@@ -24,7 +25,7 @@ class ModelOutputs:
 
     rotations: (B, S, J, 4). root_position: (B, S, 3), m. bone_offsets: (B, J, 3), m. duration:
     (B,), s. sigma: (B,), m. travel: (B, S, 3). curves: values (B, S, C); None for a model without
-    curves.
+    curves. contacts: probabilities (B, S, K); None for a model without contacts.
     """
 
     rotations: Floats
@@ -34,6 +35,7 @@ class ModelOutputs:
     sigma: Floats
     travel: Floats
     curves: Floats | None = None
+    contacts: Floats | None = None
 
     def positions(self, parents: tuple[int, ...]) -> Floats:
         """Return joint positions (B, S, J, 3), m."""
@@ -50,13 +52,18 @@ class ModelOutputs:
 
 @dataclass(frozen=True)
 class FloatModel:
-    """Stages of a trained model. travel: None if it is not cyclic."""
+    """Stages of a trained model.
+
+    travel: None if it is not cyclic. contacts: None without contacts; `bank.contacts` gives their
+    coefficients.
+    """
 
     bank: KrigingBank
     timing: CanonicalTiming
     decoder: Decoder
     proportions: Proportions
     travel: Travel | None
+    contacts: ContactTable | None = None
 
     def evaluate(
         self, controls: Floats, time: Floats, labels: Floats | None = None, level: int = 0
@@ -67,7 +74,13 @@ class FloatModel:
         """
         none = np.zeros((len(controls), self.bank.label_count))
         fields = self.fields(controls, none if labels is None else labels, level)
-        return self.outputs_at_times(fields, time, level)
+        found = self.outputs_at_times(fields, time, level)
+        if self.contacts is None or self.bank.contacts is None:
+            return found
+        points = self.bank.points(controls, none if labels is None else labels)
+        _, place = self.timing.numpy(fields["duration"], fields["warp"], time)
+        contacts = self.contacts.numpy(self.bank.contacts.predict(points), place)
+        return replace(found, contacts=contacts)
 
     def fields(self, controls: Floats, labels: Floats, level: int) -> dict[str, Floats]:
         """Return the values (B, m) of all kriged quantities by name."""
@@ -143,6 +156,11 @@ class FloatModel:
             steps = net("Shape", place, start=0, end=2)
             shape = net("Concat", steps, net.indices(len(self.decoder.curves)), axis=0)
             net.add_output("curves", net("Reshape", *curves, shape))
+        if self.contacts and self.bank.contacts:
+            # Built last, so that a graph pruned of them is the graph of a model without them.
+            field = self.bank.contacts
+            found = kriging_graph.contact_coefficients(self.bank, field, net, "controls")
+            net.add_output("contacts", self.contacts.onnx(net, found, place))
         joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.labels:
@@ -159,4 +177,6 @@ class FloatModel:
         }
         if self.decoder.curves:
             outputs["curves"] = ["batch", "steps", len(self.decoder.curves)]
+        if self.contacts:
+            outputs["contacts"] = ["batch", "steps", self.contacts.values.shape[1]]
         return checksum.append_checksum(net.model(inputs, outputs, metadata, about))

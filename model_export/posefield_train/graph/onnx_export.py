@@ -28,6 +28,7 @@ from posefield.model_file.model_card import (
     Preset,
     TrainingParameters,
 )
+from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph import levels, training_notes, truncation_cost
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
@@ -44,6 +45,8 @@ from posefield_train.tensor import truncation_error
 POINTS, BATCH = 10_000, 1_000
 # Largest distance of a joint of the graph from the reference's, m.
 PARITY_LIMIT = 1e-4
+# Largest difference of the probability of a contact.
+CONTACT_LIMIT = 2e-3
 # A control with more distinct values than this is continuous, and they are not listed.
 MAX_LISTED_VALUES = 10
 
@@ -117,6 +120,7 @@ def check_parity(model: FloatModel, content: bytes, own_card: ModelCard) -> floa
     for question in range(POINTS // BATCH):
         asked = _draw_inputs(rng, model, own_card, question % len(own_card.levels))
         gaps = _joint_distances(model, opened, asked)
+        _check_contacts(model, opened, asked)
         at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
         worst = max(worst, float(gaps[at]))
         if worst > PARITY_LIMIT:
@@ -178,6 +182,22 @@ def _joint_distances(model: FloatModel, opened: Session, asked: _ParityInputs) -
     return np.asarray(np.linalg.norm(found - expected, axis=-1))
 
 
+def _check_contacts(model: FloatModel, opened: Session, asked: _ParityInputs) -> None:
+    """Raise ExportRefused where the graph's contacts differ from the reference's."""
+    question, level = (asked.points, asked.times), asked.level
+    expected = model.evaluate(*question, asked.labels, level).contacts
+    if expected is None:
+        return
+    (found,) = opened.run(*question, graph_ports.CONTACTS, labels=asked.labels, level=level)
+    gaps = np.abs(found - expected)
+    if gaps.max() > CONTACT_LIMIT:
+        row = int(np.unravel_index(int(np.argmax(gaps)), gaps.shape)[0])
+        raise ExportRefused(
+            f"the graph's probability of a contact is {gaps.max():.5f} off the reference's, "
+            f"expected at most {CONTACT_LIMIT:g}; at {asked.said(opened.card, row)}"
+        )
+
+
 def _card(
     recipe: Recipe,
     trained: TrainedModel,
@@ -215,6 +235,7 @@ def _card(
             Preset(name, preset.values, preset.labels) for name, preset in recipe.presets.items()
         ),
         curves=trained.tensor.curves,
+        contacts=trained.contacts.statistics if trained.contacts else (),
     )
 
 
@@ -329,7 +350,14 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
         "tensor": list(trained.tensor.values.shape),
         "parity_m": float(f"{parity:.1e}"),
         "notes": list(notes),
+        **_contact_accuracy(trained.contacts),
     }
+
+
+def _contact_accuracy(found: FittedContacts | None) -> dict[str, Any]:
+    if found is None:
+        return {}
+    return {"contacts": {name: _rounded(own) for name, own in asdict(found.accuracy).items()}}
 
 
 def plain_parameters(hyper: Hyper) -> Hyper:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align.time_alignment import AlignedClips
+from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.sample_points import SamplePoints
@@ -45,7 +46,8 @@ class TrainedModel:
     controls, by quantity; one that they do not explain is constant. residuals:
     leave-one-out residuals (N, m) of each quantity but the pose. truncation_errors: of the reduced
     tensor. joints: leave-one-out error (J,) of each joint as a share of the root mean square of
-    all. outliers: evidence against clips that do not fit.
+    all. outliers: evidence against clips that do not fit. contacts: of the feet, None without them.
+    contact_notes: assumptions about them.
     """
 
     model: FloatModel
@@ -65,6 +67,8 @@ class TrainedModel:
     truncation_errors: TruncationErrors
     joints: Floats
     outliers: tuple[Outlier, ...] = ()
+    contacts: FittedContacts | None = None
+    contact_notes: tuple[str, ...] = ()
 
     def outlier_notes(self) -> list[str]:
         """Return one note per clip with evidence against it, the worst kinds first.

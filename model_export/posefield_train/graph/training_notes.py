@@ -44,6 +44,7 @@ def training_notes(recipe: Recipe, trained: TrainedModel, imported: Sequence[str
         *imported,
         *finding_notes(trained.findings, trained.examples, trained.skeleton.names),
         *phase_alignment.shift_notes(trained.examples),
+        *trained.contact_notes,
     ]
 
 

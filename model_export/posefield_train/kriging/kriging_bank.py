@@ -60,7 +60,8 @@ class KrigingBank:
     weights (p + 1 + d + m, M) of each coarser level. Rows: labels, one, controls and the first m
     covariances. Columns: the logarithm of the variance, the other quantities, the pose's leading
     coefficients. power_law: of the duration, beside its model. event: second model of the pose's
-    leading coefficients, for the time around the event, at the finest level.
+    leading coefficients, for the time around the event, at the finest level. contacts: model of the
+    coefficients of the contacts with the pose's parameters, and so its weights, at every level.
     """
 
     low: PerControl
@@ -72,6 +73,7 @@ class KrigingBank:
     coarse: tuple[Annotated[Floats, "rows columns"], ...] = ()
     power_law: PowerLaw | None = None
     event: UniversalKriging | None = None
+    contacts: UniversalKriging | None = None
 
     @property
     def event_columns(self) -> int:

@@ -15,6 +15,7 @@ from posefield_train.kriging.kriging_bank import (
     ConstantModel,
     KrigingBank,
 )
+from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.onnx_graph.level_tables import Integers
 
@@ -70,6 +71,22 @@ def onnx(
     if bank.power_law:
         fields[DURATION] = net("Add", fields[DURATION], bank.power_law.onnx(net, controls))
     return {**fields, "sigma": sigma}
+
+
+def contact_coefficients(
+    bank: KrigingBank, field: UniversalKriging, net: GraphBuilder, controls: str
+) -> str:
+    """Build the coefficients (B, r) of the contacts, which do not depend on the level.
+
+    field: the bank's model of the contacts.
+    """
+    n = len(field.samples)
+    points = _points(bank, net, controls)
+    linear = _linear(bank, net, controls, points)
+    near = _covariances(bank, net, points, linear, net.indices(n))
+    weights = np.vstack([bank.linear_weights(field), field.dual[:n]])
+    basis = net("Concat", linear, near, axis=1)
+    return net("MatMul", basis, net.weights("contact_weights", weights))
 
 
 def _points(bank: KrigingBank, net: GraphBuilder, controls: str) -> str:

@@ -35,7 +35,9 @@ def sort_samples(bank: KrigingBank) -> KrigingBank:
     order = pivoted_order(bank.pose)
     others = {name: _permute(field, order) for name, field in bank.others.items()}
     event = _permute_kriging(bank.event, order) if bank.event else None
-    return replace(bank, pose=_permute_kriging(bank.pose, order), others=others, event=event)
+    contacts = _permute_kriging(bank.contacts, order) if bank.contacts else None
+    pose = _permute_kriging(bank.pose, order)
+    return replace(bank, pose=pose, others=others, event=event, contacts=contacts)
 
 
 def pivoted_order(pose: UniversalKriging) -> Annotated[Indices, "samples"]:

@@ -77,7 +77,13 @@ def named_joints(recipe: Recipe) -> set[str]:
     motion = recipe.motion
     autos = [control.auto for control in recipe.measured]
     event |= {joint for auto in autos for joint in (*auto.joint_names, *recipe.leg_ends(auto))}
-    listed = {*motion.joint_weights, *motion.feet, *motion.end_sites, *recipe.roles.values()}
+    listed = {
+        *motion.joint_weights,
+        *motion.feet,
+        *recipe.contacts.columns,
+        *motion.end_sites,
+        *recipe.roles.values(),
+    }
     return listed | event
 
 

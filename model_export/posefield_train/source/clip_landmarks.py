@@ -1,6 +1,6 @@
-"""Landmarks of clips: frames of events as shares of a clip, and their order in a family."""
+"""Landmarks and contacts of clips: frames of the file as shares of a clip."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +9,9 @@ from posefield.motion.clip import Clip
 from posefield_train.source import measured_controls
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.recipe import Recipe
+
+Spans = tuple[tuple[float, float], ...]
+"""Intervals of shares of a clip."""
 
 
 def landmarks(row: ClipRow, last: int, columns: Sequence[str]) -> tuple[float, ...]:
@@ -72,3 +75,19 @@ def expect_same_order(
                 f"found {found} of {row.place.name}, expected the order of line "
                 f"{rows[0].line}, {', '.join(names[i] for i in expected)}"
             )
+
+
+def contact_spans(row: ClipRow, last: int, columns: Mapping[str, str]) -> dict[str, Spans]:
+    """Return the contacts of a row by joint, first and last share of its clip.
+
+    last: its last frame in the file. A contact lasts from half a frame before its first frame to
+    half a frame behind its last.
+    """
+    first, steps = row.first_frame, last - row.first_frame
+    return {
+        joint: tuple(
+            ((begin - 0.5 - first) / steps, (end + 0.5 - first) / steps)
+            for begin, end in row.contacts[column]
+        )
+        for joint, column in columns.items()
+    }

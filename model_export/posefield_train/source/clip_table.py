@@ -12,7 +12,7 @@ from posefield_train.source import data_folder, shipped_recipes, table_cells
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections.data_sections import PERFORMER, Clips
-from posefield_train.source.table_cells import ClipTable
+from posefield_train.source.table_cells import ClipTable, FrameSpans
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class ClipRow:
     landmarks: frames of the file. other_labels: name of the clip in each further label set. take:
     name of the take, unique among the performer's; None if the table has no such column.
     curve_place: file of the clip's curves; None without them, and where the clip has curves alone.
+    contacts: first and last frame in the file of each contact, by column.
     """
 
     place: FileLocation
@@ -38,6 +39,7 @@ class ClipRow:
     other_labels: Mapping[str, str] = field(default_factory=dict)
 
     curve_place: FileLocation | None = None
+    contacts: Mapping[str, FrameSpans] = field(default_factory=dict)
 
     @property
     def labels(self) -> dict[str, str]:
@@ -97,6 +99,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         **{column: f"clips.labels.{name}" for name, column in clips.labels.items()},
         **{control.column: f"control {control.name}" for control in recipe.column_controls},
     }
+    named |= {column: f"contacts.columns.{j}" for j, column in recipe.contacts.columns.items()}
     for key in ("performer", "take", "first_frame", "last_frame"):
         column = getattr(clips, key)
         if column is not None:
@@ -129,6 +132,9 @@ def _row(
         },
         take=_take(clips, cells, line, record),
         curve_place=_curve_place(recipe, find, record),
+        contacts={
+            column: cells.spans(line, record, column) for column in recipe.contacts.columns.values()
+        },
     )
 
 

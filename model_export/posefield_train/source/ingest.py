@@ -1,7 +1,7 @@
 """Clips from rows of the table: cut, in metres, Y up, with heading and origin removed."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from posefield.common.array_shapes import Positions
@@ -19,6 +19,7 @@ from posefield_train.source import (
 )
 from posefield_train.source.canonical import placement
 from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source.clip_landmarks import Spans
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.curve_files import CurveReader
 from posefield_train.source.recipe import Recipe
@@ -41,7 +42,8 @@ class Example:
     by which the clip was shifted to begin later. take: name of the take; examples of one take are
     left out together. facing: degrees from the root's +z to the body's facing in the file, to the
     left; None for a motion without a facing. captured: the clip of a cycle before its seam
-    was closed; None where nothing was closed.
+    was closed; None where nothing was closed. contacts: first and last share of the clip as it was
+    cut of each contact in the table, by joint.
     """
 
     row: ClipRow
@@ -53,6 +55,7 @@ class Example:
     take: str = ""
     facing: float | None = 0.0
     captured: Clip | None = None
+    contacts: Mapping[str, Spans] = field(default_factory=dict)
 
     @property
     def offsets(self) -> Floats:
@@ -188,7 +191,10 @@ def _example(
         *clip_landmarks.found_landmark(recipe, row, clip),
     )
     values = measured_controls.control_values(recipe, row, clip, marks)
-    example = Example(row, clip, values, marks, jumps, facing=facing, captured=before)
+    spans = clip_landmarks.contact_spans(row, last, recipe.contacts.columns)
+    example = Example(
+        row, clip, values, marks, jumps, facing=facing, captured=before, contacts=spans
+    )
     return _FoundExample(example, placement.largest_stretch(captured), captured.positions())
 
 

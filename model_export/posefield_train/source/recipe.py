@@ -30,6 +30,7 @@ from posefield_train.source.recipe_sections.control_sources import (
 from posefield_train.source.recipe_sections.data_sections import Clips, Motion, Source
 from posefield_train.source.recipe_sections.training_sections import (
     Alignment,
+    Contacts,
     Event,
     Kriging,
     Preset,
@@ -56,6 +57,7 @@ class Recipe(RecipePart):
     kriging: Kriging = Kriging()
     event: Event | None = None
     curves: Curves | None = None
+    contacts: Contacts = Contacts()
     roles: dict[Role, Text] = Field(
         default={},
         description="joints by role; exports need them for the joint names of Mixamo, Unreal, VRM "

@@ -5,7 +5,7 @@ import io
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 
 from posefield.common.errors import RecipeError
 from posefield_train.source import data_folder
@@ -15,6 +15,10 @@ from posefield_train.source.recipe_sections.data_sections import Condition
 LABEL_FORM = (
     "a name of printable characters, without commas and colons, and without blanks at its ends"
 )
+
+
+FrameSpans = tuple[tuple[int, int], ...]
+"""Intervals of frames of a file, first and last."""
 
 
 def is_label(name: str) -> bool:
@@ -117,6 +121,23 @@ class ClipTable:
                 self.name, f"column {column!r}: {record[column]!r}, expected a frame from 0", line
             )
         return int(value)
+
+    def spans(self, line: int, record: dict[str, str], column: str) -> FrameSpans:
+        """Return the intervals of frames in a cell, such as '12-40 77-90', in order."""
+        ends = [part.split("-") for part in record[column].split()]
+        right = all(len(pair) == 2 and all(end.isdecimal() for end in pair) for pair in ends)
+        flat = [int(end) for pair in ends for end in pair] if right else []
+        # A contact begins behind the end of the one before; one frame is an interval, too.
+        right = right and all(a <= b for a, b in pairwise(flat))
+        right = right and all(b < c for b, c in zip(flat[1::2], flat[2::2], strict=False))
+        if not right:
+            raise RecipeError(
+                self.name,
+                f"column {column!r}: {record[column]!r}, expected intervals of frames in order, "
+                "such as '12-40 77-90', or nothing",
+                line,
+            )
+        return tuple(zip(flat[::2], flat[1::2], strict=True))
 
     def name_of(self, line: int, record: dict[str, str], column: str) -> str:
         """Return the name in a cell of labels."""

@@ -45,6 +45,7 @@ def _summary(plain: dict[str, Any]) -> str:
         "controls:",
         *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
         *map(_curve, plain.get("curves", [])),
+        *_contacts(plain),
         *(f"{own['name']}s: {', '.join(own['names'])}" for own in plain["labels"]),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),
@@ -64,6 +65,23 @@ def _curve(plain: dict[str, Any]) -> str:
     """Return one line on a curve: its limits, and the distance that one unit counts as."""
     span = f"{plain['minimum']:g} to {plain['maximum']:g}"
     return f"curve {plain['name']}: {span}, a unit counts as {100 * plain['distance']:g} cm"
+
+
+def _contacts(plain: dict[str, Any]) -> list[str]:
+    """Return a line on each joint with contacts, and one on the accuracy of the contacts."""
+    names, accuracy = plain["skeleton"]["names"], plain["diagnostics"].get("contacts")
+    found = [
+        f"contacts of {names[own['joint']]}: {100 * own['height']:.1f} cm high, swings of "
+        f"{own['swing']:.2f} s, at most {own['longest_swing']:.2f} s in nine of ten, lifted by "
+        f"{100 * own['clearance']:.1f} cm"
+        for own in plain.get("contacts", [])
+    ]
+    if accuracy:
+        found.append(
+            f"contacts of clips left out: {accuracy['agreement']:.0%} of frames agree, Brier score "
+            f"{accuracy['brier']:.3f}, {accuracy['climatology']:.3f} by the mean of the others"
+        )
+    return found
 
 
 def _control(plain: dict[str, Any], joints: list[str]) -> str:

@@ -22,11 +22,18 @@ OUTPUTS = {
 
 CURVES = "curves"
 """Output of a model with curves."""
+CONTACTS = "contacts"
+"""Output of a model with contacts; only sessions that are asked for it compute it."""
 
 
 def outputs(card: ModelCard) -> tuple[str, ...]:
-    """Return the names of the outputs of a card's graph."""
+    """Return the names of the outputs of a card's graph, but for the contacts."""
     return (*OUTPUTS, CURVES) if card.curves else tuple(OUTPUTS)
+
+
+def all_outputs(card: ModelCard) -> tuple[str, ...]:
+    """Return the names of all outputs of a card's graph."""
+    return (*outputs(card), CONTACTS) if card.contacts else outputs(card)
 
 
 def check(runtime: Any, card: ModelCard, source: str) -> None:
@@ -51,7 +58,8 @@ def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> No
     if card.labels:
         feed[LABELS] = np.eye(1, sum(card.label_counts), dtype=np.float32)
     try:
-        answers = dict(zip(outputs(card), runtime.run([*outputs(card)], feed), strict=True))
+        names = all_outputs(card)
+        answers = dict(zip(names, runtime.run([*names], feed), strict=True))
     except Exception as fault:  # onnxruntime's exceptions share no base of their own
         raise ModelError(source, f"does not run: {first_line(fault)}") from fault
     for name, shape in _shapes(len(points), times.shape[1], card).items():
@@ -59,6 +67,8 @@ def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> No
             raise ModelError(source, f"{name} {answers[name].shape}, expected {shape}")
         if not np.isfinite(answers[name]).all():
             raise ModelError(source, f"its {name} are not finite numbers")
+    if card.contacts and not ((answers[CONTACTS] >= 0.0) & (answers[CONTACTS] <= 1.0)).all():
+        raise ModelError(source, f"its {CONTACTS} are not probabilities, expected 0 to 1")
     if not (answers["duration"] > 0.0).all():
         raise ModelError(source, f"its duration is {answers['duration'].min()} s, expected above 0")
 
@@ -66,7 +76,10 @@ def _check_outputs(runtime: Any, card: ModelCard, source: str, level: int) -> No
 def _shapes(rows: int, times: int, card: ModelCard) -> dict[str, tuple[int, ...]]:
     joints = len(card.skeleton)
     curves = {CURVES: (rows, times, len(card.curves))} if card.curves else {}
-    return curves | {
+    contacts = {CONTACTS: (rows, times, len(card.contacts))} if card.contacts else {}
+    return {
+        **curves,
+        **contacts,
         "rotations": (rows, times, joints, 4),
         "root_position": (rows, times, 3),
         "bone_offsets": (rows, joints, 3),

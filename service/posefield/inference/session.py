@@ -12,7 +12,7 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Singles
 from posefield.inference import graph_ports, onnx_runtime
-from posefield.inference.graph_ports import LABELS
+from posefield.inference.graph_ports import CONTACTS, LABELS
 from posefield.inference.onnx_runtime import LazySessions
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
@@ -51,7 +51,8 @@ class Session:
     card: its metadata. digest: identifies the file's bytes. runtimes: onnxruntime sessions, one for
     each level of detail. clocks: sessions that compute only the duration. gauges: the session that
     computes only sigma, at the finest level. states: sessions that compute a State. size: of the
-    file, bytes. content: the file. golden: the answer at the default controls.
+    file, bytes. contact_sessions: sessions that compute only the contacts, none without them.
+    content: the file. golden: the answer at the default controls.
     """
 
     card: ModelCard
@@ -61,6 +62,7 @@ class Session:
     sigma_sessions: Sequence[Any]
     size: int
     state_sessions: Sequence[Any] = ()
+    contact_sessions: Sequence[Any] = ()
     content: bytes = field_of(default=b"", repr=False)
     golden: bytes = b""
 
@@ -76,8 +78,11 @@ class Session:
 
         labels (B or 1, p): weights of the names of all label sets; all sets are left open if None.
         level: level of detail. Outside the sampled ranges, answers are bounded (`answer_bounds`),
-        but sigma is that of the controls as asked.
+        but sigma is that of the controls as asked. Raises ValueError for the contacts of a model
+        without them.
         """
+        if CONTACTS in outputs and not self.card.contacts:
+            raise ValueError(f"model {self.card.name} has no contacts")
         if self.bounds.is_inside(controls):
             return self._run(controls, time, outputs, labels, level)
         raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
@@ -140,7 +145,11 @@ class Session:
         """Return the graph's outputs at any controls, without bounds."""
         feed = self._feed(controls, labels)
         feed["time"] = time.astype(np.float32, copy=False)
-        answers: list[Any] = self.runtimes[level].run(list(outputs), feed)
+        poses = [name for name in outputs if name != CONTACTS]
+        answers: list[Any] = self.runtimes[level].run(poses, feed) if poses else []
+        if CONTACTS in outputs:
+            (contacts,) = self.contact_sessions[level].run([CONTACTS], feed)
+            answers.insert(outputs.index(CONTACTS), contacts)
         return answers
 
     def _durations(
@@ -246,8 +255,13 @@ def open_bytes(content: bytes, source: str) -> Session:
 def open_checked(content: bytes, card: ModelCard, source: str) -> Session:
     """Return a session on a checked file, with the finest level and its clock open."""
 
+    # onnxruntime computes outputs that are not asked for, too.
+    poses = (
+        subgraph.select_outputs(content, *graph_ports.outputs(card)) if card.contacts else content
+    )
+
     def whole(level: int) -> Any:
-        return onnx_runtime.open_session(subgraph.fix_level(content, level), source)
+        return onnx_runtime.open_session(subgraph.fix_level(poses, level), source)
 
     def telling(*outputs: str) -> Callable[[int], Any]:
         return lambda level: onnx_runtime.open_session(
@@ -263,6 +277,7 @@ def open_checked(content: bytes, card: ModelCard, source: str) -> Session:
         sigma_sessions=LazySessions(telling("sigma"), 1),
         size=len(content),
         state_sessions=LazySessions(telling(*state_outputs(card)), count),
+        contact_sessions=LazySessions(telling(CONTACTS), count) if card.contacts else (),
         content=content,
     )
     # The trial runs the finest level and its clock, which opens them.

@@ -29,7 +29,9 @@ MAX_CURVES = 1_000
 ANY_SIZE = -1
 """A size that the card does not determine."""
 REQUIRED_VALUES = ("coefficients", "frame")
-"""Values inside the graph that corrections start from; a cyclic model has `way` as well."""
+"""Values inside the graph that corrections start from; a cyclic model has `way` as well, and one
+with contacts `contacts`.
+"""
 
 
 def check(card: ModelCard) -> None:
@@ -49,6 +51,7 @@ def check(card: ModelCard) -> None:
     _check_training_parameters(card)
     _check_presets(card)
     _check_curves(card)
+    _check_contacts(card)
 
 
 def check_graph(
@@ -67,7 +70,8 @@ def check_graph(
             raise ValueError(
                 f"its graph's constant {name!r} has shape {found}, expected {wanted} by its card"
             )
-    for name in (*REQUIRED_VALUES, "way") if card.cyclic else REQUIRED_VALUES:
+    further = (*["way"] * card.cyclic, *["contacts"] * bool(card.contacts))
+    for name in (*REQUIRED_VALUES, *further):
         if name not in values:
             raise ValueError(f"its graph computes no value {name!r}, expected one")
 
@@ -258,6 +262,16 @@ def _check_curves(card: ModelCard) -> None:
         _expect(ends[0] < ends[1], f"curves[{index}]", ends, "a minimum below the maximum")
 
 
+def _check_contacts(card: ModelCard) -> None:
+    _expect_joints(tuple(own.joint for own in card.contacts), "contacts", card)
+    for index, own in enumerate(card.contacts):
+        path, longest = f"contacts[{index}]", own.longest_swing
+        right = own.swing <= longest
+        _expect(right, f"{path}.longest_swing", longest, f"at least its swing, {own.swing} s")
+        for name, found in (("height", own.height), ("clearance", own.clearance)):
+            _expect(abs(found) <= MAX_LENGTH, f"{path}.{name}", found, f"at most {MAX_LENGTH:g} m")
+
+
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     """Return the shapes of constants that the exporter writes for a card, ANY for other sizes."""
     joints, controls, labels = len(card.skeleton), len(card.controls), sum(card.label_counts)
@@ -279,6 +293,9 @@ def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:
     }
     if card.curves:
         shapes["curve_mean"] = (len(card.curves),)
+    if card.contacts:
+        shapes["contact_weights"] = (labels + 1 + controls + card.samples, ANY_SIZE)
+        shapes["contact_table"] = (ANY_SIZE, len(card.contacts), card.frames)
     # Without label sets the graph has no such constants.
     labelled: dict[str, tuple[int, ...]] = {"labels": (1, labels) if labels else ()}
     blended = {"event_mixing": (ANY_SIZE, r2), "event_times": (ANY_SIZE, card.frames)}

@@ -7,7 +7,7 @@ from typing import Any, Literal, NotRequired, TypedDict, get_type_hints
 import msgspec
 import numpy as np
 
-from posefield.common.bounded_types import Count, Degree, Name, NonNegative, Number, Text
+from posefield.common.bounded_types import Count, Degree, Name, NonNegative, Number, Share, Text
 from posefield.common.units import Floats
 from posefield.model_file import card_check
 from posefield.model_file.model_card import FORMAT, OPTIONAL_ENTRIES, PREFIX, UNITS, ModelCard
@@ -35,6 +35,18 @@ class LabelParameters(TypedDict):
     offset: NonNegative
 
 
+class ContactAccuracy(TypedDict):
+    """Leave-one-take-out errors of contacts, over clips, canonical frames and joints.
+
+    agreement: share of right contacts. brier: mean squared error of their probabilities.
+    climatology: the same of the mean over the other takes.
+    """
+
+    agreement: Share
+    brier: NonNegative
+    climatology: NonNegative
+
+
 class Diagnostics(TypedDict):
     """Errors (m), sizes and parameters, written by `posefield_train.graph.onnx_export`."""
 
@@ -54,6 +66,7 @@ class Diagnostics(TypedDict):
     tensor: tuple[Count, Count, Count]
     parity_m: NonNegative
     notes: tuple[Text, ...]
+    contacts: NotRequired[ContactAccuracy]
 
 
 class Adaptation(TypedDict):

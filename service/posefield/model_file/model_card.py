@@ -30,12 +30,13 @@ from posefield.kriging.kriging_model import Hyper
 from posefield.model_file.level_of_detail import Level
 from posefield.motion import measures
 from posefield.motion.curves import Curve
+from posefield.motion.foot_contacts import FootContact
 from posefield.motion.measures import Measure
 from posefield.motion.skeleton import Skeleton
 
 FORMAT = 4
 PREFIX = "posefield."
-OPTIONAL_ENTRIES = ("presets", "curves")
+OPTIONAL_ENTRIES = ("presets", "curves", "contacts")
 """Entries that a file lacks where they are empty."""
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
@@ -139,7 +140,9 @@ class ModelCard:
     cycle, a root of the covariance of the errors of its duration's logarithm and its travel, for a
     sigma of one metre; else empty. presets: named points of the controls; the file has no such
     entry if the recipe names none. curves: scalar channels of the family, in the order of the
-    graph's output `curves`; the file has no such entry without them.
+    graph's output `curves`; the file has no such entry without them. contacts: joints that contact
+    the ground or a thing, in the order of the graph's output `contacts`, whose values are the
+    probabilities of their contacts; the file has neither without them.
     """
 
     name: Slug
@@ -168,6 +171,7 @@ class ModelCard:
     beside: tuple[tuple[Number, ...], ...] = ()
     presets: tuple[Preset, ...] = ()
     curves: tuple[Curve, ...] = ()
+    contacts: tuple[FootContact, ...] = ()
 
     @property
     def clip_labels(self) -> Floats:
@@ -232,8 +236,9 @@ def _plain_fields(card: ModelCard) -> dict[str, Any]:
     """Return the fields of the card but `making`, as numbers, texts, lists and dicts."""
     plain: dict[str, Any] = msgspec.to_builtins(card, enc_hook=np.ndarray.tolist)
     del plain["making"]
-    if not card.curves:
-        del plain["curves"]
+    for name in ("curves", "contacts"):
+        if not getattr(card, name):
+            del plain[name]
     # msgspec leaves out defaults of objects that it decoded.
     for control, own in zip(plain["controls"], card.controls, strict=True):
         control.pop("measure", None)

@@ -82,7 +82,9 @@ class Motion(RecipePart):
         default={}, description="weight of a joint's position in the metric; default: 1"
     )
     feet: list[Text] = Field(
-        default=[], description="joints of the feet, for the measurement of foot skate"
+        default=[],
+        description="joints of the feet, best the balls: for the contacts with the ground and the "
+        "measurement of foot skate",
     )
     end_sites: list[Text] = Field(
         default=[],

@@ -110,6 +110,18 @@ class Event(RecipePart):
         return self.at in FOUND_MOMENTS
 
 
+class Contacts(RecipePart):
+    """Contacts from the table of clips, in place of detected ones."""
+
+    columns: dict[Text, Text] = Field(
+        default={},
+        description="columns: intervals of contact of a joint, such as { RightHand = 'hand_on' }; "
+        "a cell has frames of the motion file from 0, first and last, as '12-40 77-90'. A foot of "
+        "motion.feet that is not listed is detected; any other joint, such as a hand on a thing, "
+        "has contacts only if it is listed",
+    )
+
+
 class Detail(RecipePart):
     """Level of detail below the model's own size."""
 

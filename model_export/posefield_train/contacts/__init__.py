@@ -1,0 +1,1 @@
+"""Contacts of joints: labels of the captured clips, their reduction and their prediction."""

@@ -1,0 +1,1 @@
+"""Contacts of joints in motions."""

@@ -1,0 +1,220 @@
+"""Contacts of a model: labels, their kriging with the weights of the pose, and the graph."""
+
+from dataclasses import replace
+
+import numpy as np
+import onnx
+import pytest
+
+from posefield.inference import graph_ports, session
+from posefield.inference.graph_ports import CONTACTS
+from posefield.model_file import model_card, subgraph
+from posefield_train.contacts import contact_labels, contact_model, contact_table
+from posefield_train.graph import onnx_export
+from posefield_train.kriging import universal_kriging
+from posefield_train.sample import sample_walk
+
+# The graph computes in float32; a label rises within one canonical frame.
+SINGLE = 1e-4
+
+
+@pytest.fixture(scope="module")
+def walk(models_trained):
+    return models_trained.trained("stroll")
+
+
+@pytest.fixture(scope="module")
+def walk_exported(models_trained):
+    return models_trained.exported("stroll")
+
+
+@pytest.fixture(scope="module")
+def opened(walk_exported):
+    return session.open_bytes(walk_exported.content, "stroll")
+
+
+@pytest.fixture(scope="module")
+def labels(walk, models_trained):
+    """Labels (N, T, K) of the strides."""
+    asked = contact_labels.settings(models_trained.RECIPES["stroll"](), walk.skeleton.names)
+    clips = [contact_labels.clip_contacts(example, asked) for example in walk.examples]
+    timing = walk.model.timing
+    return contact_labels.canonical_labels(clips, walk.aligned.logs, timing.basis, timing.frames)
+
+
+def questions(card, count=200):
+    """Controls, times and labels at random, some beyond the sampled ranges."""
+    rng = np.random.default_rng(5)
+    low, high = card.sampled_ranges
+    points = rng.uniform(low - 0.1 * (high - low), high + 0.1 * (high - low), (count, len(low)))
+    named = sum(card.label_counts)
+    weights = np.eye(named + 1, named)[rng.integers(0, named + 1, count)]
+    return points, rng.uniform(0.0, card.durations[0], (count, 4)), weights
+
+
+def test_the_stance_of_a_procedural_walk_is_labelled_as_contact(labels, walk):
+    """Its feet stand for STANCE of a stride, each from the phase at which it lands."""
+    phases = np.linspace(0.0, 1.0, labels.shape[1])
+    for foot, (_, landing) in enumerate(sample_walk.SIDES.values()):
+        since = (phases - landing) % 1.0
+        inside = (since > 0.05) & (since < sample_walk.STANCE - 0.05)
+        outside = (since > sample_walk.STANCE + 0.08) & (since < 0.92)
+        assert labels[:, inside, foot].mean() > 0.99
+        assert labels[:, outside, foot].mean() < 0.01
+    assert np.array_equal(labels[:, 0], labels[:, -1])
+
+
+def test_the_statistics_are_those_of_the_walk(walk):
+    """A swing lasts 0.4 of a stride of 0.7 to 1.1 s and lifts the foot by 8 cm."""
+    for own in walk.contacts.statistics:
+        assert own.height == pytest.approx(sample_walk.ANKLE, abs=0.01)
+        # A swing that begins and ends gently is in contact for a few frames at both ends.
+        swings = (1.0 - sample_walk.STANCE) * walk.aligned.durations
+        assert 0.7 * np.median(swings) < own.swing < np.median(swings)
+        assert own.swing <= own.longest_swing <= swings.max() + 0.05
+        assert own.clearance == pytest.approx(0.08, abs=0.02)
+
+
+def test_kriged_contacts_are_the_weighted_sum_of_the_clips_labels(walk):
+    """Indicator kriging: the weights are those that the poses have."""
+    model, pose = walk.model, walk.model.bank.pose
+    points = np.array([[0.3, -0.2, 1.0, 0.0], [-0.8, 0.5, 0.0, 0.0]])
+    place = np.tile(np.linspace(0.0, model.timing.frames - 1.0, model.timing.frames), (2, 1))
+    found = model.contacts.numpy(model.bank.contacts.predict(points), place)
+    known = model.contacts.labels(model.bank.contacts.values)
+    expected = np.einsum("bn,ntk->btk", pose.weights(points), known)
+    assert np.abs(found - np.clip(expected, 0.0, 1.0)).max() < 1e-9
+    poses = pose.weights(points) @ pose.values
+    assert np.abs(poses - pose.predict(points)).max() < 1e-9
+    # Negative control: weights of another point.
+    other = np.einsum("bn,ntk->btk", pose.weights(points[::-1]), known)
+    assert np.abs(found - np.clip(other, 0.0, 1.0)).max() > 0.05
+
+
+def test_without_a_nugget_a_captured_clip_has_its_own_labels(walk, labels):
+    pose = walk.model.bank.pose
+    table, coefficients = contact_table.reduce_labels(labels)
+    exact = universal_kriging.solve(replace(pose.hyper, nugget=0.0), pose.samples, coefficients)
+    known = np.clip(table.labels(coefficients), 0.0, 1.0)
+    place = np.tile(np.arange(labels.shape[1], dtype=float), (len(labels), 1))
+    found = table.numpy(exact.predict(pose.samples), place)
+    assert np.abs(found - known).max() < 1e-6
+    smooth = universal_kriging.solve(replace(pose.hyper, nugget=0.5), pose.samples, coefficients)
+    assert np.abs(table.numpy(smooth.predict(pose.samples), place) - known).max() > 0.05
+
+
+def test_reduced_labels_keep_what_their_functions_hold(labels):
+    table, coefficients = contact_table.reduce_labels(labels)
+    rank = len(table.values)
+    assert contact_table.LEAST_COLUMNS <= rank <= contact_table.MOST_COLUMNS
+    rows = labels.transpose(0, 2, 1).reshape(len(labels), -1)
+    sizes = np.linalg.svd(rows, compute_uv=False)
+    lost = np.sum(np.square(table.labels(coefficients) - labels))
+    assert lost == pytest.approx(np.sum(np.square(sizes[rank:])))
+    few, own = contact_table.reduce_labels(labels[:3])
+    assert len(few.values) == 3 and np.abs(few.labels(own) - labels[:3]).max() < 1e-9
+
+
+def test_the_graph_computes_the_contacts_of_the_reference(walk_exported, opened):
+    points, times, weights = questions(opened.card)
+    inside = opened.bounds.limit(points)
+    for level in range(len(opened.card.levels)):
+        expected = walk_exported.model.evaluate(inside, times, weights, level).contacts
+        (found,) = opened.run(inside, times, CONTACTS, labels=weights, level=level)
+        assert found.shape == (*times.shape, 2)
+        assert np.abs(found - expected).max() < SINGLE
+        assert np.abs(found[::-1] - expected).max() > 0.5
+
+
+def test_contacts_are_probabilities_beyond_the_sampled_ranges_too(opened):
+    points, times, weights = questions(opened.card)
+    assert not opened.bounds.is_inside(points)
+    names = ("sigma", CONTACTS, "rotations", "duration")
+    sigma, found, rotations, duration = opened.run(points, times, *names, labels=weights)
+    assert found.shape == (*times.shape, 2) and found.min() >= 0.0 and found.max() <= 1.0
+    alone = opened.run(points, times, CONTACTS, labels=weights)[0]
+    assert np.array_equal(alone, found)
+    others = opened.run(points, times, "sigma", "rotations", "duration", labels=weights)
+    for one, other in zip((sigma, rotations, duration), others, strict=True):
+        assert np.array_equal(one, other)
+
+
+def test_the_end_of_a_cycle_has_the_contacts_of_its_begin(opened):
+    points = opened.bounds.limit(questions(opened.card)[0])
+    durations = opened.durations(points).astype(float)
+    times = np.stack([np.zeros_like(durations), durations], axis=1)
+    (found,) = opened.run(points, times, CONTACTS)
+    assert np.abs(found[:, 0] - found[:, 1]).max() < 1e-3
+    (later,) = opened.run(points, 0.75 * times, CONTACTS)
+    assert np.abs(later[:, 1] - found[:, 0]).max() > 0.5
+
+
+def test_the_rest_of_the_graph_is_that_of_a_model_without_contacts(walk_exported, opened):
+    """So no other answer changes its bytes or becomes slower."""
+    model = walk_exported.model
+    bare = replace(model, contacts=None, bank=replace(model.bank, contacts=None))
+    card = replace(walk_exported.card, contacts=())
+    graphs = []
+    for one, own in ((model, walk_exported.card), (bare, card)):
+        content = one.onnx(model_card.dump(own), {})
+        pruned = subgraph.select_outputs(content, *graph_ports.outputs(own))
+        graphs.append(onnx.load_from_string(pruned).graph)
+    assert list(graphs[0].node) == list(graphs[1].node)
+    assert list(graphs[0].initializer) == list(graphs[1].initializer)
+    whole = onnx.load_from_string(walk_exported.content).graph
+    assert len(whole.node) > len(graphs[1].node)
+    for name in graph_ports.outputs(card):
+        asked = {"controls": np.zeros((1, 2), np.float32), "time": np.zeros((1, 1), np.float32)}
+        assert CONTACTS not in [one.name for one in opened.runtimes[0].get_outputs()]
+        assert len(opened.runtimes[0].run([name], asked)) == 1
+
+
+def test_a_model_without_feet_has_no_contacts(exported):
+    assert exported.card.contacts == ()
+    assert "posefield.contacts" not in model_card.dump(exported.card)
+    assert "contacts" not in model_card.plain_values(exported.card)
+    assert "contacts" not in exported.card.diagnostics
+    bare = session.open_bytes(exported.content, "reaching")
+    assert not len(bare.contact_sessions)
+    with pytest.raises(ValueError, match="model reaching has no contacts"):
+        bare.run(graph_ports.default_controls(bare.card), np.zeros((1, 1)), CONTACTS)
+
+
+def test_the_card_has_the_joints_in_the_order_of_the_output(opened, walk):
+    own = opened.card
+    assert own.contacts == walk.contacts.statistics
+    assert tuple(one.joint for one in own.contacts) == own.feet
+    plain = model_card.plain_values(own)["contacts"][0]
+    assert plain == {
+        "joint": own.feet[0],
+        "height": own.contacts[0].height,
+        "swing": own.contacts[0].swing,
+        "longest_swing": own.contacts[0].longest_swing,
+        "clearance": own.contacts[0].clearance,
+    }
+
+
+def test_left_out_clips_agree_with_their_labels(walk, labels):
+    accuracy = walk.contacts.accuracy
+    assert accuracy.agreement > 0.97
+    assert accuracy.brier < 0.03
+    pose, samples = walk.pose.hyper, walk.samples
+    left_out = universal_kriging.leave_out(pose, samples.points, samples.groups)
+    rows = labels.reshape(len(labels), -1)
+    straight = [
+        1.0 - np.mean((np.clip(rows - left_out @ rows, 0, 1)[i] > 0.5) != rows[i])
+        for i in range(len(rows))
+    ]
+    found = contact_model.left_out_accuracy(labels, labels, pose, samples)
+    assert found.agreement == pytest.approx(np.mean(straight))
+    # Negative control: labels of other clips agree less.
+    mixed = contact_model.left_out_accuracy(np.roll(labels, 9, axis=1), labels, pose, samples)
+    assert mixed.agreement < found.agreement - 0.1 and mixed.brier > 2 * found.brier
+
+
+def test_the_parity_check_refuses_wrong_contacts(walk_exported):
+    model, card = walk_exported.model, walk_exported.card
+    content = model.onnx(model_card.dump(card), {})
+    wrong = replace(model.contacts, values=1.01 * model.contacts.values)
+    with pytest.raises(onnx_export.ExportRefused, match="probability of a contact"):
+        onnx_export.check_parity(replace(model, contacts=wrong), content, card)
