@@ -1,0 +1,269 @@
+"""Contact labels of families: quadrupeds, motions in place, tables of clips, and new performers."""
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.common.errors import RecipeError
+from posefield.inference import session
+from posefield.inference.graph_ports import CONTACTS
+from posefield.motion import bvh_writer
+from posefield.motion.contacts import contact_detection
+from posefield.motion.contacts.contact_detection import ContactThresholds
+from posefield_train import train
+from posefield_train.adapt import canonical_clips, contact_extension
+from posefield_train.adapt.adaptation import adapt
+from posefield_train.adapt.model_reconstruction import reconstruct
+from posefield_train.align import phase_alignment
+from posefield_train.contacts import contact_labels, contact_statistics
+from posefield_train.graph import onnx_export
+from posefield_train.sample import sample_files, sample_walk
+from posefield_train.sample.figures import quadruped_walk
+from posefield_train.source import ingest, recipe
+from posefield_train.source.recipe import Recipe
+
+# Joint that is no foot, whose contacts only a table can give.
+RAIL = "Hips"
+
+
+def walk_recipe(**changes):
+    """Recipe of the strides with values of its sections changed or added."""
+    plain = tomllib.loads(sample_walk.RECIPE_TEXT)
+    for section, values in changes.items():
+        plain[section] = {**plain.get(section, {}), **values}
+    return Recipe.model_validate(plain)
+
+
+def labelled(own, examples):
+    """Labels (M, K) of each example at the frames of its own time."""
+    asked = contact_labels.settings(own, examples[0].clip.skeleton.names)
+    return [contact_labels.clip_contacts(example, asked) for example in examples]
+
+
+def stance(shares, landing):
+    """Whether a foot of the strides stands, away from both ends of its stance; None near them."""
+    since = (shares - landing) % 1.0
+    sure = (np.abs(since - sample_walk.STANCE) > 0.12) & (since > 0.05) & (since < 0.92)
+    return sure, since < sample_walk.STANCE
+
+
+def test_four_feet_of_a_quadruped_are_labelled(tmp_path):
+    own = recipe.read(sample_files.write_folder(tmp_path / "q", quadruped_walk.files()))
+    examples, _ = ingest.ingest(own, tmp_path / "q")
+    trained = train.train(own, examples, lambda _: None)
+    assert len(trained.contacts.statistics) == 4
+    assert trained.contacts.accuracy.agreement > 0.93
+    assert trained.contacts.accuracy.brier < trained.contacts.accuracy.climatology
+    opened = session.open_bytes(onnx_export.export_model(own, trained, []).content, "quadruped")
+    assert [opened.card.skeleton.names[one.joint] for one in opened.card.contacts] == list(
+        quadruped_walk.PAWS
+    )
+    controls = np.array([[control.default for control in opened.card.controls]])
+    times = np.linspace(0.0, opened.durations(controls).item(), 40)[None]
+    for level in range(len(opened.card.levels)):
+        (found,) = opened.run(controls, times, CONTACTS, level=level)
+        standing = found[0] > 0.5
+        # Three paws stand most of the time, two at least, and each swings.
+        assert standing.sum(axis=1).min() >= 2
+        assert 0.6 < standing.mean() < 0.95 and not standing.all(axis=0).any()
+
+
+def test_loose_thresholds_give_wrong_labels(strides):
+    """Negative control: swings of a foot that hardly lifts are taken for contacts."""
+    own = walk_recipe()
+    shares = [np.linspace(0.0, 1.0, len(clip.contacts)) for clip in labelled(own, strides)]
+
+    def wrong(clips):
+        parts = []
+        for clip, at in zip(clips, shares, strict=True):
+            for foot, (_, landing) in enumerate(sample_walk.SIDES.values()):
+                sure, stands = stance(at, landing)
+                parts.append(clip.contacts[sure, foot] != stands[sure])
+        return float(np.mean(np.concatenate(parts)))
+
+    loose = ContactThresholds(speed=3.0, grown_speed=5.0, height=0.1, grown_height=0.2)
+    right = labelled(own, strides)
+    detect = contact_detection.detect_contacts
+    wide = []
+    for example, clip in zip(strides, right, strict=True):
+        paths = np.moveaxis(feet_paths(example, clip), 1, 0)
+        found = [detect(path, clip.rate, True, thresholds=loose) for path in paths]
+        wide.append(replace(clip, contacts=np.stack(found, axis=1)))
+    assert wrong(right) < 0.01
+    assert wrong(wide) > 0.1
+
+
+def feet_paths(example, clip):
+    """Paths (F, 2, 3) of the feet at the frames of labels."""
+    places = np.linspace(0.0, len(example.clip) - 1, len(clip.contacts))
+    positions = example.clip.positions()[:, [3, 6]]
+    before = np.minimum(places.astype(int), len(positions) - 2)
+    share = (places - before)[:, None, None]
+    return (1.0 - share) * positions[before] + share * positions[before + 1]
+
+
+def test_a_walk_in_place_has_the_contacts_of_the_walk(models_trained, strides):
+    own = walk_recipe(motion={"root": "in_place"})
+    still, _ = ingest.ingest(own, models_trained.strides_folder())
+    order = {example.row.place.name: example for example in still}
+    same = [order[example.row.place.name] for example in strides]
+    assert max(np.ptp(example.clip.root_path[:, 2]) for example in same) < 0.2
+    agree = [
+        np.mean(one.contacts == other.contacts)
+        for one, other in zip(labelled(own, same), labelled(walk_recipe(), strides), strict=True)
+    ]
+    assert min(agree) > 0.9
+    # Negative control: without the ground's velocity no foot stands.
+    asked = contact_labels.settings(walk_recipe(), same[0].clip.skeleton.names)
+    assert not contact_labels.clip_contacts(same[0], asked).contacts.all(axis=1).any()
+
+
+@pytest.fixture
+def rail(tmp_path, models_trained):
+    """Folder of strides, and its recipe, whose table has contacts of a joint and of a foot."""
+    for path in models_trained.strides_folder().iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    lines = (tmp_path / "strides.csv").read_text().splitlines()
+    rows = [f"{lines[0]},rail,left", *(f"{line},10-19,0-5 30-200" for line in lines[1:])]
+    (tmp_path / "strides.csv").write_text("\n".join(rows) + "\n")
+    return tmp_path, walk_recipe(contacts={"columns": {RAIL: "rail", "LeftFoot": "left"}})
+
+
+def test_contacts_of_the_table_stand_for_detected_ones(rail):
+    folder, own = rail
+    examples, _ = ingest.ingest(own, folder)
+    for example, clip in zip(examples, labelled(own, examples), strict=True):
+        frames = np.linspace(0.0, 1.0, len(clip.contacts))[:-1] * (len(example.clip) - 1)
+        left, _, hand = clip.contacts[:-1].T
+        assert np.array_equal(hand, (frames >= 9.5) & (frames <= 19.5))
+        assert np.array_equal(left, (frames <= 5.5) | (frames >= 29.5))
+    trained = train.train(own, examples, lambda _: None)
+    names = trained.skeleton.names
+    found = [names[one.joint] for one in trained.contacts.statistics]
+    assert found == ["LeftFoot", "RightFoot", RAIL]
+    assert trained.contacts.statistics[2].height == pytest.approx(sample_walk.HIPS, abs=0.1)
+
+
+def test_contacts_of_the_table_follow_a_shifted_cycle(rail):
+    folder, own = rail
+    examples, _ = ingest.ingest(own, folder)
+    example = examples[0]
+    later = phase_alignment.shift_start(example, 0.25)
+    clip, shifted = labelled(own, [example, later])
+    gone = round(later.shift * (len(clip.contacts) - 1))
+    rolled = np.roll(clip.contacts[:-1], -gone, axis=0)
+    assert np.mean(rolled == shifted.contacts[:-1]) > 0.97
+    assert np.mean(clip.contacts[:-1] == shifted.contacts[:-1]) < 0.8
+
+
+@pytest.mark.parametrize("cell", ["10", "10-", "20-10", "10-20-30", "1-5 4-9", "a-b", "-5-6"])
+def test_a_cell_that_is_no_intervals_is_refused(rail, cell):
+    folder, own = rail
+    table = folder / "strides.csv"
+    table.write_text(table.read_text().replace("10-19", cell, 1))
+    with pytest.raises(RecipeError, match=r"column 'rail': .* expected intervals of frames") as it:
+        ingest.ingest(own, folder)
+    assert it.value.line == 2
+
+
+def test_a_column_or_joint_that_is_missing_is_refused(rail):
+    folder, _ = rail
+    missing = walk_recipe(contacts={"columns": {RAIL: "handrail"}})
+    with pytest.raises(RecipeError, match=r"no column 'handrail' \(contacts.columns.Hips\)"):
+        ingest.ingest(missing, folder)
+    unknown = walk_recipe(contacts={"columns": {"Hand": "rail"}})
+    with pytest.raises(RecipeError, match="no joints 'Hand'"):
+        ingest.ingest(unknown, folder)
+
+
+def test_a_joint_that_contacts_nothing_is_noted_and_left_out(rail):
+    folder, own = rail
+    table = folder / "strides.csv"
+    table.write_text(table.read_text().replace("10-19", ""))
+    examples, _ = ingest.ingest(own, folder)
+    trained = train.train(own, examples, lambda _: None)
+    assert [one.joint for one in trained.contacts.statistics] == [3, 6]
+    assert trained.contact_notes[0].startswith("Hips contacts nothing in any clip")
+    assert "contacts nothing" in " ".join(
+        onnx_export.export_model(own, trained, []).card.diagnostics["notes"]
+    )
+
+
+def test_a_joint_without_a_whole_swing_takes_those_of_the_others():
+    moves = np.zeros((60, 2), bool)
+    moves[:20], moves[40:, 1] = True, True
+    clip = contact_labels.ClipContacts(moves, np.where(moves, 0.1, 0.3), 120.0)
+    one, other = contact_statistics.contact_statistics([clip], (4, 7), cyclic=False)
+    assert other.swing == pytest.approx(20 / 120.0, rel=1e-3)
+    assert (one.swing, one.longest_swing, one.clearance) == (
+        other.swing,
+        other.longest_swing,
+        other.clearance,
+    )
+    assert contact_statistics.without_swings([clip], 0, cyclic=False)
+    assert not contact_statistics.without_swings([clip], 1, cyclic=False)
+    (alone,) = contact_statistics.contact_statistics(
+        [replace(clip, contacts=moves[:, :1], heights=clip.heights[:, :1])], (4,), cyclic=False
+    )
+    assert alone.swing == contact_statistics.USUAL_SWING
+
+
+def newcomers():
+    """Strides of a third walker, by their controls."""
+    return {
+        (3.6 * speed, 1000.0 * turn): sample_walk.walk_stride(speed, turn, 0.08)
+        for speed, turn in ((0.8, -0.3), (1.1, 0.3), (1.4, 0.0))
+    }
+
+
+def test_adapting_adds_the_contacts_of_the_new_clips(posefield, walk_path, tmp_path):
+    rows = ["file,haste,veer"]
+    for index, ((haste, veer), clip) in enumerate(newcomers().items()):
+        (tmp_path / f"{index}.bvh").write_bytes(bvh_writer.dumps(clip, metres_per_unit=1.0))
+        rows.append(f"{index}.bvh,{haste},{veer}")
+    (tmp_path / "cy.csv").write_text("\n".join(rows) + "\n")
+    said = ("--performer", "cy", "--unit", "1", "--up", "y", "--licence", "CC0-1.0")
+    path = tmp_path / "new.onnx"
+    table = tmp_path / "cy.csv"
+    code, _, err = posefield("adapt", walk_path, "--table", table, "-o", path, *said)
+    assert code == 0, err
+    parent, opened = session.load(walk_path), session.load(path)
+    assert opened.card.contacts == parent.card.contacts
+    assert opened.card.diagnostics["contacts"] == parent.card.diagnostics["contacts"]
+    assert not [note for note in opened.card.diagnostics["notes"] if "left out" in note]
+    for controls in newcomers():
+        point, who = np.array([controls]), np.array([[0.0, 0.0, 1.0]])
+        shares = np.linspace(0.0, 1.0, 50)
+        times = shares[None] * opened.durations(point, who).astype(float)[:, None]
+        (found,) = opened.run(point, times, CONTACTS, labels=who)
+        for foot, (_, landing) in enumerate(sample_walk.SIDES.values()):
+            sure, stands = stance(shares, landing)
+            assert np.mean((found[0, sure, foot] > 0.5) == stands[sure]) > 0.97
+
+
+def test_adapting_leaves_out_contacts_of_the_table_with_a_note(rail):
+    folder, own = rail
+    examples, _ = ingest.ingest(own, folder)
+    trained = train.train(own, examples[3:], lambda _: None)
+    known = canonical_clips.adaptable(own, trained)
+    adapted = adapt(known, examples[:3], "new")
+    assert [one.joint for one in adapted.contacts.statistics] == [3, 6]
+    assert adapted.model.contacts.values.shape[1] == 2
+    (note,) = contact_extension.contact_notes(known, adapted.contacts)
+    assert note.startswith("contacts of Hips were left out")
+    handless = replace(known, feet=())
+    assert adapt(handless, examples[:3], "new").contacts is None
+    (note,) = contact_extension.contact_notes(known, None)
+    assert "LeftFoot, RightFoot, Hips" in note
+
+
+def test_a_reopened_model_has_the_contacts_of_the_trained_one(models_trained):
+    exported = models_trained.exported("stroll")
+    reopened = reconstruct(exported.content, "stroll.onnx")
+    points, times = np.array([[3.6, 100.0], [5.0, -200.0]]), np.array([[0.1, 0.5], [0.3, 0.7]])
+    expected = exported.model.evaluate(points, times).contacts
+    found = reopened.known.model.evaluate(points, times).contacts
+    assert np.abs(found - expected).max() < 1e-3
+    assert np.abs(found[::-1] - expected).max() > 0.1
