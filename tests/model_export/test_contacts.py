@@ -6,6 +6,7 @@ import numpy as np
 import onnx
 import pytest
 
+from posefield.common.errors import ModelError
 from posefield.inference import graph_ports, session
 from posefield.inference.graph_ports import CONTACTS
 from posefield.model_file import model_card, subgraph
@@ -218,3 +219,60 @@ def test_the_parity_check_refuses_wrong_contacts(walk_exported):
     wrong = replace(model.contacts, values=1.01 * model.contacts.values)
     with pytest.raises(onnx_export.ExportRefused, match="probability of a contact"):
         onnx_export.check_parity(replace(model, contacts=wrong), content, card)
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (lambda own: own * 2, "contacts is .*, expected each entry once"),
+        (lambda own: (replace(own[0], joint=99), own[1]), "expected joints from 0 to 6"),
+        (lambda own: (replace(own[0], longest_swing=0.01), own[1]), "at least its swing"),
+        (lambda own: (replace(own[0], height=2e3), own[1]), "contacts.0..height is 2000.0"),
+        (lambda own: own[:1], "constant 'contact_table' has shape"),
+    ],
+)
+def test_a_card_that_contradicts_itself_or_its_graph_is_refused(walk_exported, change, said):
+    card = replace(walk_exported.card, contacts=change(walk_exported.card.contacts))
+    content = walk_exported.model.onnx(model_card.dump(card), {})
+    with pytest.raises(ModelError, match=said):
+        session.open_bytes(content, "odd.onnx")
+
+
+def test_a_card_with_contacts_needs_a_graph_with_them(walk_exported, opened):
+    model = walk_exported.model
+    bare = replace(model, contacts=None, bank=replace(model.bank, contacts=None))
+    with pytest.raises(ModelError, match="constant 'contact_weights' has shape"):
+        session.open_bytes(bare.onnx(model_card.dump(walk_exported.card), {}), "odd.onnx")
+    # A file as version 0.2.0 wrote it, which lacks both, is served without contacts.
+    card = replace(walk_exported.card, contacts=())
+    old = session.open_bytes(bare.onnx(model_card.dump(card), {}), "old.onnx")
+    points, times, weights = questions(card)
+    names = graph_ports.outputs(card)
+    answers = (one.run(points, times, *names, labels=weights, level=2) for one in (opened, old))
+    for own, other in zip(*answers, strict=True):
+        assert np.array_equal(own, other)
+    assert old.run_trial() == opened.run_trial()
+
+
+def test_inspect_prints_the_contacts(posefield, walk_path, model_path):
+    code, out, _ = posefield("inspect", walk_path)
+    card = session.load(walk_path).card
+    own, accuracy = card.contacts[0], card.diagnostics["contacts"]
+    assert code == 0
+    assert (
+        f"contacts of LeftFoot: {100 * own.height:.1f} cm high, swings of {own.swing:.2f} s" in out
+    )
+    assert f"{accuracy['agreement']:.0%} of frames agree" in out
+    code, out, _ = posefield("inspect", model_path)
+    assert code == 0 and "contacts" not in out
+
+
+def test_equal_questions_in_one_batch_have_equal_contacts(opened):
+    """Rows of a batch of two or more do not depend on their place in it."""
+    points, times, weights = questions(opened.card)
+    points = opened.bounds.limit(points)
+    (whole,) = opened.run(points, times[:, :1], CONTACTS, labels=weights)
+    for row in range(0, 40, 7):
+        pair = [array[row : row + 1].repeat(2, axis=0) for array in (points, times, weights)]
+        (found,) = opened.run(pair[0], pair[1][:, :1], CONTACTS, labels=pair[2])
+        assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], whole[row])
