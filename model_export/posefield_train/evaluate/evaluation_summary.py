@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats
+from posefield_train.contacts import held_out_contacts
 from posefield_train.evaluate import corrections, equal_information, motion_errors
 from posefield_train.evaluate.methods import ASKED_OPEN, EXACT, OURS, TOLD, definition
 from posefield_train.evaluate.motion_errors import MotionErrors
@@ -167,6 +168,7 @@ def joint_sigma_ratios(result: EvaluationResult) -> dict[str, float]:
 def facts(result: EvaluationResult) -> dict[str, Any]:
     """Return the figures of a result as JSON values."""
     held = {} if result.flags is None else {"support": result.flags.facts()}
+    contacts = held_out_contacts.mean_facts(result.contacts) if result.contacts else None
     by_joint = joint_sigma_ratios(result)
     methods = {summary.name: summary.facts() for summary in summarize(result)}
     if EXACT in methods:
@@ -180,6 +182,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
             name: significant_digits.round_number(ratio) for name, ratio in by_joint.items()
         },
         **held,
+        **({"contacts": contacts} if contacts else {}),
         "equal_information": equal_information.facts(result),
         "methods": methods,
     }
@@ -200,14 +203,16 @@ def table(result: EvaluationResult) -> str:
 
 
 def trust_text(result: EvaluationResult) -> list[str]:
-    """Return a sentence on sigma by joint, and one on the support flag."""
+    """Return sentences on sigma by joint, on the support flag and on contacts."""
     ratios = joint_sigma_ratios(result)
     least, most = min(ratios, key=ratios.__getitem__), max(ratios, key=ratios.__getitem__)
     joints = (
         f"sigma ratio by joint: median {np.median(list(ratios.values())):.2f}, "
         f"from {ratios[least]:.2f} ({least}) to {ratios[most]:.2f} ({most})"
     )
-    return [joints] + ([result.flags.text()] if result.flags else [])
+    flags = [result.flags.text()] if result.flags else []
+    contacts = [held_out_contacts.text(result.contacts)] if result.contacts else []
+    return [joints, *flags, *contacts]
 
 
 def legend(results: Sequence[EvaluationResult]) -> str:

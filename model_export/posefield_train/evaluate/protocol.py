@@ -8,6 +8,9 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
+from posefield_train.contacts import held_out_contacts
+from posefield_train.contacts.contact_model import ContactAccuracy
+from posefield_train.contacts.held_out_contacts import HeldOutClips
 from posefield_train.evaluate import (
     compared_motion,
     corrected_answers,
@@ -54,7 +57,8 @@ class EvaluationResult:
     joints: their names. takes: number (C,) of the take of each clip. corrections: of the
     predictions to the captured event (C,); empty without an event. flags: accuracy of the support
     flag; None against the truth, which has no held-out clips. bodies: at the event, of captured
-    clips and of posefield's predictions. parents: of the joints.
+    clips and of posefield's predictions. parents: of the joints. contacts: accuracy of posefield's
+    (C,); empty without contacts, and against the truth.
     """
 
     family: str
@@ -69,6 +73,7 @@ class EvaluationResult:
     flags: SupportFlags | None = None
     bodies: EventBodies = field(default_factory=dict)
     parents: tuple[int, ...] = ()
+    contacts: tuple[ContactAccuracy, ...] = ()
 
     def asked(self, name: str) -> list[int]:
         """Return the indices of the clips that a method predicted."""
@@ -90,6 +95,7 @@ class PartialResult:
     corrections: list[Correction]
     bodies: EventBodies
     parents: tuple[int, ...]
+    contacts: Sequence[ContactAccuracy] = ()
 
     def of(self, name: str) -> Sequence[MotionErrors | None]:
         """Return the errors of a method, None for each clip if it predicted none."""
@@ -192,7 +198,25 @@ def run_fold(
         more: ExtraPredictions = new_performers.predict_unnamed(recipe, made.trained, rest, asked)
     else:
         more = new_performers.predict_adapted(recipe, made.trained, held)
-    return _compare_methods(made, fold.held, asked, _ReferenceMotions(captured, events, more))
+    found = _compare_methods(made, fold.held, asked, _ReferenceMotions(captured, events, more))
+    return replace(found, contacts=_contact_accuracies(made, HeldOutClips(rest, held), asked))
+
+
+def _contact_accuracies(
+    made: _EvaluatedModel, clips: HeldOutClips, asked: Queries
+) -> list[ContactAccuracy]:
+    own, model = made.trained.contacts, made.trained.model
+    if own is None:
+        return []
+    labels = sample_points.label_weights(asked.labels, model.bank.labels)
+    durations = model.durations(asked.controls, labels)
+
+    def predict(shares: Floats) -> Floats:
+        found = model.evaluate(asked.controls, shares * durations[:, None], labels).contacts
+        return np.zeros((len(durations), len(shares), 0)) if found is None else found
+
+    joints = [one.joint for one in own.statistics]
+    return held_out_contacts.held_out_accuracies(made.recipe, clips, joints, predict)
 
 
 ExtraPredictions = Mapping[str, Sequence[ComparedMotion | None]]
@@ -274,6 +298,7 @@ def _merge_parts(
     listed = sorted(parts, key=lambda part: part.places)
     order = np.argsort([place for part in listed for place in part.places])
     corrections = [correction for part in listed for correction in part.corrections]
+    contacts = [accuracy for part in listed for accuracy in part.contacts]
     # A fold that leaves one performer lacks the methods that distinguish performers.
     methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
     gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
@@ -294,4 +319,6 @@ def _merge_parts(
         tuple(corrections[i] for i in order if corrections),
         bodies={name: [own[i] for i in order] for name, own in looks.items()},
         parents=listed[0].parents,
+        # A fold without a clip in contact has no contacts.
+        contacts=tuple(contacts[i] for i in order) if len(contacts) == len(order) else (),
     )
