@@ -164,7 +164,7 @@ def test_twists_of_a_whole_chain_are_taken_out_by_removing_jumps(smooth):
     bone = OFFSETS[HAND] / np.linalg.norm(OFFSETS[HAND])
     broken[30:, ARM] = quat.mul(broken[30:, ARM], quat.from_axis_angle(bone, np.array(np.pi)))
     clean, findings = half_turns.remove_jumps(clip(broken), 0)
-    assert [finding.kind for finding in findings][0] == "twist"
+    assert findings[0].kind == "twist"
     assert steps(clean.rotations)[:, ARM].max() < 0.1
 
 
