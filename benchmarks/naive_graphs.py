@@ -187,7 +187,9 @@ class Contents:
         turned = net("Slice", numbers, net.indices(3), end, net.indices(1))
         rows = net("Transpose", turned, perm=[1, 0])
         innermost = net.weights("naive_means", means[:, :, None])
-        return decoder.innermost_joints(net, decoder.quaternions(net, rows, innermost), len(means))
+        found = decoder.quaternions(net, rows, innermost, net.indices(len(means), 1, -1))
+        shape = net.indices(-1, len(means), 4)
+        return decoder.innermost_joints(net, found, len(means), shape)
 
 
 def check(

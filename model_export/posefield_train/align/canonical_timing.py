@@ -35,23 +35,32 @@ class CanonicalTiming:
     def onnx(self, net: GraphBuilder, log_duration: str, logs: str, time: str) -> tuple[str, str]:
         """Build durations (B,), s, and canonical frames (B, S, 1)."""
         duration = net("Exp", log_duration)
-        share = net("Unsqueeze", net("Div", time, duration), net.indices(2))
-        u = net("Clip", share, net.number(0.0), net.number(1.0))
-        breaks = np.concatenate([[0.0], self.basis.breaks])
-        hinges = net("Relu", net("Sub", u, net.weights("warp_breaks", breaks)))
-        cubes = net("Mul", net("Mul", hinges, hinges), hinges)
-        powers = net("Concat", u, net("Mul", u, u), cubes, axis=2)
+        u = net("Clip", net("Div", time, duration), net.number(0.0), net.number(1.0))
         still = net.weights("warp_still", np.log(self.basis.identity))
         increments = net("Softmax", net("Add", logs, still), axis=1)
         # Scale to frames here, at no extra cost.
-        form = (self.frames - 1) * self.basis.power_form.T
-        coefficients = net("MatMul", increments, net.weights("warp_form", form))
-        # A small matrix product per clip would take longer than product and sum.
-        terms = net("Mul", powers, net("Unsqueeze", coefficients, net.indices(1)))
-        pairs = net.weights("warp_pairs", np.ones((len(form.T), 2)))
-        place = net.row_sums(terms, pairs)
-        end = net.number(self.frames - 1.0)
+        form = net.weights("warp_form", (self.frames - 1) * self.basis.power_form)
+        coefficients = net("Unsqueeze", net("Gemm", form, increments, transB=1), net.indices(2))
+        # Powers lie outermost: a sum over them has the same order at every place of a row.
+        terms = net("Mul", self._powers(net, u), coefficients)
+        place = net("ReduceSum", terms, net.indices(0), keepdims=0)
+        kept = net("Clip", place, net.number(0.0), net.number(self.frames - 1.0))
         return (
             net("Squeeze", duration, net.indices(1)),
-            net("Clip", place, net.number(0.0), end),
+            net("Unsqueeze", kept, net.indices(2)),
         )
+
+    def _powers(self, net: GraphBuilder, u: str) -> str:
+        """Build the functions (2 + pieces, B, S) of the warps' power form at shares (B, S).
+
+        Each is a product of three factors: u times ones, u times u, or a hinge cubed.
+        """
+        breaks = np.concatenate([np.zeros(3), self.basis.breaks])[:, None, None]
+        hinges = net("Sub", u, net.weights("warp_breaks", breaks))
+        # No hinge exceeds one, and none of the first two is negative.
+        least = np.zeros((2, len(breaks), 1, 1))
+        least[0, :1], least[1, :2] = 1.0, 1.0
+        second, third = (
+            net("Max", hinges, net.weights(f"warp_factor_{i + 2}", least[i])) for i in range(2)
+        )
+        return net("Mul", net("Mul", net("Relu", hinges), second), third)

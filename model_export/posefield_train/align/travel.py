@@ -14,13 +14,11 @@ from posefield.common.array_shapes import ClipFrames, ClipPaths, ClipRotations, 
 from posefield.common.units import UP, Floats
 from posefield.motion import quat, root_travel
 from posefield_train.align.time_alignment import AlignedClips
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph.graph_builder import SLICE_END, GraphBuilder
 from posefield_train.source import measured_controls
 
 # A quaternion q turned about the vertical by an angle a is q cos a/2 + (q TURN) sin a/2.
 HALF_TURN = quat.mul(quat.from_axis_angle(UP, np.array(np.pi)), np.eye(4))
-# A slice to the end, however long the axis is.
-SLICE_END = 2**31 - 1
 
 
 def remove_travel(aligned: AlignedClips) -> tuple[AlignedClips, ClipTravel]:

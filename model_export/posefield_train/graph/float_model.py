@@ -145,9 +145,12 @@ class FloatModel:
             way = net.rename_value("way", fields["travel"])
             rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)
         else:
-            gone = net("Mul", place, net.weights("no_travel", np.zeros(3)))
+            # A difference of equal numbers costs less than a product with three zeros per pose.
+            root = net.rename_value("root_position", root)
+            gone = net("Sub", root, root)
         net.add_output("rotations", rotations)
-        net.add_output("root_position", root)
+        if root != "root_position":
+            net.add_output("root_position", root)
         net.add_output("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
         net.add_output("duration", duration)
         net.add_output("sigma", fields["sigma"])

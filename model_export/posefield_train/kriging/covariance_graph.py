@@ -18,37 +18,39 @@ class Covariance:
     """A covariance of squared distances: a NumPy function, its slope, and a builder of ONNX nodes.
 
     slope: derivative by the squared distance; zero at distance zero where it is infinite there.
+    gain: number by which the nodes expect squared distances to be multiplied, which saves a node.
     """
 
     numpy: Callable[[Floats], Floats]
     slope: Callable[[Floats], Floats]
     onnx: Callable[[GraphBuilder, str], str]
+    gain: float
 
 
-def _exponential_onnx(net: GraphBuilder, squared: str) -> str:
-    return net("Exp", net("Mul", net("Sqrt", squared), net.number(-3.0)))
+def _exponential_onnx(net: GraphBuilder, scaled: str) -> str:
+    return net("Exp", net("Neg", net("Sqrt", scaled)))
 
 
-def _gaussian_onnx(net: GraphBuilder, squared: str) -> str:
-    return net("Exp", net("Mul", squared, net.number(-3.0)))
+def _gaussian_onnx(net: GraphBuilder, scaled: str) -> str:
+    return net("Exp", net("Neg", scaled))
 
 
-def _spherical_onnx(net: GraphBuilder, squared: str) -> str:
-    h = net("Min", net("Sqrt", squared), net.number(1.0))
+def _spherical_onnx(net: GraphBuilder, scaled: str) -> str:
+    h = net("Min", net("Sqrt", scaled), net.number(1.0))
     cubed = net("Mul", net("Mul", h, h), h)
     falling = net("Sub", net("Mul", cubed, net.number(0.5)), net("Mul", h, net.number(1.5)))
     return net("Add", falling, net.number(1.0))
 
 
-def _matern32_onnx(net: GraphBuilder, squared: str) -> str:
-    a = net("Mul", net("Sqrt", squared), net.number(RATE32))
+def _matern32_onnx(net: GraphBuilder, scaled: str) -> str:
+    a = net("Sqrt", scaled)
     return net("Mul", net("Add", a, net.number(1.0)), net("Exp", net("Neg", a)))
 
 
-def _matern52_onnx(net: GraphBuilder, squared: str) -> str:
-    a = net("Mul", net("Sqrt", squared), net.number(RATE52))
+def _matern52_onnx(net: GraphBuilder, scaled: str) -> str:
+    a = net("Sqrt", scaled)
     linear = net("Add", a, net.number(1.0))
-    growing = net("Add", net("Mul", squared, net.number(RATE52**2 / 3.0)), linear)
+    growing = net("Add", net("Mul", scaled, net.number(1.0 / 3.0)), linear)
     return net("Mul", growing, net("Exp", net("Neg", a)))
 
 
@@ -78,11 +80,11 @@ def _matern52_slope(squared: Floats) -> Floats:
 
 
 _GRAPHS = {
-    "exponential": (_exponential_slope, _exponential_onnx),
-    "gaussian": (_gaussian_slope, _gaussian_onnx),
-    "spherical": (_spherical_slope, _spherical_onnx),
-    "matern32": (_matern32_slope, _matern32_onnx),
-    "matern52": (_matern52_slope, _matern52_onnx),
+    "exponential": (_exponential_slope, _exponential_onnx, 9.0),
+    "gaussian": (_gaussian_slope, _gaussian_onnx, 3.0),
+    "spherical": (_spherical_slope, _spherical_onnx, 1.0),
+    "matern32": (_matern32_slope, _matern32_onnx, RATE32**2),
+    "matern52": (_matern52_slope, _matern52_onnx, RATE52**2),
 }
 COVARIANCES = {
     name: Covariance(formula, *_GRAPHS[name]) for name, formula in COVARIANCE_MODELS.items()

@@ -64,9 +64,9 @@ class NaiveKriging:
         samples = self.fields[0].samples
         gaps = net("Sub", points, net.weights("naive_samples", samples))
         squared = net("ReduceSum", net("Mul", gaps, gaps), net.indices(1), keepdims=0)
-        worth = np.array([field.hyper.scales[:1] ** 2 for field in self.fields])
-        near = net("Mul", net.weights("naive_scales", worth), squared)
-        covariance = COVARIANCES[self.fields[0].hyper.covariance].onnx(net, near)
+        kind = COVARIANCES[self.fields[0].hyper.covariance]
+        worth = kind.gain * np.array([field.hyper.scales[:1] ** 2 for field in self.fields])
+        covariance = kind.onnx(net, net("Mul", net.weights("naive_scales", worth), squared))
         one = net.weights("one", np.ones((1, 1)))
         drift = net("Concat", one, points, axis=1)
         frames = net.indices(len(self.fields), samples.shape[1] + 1)

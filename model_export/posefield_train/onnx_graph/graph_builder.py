@@ -13,6 +13,8 @@ OPSET, IR_VERSION = 18, 8
 Shapes = dict[str, list[str | int]]
 """Axes by the name of an input or output: a fixed size, or the name of a free one."""
 
+SLICE_END = 2**63 - 1
+"""End of a slice that keeps everything; onnxruntime removes such slices when it loads."""
 REGISTER = 16
 """Largest number of float32 values in a vector register."""
 

@@ -171,12 +171,13 @@ class Decoder:
         return {
             "core": [[r2, r1, r3] for r1, r2, r3 in ranks],
             "core_rows": [[-1, r3] for _, _, r3 in ranks],
-            "motion": [[r2, r1, -1, 1] for r1, r2, _ in ranks],
-            "flat": [[r1, -1] for r1, _, _ in ranks],
+            "motion": [[-1, 1, r2, r1] for r1, r2, _ in ranks],
+            "flat": [[-1, r1] for r1, _, _ in ranks],
             "time": [[r2] for _, r2, _ in ranks],
             "root": [[3, r1] for r1, _, _ in ranks],
             "turning": [[4 * n, r1] for n, (r1, _, _) in zip(joints, ranks, strict=True)],
             "joints": [[n] for n in joints],
+            "half_angles": [[n, 1, -1] for n in joints],
             "quaternions": [[4 * n] for n in joints],
             **({"curves": [[len(self.mean), r1] for r1, _, _ in ranks]} if self.curves else {}),
         }
@@ -194,23 +195,23 @@ class Decoder:
         three, end = net.indices(3), net.indices(3 + 3 * len(self.means))
         of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
         mean = net.weights("root_mean", self.mean[:3])
-        root = net("Gemm", flat, of_root, mean, transA=1, transB=1)
+        root = net("Gemm", flat, of_root, mean, transB=1)
         steps = net("Shape", place, start=0, end=2)
         root_shape = net("Concat", steps, net.indices(3), axis=0)
         joint_shape = net("Concat", steps, net.indices(len(self.means), 4), axis=0)
         of_joints = net("Slice", directions, three, end, net.indices(0))
         return (
-            net("Reshape", self._rotations(net, flat, of_joints, ends), joint_shape),
+            self._rotations(net, flat, of_joints, {**ends, "rotations": joint_shape}),
             net("Reshape", root, root_shape),
             *([self._curves(net, flat, directions, ends)] if self.curves else []),
         )
 
     def _curves(self, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]) -> str:
-        """Build the values (B S, C) of the curves, clamped, from coefficients (r1, B S)."""
+        """Build the values (B S, C) of the curves, clamped, from coefficients (B S, r1)."""
         own = PoseChart(self.means).curve_numbers
         of_curves = net("Slice", directions, net.indices(own.start, 0), ends["curves"])
         mean = net.weights("curve_mean", self.mean[own])
-        values = net("Gemm", flat, of_curves, mean, transA=1, transB=1)
+        values = net("Gemm", flat, of_curves, mean, transB=1)
         low, high = limits(self.curves)
         least, most = net.weights("curve_minimum", low), net.weights("curve_maximum", high)
         return net("Min", net("Max", values, least), most)
@@ -218,18 +219,16 @@ class Decoder:
     def _reduced(
         self, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
     ) -> str:
-        """Build the coefficients of the first mode (r1, B S).
+        """Build the coefficients of the first mode (B S, r1).
 
-        Poses lie innermost: one small matrix product per pose would cost more in calls than in
-        arithmetic.
+        Each pose is a product of one row, its time coefficients, with its clip's motion (r2, r1),
+        so that a sum has the same order in every batch.
         """
         core = net("Slice", self._core(net), net.indices(0, 0, 0), ends["core"])
         rows = net("Reshape", core, ends["core_rows"])
-        motion = net("Reshape", net("Gemm", rows, coefficients, transB=1), ends["motion"])
-        time = net("Unsqueeze", self._time(net, place, ends["time"]), net.indices(1))
-        terms = net("Mul", motion, time)
-        poses = net("ReduceSum", terms, net.indices(0), keepdims=0)
-        return net("Reshape", poses, ends["flat"])
+        motion = net("Reshape", net("Gemm", coefficients, rows, transB=1), ends["motion"])
+        time = self._time(net, place, ends["time"])
+        return net("Reshape", net("MatMul", time, motion), ends["flat"])
 
     def _core(self, net: GraphBuilder) -> str:
         """Build the core (r2, r1, r3); the event's block is made when the session loads."""
@@ -249,20 +248,23 @@ class Decoder:
         return net("Concat", upper, net("Concat", before, block, axis=2), axis=0)
 
     def _time(self, net: GraphBuilder, place: str, end: str) -> str:
-        """Build time coefficients (r2, B, S), linearly interpolated between frames."""
+        """Build time coefficients (B, S, 1, r2), linearly interpolated between frames."""
         table = net.weights("time_basis", self.reduced.bases[1].T)
         if self.event:
             table = net("Concat", table, net.weights("event_times", self.event.times.T), axis=0)
-        last = len(self.reduced.bases[1]) - 1
+        frames = len(self.reduced.bases[1])
         zero, one = net.indices(0), net.indices(1)
-        kept = net("Slice", table, zero, end, zero)
-        first = net("Slice", kept, zero, net.indices(last), one)
-        steps = net("Sub", net("Slice", kept, one, net.indices(last + 1), one), first)
-        when = net("Squeeze", place, net.indices(2))
-        before = net("Min", net("Floor", when), net.number(last - 1.0))
-        column = net("Cast", before, to=6)
-        rise = net("Mul", net("Gather", steps, column, axis=1), net("Sub", when, before))
-        return net("Add", net("Gather", first, column, axis=1), rise)
+        # Rows of frames are copied whole. Behind the last frame nothing changes.
+        every = net("Transpose", table, perm=[1, 0])
+        after = net(
+            "Gather", every, net.weights("next_frames", np.append(np.arange(1, frames), frames - 1))
+        )
+        kept = net("Slice", every, zero, end, one)
+        steps = net("Slice", net("Sub", after, every), zero, end, one)
+        before = net("Floor", place)
+        row, share = net("Cast", before, to=6), net("Sub", place, before)
+        rise = net("Mul", net("Gather", steps, row), net("Unsqueeze", share, net.indices(3)))
+        return net("Add", net("Gather", kept, row), rise)
 
     def _directions(self, net: GraphBuilder) -> str:
         """Build directions (D, r1) from stored nonzero rows when the session loads."""
@@ -276,7 +278,7 @@ class Decoder:
     def _rotations(
         self, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
     ) -> str:
-        """Build quaternions (B S, J, 4) from the first mode's coefficients (r1, B S)."""
+        """Build quaternions (B, S, J, 4) from the first mode's coefficients (B S, r1)."""
         turning = half_angle_products_onnx(net, self.means, directions)
         offset = half_angle_products(self.means, self._mean_vectors)
         if any(len(rung.joints) < len(self.means) for rung in self.level_sizes):
@@ -286,8 +288,14 @@ class Decoder:
         constant = net.weights("rotation_mean", offset[:, None])
         return innermost_joints(
             net,
-            quaternions(net, net("Gemm", turning, flat, constant), means),
+            quaternions(
+                net,
+                net("Gemm", turning, flat, constant, transB=1),
+                means,
+                ends["half_angles"],
+            ),
             len(self.means),
+            ends["rotations"],
         )
 
     def _partly_fixed_rotations(
@@ -313,7 +321,8 @@ class Decoder:
         ordered = net.weights("mean_rotations", self.means[:, :, None])
         ordered = net("Gather", ordered, net.weights("joint_order", order))
         moving = net("Slice", ordered, zero, ends["joints"], zero)
-        found = quaternions(net, net("Gemm", turning, flat, constant), moving)
+        rows_of_joints = net("Gemm", turning, flat, constant, transB=1)
+        found = quaternions(net, rows_of_joints, moving, ends["half_angles"])
         still = quat.mul(self.means, quat.exp(self._mean_vectors.reshape(-1, 3)))[order][:, :, None]
         still_ones = net(
             "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
@@ -322,7 +331,7 @@ class Decoder:
         shape = net("Concat", net.indices(1, 1), poses, axis=0)
         both = net("Concat", found, net("Expand", still_ones, shape), axis=0)
         back = net("Gather", both, net.weights("joint_places", np.argsort(order)))
-        return innermost_joints(net, back, joints)
+        return innermost_joints(net, back, joints, ends["rotations"])
 
     @property
     def _mean_vectors(self) -> Annotated[Floats, "numbers"]:
@@ -360,31 +369,31 @@ def half_angle_products_onnx(net: GraphBuilder, means: JointRotations, vectors: 
     return net("Reshape", columns, net.indices(4 * len(means), -1))
 
 
-def quaternions(net: GraphBuilder, rows: str, means: str) -> str:
+def quaternions(net: GraphBuilder, rows: str, means: str, shape: str) -> str:
     """Build quaternions (J, 4, P) from turned rotation vectors (4 J, P) about means (J, 4, 1).
 
-    Poses lie innermost, so that every operation runs over long rows.
+    Poses lie innermost, so that every operation runs over long rows. shape: graph value of the
+    shape (J, 1, -1).
     """
     joints = net(
         "Reshape", rows, net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
     )
     squares = net("ReduceSum", net("Mul", joints, joints), net.indices(1), keepdims=1)
-    cosine, share = _half_angle_terms(net, squares)
+    cosine, share = _half_angle_terms(net, squares, shape)
     return net("Add", net("Mul", means, cosine), net("Mul", joints, share))
 
 
-def _half_angle_terms(net: GraphBuilder, squares: str) -> tuple[str, str]:
+def _half_angle_terms(net: GraphBuilder, squares: str, shape: str) -> tuple[str, str]:
     """Build cosines of half angles a and ratios sin(a) / a, from their squares (J, 1, P)."""
     half = net("Sqrt", net("Add", net.padded(squares), net.number(TINY)))
-    shape = net("Shape", squares)
     share = net("Div", net("Sin", half), half)
     return net.unpadded(net("Cos", half), shape), net.unpadded(share, shape)
 
 
-def innermost_joints(net: GraphBuilder, rotations: str, joints: int) -> str:
-    """Build quaternions (P, J, 4) from quaternions (J, 4, P) with poses innermost."""
+def innermost_joints(net: GraphBuilder, rotations: str, joints: int, shape: str) -> str:
+    """Build quaternions of a shape (..., J, 4) from quaternions (J, 4, P) with poses innermost."""
     finished = net("Reshape", rotations, net.indices(4 * joints, -1))
-    return net("Reshape", net("Transpose", finished, perm=[1, 0]), net.indices(-1, joints, 4))
+    return net("Reshape", net("Transpose", finished, perm=[1, 0]), shape)
 
 
 @dataclass(frozen=True)
