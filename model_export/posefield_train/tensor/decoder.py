@@ -171,7 +171,7 @@ class Decoder:
         return {
             "core": [[r2, r1, r3] for r1, r2, r3 in ranks],
             "core_rows": [[-1, r3] for _, _, r3 in ranks],
-            "motion": [[-1, 1, r2, r1] for r1, r2, _ in ranks],
+            "motion": [[-1, r2, r1] for r1, r2, _ in ranks],
             "flat": [[-1, r1] for r1, _, _ in ranks],
             "time": [[r2] for _, r2, _ in ranks],
             "root": [[3, r1] for r1, _, _ in ranks],
@@ -221,8 +221,8 @@ class Decoder:
     ) -> str:
         """Build the coefficients of the first mode (B S, r1).
 
-        Each pose is a product of one row, its time coefficients, with its clip's motion (r2, r1),
-        so that a sum has the same order in every batch.
+        Each clip is a product of its own, time coefficients (S, r2) with its motion (r2, r1), so
+        that sums have the same order in every batch.
         """
         core = net("Slice", self._core(net), net.indices(0, 0, 0), ends["core"])
         rows = net("Reshape", core, ends["core_rows"])
@@ -248,7 +248,7 @@ class Decoder:
         return net("Concat", upper, net("Concat", before, block, axis=2), axis=0)
 
     def _time(self, net: GraphBuilder, place: str, end: str) -> str:
-        """Build time coefficients (B, S, 1, r2), linearly interpolated between frames."""
+        """Build time coefficients (B, S, r2), linearly interpolated between frames."""
         table = net.weights("time_basis", self.reduced.bases[1].T)
         if self.event:
             table = net("Concat", table, net.weights("event_times", self.event.times.T), axis=0)
@@ -262,8 +262,8 @@ class Decoder:
         kept = net("Slice", every, zero, end, one)
         steps = net("Slice", net("Sub", after, every), zero, end, one)
         before = net("Floor", place)
-        row, share = net("Cast", before, to=6), net("Sub", place, before)
-        rise = net("Mul", net("Gather", steps, row), net("Unsqueeze", share, net.indices(3)))
+        row = net("Cast", net("Squeeze", before, net.indices(2)), to=6)
+        rise = net("Mul", net("Gather", steps, row), net("Sub", place, before))
         return net("Add", net("Gather", kept, row), rise)
 
     def _directions(self, net: GraphBuilder) -> str:
