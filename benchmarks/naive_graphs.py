@@ -19,7 +19,7 @@ from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.naive_kriging import NaiveKriging
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.onnx_graph.level_tables import LevelTables
-from posefield_train.tensor import decoder
+from posefield_train.tensor import quaternion_graph
 
 ABOUT = {"producer_name": "posefield", "producer_version": "naive"}
 
@@ -28,7 +28,7 @@ def numbers(made: Family) -> Floats:
     """Return the values (N, T, 3 + 4 J) that naive kriging averages: root positions, and rotation
     vectors turned beforehand as in the model, so that decoding costs both the same."""
     means = made.trained.model.decoder.means
-    vectors = decoder.half_angle_products(means, made.vectors[..., 3:])
+    vectors = quaternion_graph.half_angle_products(means, made.vectors[..., 3:])
     return np.concatenate([made.vectors[..., :3], vectors], axis=-1)
 
 
@@ -187,9 +187,9 @@ class Contents:
         turned = net("Slice", numbers, net.indices(3), end, net.indices(1))
         rows = net("Transpose", turned, perm=[1, 0])
         innermost = net.weights("naive_means", means[:, :, None])
-        found = decoder.quaternions(net, rows, innermost, net.indices(len(means), 1, -1))
+        found = quaternion_graph.quaternions(net, rows, innermost, net.indices(len(means), 1, -1))
         shape = net.indices(-1, len(means), 4)
-        return decoder.innermost_joints(net, found, len(means), shape)
+        return quaternion_graph.innermost_joints(net, found, len(means), shape)
 
 
 def check(

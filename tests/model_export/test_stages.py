@@ -16,7 +16,7 @@ from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import VARIANCE, ConstantModel, KrigingBank
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.onnx_graph.level_tables import LevelTables
-from posefield_train.tensor import hosvd
+from posefield_train.tensor import decoder_graph, hosvd
 from posefield_train.tensor.decoder import BLOCK_NUMBERS, Decoder, LevelSize, Proportions
 from posefield_train.tensor.hosvd import TuckerTensor
 
@@ -181,8 +181,10 @@ def decoder(stage):
     coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
 
     def build(net, coefficients, place):
-        ends = LevelTables(stage.entries()).onnx(net)
-        return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)
+        ends = LevelTables(decoder_graph.entries(stage)).onnx(net)
+        return decoder_graph.onnx(
+            stage, net, coefficients, net("Unsqueeze", place, net.indices(2)), ends
+        )
 
     found = outputs(build, (4, 3), coefficients=coefficients, place=place)
     nearest = stage.numpy(coefficients, np.rint(place))
@@ -205,8 +207,10 @@ def level_of_decoder(level):
     coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
 
     def build(net, coefficients, place):
-        ends = LevelTables(stage.entries()).onnx(net)
-        return stage.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)
+        ends = LevelTables(decoder_graph.entries(stage)).onnx(net)
+        return decoder_graph.onnx(
+            stage, net, coefficients, net("Unsqueeze", place, net.indices(2)), ends
+        )
 
     found = outputs(build, (4, 3), level=level, coefficients=coefficients, place=place)
     moving = replace(stage, coarse=(*RUNGS[:-1], LevelSize((1, 1, 1), (0, 1))))
@@ -222,8 +226,10 @@ def poses_at_the_means():
     nothing = np.zeros((3, 6))
 
     def build(net, coefficients, place):
-        ends = LevelTables(still.entries()).onnx(net)
-        return still.onnx(net, coefficients, net("Unsqueeze", place, net.indices(2)), ends)[0]
+        ends = LevelTables(decoder_graph.entries(still)).onnx(net)
+        return decoder_graph.onnx(
+            still, net, coefficients, net("Unsqueeze", place, net.indices(2)), ends
+        )[0]
 
     found = outputs(build, (4,), coefficients=nothing, place=np.zeros((3, 2)))
     expected = np.broadcast_to(still.means, (3, 2, 4, 4))

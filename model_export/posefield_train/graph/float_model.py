@@ -16,6 +16,7 @@ from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_bank import POSE, VARIANCE, KrigingBank
 from posefield_train.onnx_graph.graph_builder import GraphBuilder, Shapes
 from posefield_train.onnx_graph.level_tables import LevelTables
+from posefield_train.tensor import decoder_graph
 from posefield_train.tensor.decoder import Decoder, Proportions
 
 
@@ -133,14 +134,16 @@ class FloatModel:
         """Return the file of the model: one graph with metadata, producer fields and a checksum."""
         net = GraphBuilder()
         ranks = [rung.ranks[2] for rung in self.decoder.level_sizes]
-        ladder = LevelTables({**kriging_graph.entries(self.bank, ranks), **self.decoder.entries()})
+        ladder = LevelTables(
+            {**kriging_graph.entries(self.bank, ranks), **decoder_graph.entries(self.decoder)}
+        )
         ends = ladder.onnx(net)
         fields = kriging_graph.onnx(self.bank, net, "controls", ends)
         # service/posefield/constraints reads the coefficients by this name.
         fields[POSE] = net.rename_value("coefficients", fields[POSE])
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
         place = net.rename_value("frame", place)
-        rotations, root, *curves = self.decoder.onnx(net, fields[POSE], place, ends)
+        rotations, root, *curves = decoder_graph.onnx(self.decoder, net, fields[POSE], place, ends)
         if self.travel:
             way = net.rename_value("way", fields["travel"])
             rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)

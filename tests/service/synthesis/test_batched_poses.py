@@ -1,6 +1,5 @@
 """Tests of batches: equal bytes as single evaluation, at every level of every model."""
 
-import numpy as np
 import onnx
 import pytest
 from hypothesis import given, settings

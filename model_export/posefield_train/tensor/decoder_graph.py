@@ -1,0 +1,204 @@
+"""ONNX graph of the decoder; `decoder` is its NumPy counterpart."""
+
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.units import Floats, Indices
+from posefield.motion import quat
+from posefield.motion.curves import limits
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph.level_tables import Integers
+from posefield_train.tensor import quaternion_graph
+from posefield_train.tensor.decoder import Decoder
+from posefield_train.tensor.pose_vectors import PoseChart
+
+
+def entries(decoder: Decoder) -> dict[str, list[Integers]]:
+    """Return the level-dependent slice ends and shapes of the decoder's graph, by name."""
+    ranks, joints = (
+        [decoder.blended[0].shape, *(rung.ranks for rung in decoder.coarse)],
+        [len(r.joints) for r in decoder.level_sizes],
+    )
+    return {
+        "core": [[r2, r1, r3] for r1, r2, r3 in ranks],
+        "core_rows": [[-1, r3] for _, _, r3 in ranks],
+        "motion": [[-1, r2, r1] for r1, r2, _ in ranks],
+        "flat": [[-1, r1] for r1, _, _ in ranks],
+        "time": [[r2] for _, r2, _ in ranks],
+        "root": [[3, r1] for r1, _, _ in ranks],
+        "turning": [[4 * n, r1] for n, (r1, _, _) in zip(joints, ranks, strict=True)],
+        "joints": [[n] for n in joints],
+        "half_angles": [[n, 1, -1] for n in joints],
+        "quaternions": [[4 * n] for n in joints],
+        **({"curves": [[len(decoder.mean), r1] for r1, _, _ in ranks]} if decoder.curves else {}),
+    }
+
+
+def onnx(
+    decoder: Decoder, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
+) -> tuple[str, ...]:
+    """Build `Decoder.numpy` and `curve_values` in a graph, from canonical frames (B, S, 1).
+
+    ends: graph values of the level's slice ends, by the names of `entries`. The third name, of
+    the curves (B S, C), is missing without curves.
+    """
+    flat = _reduced(decoder, net, coefficients, place, ends)
+    directions = _directions(decoder, net)
+    three, end = net.indices(3), net.indices(3 + 3 * len(decoder.means))
+    of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
+    mean = net.weights("root_mean", decoder.mean[:3])
+    root = net("Gemm", flat, of_root, mean, transB=1)
+    steps = net("Shape", place, start=0, end=2)
+    root_shape = net("Concat", steps, net.indices(3), axis=0)
+    joint_shape = net("Concat", steps, net.indices(len(decoder.means), 4), axis=0)
+    of_joints = net("Slice", directions, three, end, net.indices(0))
+    return (
+        _rotations(decoder, net, flat, of_joints, {**ends, "rotations": joint_shape}),
+        net("Reshape", root, root_shape),
+        *([_curves(decoder, net, flat, directions, ends)] if decoder.curves else []),
+    )
+
+
+def _curves(
+    decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
+) -> str:
+    """Build the values (B S, C) of the curves, clamped, from coefficients (B S, r1)."""
+    own = PoseChart(decoder.means).curve_numbers
+    of_curves = net("Slice", directions, net.indices(own.start, 0), ends["curves"])
+    mean = net.weights("curve_mean", decoder.mean[own])
+    values = net("Gemm", flat, of_curves, mean, transB=1)
+    low, high = limits(decoder.curves)
+    least, most = net.weights("curve_minimum", low), net.weights("curve_maximum", high)
+    return net("Min", net("Max", values, least), most)
+
+
+def _reduced(
+    decoder: Decoder, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
+) -> str:
+    """Build the coefficients of the first mode (B S, r1).
+
+    Each clip is a product of its own, time coefficients (S, r2) with its motion (r2, r1), so
+    that sums have the same order in every batch.
+    """
+    core = net("Slice", _core(decoder, net), net.indices(0, 0, 0), ends["core"])
+    rows = net("Reshape", core, ends["core_rows"])
+    motion = net("Reshape", net("Gemm", coefficients, rows, transB=1), ends["motion"])
+    time = _time(decoder, net, place, ends["time"])
+    return net("Reshape", net("MatMul", time, motion), ends["flat"])
+
+
+def _core(decoder: Decoder, net: GraphBuilder) -> str:
+    """Build the core (r2, r1, r3); the event's block is made when the session loads."""
+    whole = net.weights("core", decoder.reduced.core.transpose(1, 0, 2))
+    if decoder.event is None:
+        return whole
+    (r1, r2, r3), count = decoder.reduced.core.shape, decoder.event.count
+    columns = decoder.event.mixing.shape[1]
+    zero, two = net.indices(0), net.indices(2)
+    leading = net("Slice", whole, zero, net.indices(count), two)
+    flat = net("Reshape", leading, net.indices(r2, r1 * count))
+    mixed = net("MatMul", net.weights("event_mixing", decoder.event.mixing.T), flat)
+    block = net("Reshape", mixed, net.indices(columns, r1, count))
+    before = net("Expand", net.number(0.0), net.indices(columns, r1, r3))
+    beside = net("Expand", net.number(0.0), net.indices(r2, r1, count))
+    upper = net("Concat", whole, beside, axis=2)
+    return net("Concat", upper, net("Concat", before, block, axis=2), axis=0)
+
+
+def _time(decoder: Decoder, net: GraphBuilder, place: str, end: str) -> str:
+    """Build time coefficients (B, S, r2), linearly interpolated between frames."""
+    table = net.weights("time_basis", decoder.reduced.bases[1].T)
+    if decoder.event:
+        table = net("Concat", table, net.weights("event_times", decoder.event.times.T), axis=0)
+    frames = len(decoder.reduced.bases[1])
+    zero, one = net.indices(0), net.indices(1)
+    # Rows of frames are copied whole. Behind the last frame nothing changes.
+    every = net("Transpose", table, perm=[1, 0])
+    after = net(
+        "Gather", every, net.weights("next_frames", np.append(np.arange(1, frames), frames - 1))
+    )
+    kept = net("Slice", every, zero, end, one)
+    steps = net("Slice", net("Sub", after, every), zero, end, one)
+    before = net("Floor", place)
+    row = net("Cast", net("Squeeze", before, net.indices(2)), to=6)
+    rise = net("Mul", net("Gather", steps, row), net("Sub", place, before))
+    return net("Add", net("Gather", kept, row), rise)
+
+
+def _directions(decoder: Decoder, net: GraphBuilder) -> str:
+    """Build directions (D, r1) from stored nonzero rows when the session loads."""
+    varies = np.any(decoder.unwhiten != 0.0, axis=1)
+    stored = net.weights("directions", decoder.directions[:, varies].T)
+    nothing = net.weights("no_direction", np.zeros((1, len(decoder.directions))))
+    # Degrees of freedom that never vary take the row of zeros after the others.
+    row = np.where(varies, np.cumsum(varies) - 1, np.count_nonzero(varies))
+    return net("Gather", net("Concat", stored, nothing, axis=0), net.weights("freedoms", row))
+
+
+def _rotations(
+    decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
+) -> str:
+    """Build quaternions (B, S, J, 4) from the first mode's coefficients (B S, r1)."""
+    turning = quaternion_graph.half_angle_products_onnx(net, decoder.means, directions)
+    offset = quaternion_graph.half_angle_products(decoder.means, decoder.mean_vectors)
+    if any(len(rung.joints) < len(decoder.means) for rung in decoder.level_sizes):
+        return _partly_fixed_rotations(decoder, net, flat, turning, offset, ends)
+    turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+    means = net.weights("mean_rotations", decoder.means[:, :, None])
+    constant = net.weights("rotation_mean", offset[:, None])
+    return quaternion_graph.innermost_joints(
+        net,
+        quaternion_graph.quaternions(
+            net,
+            net("Gemm", turning, flat, constant, transB=1),
+            means,
+            ends["half_angles"],
+        ),
+        len(decoder.means),
+        ends["rotations"],
+    )
+
+
+def _partly_fixed_rotations(
+    decoder: Decoder,
+    net: GraphBuilder,
+    flat: str,
+    turning: str,
+    offset: Annotated[Floats, "..."],
+    ends: dict[str, str],
+) -> str:
+    """Build quaternions where some level fixes joints.
+
+    Joints are sorted by the number of levels that move them, so that a slice selects a level's
+    joints.
+    """
+    order = _order(decoder)
+    joints, zero = len(order), net.indices(0)
+    rows = np.arange(4 * joints).reshape(joints, 4)[order].ravel()
+    turning = net("Gather", turning, net.weights("turning_order", rows))
+    turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
+    constant = net.weights("rotation_mean", offset[rows][:, None])
+    constant = net("Slice", constant, zero, ends["quaternions"], zero)
+    ordered = net.weights("mean_rotations", decoder.means[:, :, None])
+    ordered = net("Gather", ordered, net.weights("joint_order", order))
+    moving = net("Slice", ordered, zero, ends["joints"], zero)
+    rows_of_joints = net("Gemm", turning, flat, constant, transB=1)
+    found = quaternion_graph.quaternions(net, rows_of_joints, moving, ends["half_angles"])
+    still = quat.mul(decoder.means, quat.exp(decoder.mean_vectors.reshape(-1, 3)))[order][
+        :, :, None
+    ]
+    still_ones = net(
+        "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
+    )
+    poses = net("Shape", found, start=2, end=3)
+    shape = net("Concat", net.indices(1, 1), poses, axis=0)
+    both = net("Concat", found, net("Expand", still_ones, shape), axis=0)
+    back = net("Gather", both, net.weights("joint_places", np.argsort(order)))
+    return quaternion_graph.innermost_joints(net, back, joints, ends["rotations"])
+
+
+def _order(decoder: Decoder) -> Annotated[Indices, "joints"]:
+    """Return the joints sorted by the number of coarser levels that keep them, descending."""
+    kept = [[j in rung.joints for j in range(len(decoder.means))] for rung in decoder.coarse]
+    return np.argsort(-np.sum(kept, axis=0), kind="stable")
