@@ -31,9 +31,10 @@ from posefield_train.kriging import (
 )
 from posefield_train.kriging.coefficient_models import FittedModel
 from posefield_train.kriging.kriging_bank import KrigingBank
-from posefield_train.kriging.kriging_tuning import TunedKriging, TuningProblem
+from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
+from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.outliers import family_check, outlier_detection
 from posefield_train.parallel import single_thread
 from posefield_train.source.canonical.half_turns import Finding
@@ -214,7 +215,7 @@ def _fit_models(
     warped = warped_errors.mean_squared_errors(
         warped_errors.captured_positions(examples), predicted, len(own_tensor.curves)
     )
-    event = _fit_event(recipe, laid, judge, full, pose)
+    event = _fit_event(recipe, laid, judge, full, pose, effector)
     return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law, event)
 
 
@@ -224,13 +225,16 @@ def _fit_event(
     judge: TruncationReference,
     full: TuckerTensor,
     pose: TunedKriging,
+    effector: Floats | None,
 ) -> TunedKriging | None:
-    """Return the second model of the pose for the time around the event, where it is better."""
-    effector = event_jacobian.effector_weights(judge, full)
+    """Return the second model of the pose for the time around the event, where it is better.
+
+    effector: as in `TuningProblem`.
+    """
     if effector is None or judge.event_frame is None or recipe.kriging.fixed_degree is not None:
         return None
     second = event_kriging.tune_event(recipe.kriging.nugget, pose, laid, full.motions, effector)
-    errors = event_kriging.event_errors(judge, full, judge.event_frame, (pose, second))
+    errors = event_kriging.compare_models(judge, full, judge.event_frame, (pose, second))
     return second if errors.is_used else None
 
 
@@ -248,7 +252,7 @@ def _truncation_limits(
     limits = {"rms": max(ALL_JOINTS_SHARE * rms, SMALLEST_LIMIT)}
     if judge.event_frame is not None:
         residuals = (fits.event or fits.pose).residuals
-        missed = event_jacobian.event_errors(judge, full, judge.event_frame, residuals)
+        missed = event_jacobian.event_distances(judge, full, judge.event_frame, residuals)
         effector = float(np.sqrt(np.mean(np.square(missed))))
         limits["effector"] = max(EFFECTOR_SHARE * effector, SMALLEST_LIMIT)
     return limits

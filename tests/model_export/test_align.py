@@ -13,8 +13,8 @@ from posefield.motion.skeleton import Skeleton
 from posefield_train.align import dtw, time_alignment
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.kriging import kriging_tuning
-from posefield_train.kriging.kriging_tuning import TuningProblem
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.source.canonical import placement
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.ingest import Example

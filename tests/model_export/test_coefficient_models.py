@@ -7,8 +7,8 @@ import pytest
 
 from posefield_train.kriging import coefficient_models, kriging_tuning
 from posefield_train.kriging.kriging_bank import ConstantModel
-from posefield_train.kriging.kriging_tuning import TuningProblem
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.kriging.universal_kriging import UniversalKriging as Field
 from posefield_train.source.recipe_sections.training_sections import Kriging

@@ -87,10 +87,10 @@ def test_the_graph_and_the_service_read_the_same_blend(blended, small_recipe, ex
 
 def test_the_second_model_is_used_where_it_is_clearly_better(judge, trained, small_recipe):
     full, pose = trained.full, trained.pose
-    same = event_kriging.event_errors(judge, full, judge.event_frame, (pose, pose))
+    same = event_kriging.compare_models(judge, full, judge.event_frame, (pose, pose))
     assert same.pose == same.event and not same.is_used
     perfect = replace(pose, residuals=0.0 * pose.residuals)
-    better = event_kriging.event_errors(judge, full, judge.event_frame, (pose, perfect))
+    better = event_kriging.compare_models(judge, full, judge.event_frame, (pose, perfect))
     assert better.event < 0.7 * better.pose == 0.7 * same.pose and better.is_used
-    swapped = event_kriging.event_errors(judge, full, judge.event_frame, (perfect, pose))
+    swapped = event_kriging.compare_models(judge, full, judge.event_frame, (perfect, pose))
     assert not swapped.is_used

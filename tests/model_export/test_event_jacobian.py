@@ -41,10 +41,10 @@ def test_jacobian_is_that_of_central_differences_of_forward_kinematics(judge, tr
 
 def test_errors_are_the_way_that_residuals_move_the_joint(judge, trained):
     full, residuals = trained.full, trained.pose.residuals
-    found = event_jacobian.event_errors(judge, full, judge.event_frame, residuals)
+    found = event_jacobian.event_distances(judge, full, judge.event_frame, residuals)
     there, predicted = (at_event(judge, full, full.motions - r) for r in (0.0, residuals))
     assert np.abs(found - np.linalg.norm(there - predicted, axis=1)).max() < 1e-9
-    assert not event_jacobian.event_errors(judge, full, judge.event_frame, 0.0 * residuals).any()
+    assert not event_jacobian.event_distances(judge, full, judge.event_frame, 0.0 * residuals).any()
     # To first order the leading coefficients tell most of it.
     jacobian = event_jacobian.event_jacobians(judge, full, judge.event_frame)
     linear = np.einsum("nkm,nm->nk", jacobian, residuals[:, :COEFFICIENTS])

@@ -20,8 +20,8 @@ from posefield_train.kriging import (
 )
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import KrigingBank
-from posefield_train.kriging.kriging_tuning import TuningProblem
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import LeaveOneOutLoss, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.sample import sample_walk
@@ -157,7 +157,7 @@ def test_gradient_of_the_loss_is_that_of_both_sets(laid, rng):
     base = Hyper(
         "matern52", (0,), np.ones(2), 0.0, 0.0, (LabelKernel(3, 1, 0), LabelKernel(2, 1, 0))
     )
-    loss = kriging_tuning.LeaveOneOutLoss(problem, base, names, own_scales=True)
+    loss = LeaveOneOutLoss(problem, base, names, own_scales=True)
     at = np.array([-0.5, -0.2, -2.0, 0.4, -0.7, -1.0, 0.3, 0.2])
     away = check_grad(
         lambda x: loss.value_and_slope(x)[0], lambda x: loss.value_and_slope(x)[1], at

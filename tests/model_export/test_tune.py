@@ -8,8 +8,8 @@ from label_kernels import performers, vary
 
 from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.kriging_tuning import PRIORS, SCALE_PRIOR, TuningProblem
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import PRIORS, SCALE_PRIOR, LeaveOneOutLoss, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
 
 
@@ -118,7 +118,7 @@ def in_search_units(hyper, names=ALL):
 
 
 def loss_of(problem, hyper, names=ALL, own_scales=True):
-    return kriging_tuning.LeaveOneOutLoss(problem, hyper, names, own_scales)
+    return LeaveOneOutLoss(problem, hyper, names, own_scales)
 
 
 @pytest.mark.parametrize("effector", [False, True])

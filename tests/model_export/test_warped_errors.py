@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefield_train.graph import warped_errors
-from posefield_train.graph.warped_errors import FRAMES, UNIFORM_SHARES
+from posefield_train.tensor.uniform_motion import FRAMES, UNIFORM_SHARES
 
 
 def swing(times, size=0.4):

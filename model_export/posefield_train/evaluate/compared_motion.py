@@ -9,9 +9,8 @@ from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import time_alignment
+from posefield_train.tensor import uniform_motion
 
-FRAMES = 60
-UNIFORM_SHARES = np.linspace(0.0, 1.0, FRAMES)
 # Distance of three points at right angles from a joint, m, as in the Animation Compression Library.
 SHELL_RADIUS = 0.03
 
@@ -48,9 +47,8 @@ class MotionEvent:
 
 def motion_of_clip(clip: Clip, event: MotionEvent | None) -> ComparedMotion:
     """Return the motion of a captured clip on its own skeleton."""
-    rotations, path = time_alignment.resample(clip, UNIFORM_SHARES)
-    translations = skeleton.translations(clip.translations.mean(axis=0), path)
-    return motion_of_poses(clip.skeleton.parents, rotations, translations, clip.duration, event)
+    poses = uniform_motion.captured_poses(clip)
+    return motion_of_poses(clip.skeleton.parents, *poses, clip.duration, event)
 
 
 def motion_of_poses(

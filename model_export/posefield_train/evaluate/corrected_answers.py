@@ -19,12 +19,13 @@ from posefield.inference.session import PredictionState, Session
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
 from posefield_train.evaluate import compared_motion, motion_errors
-from posefield_train.evaluate.compared_motion import UNIFORM_SHARES, ComparedMotion, MotionEvent
+from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
 from posefield_train.evaluate.methods import Queries
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
+from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
 
 # Distances beyond the captured position, away from the root, m: possibly and certainly unreachable.
 BEYOND_DISTANCES, FAR = (0.1, 0.2, 0.3), 1.0

@@ -9,9 +9,8 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield.kriging import kriging_model
 from posefield.motion import skeleton
-from posefield_train.align import time_alignment, travel
 from posefield_train.evaluate import compared_motion
-from posefield_train.evaluate.compared_motion import UNIFORM_SHARES, ComparedMotion, MotionEvent
+from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
 from posefield_train.evaluate.peers import predicted_values
 from posefield_train.evaluate.peers.predicted_values import OPEN
 from posefield_train.graph.trained_model import TrainedModel
@@ -20,7 +19,8 @@ from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import truncation_error
+from posefield_train.tensor import truncation_error, uniform_motion
+from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
 
 OURS, EXACT, NAIVE = "posefield", "posefield_exact", "naive"
 NO_PERFORMER, ASKED_OPEN = OURS + OPEN, "posefield_open"
@@ -270,16 +270,8 @@ def _motions_of_values(
     trained: TrainedModel, values: _PredictedValues, event: truncation_error.EventFrame | None
 ) -> list[ComparedMotion]:
     """Return motions of predicted values, with the model's timing, travel, chart and bones."""
-    timing, beside = trained.model.timing, values.beside
-    steps = np.tile(UNIFORM_SHARES, (len(values.numbers), 1))
-    _, place = timing.numpy(np.zeros((len(steps), 1)), beside["warp"], steps)
-    share = place / (timing.frames - 1)
-    pairs = zip(values.numbers, share, strict=True)
-    rotations, path = trained.tensor.chart.poses(
-        np.stack([time_alignment.interpolate(*pair) for pair in pairs])
-    )
-    if "travel" in beside:
-        rotations, path = travel.put_back(rotations, path, beside["travel"], share)
-    offsets = trained.model.proportions.numpy(beside["offsets"])
+    beside, model = values.beside, trained.model
+    poses = uniform_motion.predicted_poses(model.timing, trained.tensor, values.numbers, beside)
+    offsets = model.proportions.numpy(beside["offsets"])
     durations = np.exp(beside["duration"][:, 0])
-    return _motions(trained, rotations, path, offsets, durations, beside["warp"], event)
+    return _motions(trained, poses.rotations, poses.path, offsets, durations, beside["warp"], event)

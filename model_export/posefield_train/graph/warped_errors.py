@@ -11,31 +11,31 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import curves, skeleton
 from posefield.motion.curves import Curve
-from posefield_train.align import dtw, time_alignment, travel
+from posefield_train.align import dtw, time_alignment
 from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.source.ingest import Example
+from posefield_train.tensor import uniform_motion
 from posefield_train.tensor.decoder import Proportions
 from posefield_train.tensor.motion_tensor import MotionTensor
-
-FRAMES = 60
-UNIFORM_SHARES = np.linspace(0.0, 1.0, FRAMES)
+from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
 
 
-def mean_squared_errors(captured: Floats, predicted: Floats, curves: int = 0) -> Floats:
+def mean_squared_errors(captured: Floats, predicted: Floats, curve_count: int = 0) -> Floats:
     """Return the mean squared joint distances (N,), m², after time warping.
 
-    captured, predicted: joint positions (N, FRAMES, J, 3), m; the last `curves` points are those of
-    curves. Motions are warped by their positions relative to the root, and compared with it.
+    captured, predicted: joint positions (N, FRAMES, J, 3), m; the last `curve_count` points are
+    those of curves. Motions are warped by their positions relative to the root, and compared with
+    it.
     """
-    phases = dtw.warp(_features(captured, curves), _features(predicted, curves))
+    phases = dtw.warp(_features(captured, curve_count), _features(predicted, curve_count))
     pairs = zip(predicted.reshape(*predicted.shape[:2], -1), phases, strict=True)
     warped = np.stack([time_alignment.interpolate(*pair) for pair in pairs])
     squares = np.sum(np.square(warped.reshape(captured.shape) - captured), axis=-1)
     return np.asarray(np.mean(squares, axis=(1, 2)))
 
 
-def _features(positions: Floats, curves: int) -> Floats:
-    joints = positions.shape[2] - curves
+def _features(positions: Floats, curve_count: int) -> Floats:
+    joints = positions.shape[2] - curve_count
     relative = positions.copy()
     relative[:, :, :joints] -= positions[:, :, :1]
     return relative.reshape(*positions.shape[:2], -1)
@@ -48,9 +48,8 @@ def captured_positions(examples: Sequence[Example]) -> Floats:
     """
     found = []
     for example in examples:
-        rotations, path = time_alignment.resample(example.clip, UNIFORM_SHARES)
-        translations = skeleton.translations(example.clip.translations.mean(axis=0), path)
-        own = skeleton.positions(example.clip.skeleton.parents, rotations, translations)
+        poses = uniform_motion.captured_poses(example.clip)
+        own = skeleton.positions(example.clip.skeleton.parents, *poses)
         found.append(_with_curves(own, *_uniform_curves(example)))
     return np.stack(found)
 
@@ -79,15 +78,7 @@ def predicted_positions(
     slices: of the whitened tensor (D', T, N). values: of the other quantities by name. Points of
     the curves follow those of the joints.
     """
-    steps = np.tile(UNIFORM_SHARES, (slices.shape[2], 1))
-    _, place = timing.numpy(np.zeros((len(steps), 1)), values["warp"], steps)
-    share = place / (timing.frames - 1)
-    pairs = zip(tensor.numbers(slices), share, strict=True)
-    numbers = np.stack([time_alignment.interpolate(*pair) for pair in pairs])
-    rotations, path = tensor.chart.poses(numbers)
-    if "travel" in values:
-        rotations, path = travel.put_back(rotations, path, values["travel"], share)
-    offsets = proportions.numpy(values["offsets"])
-    joints = skeleton.positions(parents, rotations, skeleton.translations(offsets, path))
-    values_of_curves = curves.clamp(tensor.curves, numbers[..., tensor.chart.curve_numbers])
-    return _with_curves(joints, tensor.curves, values_of_curves)
+    found = uniform_motion.predicted_poses(timing, tensor, tensor.numbers(slices), values)
+    translations = skeleton.translations(proportions.numpy(values["offsets"]), found.path)
+    joints = skeleton.positions(parents, found.rotations, translations)
+    return _with_curves(joints, tensor.curves, found.curves)

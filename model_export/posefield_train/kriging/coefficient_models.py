@@ -9,9 +9,10 @@ from posefield.common.array_shapes import ClipBones, SampleControls, SampleValue
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel
-from posefield_train.kriging.kriging_tuning import OTHER_STRENGTH, TunedKriging, TuningProblem
+from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.power_law import PowerLawFit
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import OTHER_STRENGTH, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe_sections.training_sections import Kriging
 from posefield_train.tensor.decoder import Proportions

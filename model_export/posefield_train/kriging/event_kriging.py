@@ -12,8 +12,9 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_tuning
-from posefield_train.kriging.kriging_tuning import PRIORS, TunedKriging, TuningProblem
+from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import OTHER_STRENGTH, PRIORS, TuningProblem
 from posefield_train.tensor import event_jacobian
 from posefield_train.tensor.event_jacobian import COEFFICIENTS
 from posefield_train.tensor.hosvd import TuckerTensor
@@ -52,15 +53,13 @@ def tune_event(
 
     nugget: fixed value; None to tune it. effector: as in `TuningProblem`.
     """
-    problem = TuningProblem(
-        samples, values, nugget, EFFECTOR_GAIN * effector, kriging_tuning.OTHER_STRENGTH
-    )
+    problem = TuningProblem(samples, values, nugget, EFFECTOR_GAIN * effector, OTHER_STRENGTH)
     # So large a trend leaves the slopes to the samples, as a linear drift does.
     trend = float(np.exp(PRIORS["trend"].high))
     return kriging_tuning.tune_with_trend(problem, replace(pose.hyper, trend=trend))
 
 
-def event_errors(
+def compare_models(
     reference: TruncationReference,
     full: TuckerTensor,
     event: EventFrame,
@@ -74,7 +73,7 @@ def event_errors(
     blended = pose.copy()
     blended[:, :COEFFICIENTS] = second[:, :COEFFICIENTS]
     found = (
-        event_jacobian.event_errors(reference, full, event, residuals)
+        event_jacobian.event_distances(reference, full, event, residuals)
         for residuals in (pose, blended)
     )
     return EventErrors(*(float(np.sqrt(np.mean(np.square(one)))) for one in found))

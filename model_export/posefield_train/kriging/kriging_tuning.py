@@ -1,66 +1,28 @@
-"""Tuning of a kriging model's parameters by closed-form leave-one-out, with a prior on them.
+"""Tuning of a kriging model's parameters by closed-form leave-one-out, with a prior on them."""
 
-The loss is the logarithm of the squared leave-one-out residuals, which is the negative logarithm of
-their likelihood with an unknown variance, less the logarithm of the parameters' prior. Few samples
-leave the parameters undetermined; the prior decides between those that fit alike.
-"""
-
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
-from typing import Annotated
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.special import expit
 
 from posefield.common.array_shapes import PerSample, SampleValues
-from posefield.common.units import Floats, Indices
-from posefield.kriging import kriging_model, leave_one_out
+from posefield.common.units import Floats
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import (
+    PRIORS,
+    LeaveOneOutLoss,
+    Parameter,
+    TuningProblem,
+)
 from posefield_train.kriging.universal_kriging import Hyper
 
-
-@dataclass(frozen=True)
-class ParameterPrior:
-    """Bounds of a parameter, and the mean and deviation of its normal prior, in search units.
-
-    Search units are logarithms, and log odds for the correlation.
-    """
-
-    low: float
-    high: float
-    mean: float
-    deviation: float
-
-
-def _in_logarithms(low: float, high: float, mean: float, deviation: float) -> ParameterPrior:
-    return ParameterPrior(np.log(low), np.log(high), np.log(mean), deviation)
-
-
-# In float32 samples would coincide beyond the bounds of scales, per half-range of a control.
-SCALE_PRIOR = _in_logarithms(0.1, 3.0, 0.45, 0.7)
-PRIORS = {
-    "nugget": _in_logarithms(1e-3, 10.0, 0.1, 1.5),
-    "correlation": ParameterPrior(-6.0, 5.0, 0.0, 2.0),
-    "offset": _in_logarithms(1e-3, 30.0, 0.3, 2.0),
-    "trend": _in_logarithms(1e-3, 300.0, 1.0, 2.5),
-}
-"""Priors of the parameters besides the scales, in the order of the search.
-
-Each label set has a correlation and an offset of its own with these priors.
-"""
-Parameter = tuple[str, int]
-"""Name of a parameter, and the index of its label set; 0 for the others."""
 # The loss has several minima, between a smooth field and one of independent samples.
 STARTS = ((0.5, 0.1), (0.25, 0.03), (1.0, 0.3))
 """Scale and nugget at which searches start."""
 ITERATIONS = 80
-POSE_STRENGTH, OTHER_STRENGTH = 2.0, 1.0
-"""Weight of the prior for the pose, and for the few values of other quantities."""
 
 
 @dataclass(frozen=True)
@@ -92,21 +54,6 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) ->
         variances,
         float(np.mean(np.sum(np.square(residuals), axis=1) / variances)),
     )
-
-
-@dataclass(frozen=True)
-class TuningProblem:
-    """Values (n, m) in a Euclidean metric, and what is known of their kriging model.
-
-    nugget: fixed value; None to tune it. effector: matrices (n, k, m') that map the first m'
-    residuals of each sample to weighted displacements of the event's joint, or None.
-    """
-
-    samples: SamplePoints
-    values: SampleValues
-    nugget: float | None = None
-    effector: Annotated[Floats, "samples _ _"] | None = None
-    strength: float = POSE_STRENGTH
 
 
 def tune(problem: TuningProblem, covariance: str, degree: int | None) -> TunedKriging:
@@ -148,7 +95,7 @@ def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
     return tuple((name, index) for name in PRIORS for index in range(counts[name]))
 
 
-def _best(loss: "LeaveOneOutLoss", starts: Sequence[Floats]) -> TunedKriging:
+def _best(loss: LeaveOneOutLoss, starts: Sequence[Floats]) -> TunedKriging:
     """Return the model at the least loss that searches from the starts find."""
     if not len(starts[0]):
         return evaluate_fixed(loss.read(starts[0]), loss.problem.samples, loss.problem.values)
@@ -166,182 +113,3 @@ def _best(loss: "LeaveOneOutLoss", starts: Sequence[Floats]) -> TunedKriging:
     ]
     best = min(found, key=lambda result: float(result.fun))
     return evaluate_fixed(loss.read(best.x), loss.problem.samples, loss.problem.values)
-
-
-@dataclass(frozen=True)
-class LeaveOneOutLoss:
-    """Loss of parameters in search units: scales if own, then those named."""
-
-    problem: TuningProblem
-    hyper: Hyper
-    names: tuple[Parameter, ...]
-    own_scales: bool
-    priors: list[ParameterPrior] = field(init=False)
-
-    def __post_init__(self) -> None:
-        scales = [SCALE_PRIOR] * (self.problem.samples.controls if self.own_scales else 0)
-        object.__setattr__(self, "priors", scales + [PRIORS[name] for name, _ in self.names])
-
-    def start(self, scale: float, nugget: float) -> Annotated[Floats, "units"]:
-        """Return a start of the search from the logarithms of a scale and a nugget."""
-        means = np.array([prior.mean for prior in self.priors])
-        if self.own_scales:
-            means[: self.problem.samples.controls] = scale
-        if NUGGET in self.names:
-            means[self._place(NUGGET)] = nugget
-        return means
-
-    def _place(self, name: Parameter) -> int:
-        return len(self.priors) - len(self.names) + self.names.index(name)
-
-    def read(self, x: Annotated[Floats, "units"]) -> Hyper:
-        """Return the parameters at a point of the search."""
-        scales = len(self.priors) - len(self.names)
-        found = {name: _value(name, x[self._place(name)]) for name in self.names}
-        if self.problem.nugget is not None:
-            found[NUGGET] = self.problem.nugget
-        own = self.hyper
-        kernels = (
-            LabelKernel(
-                kernel.count,
-                found.get(("correlation", index), kernel.correlation),
-                found.get(("offset", index), kernel.offset),
-            )
-            for index, kernel in enumerate(own.labels)
-        )
-        return replace(
-            own,
-            scales=np.exp(x[:scales]) if self.own_scales else own.scales,
-            nugget=found.get(NUGGET, own.nugget),
-            trend=found.get(TREND, own.trend),
-            labels=tuple(kernels),
-        )
-
-    def value_and_slope(
-        self, x: Annotated[Floats, "units"]
-    ) -> tuple[float, Annotated[Floats, "units"]]:
-        """Return the loss and its gradient in search units."""
-        hyper = self.read(x)
-        squares, slope = self._squares(hyper)
-        groups = self._count
-        deviations = np.array([prior.deviation for prior in self.priors])
-        apart = (x - [prior.mean for prior in self.priors]) / deviations
-        strength = self.problem.strength
-        value = 0.5 * groups * np.log(squares) + 0.5 * strength * float(apart @ apart)
-        changes = np.array([np.sum(slope * change) for change in self._changes(hyper)])
-        return value, 0.5 * groups / squares * changes + strength * apart / deviations
-
-    def _squares(self, hyper: Hyper) -> tuple[float, Floats]:
-        """Return the weighted squared residuals, and their derivative (n, n) by the covariances.
-
-        With the inverse B of the kriging system's sample block and U = B values, the residuals of a
-        group g are R_g = B_gg⁻¹ U_g; see the closed form of `leave_one_out`.
-        """
-        block = self._inverse(hyper)
-        product = block @ self._values
-        residuals = leave_one_out.divide_groups(block, product, self._takes)
-        weighted = self._weighted(residuals)
-        backward = leave_one_out.divide_groups(block, weighted, self._takes)
-        paired = np.where(self._together, backward @ residuals.T, 0.0)
-        slope = block @ (paired @ block - backward @ product.T)
-        return float(np.sum(weighted * residuals)), slope + slope.T
-
-    def _inverse(self, hyper: Hyper) -> Floats:
-        """Return the sample block (n, n) of the inverse of the kriging system."""
-        points, degree = self.problem.samples.points, max(hyper.drifts)
-        inverse: Floats = np.asarray(
-            np.linalg.inv(universal_kriging.noisy(hyper, points)), dtype=np.float64
-        )
-        functions = universal_kriging.drift(points, len(hyper.scales), degree)
-        return leave_one_out.sample_block(inverse, functions)
-
-    def _weighted(self, residuals: Floats) -> Floats:
-        """Return the residuals (n, m) with the weight of the event's joint added."""
-        effector = self.problem.effector
-        if effector is None:
-            return residuals
-        found, first = residuals.copy(), effector.shape[2]
-        moved = np.einsum("nkm,nm->nk", effector, residuals[:, :first])
-        found[:, :first] += np.einsum("nkm,nk->nm", effector, moved)
-        return found
-
-    @cached_property
-    def _values(self) -> Floats:
-        """Values (n, m) in at most n coordinates, which keep their inner products."""
-        values = self.problem.values
-        if values.shape[1] <= len(values):
-            return values
-        left, lengths, _ = np.linalg.svd(values, full_matrices=False)
-        return np.asarray(left * lengths)
-
-    @cached_property
-    def _takes(self) -> list[Indices]:
-        """Sample indices (groups, size) of the groups of each size above one."""
-        return leave_one_out.equal_sized_groups(self.problem.samples.groups)
-
-    @cached_property
-    def _together(self) -> Floats:
-        """Matrix (n, n) of truth values: two samples are left out together."""
-        groups = self.problem.samples.groups
-        return np.asarray(groups[:, None] == groups[None])
-
-    @cached_property
-    def _count(self) -> int:
-        return len(np.unique(self.problem.samples.groups))
-
-    @cached_property
-    def _gaps(self) -> Floats:
-        """Squared differences (d, n, n) of each control."""
-        planes = self.problem.samples.half_ranges.T
-        return np.square(np.subtract(planes[:, :, None], planes[:, None, :]))
-
-    @cached_property
-    def _same(self) -> list[Floats]:
-        """Matrix (n, n) of each label set: one where two samples have one name."""
-        points = self.problem.samples.points
-        return kriging_model.label_products(self.hyper, points, points)
-
-    def _changes(self, hyper: Hyper) -> list[Floats]:
-        """Return the derivatives (n, n) of the covariances by each search unit."""
-        controls, model = self.problem.samples.half_ranges, COVARIANCES[hyper.covariance]
-        squared = np.tensordot(np.square(hyper.scales), self._gaps, axes=1)
-        pairs = zip(hyper.labels, self._same, strict=True)
-        shares = [own.correlation + (1.0 - own.correlation) * same for own, same in pairs]
-        found: list[Floats] = []
-        if self.own_scales:
-            slope = 2.0 * model.slope(squared) * _product(shares)
-            scaled = zip(hyper.scales, self._gaps, strict=True)
-            found += [scale**2 * gaps * slope for scale, gaps in scaled]
-        by_name: dict[str, Callable[[int], Floats]] = {
-            "nugget": lambda _: hyper.nugget * np.eye(len(controls)),
-            "correlation": lambda index: (
-                _odds_slope(hyper.labels[index].correlation)
-                * model.numpy(squared)
-                * (1.0 - self._same[index])
-                * _product(shares[:index] + shares[index + 1 :])
-            ),
-            "offset": lambda index: hyper.labels[index].offset * self._same[index],
-            "trend": lambda _: hyper.trend * (controls @ controls.T),
-        }
-        return found + [by_name[name](index) for name, index in self.names]
-
-
-NUGGET, TREND = ("nugget", 0), ("trend", 0)
-
-
-def _value(name: Parameter, unit: float) -> float:
-    """Return the value of a parameter at a search unit."""
-    return float(expit(unit) if name[0] == "correlation" else np.exp(unit))
-
-
-def _odds_slope(share: float) -> float:
-    """Return the derivative of a share by its log odds."""
-    return share * (1.0 - share)
-
-
-def _product(shares: Sequence[Floats]) -> Floats | float:
-    """Return the product of matrices, 1.0 for none."""
-    found: Floats | float = 1.0
-    for share in shares:
-        found = found * share
-    return found

@@ -50,7 +50,7 @@ def event_jacobians(
     return found
 
 
-def event_errors(
+def event_distances(
     reference: TruncationReference,
     full: TuckerTensor,
     event: EventFrame,
