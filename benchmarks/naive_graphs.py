@@ -137,9 +137,10 @@ class Contents:
     def _system(self, net: GraphBuilder, squared: str, drift: str, row: str) -> str:
         """Covariances and drift (B, 1, n + k) in the field of each question's frame."""
         fields = self.field.fields
-        worth = net.weights("naive_worth", np.array([f.hyper.scales[:1] ** 2 for f in fields]))
-        near = net("Mul", squared, net("Gather", worth, row))
-        covariance = COVARIANCES[fields[0].hyper.covariance].onnx(net, near)
+        kind = COVARIANCES[fields[0].hyper.covariance]
+        scales = kind.gain * np.array([field.hyper.scales[:1] ** 2 for field in fields])
+        worth = net.weights("naive_worth", scales)
+        covariance = kind.onnx(net, net("Mul", squared, net("Gather", worth, row)))
         return net("Unsqueeze", net("Concat", covariance, drift, axis=1), net.indices(1))
 
     def _dual(self, net: GraphBuilder, basis: str, row: str) -> str:
