@@ -1,0 +1,1 @@
+"""Feet that stand: footsteps planned from contacts, and legs that follow them."""

@@ -1,0 +1,227 @@
+"""Path of the joint that contacts: the smoothest change of the predicted path that stands.
+
+The path y minimises the sum of |y - f|² + (tau r)⁴ |D² (y - f)|² and is constant in each stance: a
+thin-plate prior on the change, conditioned on standing. f is the predicted path, r the rate and D²
+the second difference. Places over the floor are complex numbers, so that the turn of a cycle is a
+factor, and a cycle closes exactly.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from posefield.common.array_shapes import Frames, RootPath
+from posefield.common.units import Floats, Indices
+from posefield.feet import stances
+from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import FloorVectors
+from posefield.motion.foot_contacts import FootContact
+
+# Time over which a change of the path is spread, s.
+SPREAD = 0.12
+# A foot keeps its place over the floor for this time before and after a swing, while it is low, s.
+HOLD = 0.04
+# Step from which on a swing is lifted to the full clearance, m, and the exponent of its lift.
+FULL_STEP, LIFT_EXPONENT = 0.1, 0.7
+
+Numbers = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Footsteps:
+    """Planned path of one foot over the grid.
+
+    positions: (F, 3), m. stances: frames in which it stands. anchors: where, (S, 3), m, in the
+    coordinates of each stance's first frame.
+    """
+
+    positions: RootPath
+    stances: tuple[Interval, ...]
+    anchors: Annotated[Floats, "stances 3"]
+
+
+def plan_path(
+    path: FootPath, found: Sequence[Interval], foot: FootContact, floor: float = 0.0
+) -> Footsteps:
+    """Return the path of a foot that stands in the intervals `found`.
+
+    floor: height of the floor, m.
+    """
+    height = floor + foot.height
+    held = _held(path, found)
+    floor_path = smooth_change(path.floor, held, path.rate, path.cycle)
+    heights = smooth_change(
+        path.heights,
+        found,
+        path.rate,
+        None if path.cycle is None else Cycle(0.0, 0.0),
+        np.full(len(found), height),
+    )
+    placed = FootPath(floor_plane.at_height(floor_path, heights), path.rate, path.cycle)
+    heights = np.maximum(heights, height + _lifts(placed, found, foot))
+    positions = floor_plane.at_height(floor_path, heights)
+    anchors = positions[[stance.begin for stance in found]].reshape(-1, 3)
+    return Footsteps(positions, tuple(found), anchors)
+
+
+def smooth_change(
+    path: Numbers,
+    intervals: Sequence[Interval],
+    rate: float,
+    cycle: Cycle | None = None,
+    values: Floats | None = None,
+) -> Numbers:
+    """Return the path (F,) of smoothest change that is constant in each interval.
+
+    path: (F,), real or complex. rate: frames a second. cycle: motion from frame 0 to frame F; None
+    where the path does not repeat. values: of the intervals, if they are given.
+    """
+    if not intervals:
+        return path
+    count = len(path)
+    groups, firsts = _groups(count, intervals)
+    bends = _bends(count, cycle)
+    factor, way = (1.0, 0.0) if cycle is None else (cycle.factor, cycle.way)
+    # y = scale * u[groups] + shift: a stance that goes on over the end has its place in the next
+    # cycle, which is moved back.
+    after = stances.mask([Interval(0, i.end - count) for i in intervals if i.end > count], count)
+    scale = np.where(after, np.conj(factor), 1.0)
+    shift = np.where(after, -np.conj(factor) * way, 0.0)
+    if np.isrealobj(path):
+        scale, shift = scale.real, shift.real
+    stiffness = (SPREAD * rate) ** 4
+    matrix = _normal_matrix(bends, groups, scale, stiffness)
+    goal = _right_side(bends, groups, scale, stiffness, path - shift)
+    known = np.zeros(len(firsts), path.dtype)
+    free = np.ones(len(firsts), bool)
+    if values is not None:
+        own = groups[[interval.begin for interval in intervals]]
+        known[own], free[own] = values, False
+        goal = goal - matrix @ known
+    if free.any():
+        known[free] = np.linalg.solve(matrix[np.ix_(free, free)], goal[free])
+    found: Numbers = scale * known[groups] + shift
+    return found
+
+
+@dataclass(frozen=True)
+class _Bends:
+    """Second differences: frames (R, 3) of each, and their factors (R, 3)."""
+
+    frames: Annotated[Indices, "rows 3"]
+    factors: Annotated[Numbers, "rows 3"]
+
+
+def _bends(count: int, cycle: Cycle | None) -> _Bends:
+    """Return the second differences of F frames; those of a cycle go on over its end."""
+    if cycle is None:
+        frames = np.arange(max(count - 2, 0))[:, None] + np.arange(3)
+        return _Bends(frames, np.tile([1.0, -2.0, 1.0], (len(frames), 1)))
+    frames = np.arange(count)[:, None] + np.arange(-1, 2)
+    factor = cycle.factor
+    turned = np.where(frames < 0, np.conj(factor), np.where(frames >= count, factor, 1.0))
+    return _Bends(frames % count, turned * [1.0, -2.0, 1.0])
+
+
+def _normal_matrix(
+    bends: _Bends, groups: Annotated[Indices, "frames"], scale: Numbers, stiffness: float
+) -> Numbers:
+    """Return the matrix (U, U) of the quadratic form of the unknowns."""
+    columns = groups[bends.frames]
+    values = _matching(bends.factors, scale) * scale[bends.frames]
+    size = int(groups.max()) + 1
+    found = np.zeros((size, size), values.dtype)
+    for row in range(3):
+        for column in range(3):
+            own = stiffness * np.conj(values[:, row]) * values[:, column]
+            np.add.at(found, (columns[:, row], columns[:, column]), own)
+    found[np.arange(size), np.arange(size)] += np.bincount(groups)
+    return found
+
+
+def _right_side(
+    bends: _Bends,
+    groups: Annotated[Indices, "frames"],
+    scale: Numbers,
+    stiffness: float,
+    path: Numbers,
+) -> Numbers:
+    """Return the right side (U,) of the normal equations."""
+    factors = _matching(bends.factors, scale)
+    bent = np.sum(factors * path[bends.frames], axis=-1)
+    weighted = path.copy()
+    np.add.at(weighted, bends.frames, stiffness * np.conj(factors) * bent[:, None])
+    found = np.zeros(int(groups.max()) + 1, path.dtype)
+    np.add.at(found, groups, np.conj(scale) * weighted)
+    return found
+
+
+def _matching(factors: Numbers, like: Numbers) -> Numbers:
+    """Return factors that are real where others are."""
+    return factors.real if np.isrealobj(like) else factors
+
+
+def _groups(
+    count: int, intervals: Sequence[Interval]
+) -> tuple[Annotated[Indices, "frames"], Annotated[Indices, "groups"]]:
+    """Return the unknown of each frame (F,), and the first frame of each unknown.
+
+    All frames of an interval share one unknown; the others have one each.
+    """
+    leader = np.arange(count)
+    for interval in intervals:
+        leader[np.arange(interval.begin, interval.end) % count] = interval.begin
+    firsts, groups = np.unique(leader, return_inverse=True)
+    return groups, firsts
+
+
+def _held(path: FootPath, found: Sequence[Interval]) -> list[Interval]:
+    """Return the stances with the ends of the swings in which the foot keeps its place."""
+    count, hold = len(path), round(HOLD * path.rate)
+    longer = []
+    for index, stance in enumerate(found):
+        before = _gap(found, index - 1, path)
+        after = _gap(found, index, path)
+        longer.append(
+            Interval(
+                stance.begin - min(hold, before // 4), stance.end + min(hold, after // 4)
+            )
+        )
+    if path.cycle is None:
+        return [Interval(max(i.begin, 0), min(i.end, count)) for i in longer]
+    return [
+        Interval(i.begin % count, i.begin % count + min(len(i), count)) for i in longer
+    ]
+
+
+def _gap(found: Sequence[Interval], index: int, path: FootPath) -> int:
+    """Return the number of frames from a stance to the next; 0 to an end of the clip."""
+    count = len(path)
+    if path.cycle is not None:
+        own, after = found[index % len(found)], found[(index + 1) % len(found)]
+        return int((after.begin - own.end) % count)
+    if not 0 <= index < len(found) - 1:
+        return 0
+    return found[index + 1].begin - found[index].end
+
+
+def _lifts(path: FootPath, found: Sequence[Interval], foot: FootContact) -> Frames:
+    """Return the least height (F,) of a swinging foot above its place, m; 0 in stances."""
+    count = len(path)
+    lifts = np.zeros(count)
+    for index, stance in enumerate(found):
+        gap = _gap(found, index, path)
+        if gap < 2:
+            continue
+        begin = stance.end
+        frames = np.arange(begin, begin + gap)
+        start, end = path.places([begin - 1, begin + gap])
+        step = abs(end - start)
+        share = (frames - begin + 1) / (gap + 1)
+        rise = np.sin(np.pi * share) ** LIFT_EXPONENT
+        lifts[frames % count] = foot.clearance * min(step / FULL_STEP, 1.0) * rise
+    return lifts

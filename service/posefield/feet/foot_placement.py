@@ -1,0 +1,125 @@
+"""Frames of a motion with the feet placed where the plan says."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames, RootPath, Rotations
+from posefield.common.units import UP, Booleans, Floats
+from posefield.feet import limbs, two_bone
+from posefield.feet.ball_path import Footsteps
+from posefield.feet.footsteps import FeetPlan
+from posefield.feet.stances import Cycle
+from posefield.locomotion import floor_plane
+
+
+@dataclass(frozen=True)
+class PlacedFrames:
+    """Frames whose feet are placed.
+
+    rotations: (S, J, 4). roots: (S, 3), m. before, after: paths of the joints that contact
+    (S, K, 3), m, as predicted and as placed.
+    """
+
+    rotations: Rotations
+    roots: RootPath
+    before: Annotated[Floats, "frames feet 3"]
+    after: Annotated[Floats, "frames feet 3"]
+
+
+def place_feet(
+    plan: FeetPlan, times: Frames, rotations: Rotations, roots: RootPath
+) -> PlacedFrames:
+    """Return the frames at times (S,), s, with the feet where the plan says.
+
+    rotations (S, J, 4) and roots (S, 3), m: predicted poses at these times, of the motion that was
+    planned.
+    """
+    body, at = plan.character, times * plan.rate
+    poses = limbs.evaluate_poses(body.parents, body.bones, body.limbs, rotations, roots)
+    shift = -_interpolate(_extended(plan.lowered, plan.cycle), at)[:, None] * UP
+    turned, before, after = rotations.copy(), [], []
+    for leg, target in _targets(plan, poses, at):
+        arm = poses.position(leg.tip) - poses.position(leg.lower)
+        found = two_bone.solve(poses, leg, shift, target - arm)
+        for joint, own in zip((leg.upper, leg.middle, leg.lower), (found.upper, found.middle, found.lower), strict=True):
+            turned[:, joint] = own
+        before.append(poses.position(leg.tip))
+        after.append(found.reached + arm)
+    feet = len(body.legs)
+    shape = (len(times), 0, 3)
+    both = [np.stack(own[:feet], axis=1) if feet else np.zeros(shape) for own in (before, after)]
+    return PlacedFrames(turned, roots + shift, *both)
+
+
+def _targets(
+    plan: FeetPlan, poses: limbs.LimbPoses, at: Frames
+) -> Iterator[tuple[limbs.Limb, RootPath]]:
+    """Yield each limb with the target (S, 3), m, of its tip."""
+    body = plan.character
+    for leg, steps, change in zip(body.legs, plan.steps, plan.changes, strict=True):
+        moved = _interpolate(_extended_path(change, plan.cycle), at)
+        yield leg, _anchored(steps, plan, at, poses.position(leg.tip) + moved)
+    for limb in body.kept:
+        yield limb, poses.position(limb.tip)
+
+
+def _anchored(steps: Footsteps, plan: FeetPlan, at: Frames, path: RootPath) -> RootPath:
+    """Return the path (S, 3), m, exactly at its anchor in each stance."""
+    count, found = plan.changes.shape[1], path.copy()
+    for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
+        found[_within(at, stance.begin, stance.end - 1)] = anchor
+        if plan.cycle is not None and stance.end > count:
+            earlier = _moved(anchor, plan.cycle, -1)
+            found[_within(at, stance.begin - count, stance.end - 1 - count)] = earlier
+        if plan.cycle is not None and stance.begin == 0:
+            later = _moved(anchor, plan.cycle, 1)
+            found[_within(at, count, stance.end - 1 + count)] = later
+    return found
+
+
+def _within(at: Frames, first: int, last: int) -> Annotated[Booleans, "frames"]:
+    found: Booleans = (at >= first - 1e-9) & (at <= last + 1e-9)
+    return found
+
+
+def _moved(point: Floats, cycle: Cycle, cycles: int) -> Floats:
+    """Return a point (3,), m, one cycle later or earlier."""
+    floor = floor_plane.project(point)
+    if cycles > 0:
+        floor = cycle.way + cycle.factor * floor
+    else:
+        floor = np.conj(cycle.factor) * (floor - cycle.way)
+    return floor_plane.at_height(floor, point @ UP)
+
+
+def _extended_path(change: RootPath, cycle: Cycle | None) -> RootPath:
+    """Return changes (F + 3, 3) with those of one frame before and of two after."""
+    if cycle is None:
+        return _extended(change, None)
+    floor = floor_plane.project(change)
+    own = np.concatenate([np.conj(cycle.factor) * floor[-1:], floor, cycle.factor * floor[:2]])
+    return floor_plane.at_height(own, _extended(change @ UP, cycle))
+
+
+def _extended(values: Floats, cycle: Cycle | None) -> Floats:
+    """Return values (F + 3, ...) with those of one frame before and of two after."""
+    if cycle is None:
+        return np.concatenate([values[:1], values, values[-1:], values[-1:]])
+    return np.concatenate([values[-1:], values, values[:1], values[1:2]])
+
+
+def _interpolate(values: Floats, at: Frames) -> Floats:
+    """Return values at fractional frames (S,): cubic Hermite, slopes by central differences.
+
+    values: (F + 3, ...), from frame -1 on.
+    """
+    before = np.clip(np.floor(at + 1e-9).astype(np.int64), 0, len(values) - 4)
+    share = np.clip(at - before, 0.0, 1.0).reshape(-1, *(1 for _ in values.shape[1:]))
+    a, b, c, d = (values[before + offset] for offset in range(4))
+    found: Floats = b + 0.5 * share * (
+        c - a + share * (2.0 * a - 5.0 * b + 4.0 * c - d + share * (3.0 * (b - c) + d - a))
+    )
+    return found

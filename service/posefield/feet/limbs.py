@@ -1,0 +1,112 @@
+"""Limbs of two bones, found in a skeleton, and the positions of their joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Bones, RootPath, Rotations
+from posefield.common.units import Floats
+from posefield.motion import skeleton
+
+# The two bones of a leg have similar lengths; of two readings of a chain the one whose bones are
+# more alike is taken, unless those of the one that leaves a foot behind the ball are alike enough.
+ALIKE = 0.5
+
+
+@dataclass(frozen=True)
+class Limb:
+    """Joints of a limb: hip, knee, ankle and ball of a leg, or shoulder, elbow, wrist and tip.
+
+    upper, middle, lower: indices; each is the parent of the next. tip: the joint that is placed;
+    `lower`, or a descendant of it that moves with it.
+    """
+
+    upper: int
+    middle: int
+    lower: int
+    tip: int
+
+
+@dataclass(frozen=True)
+class LimbPoses:
+    """Some limbs of one character in F poses.
+
+    parents: of the compact skeleton. joints: of the whole skeleton, by compact joint. bones:
+    offsets (C, 3), m. positions: (F, C, 3), m. orientations: (F, C, 4).
+    """
+
+    joints: tuple[int, ...]
+    parents: tuple[int, ...]
+    bones: Annotated[Floats, "chain 3"]
+    positions: Annotated[Floats, "frames chain 3"]
+    orientations: Annotated[Floats, "frames chain 4"]
+
+    @cached_property
+    def _places(self) -> dict[int, int]:
+        return {joint: place for place, joint in enumerate(self.joints)}
+
+    def position(self, joint: int) -> RootPath:
+        """Return the positions (F, 3), m, of a joint of the whole skeleton."""
+        return self.positions[:, self._places[joint]]
+
+    def orientation(self, joint: int) -> Annotated[Floats, "frames 4"]:
+        """Return the orientations (F, 4) of a joint of the whole skeleton."""
+        return self.orientations[:, self._places[joint]]
+
+    def parent_orientation(self, joint: int) -> Annotated[Floats, "frames 4"]:
+        """Return the orientations (F, 4) of a joint's parent."""
+        return self.orientations[:, self.parents[self._places[joint]]]
+
+    def length(self, joint: int) -> float:
+        """Return the length of the bone that ends at a joint, m."""
+        return float(np.linalg.norm(self.bones[self._places[joint]]))
+
+
+def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
+    """Return the limb that ends at a joint; None if the chain above it has no two bones.
+
+    The limb does not reach the root: moving the root's bone would move the whole character.
+    """
+    chain = skeleton.joint_chain(tuple(parents), tip)[::-1]
+    # The ankle is the tip's parent, or the tip itself. The joint above the hip exists in both.
+    found = [
+        Limb(chain[first + 2], chain[first + 1], chain[first], tip)
+        for first in (1, 0)
+        if len(chain) > first + 3
+    ]
+    scores = [_similarity(bones, limb) for limb in found]
+    if not found or max(scores) == 0.0:
+        return None
+    return found[0] if scores[0] >= ALIKE else found[int(np.argmax(scores))]
+
+
+def evaluate_poses(
+    parents: Sequence[int],
+    bones: Bones,
+    limbs: Sequence[Limb],
+    rotations: Rotations,
+    roots: RootPath,
+) -> LimbPoses:
+    """Return the poses of the limbs and of the joints above them.
+
+    bones: (J, 3), m. rotations: (F, J, 4). roots: (F, 3), m.
+    """
+    needed = {0}
+    for limb in limbs:
+        needed.update(skeleton.joint_chain(tuple(parents), limb.tip))
+    joints = tuple(sorted(needed))
+    places = {joint: place for place, joint in enumerate(joints)}
+    own = tuple(places.get(parents[joint], -1) for joint in joints)
+    arms = bones[list(joints)]
+    moved = skeleton.translations(arms, roots)
+    found = skeleton.forward_kinematics(own, rotations[:, list(joints)], moved)
+    return LimbPoses(joints, own, arms, *found)
+
+
+def _similarity(bones: Bones, limb: Limb) -> float:
+    """Return the shorter of the limb's two bones over the longer one."""
+    lengths = np.linalg.norm(bones[[limb.middle, limb.lower]], axis=-1)
+    return float(lengths.min() / lengths.max()) if lengths.max() > 0.0 else 0.0

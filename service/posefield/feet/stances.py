@@ -1,0 +1,160 @@
+"""Stances and swings of feet: from contact probabilities, as captured feet step.
+
+Frames lie on a grid of equal steps of time. A stance of a cycle may go on over its end: its frames
+are then counted beyond the last.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames, RootPath
+from posefield.common.units import UP, Booleans, Floats
+from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import FloorVectors
+from posefield.motion.foot_contacts import FootContact
+
+# A foot stands where its contact is more likely than not. Probabilities are rounded, so that two
+# machines whose last digits differ plan the same steps.
+STANDING, DECIMALS = 0.5, 6
+# Contacts that are shorter are dropped, and gaps that are shorter are closed, s.
+SHORTEST_CONTACT, SHORTEST_GAP = 0.1, 0.08
+# A swing that goes less is none, m.
+SHORTEST_STEP = 0.03
+# A foot that is higher above the place where it stands is in the air whatever the plan says, m.
+LIFTED = 0.0525
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Floor motion from the start of a cycle to its end.
+
+    way: displacement, m. turn: change of heading, rad.
+    """
+
+    way: complex
+    turn: float
+
+    @property
+    def factor(self) -> complex:
+        """Return the unit vector of the turn."""
+        return complex(np.exp(1j * self.turn))
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Frames `begin` to `end`, exclusive, of a stance or a swing; `end` may lie after a cycle."""
+
+    begin: int
+    end: int
+
+    def __len__(self) -> int:
+        return self.end - self.begin
+
+
+@dataclass(frozen=True)
+class FootPath:
+    """Predicted path of the joint that contacts, over the grid.
+
+    positions: (F, 3), m. rate: frames a second. cycle: None where the motion does not repeat.
+    """
+
+    positions: RootPath
+    rate: float
+    cycle: Cycle | None = None
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @property
+    def floor(self) -> Annotated[FloorVectors, "frames"]:
+        """Return the path over the floor (F,)."""
+        return floor_plane.project(self.positions)
+
+    @property
+    def heights(self) -> Frames:
+        """Return the heights (F,), m."""
+        return self.positions @ UP
+
+    def places(self, frames: Sequence[int]) -> Annotated[FloorVectors, "frames"]:
+        """Return floor points at frames, which may lie within a cycle after the last."""
+        index = np.asarray(frames)
+        found = self.floor[index % len(self)]
+        if self.cycle is None:
+            return found
+        after = self.cycle.way + self.cycle.factor * found
+        return np.where(index >= len(self), after, found)
+
+
+def tidy(down: Annotated[Booleans, "frames"], rate: float, cyclic: bool) -> list[Interval]:
+    """Return the runs of true frames; short gaps are closed, then short contacts dropped."""
+    gaps = runs(~down, cyclic)
+    closed = down.copy()
+    for gap in gaps:
+        # A gap at an end of the clip is a part of a swing.
+        inner = cyclic or (gap.begin > 0 and gap.end < len(down))
+        if inner and len(gap) < SHORTEST_GAP * rate:
+            closed[np.arange(gap.begin, gap.end) % len(down)] = True
+    found = runs(closed, cyclic)
+    return [
+        stance
+        for stance in found
+        if len(stance) >= SHORTEST_CONTACT * rate
+        or not (cyclic or (stance.begin > 0 and stance.end < len(down)))
+    ]
+
+
+def discipline(
+    stances: Sequence[Interval], path: FootPath, foot: FootContact, floor: float = 0.0
+) -> list[Interval]:
+    """Return stances whose swings are as captured ones: they go somewhere, and do not last.
+
+    A swing that goes less than 3 cm is none. One that lasts longer than the captured ones is cut
+    to their median duration, where the predicted foot goes most. A foot that is in the air does
+    not stand.
+    """
+    down = mask(stances, len(path))
+    for swing in runs(~down, path.cycle is not None):
+        frames = np.arange(swing.begin, swing.end)
+        grounded = path.heights[frames % len(path)] < floor + foot.height + LIFTED
+        kept = _swing_frames(swing, path, foot)
+        down[frames[~kept & grounded] % len(path)] = True
+    return tidy(down, path.rate, path.cycle is not None)
+
+
+def mask(intervals: Sequence[Interval], frames: int) -> Annotated[Booleans, "frames"]:
+    """Return whether each of F frames is in one of the intervals."""
+    found = np.zeros(frames, bool)
+    for interval in intervals:
+        found[np.arange(interval.begin, interval.end) % frames] = True
+    return found
+
+
+def _swing_frames(swing: Interval, path: FootPath, foot: FootContact) -> Annotated[Booleans, "some"]:
+    """Return the frames of a swing in which the foot swings indeed."""
+    inner = path.cycle is not None or (swing.begin > 0 and swing.end < len(path))
+    if inner:
+        ends = path.places([swing.begin - 1 if swing.begin else 0, swing.end])
+        if abs(ends[1] - ends[0]) < SHORTEST_STEP:
+            return np.zeros(len(swing), bool)
+    if len(swing) <= foot.longest_swing * path.rate:
+        return np.ones(len(swing), bool)
+    length = min(max(2, round(foot.swing * path.rate)), len(swing) - 1)
+    places = path.places(range(swing.begin, swing.end))
+    gone = np.round(np.abs(places[length:] - places[:-length]), DECIMALS)
+    first = int(np.argmax(gone))
+    found = np.zeros(len(swing), bool)
+    found[first : first + length] = True
+    return found
+
+
+def runs(down: Annotated[Booleans, "frames"], cyclic: bool) -> list[Interval]:
+    """Return the intervals of true frames, in order; one of a cycle may go over its end."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], down, [False]]).astype(np.int8)))
+    runs = [Interval(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+    wraps = cyclic and len(runs) > 1 and runs[0].begin == 0 and runs[-1].end == len(down)
+    if not wraps:
+        return runs
+    return [*runs[1:-1], Interval(runs[-1].begin, len(down) + runs[0].end)]

@@ -1,0 +1,112 @@
+"""Inverse kinematics of a limb of two bones, in closed form.
+
+The limb turns about its upper joint towards its target and bends in the plane in which it bent
+before (law of cosines). Each bone is turned by the shortest rotation from its old direction to the
+new one, so that no axes of joints are assumed. The end keeps its orientation.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames, RootPath
+from posefield.common.units import Floats
+from posefield.feet.limbs import Limb, LimbPoses
+from posefield.motion import quat
+
+# A limb is not stretched beyond this share of its length; from 1 cm before it on it resists.
+REACH, SOFTNESS = 0.995, 0.01
+# Share of the limb's length by which it bends at least, where its plane is taken from its bend.
+LEAST_BEND = 0.01
+
+
+@dataclass(frozen=True)
+class LimbTurns:
+    """Local rotations (F, 4) of the three joints of a limb, and the place that its end reached."""
+
+    upper: Annotated[Floats, "frames 4"]
+    middle: Annotated[Floats, "frames 4"]
+    lower: Annotated[Floats, "frames 4"]
+    reached: RootPath
+
+
+def firm_reach(poses: LimbPoses, limb: Limb) -> Frames:
+    """Return the distance (F,), m, up to which the end of a limb follows its target exactly."""
+    length = poses.length(limb.middle) + poses.length(limb.lower)
+    source = np.linalg.norm(poses.position(limb.lower) - poses.position(limb.upper), axis=-1)
+    return np.maximum(source, REACH * length - SOFTNESS)
+
+
+def soften(distance: Frames, firm: Frames, length: float) -> Frames:
+    """Return distances (F,), m, that exceed the firm reach (F,) softly, and never the length.
+
+    Beyond a they are a + s (1 - exp(-(d - a) / s)), where s is at most a centimetre.
+    """
+    soft = np.maximum(np.maximum(REACH * length, firm) - firm, 1e-9)
+    beyond = np.maximum(distance - firm, 0.0)
+    return np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
+
+
+def solve(poses: LimbPoses, limb: Limb, shift: RootPath, target: RootPath) -> LimbTurns:
+    """Return the rotations with which the end of a limb is at a target (F, 3), m.
+
+    shift: movement (F, 3), m, of the upper joint from its place in the poses. The end's
+    orientation is kept. A target out of reach is approached along its direction.
+    """
+    above, below = poses.length(limb.middle), poses.length(limb.lower)
+    upper, middle = poses.position(limb.upper), poses.position(limb.middle)
+    lower = poses.position(limb.lower)
+    apart = target - upper - shift
+    distance = np.linalg.norm(apart, axis=-1)
+    reach = soften(distance, firm_reach(poses, limb), above + below)
+    reach = np.clip(reach, 1.001 * abs(above - below) + 1e-6, above + below)
+    towards = apart / np.maximum(distance, 1e-9)[:, None]
+    side = _bend_direction(poses, limb, towards)
+    along = (np.square(above) + np.square(reach) - np.square(below)) / (2.0 * reach)
+    across = np.sqrt(np.maximum(np.square(above) - np.square(along), 0.0))
+    knee = along[:, None] * towards + across[:, None] * side
+    end = reach[:, None] * towards
+    thigh = quat.mul(shortest_turn(middle - upper, knee), poses.orientation(limb.upper))
+    shin = quat.mul(shortest_turn(lower - middle, end - knee), poses.orientation(limb.middle))
+    return LimbTurns(
+        quat.mul(quat.conj(poses.parent_orientation(limb.upper)), thigh),
+        quat.mul(quat.conj(thigh), shin),
+        quat.mul(quat.conj(shin), poses.orientation(limb.lower)),
+        upper + shift + end,
+    )
+
+
+def shortest_turn(
+    before: Annotated[Floats, "*batch 3"], after: Annotated[Floats, "*batch 3"]
+) -> Annotated[Floats, "*batch 4"]:
+    """Return the rotation (..., 4) by the smallest angle from one direction to another."""
+    sizes = np.linalg.norm(before, axis=-1) * np.linalg.norm(after, axis=-1)
+    real = np.maximum(sizes + np.sum(before * after, axis=-1), 1e-12)
+    return quat.normalize(
+        np.concatenate([real[..., None], quat.cross(before, after)], axis=-1)
+    )
+
+
+def _bend_direction(poses: LimbPoses, limb: Limb, towards: RootPath) -> RootPath:
+    """Return the unit vectors (F, 3), orthogonal to the limb, towards which its middle bends.
+
+    Where a limb is nearly straight its plane is that of the mean bend in its parent's axes.
+    """
+    upper, middle = poses.position(limb.upper), poses.position(limb.middle)
+    chord = poses.position(limb.lower) - upper
+    old = chord / np.maximum(np.linalg.norm(chord, axis=-1, keepdims=True), 1e-9)
+    bone = middle - upper
+    bend = bone - np.sum(bone * old, axis=-1, keepdims=True) * old
+    frame = poses.parent_orientation(limb.upper)
+    mean = np.mean(quat.rotate(quat.conj(frame), bend), axis=0)
+    size = np.linalg.norm(mean)
+    least = LEAST_BEND * poses.length(limb.middle)
+    usual = quat.rotate(frame, np.broadcast_to(mean / max(size, 1e-9), bend.shape))
+    usual = usual - np.sum(usual * old, axis=-1, keepdims=True) * old
+    bent = np.linalg.norm(bend, axis=-1, keepdims=True)
+    mixed = bend + np.maximum(least - bent, 0.0) * usual
+    side = quat.rotate(shortest_turn(old, towards), mixed)
+    side = side - np.sum(side * towards, axis=-1, keepdims=True) * towards
+    found: RootPath = side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-12)
+    return found
