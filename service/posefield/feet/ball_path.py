@@ -27,6 +27,8 @@ SPREAD = 0.12
 HOLD = 0.04
 # Step from which on a swing is lifted to the full clearance, m, and the exponent of its lift.
 FULL_STEP, LIFT_EXPONENT = 0.1, 0.7
+# A foot in the middle of a full step is at least this high above its place, m.
+LEAST_LIFT = 0.025
 
 Numbers = npt.NDArray[Any]
 
@@ -45,13 +47,10 @@ class Footsteps:
 
 
 def plan_path(
-    path: FootPath, found: Sequence[Interval], foot: FootContact, floor: float = 0.0
+    path: FootPath, found: Sequence[Interval], foot: FootContact
 ) -> Footsteps:
-    """Return the path of a foot that stands in the intervals `found`.
-
-    floor: height of the floor, m.
-    """
-    height = floor + foot.height
+    """Return the path of a foot that stands in the intervals `found`."""
+    height = foot.height
     held = _held(path, found)
     floor_path = smooth_change(path.floor, held, path.rate, path.cycle)
     heights = smooth_change(
@@ -62,7 +61,8 @@ def plan_path(
         np.full(len(found), height),
     )
     placed = FootPath(floor_plane.at_height(floor_path, heights), path.rate, path.cycle)
-    heights = np.maximum(heights, height + _lifts(placed, found, foot))
+    added, least = _lifts(placed, found, foot)
+    heights = np.maximum(heights + added, height + least)
     positions = floor_plane.at_height(floor_path, heights)
     anchors = positions[[stance.begin for stance in found]].reshape(-1, 3)
     return Footsteps(positions, tuple(found), anchors)
@@ -209,10 +209,15 @@ def _gap(found: Sequence[Interval], index: int, path: FootPath) -> int:
     return found[index + 1].begin - found[index].end
 
 
-def _lifts(path: FootPath, found: Sequence[Interval], foot: FootContact) -> Frames:
-    """Return the least height (F,) of a swinging foot above its place, m; 0 in stances."""
+def _lifts(
+    path: FootPath, found: Sequence[Interval], foot: FootContact
+) -> tuple[Frames, Frames]:
+    """Return how much a swinging foot is lifted (F,), m, and its least height (F,) while it swings.
+
+    A foot whose prediction is lifted as captured feet are is not lifted more. Zero in stances.
+    """
     count = len(path)
-    lifts = np.zeros(count)
+    added, lowest = np.zeros(count), np.zeros(count)
     for index, stance in enumerate(found):
         gap = _gap(found, index, path)
         if gap < 2:
@@ -220,8 +225,10 @@ def _lifts(path: FootPath, found: Sequence[Interval], foot: FootContact) -> Fram
         begin = stance.end
         frames = np.arange(begin, begin + gap)
         start, end = path.places([begin - 1, begin + gap])
-        step = abs(end - start)
         share = (frames - begin + 1) / (gap + 1)
+        least = foot.clearance * min(abs(end - start) / FULL_STEP, 1.0)
+        lifted = float(path.heights[frames % count].max()) - foot.height
         rise = np.sin(np.pi * share) ** LIFT_EXPONENT
-        lifts[frames % count] = foot.clearance * min(step / FULL_STEP, 1.0) * rise
-    return lifts
+        added[frames % count] = max(least - max(lifted, 0.0), 0.0) * rise
+        lowest[frames % count] = min(least, LEAST_LIFT) * rise
+    return added, lowest

@@ -20,6 +20,8 @@ from posefield.motion.foot_contacts import FootContact
 
 # Rounds in which stances are shortened whose leg does not reach.
 ROUNDS = 4
+# A foot may stand this much higher or lower than captured feet do, m: soles differ.
+UNEVEN = 0.01
 
 
 @dataclass(frozen=True)
@@ -92,17 +94,23 @@ def plan_feet(
     paths = [FootPath(poses.position(leg.tip), motion.rate, motion.cycle) for leg in character.legs]
     down = _contacts(paths, likely)
     known = list(contacts) if likely is not None else _statistics(character, paths, down)
-    sunk = _sunk(paths, down, known, floor, character.fixed)
+    above = _heights_above(paths, down, known, floor)
+    sunk = 0.0 if character.fixed else _sunk(above)
+    heights = [
+        floor + foot.height + float(np.clip(own - sunk, -UNEVEN, UNEVEN))
+        for foot, own in zip(known, above, strict=True)
+    ]
     # The ground first: the whole character stands as high as its feet do.
     raised = [replace(path, positions=path.positions - sunk * UP) for path in paths]
+    known = [replace(foot, height=own) for foot, own in zip(known, heights, strict=True)]
     found = [
-        stances.discipline(own, path, foot, floor)
+        stances.discipline(own, path, foot)
         for own, path, foot in zip(down, raised, known, strict=True)
     ]
     most = _room(poses, character, sunk)
     for _ in range(ROUNDS):
         steps = [
-            ball_path.plan_path(path, own, foot, floor)
+            ball_path.plan_path(path, own, foot)
             for path, own, foot in zip(raised, found, known, strict=True)
         ]
         needs = _needs(poses, character, paths, steps, sunk)
@@ -143,22 +151,24 @@ def _statistics(
     ]
 
 
-def _sunk(
+def _heights_above(
     paths: Sequence[FootPath],
     down: Sequence[Sequence[Interval]],
     known: Sequence[FootContact],
     floor: float,
-    fixed: bool,
-) -> float:
-    """Return how far a character floats: by the median of its feet's heights in contact, m."""
-    if fixed:
-        return 0.0
-    above = [
-        (path.heights - foot.height - floor)[stances.mask(own, len(path))]
-        for path, own, foot in zip(paths, down, known, strict=True)
-    ]
-    gathered = np.concatenate(above) if above else np.zeros(0)
-    return float(np.median(gathered)) if len(gathered) else 0.0
+) -> list[float]:
+    """Return how much higher each foot stands than captured feet do, by its median, m."""
+    found = []
+    for path, own, foot in zip(paths, down, known, strict=True):
+        standing = path.heights[stances.mask(own, len(path))]
+        found.append(float(np.median(standing)) - foot.height - floor if len(standing) else 0.0)
+    return found
+
+
+def _sunk(above: Sequence[float]) -> float:
+    """Return how far a character floats or sinks, m, beyond the unevenness of feet."""
+    mean = float(np.mean(above)) if above else 0.0
+    return float(np.sign(mean) * max(abs(mean) - UNEVEN, 0.0))
 
 
 def _room(poses: LimbPoses, character: Character, sunk: float) -> Frames:

@@ -9,7 +9,7 @@ from posefield.common.units import UP, Floats
 
 # The pelvis is lowered this long before and after it is needed, s, and its way is smoothed with a
 # Gaussian that is half as wide.
-SPREAD, SMOOTHING = 0.1, 0.05
+SPREAD, SMOOTHING = 0.06, 0.03
 # It is lowered no more than this, m.
 MOST = 0.08
 

@@ -107,7 +107,7 @@ def tidy(down: Annotated[Booleans, "frames"], rate: float, cyclic: bool) -> list
 
 
 def discipline(
-    stances: Sequence[Interval], path: FootPath, foot: FootContact, floor: float = 0.0
+    stances: Sequence[Interval], path: FootPath, foot: FootContact
 ) -> list[Interval]:
     """Return stances whose swings are as captured ones: they go somewhere, and do not last.
 
@@ -118,7 +118,7 @@ def discipline(
     down = mask(stances, len(path))
     for swing in runs(~down, path.cycle is not None):
         frames = np.arange(swing.begin, swing.end)
-        grounded = path.heights[frames % len(path)] < floor + foot.height + LIFTED
+        grounded = path.heights[frames % len(path)] < foot.height + LIFTED
         kept = _swing_frames(swing, path, foot)
         down[frames[~kept & grounded] % len(path)] = True
     return tidy(down, path.rate, path.cycle is not None)

@@ -15,8 +15,8 @@ from posefield.common.units import Floats
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.motion import quat
 
-# A limb is not stretched beyond this share of its length; from 1 cm before it on it resists.
-REACH, SOFTNESS = 0.995, 0.01
+# A limb is not stretched beyond this share of its length; from 5 mm before it on it resists.
+REACH, SOFTNESS = 0.995, 0.005
 # Share of the limb's length by which it bends at least, where its plane is taken from its bend.
 LEAST_BEND = 0.01
 
@@ -41,7 +41,7 @@ def firm_reach(poses: LimbPoses, limb: Limb) -> Frames:
 def soften(distance: Frames, firm: Frames, length: float) -> Frames:
     """Return distances (F,), m, that exceed the firm reach (F,) softly, and never the length.
 
-    Beyond a they are a + s (1 - exp(-(d - a) / s)), where s is at most a centimetre.
+    Beyond a they are a + s (1 - exp(-(d - a) / s)), where s is at most 5 mm.
     """
     soft = np.maximum(np.maximum(REACH * length, firm) - firm, 1e-9)
     beyond = np.maximum(distance - firm, 0.0)
