@@ -218,17 +218,38 @@ def _lifts(
     """
     count = len(path)
     added, lowest = np.zeros(count), np.zeros(count)
-    for index, stance in enumerate(found):
-        gap = _gap(found, index, path)
-        if gap < 2:
+    for swing in stances.runs(~stances.mask(found, count), path.cycle is not None):
+        share = _shares(swing, path, foot)
+        if share is None:
             continue
-        begin = stance.end
-        frames = np.arange(begin, begin + gap)
-        start, end = path.places([begin - 1, begin + gap])
-        share = (frames - begin + 1) / (gap + 1)
-        least = foot.clearance * min(abs(end - start) / FULL_STEP, 1.0)
-        lifted = float(path.heights[frames % count].max()) - foot.height
+        begin, end = path.places(_ends(swing, path))
+        least = foot.clearance * min(abs(end - begin) / FULL_STEP, 1.0)
+        frames = np.arange(swing.begin, swing.end) % count
         rise = np.sin(np.pi * share) ** LIFT_EXPONENT
-        added[frames % count] = max(least - max(lifted, 0.0), 0.0) * rise
-        lowest[frames % count] = min(least, LEAST_LIFT) * rise
+        lifted = max(float(path.heights[frames].max()) - foot.height, 0.0)
+        added[frames] = max(least * float(rise.max()) - lifted, 0.0) * rise
+        lowest[frames] = min(least, LEAST_LIFT) * rise
     return added, lowest
+
+
+def _shares(swing: Interval, path: FootPath, foot: FootContact) -> Frames | None:
+    """Return the shares (S,) of a swing at its frames, 0 to 1; None for a swing without a stance.
+
+    A swing at an end of a clip goes on outside it, for the usual duration.
+    """
+    count, length = len(path), len(swing)
+    cyclic = path.cycle is not None
+    leads, trails = (not cyclic and swing.begin == 0), (not cyclic and swing.end == count)
+    if leads and trails or (cyclic and length == count):
+        return None
+    steps = np.arange(1.0, length + 1.0)
+    whole = max(length, round(foot.swing * path.rate)) + 1 if leads or trails else length + 1
+    return (steps + (whole - 1 - length) * leads) / whole
+
+
+def _ends(swing: Interval, path: FootPath) -> list[int]:
+    """Return the frames in which a foot stands before and after a swing, or the clip's ends."""
+    if path.cycle is None:
+        return [max(swing.begin - 1, 0), min(swing.end, len(path) - 1)]
+    after = len(path) if swing.begin == 0 else 0
+    return [swing.begin - 1 + after, swing.end + after]

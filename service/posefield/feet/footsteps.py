@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
 from posefield.common.units import UP, Floats
-from posefield.feet import ball_path, contact_detection, limbs, pelvis, stances, two_bone
+from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stances, two_bone
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stances import Cycle, FootPath, Interval
@@ -135,7 +135,7 @@ def _contacts(
     found = []
     for foot, path in enumerate(paths):
         if likely is None:
-            down = contact_detection.detect(path)
+            down = contact_estimates.detect(path)
         else:
             down = np.round(likely[:, foot], stances.DECIMALS) > stances.STANDING
         found.append(stances.tidy(down, path.rate, path.cycle is not None))
@@ -146,7 +146,7 @@ def _statistics(
     character: Character, paths: Sequence[FootPath], down: Sequence[Sequence[Interval]]
 ) -> list[FootContact]:
     return [
-        contact_detection.describe(leg.tip, path, own)
+        contact_estimates.describe(leg.tip, path, own)
         for leg, path, own in zip(character.legs, paths, down, strict=True)
     ]
 

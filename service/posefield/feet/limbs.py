@@ -11,10 +11,6 @@ from posefield.common.array_shapes import Bones, RootPath, Rotations
 from posefield.common.units import Floats
 from posefield.motion import skeleton
 
-# The two bones of a leg have similar lengths; of two readings of a chain the one whose bones are
-# more alike is taken, unless those of the one that leaves a foot behind the ball are alike enough.
-ALIKE = 0.5
-
 
 @dataclass(frozen=True)
 class Limb:
@@ -68,7 +64,9 @@ class LimbPoses:
 def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
     """Return the limb that ends at a joint; None if the chain above it has no two bones.
 
-    The limb does not reach the root: moving the root's bone would move the whole character.
+    The limb's end is the joint or its parent, as the ball of a foot has an ankle above it: the one
+    whose two bones have lengths that are more alike. A limb does not begin at the root, whose
+    rotation would turn the whole character.
     """
     chain = skeleton.joint_chain(tuple(parents), tip)[::-1]
     # The ankle is the tip's parent, or the tip itself. The joint above the hip exists in both.
@@ -78,9 +76,19 @@ def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
         if len(chain) > first + 3
     ]
     scores = [_similarity(bones, limb) for limb in found]
-    if not found or max(scores) == 0.0:
+    return found[int(np.argmax(scores))] if max(scores, default=0.0) > 0.0 else None
+
+
+def find_kept_limb(parents: Sequence[int], bones: Bones, joint: int) -> Limb | None:
+    """Return the limb by which a joint can be moved alone; None for a joint of the trunk.
+
+    Less than half of the joints hang from such a limb.
+    """
+    limb = find_limb(parents, bones, joint)
+    if limb is None:
         return None
-    return found[0] if scores[0] >= ALIKE else found[int(np.argmax(scores))]
+    below = skeleton.descendant_matrix(tuple(parents))[limb.upper].sum()
+    return limb if 2 * below < len(parents) else None
 
 
 def evaluate_poses(

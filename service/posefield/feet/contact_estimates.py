@@ -1,0 +1,50 @@
+"""Contacts of a foot estimated from its motion, for models without contact probabilities."""
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.units import Booleans
+from posefield.feet import stances
+from posefield.feet.stances import FootPath, Interval
+from posefield.locomotion import floor_plane
+from posefield.motion.contacts import contact_detection
+from posefield.motion.foot_contacts import FootContact
+
+# Swings of a motion in which no foot swings: median and longest duration, s.
+DEFAULT_SWING, DEFAULT_LONGEST = 0.3, 0.5
+# Percentiles of the durations and of the lifts of swings, as in training.
+LONGEST_PERCENTILE, CLEARANCE_PERCENTILE = 90.0, 75.0
+
+
+def detect(path: FootPath) -> Annotated[Booleans, "frames"]:
+    """Return whether the foot is in contact at each frame (F,)."""
+    if path.cycle is None:
+        return contact_detection.detect_contacts(path.positions, path.rate, False)
+    after = floor_plane.at_height(path.places([len(path)]), path.heights[:1])
+    whole = np.concatenate([path.positions, after])
+    return contact_detection.detect_contacts(whole, path.rate, True)[:-1]
+
+
+def describe(joint: int, path: FootPath, found: Sequence[Interval]) -> FootContact:
+    """Return the statistics of a foot's contacts in one motion."""
+    down, cyclic = stances.mask(found, len(path)), path.cycle is not None
+    heights = path.heights
+    height = float(np.median(heights[down])) if down.any() else float(heights.min())
+    swings = [
+        swing
+        for swing in stances.runs(~down, cyclic)
+        if cyclic or (swing.begin > 0 and swing.end < len(path))
+    ]
+    if not swings:
+        return FootContact(joint, height, DEFAULT_SWING, DEFAULT_LONGEST, 0.0)
+    seconds = [len(swing) / path.rate for swing in swings]
+    lifts = [heights[np.arange(own.begin, own.end) % len(path)].max() - height for own in swings]
+    return FootContact(
+        joint,
+        height,
+        float(np.median(seconds)),
+        float(np.percentile(seconds, LONGEST_PERCENTILE)),
+        max(0.0, float(np.percentile(lifts, CLEARANCE_PERCENTILE))),
+    )
