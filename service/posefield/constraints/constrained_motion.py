@@ -8,10 +8,9 @@ import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath, Rotations, Variables, Vector
 from posefield.common.units import Floats
-from posefield.constraints import constraint, gauss_newton, pinned_feet
+from posefield.constraints import constraint, gauss_newton
 from posefield.constraints.constraint import Constraint
 from posefield.constraints.motion_variables import MotionVariables
-from posefield.constraints.pinned_feet import FootPins
 from posefield.inference import reduced_motion, residual_covariance
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.inference.residual_covariance import ResidualCovariance
@@ -31,7 +30,7 @@ class ConstrainedMotion:
 
     numbers: the motion as the variables of the correction. state: the model's prediction.
     results: error of each constraint. steps: of the correction. distance: Mahalanobis distance of
-    the constraints from the prediction. slides: of each pinned foot, by its joint, m.
+    the constraints from the prediction.
     """
 
     scene: MotionVariables
@@ -40,7 +39,6 @@ class ConstrainedMotion:
     results: tuple[ConstraintResult, ...]
     steps: int = 0
     distance: float = 0.0
-    slides: tuple[tuple[int, float], ...] = ()
 
     @property
     def duration(self) -> float:
@@ -91,12 +89,10 @@ class LevelCorrector:
         beside = [np.log(state.duration), *state.travel] if self.card.cyclic else []
         return ConstrainedMotion(scene, np.concatenate([inner, beside]), state, ())
 
-    def solve(
-        self, begun: ConstrainedMotion, aims: Sequence[Constraint], pins: Sequence[Constraint] = ()
-    ) -> ConstrainedMotion:
-        """Return the nearest motion that satisfies the constraints; pins are soft."""
+    def solve(self, begun: ConstrainedMotion, aims: Sequence[Constraint]) -> ConstrainedMotion:
+        """Return the nearest motion that satisfies the constraints."""
         sigma, numbers = begun.state.sigma, begun.numbers
-        found = gauss_newton.correct(begun.scene, self.spread, sigma, numbers, aims, pins)
+        found = gauss_newton.correct(begun.scene, self.spread, sigma, numbers, aims)
         return ConstrainedMotion(
             begun.scene, found.numbers, begun.state, found.results, found.steps, found.distance
         )
@@ -106,10 +102,6 @@ class LevelCorrector:
         return gauss_newton.distance(
             begun.scene, self.spread, begun.state.sigma, begun.numbers, aims
         )
-
-    def pins(self, begun: ConstrainedMotion) -> tuple[FootPins, ...]:
-        """Return the pins for the feet of a predicted motion."""
-        return pinned_feet.build_pins(begun.scene, begun.numbers, self.card.feet)
 
     def measured(self, held: ConstrainedMotion) -> dict[str, float]:
         """Return the values of the card's measured controls on a motion."""

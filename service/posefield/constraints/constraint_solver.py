@@ -183,12 +183,10 @@ class ConstraintSolver:
         if not asked.constraints:
             return begun
         aims = constraint.from_controls(asked.constraints.controls, bench.reduced.frames)
-        feet = bench.pins(begun) if asked.constraints.pinned else ()
-        pins = [pin for foot in feet for pin in foot.constraints()]
         last = bench.reduced.frames - 1.0
         for _ in range(MAX_ROUNDS):
             aimed = self._target_constraints(question, asked.constraints.targets, held)
-            found = bench.solve(begun, [*self._without_targeted(aims, aimed, last), *aimed], pins)
+            found = bench.solve(begun, [*self._without_targeted(aims, aimed, last), *aimed])
             settled = abs(found.duration / held.duration - 1.0) < DURATION_TOLERANCE
             held = found
             if settled:
@@ -198,8 +196,7 @@ class ConstraintSolver:
             held = overshoot.bring_back(bench, held, asked.constraints, question.controls, bounds)
         self._check_times(asked.constraints.targets, held)
         _check_duplicates(self._target_constraints(question, asked.constraints.targets, held), last)
-        slides = tuple((foot.foot, foot.slide(held.scene, held.numbers)) for foot in feet)
-        return replace(held, slides=slides)
+        return held
 
     def _without_targeted(
         self, aims: Sequence[Constraint], targets: Sequence[PositionConstraint], last: float

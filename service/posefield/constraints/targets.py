@@ -16,10 +16,8 @@ from posefield.validation.question_validation import ValidatedQuestion
 # Largest coordinate of a target, m: beyond any human reach, and well within float32.
 MAX_COORDINATE = 100.0
 MAX_TARGETS = 32
-OPEN_COST, PIN_COST = 4, 4
-"""Cost of a target of a clip with open controls, and of a pinned foot, relative to the cost of a
-target.
-"""
+OPEN_COST = 4
+"""Cost of a target of a clip with open controls, relative to the cost of a target."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +38,13 @@ class ConstraintSet:
     """Constraints of a question.
 
     controls: measured controls with their target values. targets: target positions of joints.
-    pinned: joints that keep their places while they are planted.
     """
 
     controls: tuple[tuple[str, Measure, float], ...]
     targets: tuple[JointTarget, ...]
-    pinned: tuple[int, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.controls or self.targets or self.pinned)
+        return bool(self.controls or self.targets)
 
 
 NO_CONSTRAINTS = ConstraintSet((), ())
@@ -57,10 +53,10 @@ NO_CONSTRAINTS = ConstraintSet((), ())
 def solver_cost(card: ModelCard, asked: MotionQuestion) -> int:
     """Return the cost of solving the constraints of a question, in units of a plain target.
 
-    Open controls and each pinned foot cost several units (decision 0028).
+    Open controls cost several units (decision 0028).
     """
     each = OPEN_COST if len(asked.controls) < len(card.controls) else 1
-    return each * len(asked.targets) + PIN_COST * len(card.feet) * asked.pin_feet
+    return each * len(asked.targets)
 
 
 def from_question(
@@ -71,8 +67,6 @@ def from_question(
     Raises InvalidField for a control that is not measured on a motion, an unknown joint, an invalid
     position or time, and two targets for one joint at one moment.
     """
-    if asked.pin_feet and not card.feet:
-        raise InvalidField("pin_feet", "true, but this model's recipe names no feet")
     targets = tuple(_joint_target(card, i, target) for i, target in enumerate(asked.targets))
     _check_duplicates(asked.targets, targets)
     taken = {goal.moment for goal in targets if goal.time is None}
@@ -92,7 +86,7 @@ def from_question(
             continue
         goal = answer_bounds.limit_control(control, question.controls[control.name])
         controls.append((control.name, own, goal))
-    return ConstraintSet(tuple(controls), targets, tuple(card.feet) if asked.pin_feet else ())
+    return ConstraintSet(tuple(controls), targets)
 
 
 def _exact_controls(

@@ -18,7 +18,6 @@ from posefield.common.units import Floats, Indices
 from posefield.feet import stances
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
-from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion.foot_contacts import FootContact
 
 # Time over which a change of the path is spread, s.
@@ -46,9 +45,7 @@ class Footsteps:
     anchors: Annotated[Floats, "stances 3"]
 
 
-def plan_path(
-    path: FootPath, found: Sequence[Interval], foot: FootContact
-) -> Footsteps:
+def plan_path(path: FootPath, found: Sequence[Interval], foot: FootContact) -> Footsteps:
     """Return the path of a foot that stands in the intervals `found`."""
     height = foot.height
     held = _held(path, found)
@@ -187,15 +184,11 @@ def _held(path: FootPath, found: Sequence[Interval]) -> list[Interval]:
         before = _gap(found, index - 1, path)
         after = _gap(found, index, path)
         longer.append(
-            Interval(
-                stance.begin - min(hold, before // 4), stance.end + min(hold, after // 4)
-            )
+            Interval(stance.begin - min(hold, before // 4), stance.end + min(hold, after // 4))
         )
     if path.cycle is None:
         return [Interval(max(i.begin, 0), min(i.end, count)) for i in longer]
-    return [
-        Interval(i.begin % count, i.begin % count + min(len(i), count)) for i in longer
-    ]
+    return [Interval(i.begin % count, i.begin % count + min(len(i), count)) for i in longer]
 
 
 def _gap(found: Sequence[Interval], index: int, path: FootPath) -> int:
@@ -209,9 +202,7 @@ def _gap(found: Sequence[Interval], index: int, path: FootPath) -> int:
     return found[index + 1].begin - found[index].end
 
 
-def _lifts(
-    path: FootPath, found: Sequence[Interval], foot: FootContact
-) -> tuple[Frames, Frames]:
+def _lifts(path: FootPath, found: Sequence[Interval], foot: FootContact) -> tuple[Frames, Frames]:
     """Return how much a swinging foot is lifted (F,), m, and its least height (F,) while it swings.
 
     A foot whose prediction is lifted as captured feet are is not lifted more. Zero in stances.
@@ -240,7 +231,7 @@ def _shares(swing: Interval, path: FootPath, foot: FootContact) -> Frames | None
     count, length = len(path), len(swing)
     cyclic = path.cycle is not None
     leads, trails = (not cyclic and swing.begin == 0), (not cyclic and swing.end == count)
-    if leads and trails or (cyclic and length == count):
+    if (leads and trails) or (cyclic and length == count):
         return None
     steps = np.arange(1.0, length + 1.0)
     whole = max(length, round(foot.swing * path.rate)) + 1 if leads or trails else length + 1

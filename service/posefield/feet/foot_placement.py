@@ -44,7 +44,11 @@ def place_feet(
     for leg, target in _targets(plan, poses, at):
         arm = poses.position(leg.tip) - poses.position(leg.lower)
         found = two_bone.solve(poses, leg, shift, target - arm)
-        for joint, own in zip((leg.upper, leg.middle, leg.lower), (found.upper, found.middle, found.lower), strict=True):
+        for joint, own in zip(
+            (leg.upper, leg.middle, leg.lower),
+            (found.upper, found.middle, found.lower),
+            strict=True,
+        ):
             turned[:, joint] = own
         before.append(poses.position(leg.tip))
         after.append(found.reached + arm)

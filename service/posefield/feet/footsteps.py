@@ -64,7 +64,8 @@ class FeetPlan:
     """Plan of the feet over the frames of a grid.
 
     rate: of the grid, frames a second. cycle: as of the motion. steps: of each leg. changes: of the
-    path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m.
+    path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m, with what brings
+    the character to the floor. grounded: the latter, m.
     """
 
     character: Character
@@ -73,6 +74,7 @@ class FeetPlan:
     steps: tuple[Footsteps, ...]
     changes: Annotated[Floats, "feet frames 3"]
     lowered: Frames
+    grounded: float
 
 
 def plan_feet(
@@ -115,16 +117,23 @@ def plan_feet(
         ]
         needs = _needs(poses, character, paths, steps, sunk)
         shorter = [
-            _shortened(own, need > most, motion)
-            for own, need in zip(found, needs, strict=True)
+            _shortened(own, need > most, motion) for own, need in zip(found, needs, strict=True)
         ]
         if shorter == found:
             break
         found = shorter
-    changes = np.array([own.positions - path.positions for own, path in zip(steps, paths, strict=True)])
+    changes = np.array(
+        [own.positions - path.positions for own, path in zip(steps, paths, strict=True)]
+    )
     lowered = sunk + _lowered(needs, most, motion)
     return FeetPlan(
-        character, motion.rate, motion.cycle, tuple(steps), changes.reshape(-1, *motion.roots.shape), lowered
+        character,
+        motion.rate,
+        motion.cycle,
+        tuple(steps),
+        changes.reshape(-1, *motion.roots.shape),
+        lowered,
+        sunk,
     )
 
 
@@ -179,7 +188,9 @@ def _room(poses: LimbPoses, character: Character, sunk: float) -> Frames:
     most = np.full(count, pelvis.MOST)
     for limb in character.kept:
         firm = two_bone.firm_reach(poses, limb)
-        most = np.minimum(most, pelvis.room(poses.position(limb.upper), poses.position(limb.lower), firm) - sunk)
+        most = np.minimum(
+            most, pelvis.room(poses.position(limb.upper), poses.position(limb.lower), firm) - sunk
+        )
     return np.maximum(most, 0.0)
 
 

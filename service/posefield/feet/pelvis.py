@@ -1,11 +1,9 @@
 """Lowering of the pelvis, so that the legs reach the places where the feet stand."""
 
-from typing import Annotated
-
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP
 
 # The pelvis is lowered this long before and after it is needed, s, and its way is smoothed with a
 # Gaussian that is half as wide.

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.units import UP, Booleans
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion.foot_contacts import FootContact
@@ -106,9 +106,7 @@ def tidy(down: Annotated[Booleans, "frames"], rate: float, cyclic: bool) -> list
     ]
 
 
-def discipline(
-    stances: Sequence[Interval], path: FootPath, foot: FootContact
-) -> list[Interval]:
+def discipline(stances: Sequence[Interval], path: FootPath, foot: FootContact) -> list[Interval]:
     """Return stances whose swings are as captured ones: they go somewhere, and do not last.
 
     A swing that goes less than 3 cm is none. One that lasts longer than the captured ones is cut
@@ -132,7 +130,9 @@ def mask(intervals: Sequence[Interval], frames: int) -> Annotated[Booleans, "fra
     return found
 
 
-def _swing_frames(swing: Interval, path: FootPath, foot: FootContact) -> Annotated[Booleans, "some"]:
+def _swing_frames(
+    swing: Interval, path: FootPath, foot: FootContact
+) -> Annotated[Booleans, "some"]:
     """Return the frames of a swing in which the foot swings indeed."""
     inner = path.cycle is not None or (swing.begin > 0 and swing.end < len(path))
     if inner:

@@ -83,9 +83,7 @@ def shortest_turn(
     """Return the rotation (..., 4) by the smallest angle from one direction to another."""
     sizes = np.linalg.norm(before, axis=-1) * np.linalg.norm(after, axis=-1)
     real = np.maximum(sizes + np.sum(before * after, axis=-1), 1e-12)
-    return quat.normalize(
-        np.concatenate([real[..., None], quat.cross(before, after)], axis=-1)
-    )
+    return quat.normalize(np.concatenate([real[..., None], quat.cross(before, after)], axis=-1))
 
 
 def _bend_direction(poses: LimbPoses, limb: Limb, towards: RootPath) -> RootPath:

@@ -19,7 +19,7 @@ from posefield.http.decoding import clips_query, request_body
 from posefield.http.steps import Context, Steps, from_body, from_url, unlimited
 from posefield.question.motion_question import FileQuestion
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clips
+from posefield.synthesis import clips, standing_feet
 from posefield.synthesis.frame_times import MAX_POSES
 
 Clips = Context[ClipEncoder]
@@ -31,7 +31,7 @@ class ClipTask:
     """A question for a clip within the limits.
 
     most: largest number of frames. convention: unit and up axis of the file. corrected: true if
-    the constraint solver answers.
+    the constraint solver answers or feet are placed.
     """
 
     question: FileQuestion
@@ -46,7 +46,8 @@ async def validate(context: Clips, question: FileQuestion) -> ClipTask:
     convention = encoder.convention(question.unit, question.up, question.body)
     joints = len(model.session.card.skeleton)
     fits = max_poses(context.service.settings.output_limit, joints, encoder.bytes_per_joint)
-    corrected = bool(model.solver.measures or question.has_constraints)
+    stands = standing_feet.wants_standing_feet(model.session.card, question)
+    corrected = bool(model.solver.measures or question.has_constraints or stands)
     return ClipTask(question, min(fits, MAX_POSES), convention, corrected)
 
 

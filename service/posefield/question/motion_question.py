@@ -12,6 +12,7 @@ from posefield.question.body_kind import Body
 
 ExtrapolationPolicy = Literal["ok", "warn", "refuse"]
 RootMode = Literal["travelling", "in_place"]
+FeetMode = Literal["stand", "as_predicted"]
 Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
 """Moment of the motion; "farthest" is from the root."""
 TargetTime = float | Moment
@@ -100,16 +101,15 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra={"word": "target", "metavar": "JOINT@MOMENT=X,Y,Z"},
         ),
     ] = ()
-    pin_feet: Annotated[bool, Meta(description="keep the positions of planted feet")] = False
 
     @property
     def has_constraints(self) -> bool:
         """Return whether there are constraints besides the given controls."""
-        return self.exact != "auto" or bool(self.targets) or self.pin_feet
+        return self.exact != "auto" or bool(self.targets)
 
 
-CONSTRAINING = ("targets", "pin_feet")
-"""Fields that constrain an answer whatever their value, unless it is empty or false."""
+CONSTRAINING = ("targets",)
+"""Fields that constrain an answer whatever their value, unless it is empty."""
 
 
 class PoseQuestion(MotionQuestion, frozen=True, kw_only=True):
@@ -133,7 +133,8 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
     are kept, and a model that is in place already is unchanged. loop: a whole cycle as N = max(1,
     round(duration * fps)) steps, without start and end. Its frame N equals the first one if it
     stays in place, else it is the first one moved by the cycle's travel and turn. It plays N / fps
-    seconds, which is the rounded duration.
+    seconds, which is the rounded duration. feet: "stand" plans stances and swings over the whole
+    motion and places the legs; None is "stand" for models that travel and know contacts.
     """
 
     fps: Annotated[
@@ -156,6 +157,13 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
     loop: Annotated[
         bool, Meta(description="write one whole cycle whose last frame equals its first")
     ] = False
+    feet: Annotated[
+        FeetMode | None,
+        Meta(
+            description="whether feet stand where they contact the ground; default: stand, for "
+            "models that travel and know the contacts of their feet"
+        ),
+    ] = None
 
 
 class FileQuestion(ClipQuestion, frozen=True, kw_only=True):

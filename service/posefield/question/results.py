@@ -93,6 +93,41 @@ class Deviation:
 
 
 @dataclass(frozen=True)
+class StanceResult:
+    """A stance of a foot.
+
+    joint: that contacts. begin, end: s, from the start of the whole clip; in a cycle the end may
+    lie in the next one. position: of the joint, m, before the root's travel is removed.
+    """
+
+    joint: str
+    begin: float
+    end: float
+    position: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FeetResult:
+    """Feet of a clip that were made to stand, over the whole motion.
+
+    swings: number of them. skate_before, skate: foot skate as predicted and as given, m/s. drift:
+    largest distance over the floor of a standing foot from its place, m. lowered: by how much the
+    pelvis was lowered at most, so that the feet reach the floor, m. grounded: by how much the whole
+    character was lowered to the floor, m; negative if it was raised. left: one sentence for each
+    foot that is as predicted.
+    """
+
+    stances: tuple[StanceResult, ...] = ()
+    swings: int = 0
+    skate_before: float = 0.0
+    skate: float = 0.0
+    drift: float = 0.0
+    lowered: float = 0.0
+    grounded: float = 0.0
+    left: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
 class Trust:
     """Provenance and uncertainty of a result.
 
@@ -100,17 +135,15 @@ class Trust:
     length of the whole clip at these controls, s. sigma: expected distance between this clip and a
     captured clip at these controls, root mean square over joints and frames, m. warnings: one
     sentence for each control outside its sampled range, or one for controls in a gap between the
-    samples, one for each deviation, one for each target that is not reached, and one for each
-    pinned foot that slides. performer:
-    requested name; None for an
-    unseen performer. level: of detail. supported: whether clips with similar controls were
+    samples, one for each deviation, and one for each target that is not reached. performer:
+    requested name; None for an unseen performer. level: of detail. supported: whether clips with similar controls were
     captured. performer_seen: whether the requested performer was captured; None where the model
     does not distinguish performers. inferred: names of the controls that were not given and were
     set to the most typical values for the given ones. measured: values in this result of the
     controls for which the recipe has a measure. targets: residuals of the constraints. joint_sigma
     (J,), m: sigma of each joint; empty unless requested. deviations: requested controls whose value
     the motion does not have. labels: requested names or weights besides the performer, by label
-    set.
+    set. feet: of a clip that were made to stand; None for feet as predicted.
     """
 
     model: str
@@ -128,6 +161,7 @@ class Trust:
     joint_sigma: tuple[float, ...] = ()
     deviations: tuple[Deviation, ...] = ()
     labels: Mapping[str, LabelValue] = field(default_factory=dict)
+    feet: FeetResult | None = None
 
     def document(self) -> dict[str, Any]:
         """Return the Trust (schema of the contract): the facts and the band of sigma."""
@@ -156,6 +190,7 @@ class Trust:
             "joint_sigma": list(self.joint_sigma),
             "deviations": [deviation.facts() for deviation in self.deviations],
             "labels": dict(self.labels),
+            "feet": {} if self.feet is None else asdict(self.feet),
         }
         return seen | {name: fact for name, fact in more.items() if fact}
 

@@ -8,6 +8,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.constraints import constrained_motion
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
+from posefield.feet.stances import Cycle
 from posefield.locomotion import stride
 from posefield.locomotion.stride import Strides
 from posefield.motion.clip import assemble
@@ -15,8 +16,9 @@ from posefield.motion.curves import CurveValues
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
-from posefield.synthesis import frame_times
+from posefield.synthesis import frame_times, standing_feet
 from posefield.synthesis.poses import pose_outputs
+from posefield.synthesis.standing_feet import WholeMotion
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import question_validation
 from posefield.validation.question_validation import ValidatedQuestion
@@ -62,6 +64,7 @@ def synthesize_clip(
 def check(model: Synthesizer, asked: ClipQuestion) -> None:
     """Raise the errors of `synthesize_clip` that are known before the duration of the clip is."""
     model.solver.constraints(model.question(asked), asked)
+    standing_feet.wants_standing_feet(model.session.card, asked)
     _named_skeleton(model, asked)
     frame_times.time_window(asked, model.durations[1])
 
@@ -76,6 +79,7 @@ def preview_clip(
     later. Raises as `synthesize_clip` does.
     """
     question = model.question(asked)
+    standing_feet.wants_standing_feet(model.session.card, asked)
     _named_skeleton(model, asked)
     duration, misses = _duration_and_misses(model, question, asked)
     times = frame_times.sample_times(asked, duration, most)
@@ -109,12 +113,27 @@ def _unconstrained(
         predicted = model.solver.solve(question, NO_CONSTRAINTS)
         measured = model.solver.measured(question, predicted)
         answer = replace(answer, trust=replace(answer.trust, measured=measured))
-    if asked.loop or asked.root == "in_place":
-        card = model.session.card
-        measure = stride.strides if card.cyclic else stride.straight_strides
-        way = measure(model.session, question.point, question.labels, question.level)
-        answer = _apply_root_options(model, answer, way, asked)
-    return answer
+    stands = standing_feet.wants_standing_feet(model.session.card, asked)
+    routed = asked.loop or asked.root == "in_place"
+    way = _strides(model, question) if stands or routed else None
+    if stands:
+        motion = WholeMotion(
+            lambda times: _predict(model, question, asked, times),
+            answer.trust.duration,
+            cycle=_cycle(model, way),
+        )
+        answer = standing_feet.stand(model, question, NO_CONSTRAINTS, answer, motion)
+    return _apply_root_options(model, answer, way, asked) if way and routed else answer
+
+
+def _strides(model: Synthesizer, question: ValidatedQuestion) -> Strides:
+    """Return the cycle of a motion, or its straight line from first to last pose."""
+    measure = stride.strides if model.session.card.cyclic else stride.straight_strides
+    return measure(model.session, question.point, question.labels, question.level)
+
+
+def _cycle(model: Synthesizer, way: Strides | None) -> Cycle | None:
+    return standing_feet.cycle_of(way) if way and model.session.card.cyclic else None
 
 
 def _constrained(
@@ -129,12 +148,17 @@ def _constrained(
     when = frame_times.sample_times(asked, model.check_duration(held.duration), most)
     trust = model.constrained_trust(asked, question, held)
     answer = model.solver.poses(question, held, when, trust)
+    way = constrained_motion.to_strides(held)
+    if standing_feet.wants_standing_feet(model.session.card, asked):
+        motion = WholeMotion(
+            lambda times: model.solver.poses(question, held, times, trust),
+            held.duration,
+            held.state.duration / held.duration,
+            _cycle(model, way),
+        )
+        answer = standing_feet.stand(model, question, goals, answer, motion)
     routed = asked.loop or asked.root == "in_place"
-    return (
-        _apply_root_options(model, answer, constrained_motion.to_strides(held), asked)
-        if routed
-        else answer
-    )
+    return _apply_root_options(model, answer, way, asked) if routed else answer
 
 
 def _duration_and_misses(

@@ -7,7 +7,6 @@ from functools import cached_property
 from posefield.common.errors import OutOfReach, OutsideSamples
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
-from posefield.constraints.pinned_feet import LOOSE
 from posefield.constraints.targets import ConstraintSet
 from posefield.inference.named_model import NamedModel
 from posefield.model_file.model_card import PERFORMER
@@ -114,18 +113,8 @@ class Synthesizer(NamedModel):
         question = replace(question, deviations=apart)
         own = self.trust(asked, question, held.duration, held.state.asked_sigma)
         said = () if asked.extrapolate == "ok" else miss_warnings(targets)
-        warnings = (*own.warnings, *said, *self._slide_warnings(held))
+        warnings = (*own.warnings, *said)
         return replace(own, warnings=warnings, measured=measured, targets=held.results)
-
-    def _slide_warnings(self, held: ConstrainedMotion) -> tuple[str, ...]:
-        """Return a sentence for each pinned foot that could not be kept in its place."""
-        names = self.session.card.skeleton.names
-        return tuple(
-            f"{names[foot]} cannot be pinned: it slides by up to {100.0 * slide:.1f} cm while "
-            "planted"
-            for foot, slide in held.slides
-            if slide > LOOSE
-        )
 
     def _deviations(
         self,

@@ -1,0 +1,193 @@
+"""Feet of clips that stand: which clips, and the plan over the whole motion."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
+from posefield.constraints.targets import ConstraintSet
+from posefield.feet import foot_placement, footsteps, limb_choice, stances
+from posefield.feet.foot_placement import PlacedFrames
+from posefield.feet.footsteps import FeetPlan, SampledMotion
+from posefield.feet.stances import Cycle
+from posefield.inference.graph_ports import CONTACTS
+from posefield.locomotion import floor_plane
+from posefield.locomotion.stride import Strides
+from posefield.model_file.model_card import ModelCard
+from posefield.motion import foot_skate, measures, skeleton
+from posefield.motion.foot_contacts import FootContact
+from posefield.motion.measures import MeasuredMotion
+from posefield.question.motion_question import ClipQuestion
+from posefield.question.results import FeetResult, PoseAnswer, StanceResult
+from posefield.synthesis.synthesizer import MICROMETRES, Synthesizer
+from posefield.validation.question_validation import ValidatedQuestion
+
+# Frames a second of the grid of a plan, and the smallest and largest number of its steps.
+RATE, FEWEST, MOST = 60.0, 8, 600
+
+
+@dataclass(frozen=True)
+class WholeMotion:
+    """A motion from its start to its end.
+
+    poses: at times (S,), s. duration: s. stretch: duration of the prediction over this duration.
+    cycle: floor motion of a cycle; None for a motion without cycles.
+    """
+
+    poses: Callable[[Floats], PoseAnswer[np.float64]]
+    duration: float
+    stretch: float = 1.0
+    cycle: Cycle | None = None
+
+    @property
+    def times(self) -> Annotated[Floats, "frames"]:
+        """Return times (F,), s, of the grid; a cycle's lack its last frame."""
+        steps = min(max(round(self.duration * RATE), FEWEST), MOST)
+        return np.arange(steps + (self.cycle is None)) * (self.duration / steps)
+
+
+def wants_standing_feet(card: ModelCard, asked: ClipQuestion) -> bool:
+    """Return whether the feet of a clip are placed.
+
+    Raises InvalidField if they are asked to stand, but the model has no feet on the ground.
+    """
+    travels = card.root == "travelling"
+    if asked.feet is None:
+        return bool(travels and card.feet and card.contacts)
+    if asked.feet == "stand" and not card.feet:
+        raise InvalidField("feet", "'stand', but this model's recipe names no feet")
+    if asked.feet == "stand" and not travels:
+        raise InvalidField("feet", "'stand', but the root of this model's motions stays in place")
+    return asked.feet == "stand"
+
+
+def cycle_of(way: Strides) -> Cycle:
+    """Return the floor motion from the start of a cycle to its end."""
+    turn = float(way.turns[0])
+    gap = floor_plane.arc_displacement(way.travels, way.turns)[0]
+    start = way.starts[0]
+    return Cycle(complex(start + gap - np.exp(1j * turn) * start), turn)
+
+
+def stand(
+    model: Synthesizer,
+    question: ValidatedQuestion,
+    goals: ConstraintSet,
+    answer: PoseAnswer[np.float64],
+    motion: WholeMotion,
+) -> PoseAnswer[np.float64]:
+    """Return the poses of an answer with standing feet, and with the facts about them in `trust`.
+
+    goals: constraints that the motion meets, which stay met.
+    """
+    card, times = model.session.card, motion.times
+    poses = motion.poses(times)
+    known = [own for own in card.contacts if own.joint in card.feet]
+    feet = [own.joint for own in known] if known else list(card.feet)
+    choice = limb_choice.choose_limbs(
+        card.skeleton.parents, answer.bone_offsets, feet, _held_joints(goals)
+    )
+    left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in choice.left)
+    if not choice.feet:
+        return replace(answer, trust=replace(answer.trust, feet=FeetResult(left=left)))
+    rate = (len(times) - (motion.cycle is None)) / motion.duration
+    sampled = SampledMotion(poses.rotations, poses.root_position, rate, motion.cycle)
+    own = [known[place] for place in choice.feet] if known else []
+    likely = _probabilities(model, question, own, times * motion.stretch) if known else None
+    plan = footsteps.plan_feet(choice.character, sampled, own, likely)
+    whole = foot_placement.place_feet(plan, times, poses.rotations, poses.root_position)
+    told = replace(describe(plan, whole, card.skeleton.names), left=left)
+    measured = _measured(card, goals, answer, poses, whole)
+    placed = foot_placement.place_feet(plan, answer.times, answer.rotations, answer.root_position)
+    trust = replace(answer.trust, feet=told, measured=measured)
+    return replace(answer, rotations=placed.rotations, root_position=placed.roots, trust=trust)
+
+
+def describe(plan: FeetPlan, whole: PlacedFrames, names: Sequence[str]) -> FeetResult:
+    """Return the facts about the placed feet of a whole motion."""
+    found, swings, drift = [], 0, 0.0
+    count, cyclic = len(plan.lowered), plan.cycle is not None
+    for foot, (leg, steps) in enumerate(zip(plan.character.legs, plan.steps, strict=True)):
+        swings += len(stances.runs(~stances.mask(steps.stances, count), cyclic))
+        for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
+            frames = np.arange(stance.begin, min(stance.end, count))
+            away = (whole.after[frames, foot] - anchor)[:, [0, 2]]
+            drift = max(drift, float(np.linalg.norm(away, axis=-1).max()))
+            position = tuple(round(float(axis), MICROMETRES) for axis in anchor)
+            begin, end = stance.begin / plan.rate, (stance.end - 1) / plan.rate
+            found.append(StanceResult(names[leg.tip], _rounded(begin), _rounded(end), position))
+    before, after = (
+        float(foot_skate.mean_skate_speed(paths, plan.rate))
+        for paths in (whole.before, whole.after)
+    )
+    lowered = float((plan.lowered - plan.grounded).max())
+    figures = (before, after, drift, lowered, plan.grounded)
+    return FeetResult(tuple(found), swings, *map(_rounded, figures))
+
+
+def _rounded(value: float) -> float:
+    return round(value, MICROMETRES)
+
+
+def _held_joints(goals: ConstraintSet) -> set[int]:
+    """Return the joints whose positions constrain a motion."""
+    own = [measure for _, measure, _ in goals.controls] + [goal.moment for goal in goals.targets]
+    return {joint for measure in own for joint in measure.joints}
+
+
+def _probabilities(
+    model: Synthesizer,
+    question: ValidatedQuestion,
+    feet: Sequence[FootContact],
+    times: Annotated[Floats, "frames"],
+) -> Annotated[Floats, "frames feet"]:
+    """Return the probabilities (F, K) of the contacts of feet at times (F,), s."""
+    (likely,) = model.session.run(
+        question.point, times[None], CONTACTS, labels=question.labels, level=question.level
+    )
+    joints = [own.joint for own in model.session.card.contacts]
+    return likely[0][:, [joints.index(own.joint) for own in feet]].astype(np.float64)
+
+
+def _measured(
+    card: ModelCard,
+    goals: ConstraintSet,
+    answer: PoseAnswer[np.float64],
+    before: PoseAnswer[np.float64],
+    after: PlacedFrames,
+) -> dict[str, float]:
+    """Return the measured controls of an answer, moved by as much as the feet's placing moves them.
+
+    before, after: the whole motion. Those that constrain it stay.
+    """
+    found, held = dict(answer.trust.measured), {name for name, _, _ in goals.controls}
+    moving = [
+        (control.name, control.measure)
+        for control in card.controls
+        if control.measure and control.measure.joints and not control.measure.is_body_measure
+    ]
+    moving = [pair for pair in moving if pair[0] in found and pair[0] not in held]
+    if not moving:
+        return found
+    bones, parents = answer.bone_offsets, card.skeleton.parents
+    both = [
+        skeleton.positions(parents, rotations, skeleton.translations(bones, roots))
+        for rotations, roots in (
+            (before.rotations, before.root_position),
+            (after.rotations, after.roots),
+        )
+    ]
+    for name, measure in moving:
+        share = (measure.share or 0.0) * (len(both[0]) - 1)
+        old, new = (
+            measures.evaluate(
+                measure,
+                MeasuredMotion(own, answer.trust.duration, np.zeros(3), parents, bones, share),
+            )
+            for own in both
+        )
+        found[name] += new - old
+    return found
