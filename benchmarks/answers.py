@@ -146,7 +146,6 @@ def _extras(card: dict[str, Any], joint: str) -> list[dict[str, Any]]:
         {"joint_sigma": True, "extrapolate": "ok"},
         {"exact": "none"},
         {"targets": [target], "extrapolate": "ok"},
-        {"pin_feet": True},
     ]
 
 

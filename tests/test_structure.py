@@ -200,7 +200,7 @@ def test_public_functions_have_few_parameters(own, tmp_path):
 
 
 def test_a_boolean_of_a_question_stands_in_few_files():
-    """`pin_feet`: type, contract, check, the Python client's signatures, the page's download."""
+    """`as_predicted`: type, contract, the Python client's signatures, the page's download."""
     folders = (ROOT / folder for folder in ("service", "model_export", "clients", "api"))
     kinds = {".py", ".ts", ".yaml", ".json"}
     files = (path for folder in folders for path in folder.rglob("*") if path.suffix in kinds)
@@ -209,14 +209,12 @@ def test_a_boolean_of_a_question_stands_in_few_files():
     found = {
         path.relative_to(ROOT).as_posix()
         for path in own
-        if not path.is_symlink() and "pin_feet" in path.read_text()
+        if not path.is_symlink() and "as_predicted" in path.read_text()
     }
     assert found == {
         "api/openapi.yaml",
         "clients/python/posefield_client/files.py",
         "clients/viewer/src/files.ts",
         "clients/viewer/test/product.page.ts",
-        "clients/python/posefield_client/questions.py",
-        "service/posefield/constraints/targets.py",
         "service/posefield/question/motion_question.py",
     }

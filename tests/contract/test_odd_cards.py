@@ -136,8 +136,8 @@ class Tried:
         target = {"joint": card.skeleton.names[-1], "position": [0.1, 1.0, 0.3]}
         for at in ("end", "event") if card.event else ("end",):
             self.post("/pose.json", controls=controls, times=[0], targets=[{**target, "at": at}])
-        if card.feet:
-            self.get("/clip.npz", **controls, pin_feet="true")
+        if card.feet and card.root == "travelling":
+            self.get("/clip.npz", **controls, feet="stand")
         if card.cyclic:
             self.get("/crowd.usdc", count=2, seconds=0.5)
 

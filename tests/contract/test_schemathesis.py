@@ -249,9 +249,11 @@ def narrowed(spec, card):
 
 
 def narrow_holds(parts, card, times):
-    """Narrow the constraints to this model's: none of its controls is measured, it has no feet to
-    pin, and no schema can say which places are out of reach, or that two targets differ."""
-    parts["schemas"]["PinFeet"] = {"type": "boolean", "enum": [False]}
+    """Narrow the constraints to this model's: none of its controls is measured, it has no feet
+    that stand, and no schema can say which places are out of reach, or that two targets differ."""
+    parts["schemas"]["FeetMode"] = parts["parameters"]["feet"]["schema"] = {
+        "enum": ["as_predicted"]
+    }
     parts["schemas"]["Exact"] = parts["parameters"]["exact"]["schema"] = {"enum": ["auto", "none"]}
     parts["schemas"]["Extrapolate"] = {"enum": ["warn"]}
     target = parts["schemas"]["Target"]["properties"]

@@ -38,7 +38,7 @@ IN_QUERY = [
     ("exact", "turn,", 400, "bad-parameter", "exact", "expected auto, none or names of controls"),
     ("exact", "spin", 422, "invalid-field", "exact", "expected controls of this model: stature"),
     ("exact", "turn", 422, "invalid-field", "exact", "not measured on a motion, expected some of:"),
-    ("pin_feet", "yes", 400, "bad-parameter", "pin_feet", "expected one of true, false"),
+    ("feet", "yes", 400, "bad-parameter", "feet", "expected one of stand, as_predicted"),
 ]
 
 # Fields of a body, status, problem, place at fault, words of the detail
@@ -97,7 +97,6 @@ IN_BODY = [
     ({"exact": []}, 400, "bad-body", "/exact", "length >= 1"),
     ({"exact": ["spin"]}, 422, "invalid-field", "/exact", "expected controls of this model"),
     ({"exact": ["turn"]}, 422, "invalid-field", "/exact", "'turn' is not measured on a motion"),
-    ({"pin_feet": 1}, 400, "bad-body", "/pin_feet", "Expected `bool`"),
 ]
 
 

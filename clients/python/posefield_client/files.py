@@ -23,6 +23,7 @@ from posefield_client.questions import Controls, Extrapolate, Labels
 from posefield_client.wire import Request
 
 Root = Literal["travelling", "in_place"]
+Feet = Literal["stand", "as_predicted"]
 Names = Literal["own", "mixamo", "ue5", "vrm", "humanik"]
 Instancing = Literal["references", "scenegraph", "flatten"]
 Body = Literal["none", "mannequin", "bones"]
@@ -85,7 +86,7 @@ def clip(
     extrapolate: Extrapolate | None = None,
     exact: Exact | None = None,
     targets: Targets | None = None,
-    pin_feet: bool | None = None,
+    feet: Feet | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Files:
@@ -94,7 +95,7 @@ def clip(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
-        **asking.said(body=body, joint_sigma=joint_sigma, pin_feet=pin_feet, labels=labels),
+        **asking.said(body=body, joint_sigma=joint_sigma, feet=feet, labels=labels),
         **holding.said(exact, targets),
     )
     ask = partial(asking.either, "ClipInFormat", model, question)

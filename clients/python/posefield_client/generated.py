@@ -60,7 +60,6 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     joint_sigma: bool | UnsetType = UNSET
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
-    pin_feet: bool | UnsetType = UNSET
 
 
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -80,7 +79,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     loop: bool | UnsetType = UNSET
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
-    pin_feet: bool | UnsetType = UNSET
+    feet: Literal["stand", "as_predicted"] | UnsetType | None = UNSET
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
     body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
@@ -104,7 +103,7 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     loop: bool | UnsetType = UNSET
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
-    pin_feet: bool | UnsetType = UNSET
+    feet: Literal["stand", "as_predicted"] | UnsetType | None = UNSET
 
 
 class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -363,6 +362,28 @@ class Met(Struct, frozen=True, kw_only=True):
     reached: bool
 
 
+class Stance(Struct, frozen=True, kw_only=True):
+    """Interval in which a foot stands."""
+
+    joint: str
+    begin: float
+    end: float
+    position: tuple[float, float, float]
+
+
+class FeetResult(Struct, frozen=True, kw_only=True):
+    """Feet that were made to stand, over the whole motion."""
+
+    stances: tuple[Stance, ...]
+    swings: int
+    skate_before: float
+    skate: float
+    drift: float
+    lowered: float
+    grounded: float
+    left: tuple[str, ...]
+
+
 class Trust(Struct, frozen=True, kw_only=True):
     """Provenance and uncertainty of a response."""
 
@@ -382,6 +403,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     inferred: tuple[str, ...] = ()
     measured: dict[str, float] = {}
     targets: tuple[Met, ...] = ()
+    feet: FeetResult | None = None
 
 
 class Backing(Struct, frozen=True, kw_only=True):

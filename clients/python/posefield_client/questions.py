@@ -74,7 +74,6 @@ def pose(
     extrapolate: Extrapolate | None = None,
     exact: Exact | None = None,
     targets: Targets | None = None,
-    pin_feet: bool | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Call[Pose]:
@@ -83,7 +82,7 @@ def pose(
         controls=asking.controls(controls, named),
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
-        **asking.said(joint_sigma=joint_sigma, pin_feet=pin_feet, labels=labels),
+        **asking.said(joint_sigma=joint_sigma, labels=labels),
         **holding.said(exact, targets),
     )
     return Call(asking.either("PoseInFormat", model, question, "msgpack"), numbers.pose)

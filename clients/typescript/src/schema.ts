@@ -694,10 +694,11 @@ export interface components {
          */
         Targets: components["schemas"]["Target"][];
         /**
-         * @description Whether planted feet keep their positions.
-         * @default false
+         * @description Whether feet stand where they contact the ground. `stand` plans stances and swings over the whole motion, keeps standing feet in one place on the floor, and places the legs; exact targets and controls stay met. Default: `stand` for models that travel and know the contacts of their feet. Since 4.0.0.
+         * @default null
+         * @enum {string|null}
          */
-        PinFeet: boolean;
+        FeetMode: "stand" | "as_predicted" | null;
         /**
          * @description Unit of length in the file; null for the format's usual unit. glTF is always in metres.
          * @default null
@@ -785,7 +786,6 @@ export interface components {
             joint_sigma?: components["schemas"]["JointSigma"];
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
-            pin_feet?: components["schemas"]["PinFeet"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -814,7 +814,7 @@ export interface components {
             loop?: components["schemas"]["Loop"];
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
-            pin_feet?: components["schemas"]["PinFeet"];
+            feet?: components["schemas"]["FeetMode"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
@@ -1012,7 +1012,7 @@ export interface components {
             loop?: components["schemas"]["Loop"];
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
-            pin_feet?: components["schemas"]["PinFeet"];
+            feet?: components["schemas"]["FeetMode"];
         };
         /** @description One clip of an archive, with its uncertainty. */
         ManifestEntry: {
@@ -1065,7 +1065,7 @@ export interface components {
             supported?: components["schemas"]["Supported"];
             performer_seen?: components["schemas"]["PerformerSeen"];
             joint_sigma?: components["schemas"]["SigmaByJoint"];
-            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, one for each element of `deviations`, one for each target that is not reached, and one for each pinned foot that slides by more than 1.5 cm. */
+            /** @description One sentence for each control outside its sampled range, or one sentence if the controls lie in a gap between the samples, one for each element of `deviations`, and one for each target that is not reached. */
             warnings: string[];
             /** @description Requested controls whose value the motion does not have. Absent if there is none. Since 3.1.0. */
             deviations?: components["schemas"]["Deviation"][];
@@ -1076,6 +1076,38 @@ export interface components {
             };
             /** @description Measured controls and targets that constrained the motion, each with its remaining distance. Absent without constraints. */
             targets?: components["schemas"]["Met"][];
+            /** @description Feet that were made to stand. Absent for feet as predicted. Since 4.0.0. */
+            feet?: components["schemas"]["FeetResult"];
+        };
+        /** @description Feet that were made to stand, over the whole motion. */
+        FeetResult: {
+            /** @description Stances of all feet. Empty where no foot can be placed. */
+            stances: components["schemas"]["Stance"][];
+            /** @description Number of swings. */
+            swings: number;
+            /** @description Foot skate of the prediction, in metres a second. */
+            skate_before: number;
+            /** @description Foot skate of the motion, in metres a second. */
+            skate: number;
+            /** @description Largest distance over the floor of a standing foot from its place, in metres. */
+            drift: number;
+            /** @description Largest distance by which the pelvis was lowered so that the legs reach, in metres. */
+            lowered: number;
+            /** @description Distance by which the whole character was lowered to the floor, in metres; negative if it was raised. */
+            grounded: number;
+            /** @description One sentence for each foot that is as predicted. */
+            left: string[];
+        };
+        /** @description Interval in which a foot stands. */
+        Stance: {
+            /** @description Joint that contacts the ground. */
+            joint: string;
+            /** @description Time from the start of the whole clip, in seconds. */
+            begin: number;
+            /** @description Time from the start of the whole clip, in seconds; in a cycle it may lie in the next one. */
+            end: number;
+            /** @description Position of the joint before the root's travel is removed, in metres. */
+            position: number[];
         };
         /**
          * @description Range of `sigma`, on one scale for all models: `close` up to 3 cm, `near` up to 7.5 cm,
@@ -2102,8 +2134,8 @@ export interface components {
          *     ]
          */
         target: string[];
-        /** @description Whether planted feet keep their positions. */
-        pinFeet: components["schemas"]["PinFeet"];
+        /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
+        feet: "stand" | "as_predicted";
         /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
         unit: "m" | "cm";
         /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
@@ -2209,7 +2241,7 @@ export interface components {
                 "application/json": components["schemas"]["CrowdQuestion"];
             };
         };
-        /** @description Default limits: 8 MiB, 10,000 clips, 1,000,000 frames in all, and a total target cost of 2,000. A target costs 1, or 4 if the clip omits controls; each pinned foot costs 4. */
+        /** @description Default limits: 8 MiB, 10,000 clips, 1,000,000 frames in all, and a total target cost of 2,000. A target costs 1, or 4 if the clip omits controls. */
         ClipsQuestion: {
             content: {
                 "application/json": components["schemas"]["ClipsQuestion"];
@@ -2464,8 +2496,6 @@ export interface operations {
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether planted feet keep their positions. */
-                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -2601,8 +2631,6 @@ export interface operations {
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether planted feet keep their positions. */
-                pin_feet?: components["parameters"]["pinFeet"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -2750,8 +2778,8 @@ export interface operations {
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether planted feet keep their positions. */
-                pin_feet?: components["parameters"]["pinFeet"];
+                /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
+                feet?: components["parameters"]["feet"];
                 /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
@@ -2893,8 +2921,8 @@ export interface operations {
                  *     ]
                  */
                 target?: components["parameters"]["target"];
-                /** @description Whether planted feet keep their positions. */
-                pin_feet?: components["parameters"]["pinFeet"];
+                /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
+                feet?: components["parameters"]["feet"];
                 /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
@@ -3982,8 +4010,7 @@ export const KEYS = {
     "level",
     "joint_sigma",
     "exact",
-    "targets",
-    "pin_feet"
+    "targets"
   ],
   "ClipQuestion": [
     "controls",
@@ -4000,7 +4027,7 @@ export const KEYS = {
     "loop",
     "exact",
     "targets",
-    "pin_feet",
+    "feet",
     "unit",
     "up",
     "body"
@@ -4021,7 +4048,7 @@ export const KEYS = {
     "loop",
     "exact",
     "targets",
-    "pin_feet"
+    "feet"
   ],
   "CrowdQuestion": [
     "controls",

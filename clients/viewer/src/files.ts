@@ -49,7 +49,7 @@ interface Choice {
   names: Names;
   unit: "" | "m" | "cm";
   up: "" | "y" | "z";
-  pinFeet: boolean;
+  stands: boolean;
   exact: "auto" | "none";
   text: Text;
 }
@@ -68,6 +68,10 @@ export function mount(host: HTMLElement, session: Session): void {
 
 const NONE =
   "Animation files need a service: this page runs without one, on answers computed beforehand. A video can be recorded.";
+
+/** Whether the service places the feet of a model's clips unless it is told otherwise. */
+const standing = (card: Page["card"]): boolean =>
+  card.root === "travelling" && Boolean(card.feet.length && card.contacts?.length);
 
 function titled(...content: readonly HTMLElement[]): HTMLElement {
   return el(
@@ -100,7 +104,7 @@ class Files {
       names: "own",
       unit: "",
       up: "",
-      pinFeet: false,
+      stands: standing(page.card),
       exact: "auto",
       text: "curl",
     };
@@ -153,7 +157,7 @@ class Files {
   /** What differs from what is usual, so that texts stay short. */
   get #question(): ClipQuestion {
     const { controls, labels, performer, level, root } = this.#page.store.state;
-    const { fps, loop, names, unit, up, format, pinFeet, exact } = this.#choice;
+    const { fps, loop, names, unit, up, format, stands, exact } = this.#choice;
     const targets = this.#targets;
     const measured = format === "glb" ? {} : { ...(unit && { unit }), ...(up && { up }) };
     return {
@@ -165,7 +169,7 @@ class Files {
       ...(root === "in_place" && { root }),
       ...(loop && { loop }),
       ...(targets && { targets }),
-      ...(pinFeet && { pin_feet: true }),
+      ...(stands !== standing(this.#page.card) && { feet: stands ? "stand" : "as_predicted" }),
       ...(exact !== "auto" && { exact }),
       ...(names !== "own" && { names }),
       ...measured,
@@ -297,8 +301,10 @@ class Files {
   #holds(): HTMLElement[] {
     const { card, store } = this.#page;
     const rows: HTMLElement[] = card.cyclic ? [this.#cycle()] : [];
-    if (card.feet.length)
-      rows.push(check("Hold standing feet in place", (pinFeet) => this.#take({ pinFeet })));
+    if (card.feet.length && card.root === "travelling") {
+      const take = (stands: boolean) => this.#take({ stands });
+      rows.push(check("Feet stand where they contact the ground", take, standing(card)));
+    }
     const measured = card.controls.filter(({ measure }) => measure).map(({ name }) => title(name));
     if (measured.length) {
       const words = `Match exactly: ${measured.join(", ")}`;

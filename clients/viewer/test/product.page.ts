@@ -173,11 +173,13 @@ describe("what a download holds exactly", () => {
   it("is the feet and the measured controls", async () => {
     const { page } = await opened(from, "/#cmu_walk");
     await settled(page);
-    assert.ok(!(await link(page)).has("pin_feet") && !(await link(page)).has("exact"));
-    await page.getByLabel("Hold standing feet in place").check();
+    assert.ok(!(await link(page)).has("feet") && !(await link(page)).has("exact"));
+    const feet = page.getByLabel("Feet stand where they contact the ground");
+    const usual = await feet.isChecked();
+    await feet.setChecked(!usual);
     await page.getByLabel(/Match exactly: Speed/).uncheck();
     const found = await link(page);
-    assert.equal(found.get("pin_feet"), "true");
+    assert.equal(found.get("feet"), usual ? "as_predicted" : "stand");
     assert.equal(found.get("exact"), "none");
     await page.close();
   });

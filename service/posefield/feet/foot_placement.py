@@ -99,7 +99,7 @@ def _moved(point: Floats, cycle: Cycle, cycles: int) -> Floats:
     return floor_plane.at_height(floor, point @ UP)
 
 
-def _extended_path(change: RootPath, cycle: Cycle | None) -> RootPath:
+def _extended_path(change: RootPath, cycle: Cycle | None) -> Annotated[Floats, "_ 3"]:
     """Return changes (F + 3, 3) with those of one frame before and of two after."""
     if cycle is None:
         return _extended(change, None)

@@ -100,13 +100,13 @@ FOOT = Target(joint="Foot", position=(0, 0, 1), time=0.25)
 
 
 def test_targets_and_exact_controls_in_a_query():
-    asked = files.clip("m", targets=[HAND, FOOT], exact=["a", "b"], pin_feet=True, a=1)
+    asked = files.clip("m", targets=[HAND, FOOT], exact=["a", "b"], feet="stand", a=1)
     assert parse_qsl(urlsplit(asked.request("bvh").target).query) == [
         ("a", "1"),
         ("exact", "a,b"),
         ("target", "mixamorig:Hand@end:0.5,-0.0000001,2.0"),
         ("target", "Foot@0.25:0.0,0.0,1.0"),
-        ("pin_feet", "true"),
+        ("feet", "stand"),
     ]
     assert target(questions.pose("m", 0, exact="a")) == target(questions.pose("m", 0, exact=["a"]))
 
@@ -114,9 +114,7 @@ def test_targets_and_exact_controls_in_a_query():
 def test_targets_and_exact_controls_in_a_body():
     # More than a line takes.
     many = {f"control_{number:04}": number for number in range(400)}
-    asked = questions.pose(
-        "m", 0, controls=many, targets=[HAND, FOOT], exact="none", pin_feet=False
-    )
+    asked = questions.pose("m", 0, controls=many, targets=[HAND, FOOT], exact="none")
     assert asked.request.operation.method == "POST"
     expected = {
         "controls": many,
@@ -126,12 +124,12 @@ def test_targets_and_exact_controls_in_a_body():
             {"joint": "mixamorig:Hand", "position": [0.5, -1e-7, 2], "at": "end"},
             {"joint": "Foot", "position": [0, 0, 1], "time": 0.25},
         ],
-        "pin_feet": False,
     }
     assert msgspec.json.decode(asked.request.body) == expected
-    clip = {"controls": many, "targets": [HAND, FOOT], "exact": "none", "pin_feet": False}
+    clip = {"controls": many, "targets": [HAND, FOOT], "exact": "none", "feet": "as_predicted"}
     (sent,) = msgspec.json.decode(files.clips("m", [clip], "usdc").request("zip").body)["clips"]
-    assert sent == {name: each for name, each in expected.items() if name != "times"}
+    del expected["times"]
+    assert sent == {**expected, "feet": "as_predicted"}
 
 
 @pytest.mark.parametrize(

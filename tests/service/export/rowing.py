@@ -16,7 +16,7 @@ POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
 TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}
 TYPES |= {"performer": pa.string(), "extrapolate": pa.string()}
 TYPES |= {"names": pa.string(), "root": pa.string(), "loop": pa.bool_()}
-TYPES |= {"exact": pa.string(), "targets": pa.string(), "pin_feet": pa.bool_()}
+TYPES |= {"exact": pa.string(), "targets": pa.string(), "feet": pa.string()}
 
 
 def columns(rows):

@@ -12,7 +12,7 @@ from posefield.common.errors import InvalidField
 from posefield.question.motion_question import ClipQuestion, Target
 from posefield.registry import model_registry
 
-HELD = ("exact", "targets", "pin_feet")
+HELD = ("exact", "targets", "feet")
 HAND = {"joint": "RightHand", "position": [-0.2, 1.1, 0.5], "at": "end"}
 FOOT = {"joint": "LeftFoot", "position": [0.1, 0, 0.5], "time": 0.25}
 BOTH = (
@@ -38,7 +38,7 @@ def test_lines_are_held_each_to_its_own(model, tmp_path):
     lines = [
         {**POINT, "targets": [HAND, FOOT]},
         POINT,
-        {**POINT, "exact": "none", "pin_feet": False},
+        {**POINT, "exact": "none", "feet": None},
         {**POINT, "targets": None, "exact": None},
     ]
     path = write_jsonl(tmp_path / "q.jsonl", lines)
@@ -71,8 +71,8 @@ def test_targets_of_tables_are_text(model, tmp_path, write, name):
         ({"exact": "turn"}, "exact: 'turn' is not measured on a motion"),
         ({"exact": ["turn"]}, "exact: 'turn' is not measured on a motion"),
         ({"exact": 1}, "exact: 1, expected auto, none or names"),
-        ({"pin_feet": True}, "pin_feet: true, but this model's recipe names no feet"),
-        ({"pin_feet": "yes"}, "pin_feet: 'yes', expected true or false"),
+        ({"feet": "stand"}, "feet: 'stand', but this model's recipe names no feet"),
+        ({"feet": "yes"}, "feet: 'yes', expected stand or as_predicted"),
     ],
 )
 def test_rows_that_no_clip_can_be_held_to(model, tmp_path, said, message):

@@ -1,11 +1,9 @@
 """Tests of answers with constraints, as clips and as poses."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from posefield.common.errors import InvalidField
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
@@ -257,76 +255,3 @@ def test_the_event_needs_no_landmark(reach):
         .what
         == "LeftHand at event"
     )
-
-
-def with_feet(reach, *feet):
-    """The model with these feet, which stand during the whole motion."""
-    indices = tuple(map(reach.session.card.skeleton.names.index, feet))
-    card = replace(reach.session.card, feet=indices)
-    return Synthesizer("reach", replace(reach.session, card=card))
-
-
-def slide(reach, answer, foot):
-    """Largest horizontal distance of a foot from its mean place, m."""
-    path = joint(reach, answer, foot)[:, [0, 2]]
-    return float(np.linalg.norm(path - path.mean(axis=0), axis=-1).max())
-
-
-def test_pinned_feet_stay_where_they_stand(reach):
-    reach = with_feet(reach, "LeftFoot", "RightFoot")
-    controls = middle(reach)
-    free = clips.synthesize_clip(reach, ClipQuestion(controls=controls, fps=60.0, **FREE))
-    goal = np.add(joint(reach, free, "RightHand")[-1], [0.02, -0.01, 0.02])
-    targets = (Target("RightHand", tuple(goal), at="end"),)
-    held, pinned = (
-        clips.synthesize_clip(
-            reach,
-            ClipQuestion(controls=controls, fps=60.0, exact="none", targets=targets, pin_feet=pin),
-        )
-        for pin in (False, True)
-    )
-    for foot in ("LeftFoot", "RightFoot"):
-        assert slide(reach, pinned, foot) < 0.5 * slide(reach, held, foot)
-        assert slide(reach, held, foot) > 1e-4
-    assert pinned.trust.targets[0].miss < 1e-4
-    assert pinned.trust.targets[0].miss == pytest.approx(held.trust.targets[0].miss, abs=1e-4)
-    assert pinned.trust.warnings == ()
-
-
-@pytest.mark.parametrize("feet", [1, 2, 4])
-def test_any_number_of_feet_is_pinned_without_targets(reach, feet):
-    names = ("LeftFoot", "RightFoot", "LeftToeBase", "RightToeBase")[:feet]
-    reach = with_feet(reach, *names)
-    question = ClipQuestion(controls=middle(reach), fps=60.0, **FREE)
-    free = clips.synthesize_clip(reach, question)
-    pinned = clips.synthesize_clip(reach, structs.replace(question, pin_feet=True))
-    for foot in names:
-        assert slide(reach, pinned, foot) < 0.5 * slide(reach, free, foot)
-    gaps = joint(reach, pinned, "RightHand") - joint(reach, free, "RightHand")
-    assert 0.0 < np.abs(gaps).max() < 0.05
-
-
-def test_a_foot_that_cannot_be_pinned_is_told(reach):
-    reach = with_feet(reach, "LeftFoot", "RightFoot")
-    free = clips.synthesize_clip(reach, ClipQuestion(controls=middle(reach), fps=60.0, **FREE))
-    target = Target(
-        "LeftFoot", tuple(np.add(joint(reach, free, "LeftFoot")[-1], [0.2, 0.0, 0.1])), at="end"
-    )
-    held = clips.synthesize_clip(
-        reach,
-        ClipQuestion(
-            controls=middle(reach), fps=60.0, exact="none", targets=(target,), pin_feet=True
-        ),
-    )
-    said = next(text for text in held.trust.warnings if "pinned" in text)
-    found = re.fullmatch(
-        r"LeftFoot cannot be pinned: it slides by up to ([\d.]+) cm while planted", said
-    )
-    assert found and float(found[1]) > 1.5
-
-
-def test_feet_that_nobody_named_cannot_be_pinned(reach):
-    model = Synthesizer("reach", replace(reach.session, card=replace(reach.session.card, feet=())))
-    with pytest.raises(InvalidField, match="names no feet") as fault:
-        clips.synthesize_clip(model, ClipQuestion(controls=middle(model), pin_feet=True))
-    assert fault.value.field == "pin_feet"
