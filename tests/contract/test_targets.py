@@ -38,7 +38,6 @@ IN_QUERY = [
     ("exact", "turn,", 400, "bad-parameter", "exact", "expected auto, none or names of controls"),
     ("exact", "spin", 422, "invalid-field", "exact", "expected controls of this model: stature"),
     ("exact", "turn", 422, "invalid-field", "exact", "not measured on a motion, expected some of:"),
-    ("feet", "yes", 400, "bad-parameter", "feet", "expected one of stand, as_predicted"),
 ]
 
 # Fields of a body, status, problem, place at fault, words of the detail
@@ -120,6 +119,18 @@ def test_bad_words_are_refused(ask, path, name, words, status, kind, place, said
     found = problem(ask("GET", query(path, **{name: words}, **times)))
     assert found[:3] == (status, kind, place)
     assert said in found[3]
+
+
+def test_bad_feet_are_refused(ask):
+    """Clips have feet that stand; a pose has not, and takes the word for a control."""
+    found = problem(ask("GET", query("clip.usda", feet="yes")))
+    assert found[:3] == (400, "bad-parameter", "feet")
+    assert "expected one of stand, as_predicted" in found[3]
+    assert problem(ask("GET", query("pose", time=0, feet="stand")))[0] == 400
+    body = {"controls": CONTROLS, "feet": "yes"}
+    assert problem(ask("POST", f"{MODEL}/clip.bvh", json=body))[2] == "/feet"
+    body = {"controls": CONTROLS, "times": [0], "feet": "stand"}
+    assert problem(ask("POST", f"{MODEL}/pose", json=body))[1] == "bad-body"
 
 
 @pytest.mark.parametrize(("fields", "status", "kind", "place", "said"), IN_BODY)

@@ -1,21 +1,40 @@
-"""Contacts of a foot estimated from its motion, for models without contact probabilities."""
+"""Contacts of feet: from probabilities, or estimated from the motion where a model has none."""
 
 from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import Booleans
+from posefield.common.units import Booleans, Floats
 from posefield.feet import stances
 from posefield.feet.stances import FootPath, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.contacts import contact_detection
 from posefield.motion.foot_contacts import FootContact
 
+# A foot stands where its contact is more likely than not. Probabilities are rounded, so that two
+# machines whose last digits differ plan the same steps.
+STANDING, DECIMALS = 0.5, 6
 # Swings of a motion in which no foot swings: median and longest duration, s.
 DEFAULT_SWING, DEFAULT_LONGEST = 0.3, 0.5
 # Percentiles of the durations and of the lifts of swings, as in training.
 LONGEST_PERCENTILE, CLEARANCE_PERCENTILE = 90.0, 75.0
+
+
+def from_probabilities(
+    paths: Sequence[FootPath], likely: Annotated[Floats, "frames feet"]
+) -> list[list[Interval]]:
+    """Return the contacts of each foot, whose probabilities are (F, K)."""
+    down = np.round(likely, DECIMALS) > STANDING
+    return [
+        stances.tidy(own, path.rate, path.cycle is not None)
+        for own, path in zip(down.T, paths, strict=True)
+    ]
+
+
+def from_motion(paths: Sequence[FootPath]) -> list[list[Interval]]:
+    """Return the contacts of each foot, detected by its speed and height."""
+    return [stances.tidy(detect(path), path.rate, path.cycle is not None) for path in paths]
 
 
 def detect(path: FootPath) -> Annotated[Booleans, "frames"]:
@@ -27,7 +46,7 @@ def detect(path: FootPath) -> Annotated[Booleans, "frames"]:
     return contact_detection.detect_contacts(whole, path.rate, True)[:-1]
 
 
-def describe(joint: int, path: FootPath, found: Sequence[Interval]) -> FootContact:
+def statistics(joint: int, path: FootPath, found: Sequence[Interval]) -> FootContact:
     """Return the statistics of a foot's contacts in one motion."""
     down, cyclic = stances.mask(found, len(path)), path.cycle is not None
     heights = path.heights

@@ -11,8 +11,8 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
-from posefield.common.units import UP, Floats
-from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stances, two_bone
+from posefield.common.units import UP, Booleans, Floats
+from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stances
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stances import Cycle, FootPath, Interval
@@ -28,9 +28,9 @@ UNEVEN = 0.01
 class Character:
     """Skeleton and limbs of a character.
 
-    parents: of the joints. bones: offsets (J, 3), m. legs: of the feet that are planted. kept: limbs
-    whose ends keep their predicted paths, such as the arm of a hand with an exact target. fixed:
-    whether the root keeps its height.
+    parents: of the joints. bones: offsets (J, 3), m. legs: of the feet that are planted. kept:
+    limbs whose ends keep their predicted paths, such as the arm of a hand with an exact target.
+    fixed: whether the root keeps its height.
     """
 
     parents: tuple[int, ...]
@@ -94,70 +94,89 @@ def plan_feet(
         character.parents, character.bones, character.limbs, motion.rotations, motion.roots
     )
     paths = [FootPath(poses.position(leg.tip), motion.rate, motion.cycle) for leg in character.legs]
-    down = _contacts(paths, likely)
-    known = list(contacts) if likely is not None else _statistics(character, paths, down)
-    above = _heights_above(paths, down, known, floor)
-    sunk = 0.0 if character.fixed else _sunk(above)
-    heights = [
-        floor + foot.height + float(np.clip(own - sunk, -UNEVEN, UNEVEN))
-        for foot, own in zip(known, above, strict=True)
-    ]
-    # The ground first: the whole character stands as high as its feet do.
-    raised = [replace(path, positions=path.positions - sunk * UP) for path in paths]
-    known = [replace(foot, height=own) for foot, own in zip(known, heights, strict=True)]
-    found = [
-        stances.discipline(own, path, foot)
-        for own, path, foot in zip(down, raised, known, strict=True)
-    ]
-    most = _room(poses, character, sunk)
-    for _ in range(ROUNDS):
-        steps = [
-            ball_path.plan_path(path, own, foot)
-            for path, own, foot in zip(raised, found, known, strict=True)
+    if likely is None:
+        down = contact_estimates.from_motion(paths)
+        known = [
+            contact_estimates.statistics(leg.tip, path, own)
+            for leg, path, own in zip(character.legs, paths, down, strict=True)
         ]
-        needs = _needs(poses, character, paths, steps, sunk)
+    else:
+        down, known = contact_estimates.from_probabilities(paths, likely), list(contacts)
+    above = _heights_above(paths, down, known, floor)
+    sunk = _sunk(above, poses, character)
+    # The ground first: the whole character stands as high as its feet do.
+    grounded = [
+        _GroundedFoot(
+            replace(path, positions=path.positions - sunk * UP),
+            replace(foot, height=floor + foot.height + float(np.clip(own - sunk, -UNEVEN, UNEVEN))),
+        )
+        for path, foot, own in zip(paths, known, above, strict=True)
+    ]
+    found = [
+        stances.discipline(own, foot.path, foot.contact)
+        for own, foot in zip(down, grounded, strict=True)
+    ]
+    steps, lowered = _reachable_steps(poses, character, grounded, found, sunk)
+    changes = np.array(
+        [own.positions - path.positions for own, path in zip(steps, paths, strict=True)]
+    ).reshape(-1, *motion.roots.shape)
+    cycle, rate = motion.cycle, motion.rate
+    return FeetPlan(character, rate, cycle, tuple(steps), changes, sunk + lowered, sunk)
+
+
+@dataclass(frozen=True)
+class _GroundedFoot:
+    """A foot of a character that stands on the floor; contact: with its own height, m."""
+
+    path: FootPath
+    contact: FootContact
+
+
+def _reachable_steps(
+    poses: LimbPoses,
+    character: Character,
+    feet: Sequence[_GroundedFoot],
+    found: Sequence[list[Interval]],
+    sunk: float,
+) -> tuple[list[Footsteps], Frames]:
+    """Return the steps of the feet, and how much the pelvis is lowered for them (F,), m.
+
+    Stances whose leg does not reach are shortened.
+    """
+    count = len(poses.positions)
+    _, below = pelvis.room(poses, character.kept)
+    most = np.zeros(count) if character.fixed else np.clip(below - sunk, 0.0, pelvis.MOST)
+    steps, needs = _steps(poses, character, feet, found, sunk)
+    for _ in range(ROUNDS):
         shorter = [
-            _shortened(own, need > most, motion) for own, need in zip(found, needs, strict=True)
+            _shortened(own, pelvis.beyond(need, most), foot.path)
+            for own, need, foot in zip(found, needs, feet, strict=True)
         ]
         if shorter == found:
             break
         found = shorter
-    changes = np.array(
-        [own.positions - path.positions for own, path in zip(steps, paths, strict=True)]
-    )
-    lowered = sunk + _lowered(needs, most, motion)
-    return FeetPlan(
-        character,
-        motion.rate,
-        motion.cycle,
-        tuple(steps),
-        changes.reshape(-1, *motion.roots.shape),
-        lowered,
-        sunk,
-    )
+        steps, needs = _steps(poses, character, feet, found, sunk)
+    rate = feet[0].path.rate if feet else 1.0
+    return steps, pelvis.lower(needs, most, rate, bool(feet and feet[0].path.cycle))
 
 
-def _contacts(
-    paths: Sequence[FootPath], likely: Annotated[Floats, "frames feet"] | None
-) -> list[list[Interval]]:
-    """Return the contacts of each foot, before discipline."""
-    found = []
-    for foot, path in enumerate(paths):
-        if likely is None:
-            down = contact_estimates.detect(path)
-        else:
-            down = np.round(likely[:, foot], stances.DECIMALS) > stances.STANDING
-        found.append(stances.tidy(down, path.rate, path.cycle is not None))
-    return found
-
-
-def _statistics(
-    character: Character, paths: Sequence[FootPath], down: Sequence[Sequence[Interval]]
-) -> list[FootContact]:
-    return [
-        contact_estimates.describe(leg.tip, path, own)
-        for leg, path, own in zip(character.legs, paths, down, strict=True)
+def _steps(
+    poses: LimbPoses,
+    character: Character,
+    feet: Sequence[_GroundedFoot],
+    found: Sequence[list[Interval]],
+    sunk: float,
+) -> tuple[list[Footsteps], list[Frames]]:
+    """Return the steps of each foot, and how much lower its leg needs the pelvis to be (F,), m."""
+    steps = [
+        ball_path.plan_path(foot.path, own, foot.contact)
+        for foot, own in zip(feet, found, strict=True)
     ]
+    needs = []
+    for leg, foot, own in zip(character.legs, feet, steps, strict=True):
+        target = poses.position(leg.lower) - sunk * UP + own.positions - foot.path.positions
+        needs.append(pelvis.need(poses, leg, target, sunk))
+    return steps, needs
 
 
 def _heights_above(
@@ -174,63 +193,30 @@ def _heights_above(
     return found
 
 
-def _sunk(above: Sequence[float]) -> float:
-    """Return how far a character floats or sinks, m, beyond the unevenness of feet."""
-    mean = float(np.mean(above)) if above else 0.0
-    return float(np.sign(mean) * max(abs(mean) - UNEVEN, 0.0))
+def _sunk(above: Sequence[float], poses: LimbPoses, character: Character) -> float:
+    """Return how far a character is lowered to the floor, m: it floats, or sinks, by its feet.
 
-
-def _room(poses: LimbPoses, character: Character, sunk: float) -> Frames:
-    """Return how much the pelvis may be lowered (F,), m, beside what the character floats."""
-    count = len(poses.positions)
-    if character.fixed:
-        return np.zeros(count)
-    most = np.full(count, pelvis.MOST)
-    for limb in character.kept:
-        firm = two_bone.firm_reach(poses, limb)
-        most = np.minimum(
-            most, pelvis.room(poses.position(limb.upper), poses.position(limb.lower), firm) - sunk
-        )
-    return np.maximum(most, 0.0)
-
-
-def _needs(
-    poses: LimbPoses,
-    character: Character,
-    paths: Sequence[FootPath],
-    steps: Sequence[Footsteps],
-    sunk: float,
-) -> list[Frames]:
-    """Return how much each leg needs the pelvis to be lowered (F,), m."""
-    found = []
-    for leg, path, own in zip(character.legs, paths, steps, strict=True):
-        target = poses.position(leg.lower) + own.positions - path.positions
-        firm = two_bone.firm_reach(poses, leg)
-        found.append(pelvis.need(poses.position(leg.upper) - sunk * UP, target, firm))
-    return found
+    Feet may be uneven, and limbs that keep their ends must reach them.
+    """
+    if character.fixed or not above:
+        return 0.0
+    mean = float(np.mean(above))
+    up, down = pelvis.room(poses, character.kept)
+    wanted = float(np.sign(mean) * max(abs(mean) - UNEVEN, 0.0))
+    return float(np.clip(wanted, -up.min(), down.min()))
 
 
 def _shortened(
-    found: Sequence[Interval], beyond: Annotated[np.ndarray, "frames"], motion: SampledMotion
+    found: Sequence[Interval], beyond: Annotated[Booleans, "frames"], path: FootPath
 ) -> list[Interval]:
     """Return the stances without the frames in which the leg does not reach."""
-    count, cyclic = len(beyond), motion.cycle is not None
-    shorter = []
+    count, shorter = len(path), []
     for stance in found:
         kept = ~beyond[np.arange(stance.begin, stance.end) % count]
-        parts = stances.runs(kept, False)
-        longest = max(parts, key=len, default=Interval(0, 0))
-        if len(longest) >= stances.SHORTEST_CONTACT * motion.rate:
-            begin = stance.begin + longest.begin
-            moved = begin // count * count if cyclic else 0
-            shorter.append(Interval(begin - moved, stance.begin + longest.end - moved))
+        longest = max(stances.runs(kept, False), key=len, default=Interval(0, 0))
+        if len(longest) >= stances.SHORTEST_CONTACT * path.rate:
+            begin, end = stance.begin + longest.begin, stance.begin + longest.end
+            # A stance of a cycle begins within it.
+            whole = count if begin >= count else 0
+            shorter.append(Interval(begin - whole, end - whole))
     return sorted(shorter, key=lambda own: own.begin)
-
-
-def _lowered(needs: Sequence[Frames], most: Frames, motion: SampledMotion) -> Frames:
-    """Return how much the pelvis is lowered (F,), m, smoothly, as far as there is room."""
-    cyclic = motion.cycle is not None
-    wanted = np.minimum(np.max([np.zeros(len(most)), *needs], axis=0), most)
-    smooth = pelvis.smooth_cover(wanted, motion.rate, cyclic)
-    excess = pelvis.smooth_cover(np.maximum(smooth - most, 0.0), motion.rate, cyclic)
-    return np.maximum(smooth - excess, 0.0)

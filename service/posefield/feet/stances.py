@@ -16,11 +16,10 @@ from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion.foot_contacts import FootContact
 
-# A foot stands where its contact is more likely than not. Probabilities are rounded, so that two
-# machines whose last digits differ plan the same steps.
-STANDING, DECIMALS = 0.5, 6
 # Contacts that are shorter are dropped, and gaps that are shorter are closed, s.
 SHORTEST_CONTACT, SHORTEST_GAP = 0.1, 0.08
+# Distances are compared to the micrometre, so that two machines plan the same steps.
+MICROMETRES = 6
 # A swing that goes less is none, m.
 SHORTEST_STEP = 0.03
 # A foot that is higher above the place where it stands is in the air whatever the plan says, m.
@@ -143,7 +142,7 @@ def _swing_frames(
         return np.ones(len(swing), bool)
     length = min(max(2, round(foot.swing * path.rate)), len(swing) - 1)
     places = path.places(range(swing.begin, swing.end))
-    gone = np.round(np.abs(places[length:] - places[:-length]), DECIMALS)
+    gone = np.round(np.abs(places[length:] - places[:-length]), MICROMETRES)
     first = int(np.argmax(gone))
     found = np.zeros(len(swing), bool)
     found[first : first + length] = True

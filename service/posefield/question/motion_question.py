@@ -108,7 +108,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return self.exact != "auto" or bool(self.targets)
 
 
-CONSTRAINING = ("targets",)
+CONSTRAINING = ("targets", "feet")
 """Fields that constrain an answer whatever their value, unless it is empty."""
 
 

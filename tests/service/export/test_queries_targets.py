@@ -72,7 +72,7 @@ def test_targets_of_tables_are_text(model, tmp_path, write, name):
         ({"exact": ["turn"]}, "exact: 'turn' is not measured on a motion"),
         ({"exact": 1}, "exact: 1, expected auto, none or names"),
         ({"feet": "stand"}, "feet: 'stand', but this model's recipe names no feet"),
-        ({"feet": "yes"}, "feet: 'yes', expected stand or as_predicted"),
+        ({"feet": "yes"}, "feet: 'yes', expected one of stand, as_predicted"),
     ],
 )
 def test_rows_that_no_clip_can_be_held_to(model, tmp_path, said, message):

@@ -1,0 +1,96 @@
+"""The path of a foot: the smoothest change that stands, against the quadratic form it minimises."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.feet import ball_path, stances
+from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.locomotion import floor_plane
+from posefield.motion.foot_contacts import FootContact
+
+RATE = 60.0
+FOOT = FootContact(0, 0.04, 0.3, 0.5, 0.05)
+
+
+def energy(change, cycle=None):
+    """Sum of |d|² + (tau r)⁴ |D² d|²; over the end of a cycle the change is turned."""
+    if cycle is None:
+        bends = np.diff(change, 2)
+    else:
+        turned = cycle.factor
+        around = np.concatenate([[change[-1] / turned], change, [change[0] * turned]])
+        bends = np.diff(around, 2)
+    stiffness = (ball_path.SPREAD * RATE) ** 4
+    return np.sum(np.abs(change) ** 2) + stiffness * np.sum(np.abs(bends) ** 2)
+
+
+@pytest.mark.parametrize("cycle", [None, Cycle(0.8 + 0.1j, 0.4), Cycle(0.9, 0.0)])
+def test_no_other_path_that_stands_changes_less(rng, cycle):
+    path = np.cumsum(rng.normal(size=50) + 1j * rng.normal(size=50)) * 0.01
+    held = [Interval(5, 17), Interval(40, 55 if cycle else 50)]
+    found = ball_path.smooth_change(path, held, RATE, cycle)
+    least = energy(found - path, cycle)
+    for _ in range(20):
+        other = found + 1e-3 * change_that_stands(rng, held, cycle)
+        assert energy(other - path, cycle) > least
+
+
+def change_that_stands(rng, held, cycle):
+    """A change of 50 frames that is one vector in each interval, turned in the next cycle."""
+    found = rng.normal(size=50) + 1j * rng.normal(size=50)
+    for interval in held:
+        frames = np.arange(interval.begin, interval.end)
+        turned = np.where(frames >= 50, 1.0 / (cycle.factor if cycle else 1.0), 1.0)
+        found[frames % 50] = found[interval.begin] * turned
+    return found
+
+
+def test_a_foot_keeps_one_place_in_each_stance(rng):
+    path = FootPath(np.cumsum(rng.normal(size=(80, 3)), axis=0) * 0.01, RATE)
+    held = (Interval(0, 20), Interval(40, 66))
+    found = ball_path.plan_path(path, held, FOOT)
+    for stance, anchor in zip(found.stances, found.anchors, strict=True):
+        assert (found.positions[stance.begin : stance.end] == anchor).all()
+        assert anchor[1] == FOOT.height
+    assert (found.positions[:, 1] >= FOOT.height).all()
+
+
+def test_a_stance_over_the_end_of_a_cycle_is_one_place():
+    cycle = Cycle(0.9 + 0.2j, 0.3)
+    phase = np.linspace(0.0, 1.0, 50, endpoint=False)
+    positions = floor_plane.at_height(phase * cycle.way, 0.04 + 0.05 * np.sin(np.pi * phase))
+    found = ball_path.plan_path(FootPath(positions, RATE, cycle), [Interval(40, 60)], FOOT)
+    planned = FootPath(found.positions, RATE, cycle)
+    assert np.ptp(np.abs(planned.places(range(40, 60)) - planned.places([40])[0])) < 1e-12
+
+
+def test_a_path_without_stances_is_as_predicted(rng):
+    path = rng.normal(size=40) + 0j
+    assert (ball_path.smooth_change(path, [], RATE) == path).all()
+
+
+def test_a_dragged_swing_is_lifted_and_a_lifted_one_is_not():
+    ahead = np.concatenate([np.zeros(20), np.linspace(0.0, 0.4, 20), np.full(20, 0.4)])
+    positions = floor_plane.at_height(ahead + 0j, np.full(60, 0.04))
+    held = [Interval(0, 20), Interval(40, 60)]
+    low = ball_path.plan_path(FootPath(positions, RATE), held, FOOT)
+    assert low.positions[:, 1].max() == pytest.approx(FOOT.height + FOOT.clearance, abs=2e-3)
+    lifted = positions.copy()
+    lifted[20:40, 1] += 0.2 * np.sin(np.pi * np.linspace(0.0, 1.0, 20)) ** 2
+    high = ball_path.plan_path(FootPath(lifted, RATE), held, FOOT)
+    assert high.positions[:, 1].max() == pytest.approx(lifted[:, 1].max(), abs=5e-3)
+
+
+@pytest.mark.parametrize("ends", ["leads", "trails"])
+def test_a_swing_at_an_end_of_the_clip_is_lifted(ends):
+    ahead = np.linspace(0.0, 0.3, 12)
+    ahead = [*ahead, *[0.3] * 30] if ends == "leads" else [*[0.0] * 30, *ahead]
+    path = FootPath(floor_plane.at_height(np.array(ahead) + 0j, np.full(42, 0.04)), RATE)
+    held = [Interval(12, 42)] if ends == "leads" else [Interval(0, 30)]
+    heights = ball_path.plan_path(path, held, FOOT).positions[:, 1]
+    swing = ~stances.mask(held, 42)
+    assert heights[swing].max() > FOOT.height + 0.6 * FOOT.clearance
+    still = replace(FOOT, clearance=0.0)
+    assert (ball_path.plan_path(path, held, still).positions[swing, 1] == FOOT.height).all()

@@ -1,0 +1,80 @@
+"""Stances and swings: runs, tidying, and swings as captured feet have them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posefield.feet import stances
+from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.motion.foot_contacts import FootContact
+
+RATE = 60.0
+FOOT = FootContact(0, 0.04, 0.3, 0.5, 0.05)
+
+
+def path_of(forward, height=0.04, cycle=None):
+    """A foot that goes ahead as said, m, at a constant height."""
+    places = np.zeros((len(forward), 3))
+    places[:, 1], places[:, 2] = height, forward
+    return FootPath(places, RATE, cycle)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=40), st.booleans())
+def test_runs_cover_their_frames_and_no_others(down, cyclic):
+    down = np.array(down)
+    found = stances.runs(down, cyclic)
+    assert (stances.mask(found, len(down)) == down).all()
+    assert all(0 <= run.begin < len(down) and len(run) > 0 for run in found)
+    assert sum(map(len, found)) == down.sum()
+
+
+def test_a_run_of_a_cycle_goes_over_its_end():
+    down = np.array([True, True, False, False, True])
+    assert stances.runs(down, True) == [Interval(4, 7)]
+    assert stances.runs(down, False) == [Interval(0, 2), Interval(4, 5)]
+
+
+def test_short_gaps_close_and_short_contacts_end():
+    down = np.zeros(60, bool)
+    down[[*range(10, 20), *range(23, 40), 50, 51]] = True
+    assert stances.tidy(down, RATE, False) == [Interval(10, 40)]
+
+
+def test_contacts_at_the_ends_of_a_clip_stay_however_short():
+    down = np.zeros(60, bool)
+    down[[0, 1, 59]] = True
+    assert stances.tidy(down, RATE, False) == [Interval(0, 2), Interval(59, 60)]
+    assert stances.tidy(down, RATE, True) == []
+
+
+def test_a_swing_that_goes_nowhere_is_none():
+    forward = np.linspace(0.0, 0.02, 60)
+    held = [Interval(0, 20), Interval(40, 60)]
+    assert stances.discipline(held, path_of(forward), FOOT) == [Interval(0, 60)]
+    far = path_of(5.0 * forward)
+    assert stances.discipline(held, far, FOOT) == held
+
+
+def test_a_long_swing_is_cut_where_the_foot_goes_most():
+    forward = np.concatenate([np.zeros(40), np.linspace(0.0, 0.5, 20), np.full(40, 0.5)])
+    held = [Interval(0, 10), Interval(90, 100)]
+    (before, after) = stances.discipline(held, path_of(forward), FOOT)
+    assert after.begin - before.end == round(FOOT.swing * RATE)
+    assert 38 <= before.end <= 42
+
+
+def test_a_foot_in_the_air_does_not_stand():
+    forward = np.linspace(0.0, 0.02, 60)
+    held = [Interval(0, 20), Interval(40, 60)]
+    high = path_of(forward, 0.04)
+    high.positions[25:35, 1] = 0.3
+    assert stances.discipline(held, high, FOOT) == [Interval(0, 25), Interval(35, 60)]
+
+
+def test_places_go_on_over_the_end_of_a_cycle():
+    cycle = Cycle(1.0 + 0.5j, 0.3)
+    found = path_of(np.linspace(0.0, 1.0, 10), cycle=cycle).places([9, 10, 11])
+    assert found[0] == pytest.approx(1.0)
+    assert found[1] == pytest.approx(cycle.way)
+    assert found[2] == pytest.approx(cycle.way + np.exp(0.3j) / 9.0)

@@ -1,0 +1,129 @@
+"""Limbs: which are found, and inverse kinematics of two bones."""
+
+import numpy as np
+import pytest
+
+from posefield.feet import limb_choice, limbs, two_bone
+from posefield.feet.limbs import Limb
+from posefield.motion import quat, skeleton
+
+# Root, hip joint of no length, hip, knee, ankle, ball; spine, chest, shoulder, elbow, wrist, hand;
+# the other shoulder, elbow and wrist, and a head.
+PARENTS = (-1, 0, 1, 2, 3, 4, 0, 6, 7, 8, 9, 10, 7, 12, 13, 7)
+BONES = np.array(
+    [
+        [0, 0, 0],
+        [0.02, 0, 0],
+        [0.08, 0, 0],
+        [0, -0.42, 0.01],
+        [0, -0.40, -0.01],
+        [0, -0.06, 0.13],
+        [0, 0.2, 0],
+        [0, 0.3, 0],
+        [0.18, 0, 0],
+        [0.28, 0, 0.01],
+        [0.26, 0, -0.01],
+        [0.06, 0, 0],
+        [-0.18, 0, 0],
+        [-0.28, 0, 0],
+        [-0.26, 0, 0],
+        [0, 0.2, 0],
+    ]
+)
+LEG, ARM = Limb(2, 3, 4, 5), Limb(8, 9, 10, 11)
+
+
+def poses(rng, frames=30, size=0.3):
+    """Random smooth poses: rotations (F, J, 4) and roots (F, 3)."""
+    waves = np.sin(np.linspace(0.0, 3.0, frames)[:, None, None] + rng.normal(size=(1, 16, 3)))
+    return quat.exp(size * waves), np.tile([0.0, 0.95, 0.0], (frames, 1))
+
+
+def forward(rotations, roots):
+    return skeleton.forward_kinematics(PARENTS, rotations, skeleton.translations(BONES, roots))
+
+
+def moved(rotations, limb, found):
+    turned = rotations.copy()
+    for joint, own in zip(
+        (limb.upper, limb.middle, limb.lower),
+        (found.upper, found.middle, found.lower),
+        strict=True,
+    ):
+        turned[:, joint] = own
+    return turned
+
+
+def test_a_leg_has_an_ankle_above_the_ball_and_a_toeless_one_none():
+    assert limbs.find_limb(PARENTS, BONES, 5) == LEG
+    assert limbs.find_limb(PARENTS, BONES, 4) == Limb(2, 3, 4, 4)
+    assert limbs.find_limb(PARENTS, BONES, 11) == ARM
+    assert limbs.find_limb(PARENTS, BONES, 6) is None
+    assert limbs.find_limb(PARENTS, np.zeros((16, 3)), 5) is None
+
+
+def test_a_joint_of_the_trunk_has_no_limb_of_its_own():
+    assert limbs.find_kept_limb(PARENTS, BONES, 11) == ARM
+    assert limbs.find_kept_limb(PARENTS, BONES, 7) is None
+
+
+def test_limbs_are_chosen_by_feet_and_exact_joints():
+    plain = limb_choice.choose_limbs(PARENTS, BONES, (5,), ())
+    assert plain.character.legs == (LEG,) and not plain.left and not plain.character.fixed
+    hand = limb_choice.choose_limbs(PARENTS, BONES, (5,), {11})
+    assert hand.character.kept == (ARM,) and not hand.character.fixed
+    trunk = limb_choice.choose_limbs(PARENTS, BONES, (5,), {0})
+    assert trunk.character.fixed
+    foot = limb_choice.choose_limbs(PARENTS, BONES, (5,), {5})
+    assert foot.character.legs == () and foot.character.kept == (LEG,)
+    assert foot.left == ((5, "is as predicted: its leg meets an exact target"),)
+    none = limb_choice.choose_limbs(PARENTS, BONES, (1,), ())
+    assert none.left == ((1, "is as predicted: no two bones lead to it"),)
+    both = limb_choice.choose_limbs(PARENTS, BONES, (5, 4), ())
+    assert both.feet == (0,)
+    assert both.left == ((4, "is as predicted: its leg moves another foot"),)
+
+
+def test_the_end_reaches_its_target_and_keeps_its_orientation(rng):
+    rotations, roots = poses(rng)
+    before, oriented = forward(rotations, roots)
+    found = limbs.evaluate_poses(PARENTS, BONES, (LEG,), rotations, roots)
+    shift = np.tile([0.0, -0.03, 0.0], (30, 1))
+    target = before[:, 4] + 0.02 * rng.normal(size=(30, 3)) + [0.0, 0.05, 0.0]
+    turned = moved(rotations, LEG, two_bone.solve(found, LEG, shift, target))
+    after, now = forward(turned, roots + shift)
+    assert np.abs(after[:, 4] - target).max() < 1e-12
+    same = np.abs(np.sum(now[:, 4] * oriented[:, 4], axis=-1))
+    assert np.abs(same - 1.0).max() < 1e-12
+    others = [joint for joint in range(16) if joint not in (2, 3, 4, 5)]
+    assert np.abs(after[:, others] - before[:, others] - shift[:, None]).max() < 1e-12
+
+
+def test_a_target_where_the_end_is_changes_nothing(rng):
+    rotations, roots = poses(rng)
+    before, _ = forward(rotations, roots)
+    found = limbs.evaluate_poses(PARENTS, BONES, (LEG,), rotations, roots)
+    turned = moved(
+        rotations, LEG, two_bone.solve(found, LEG, np.zeros((30, 3)), before[:, LEG.lower])
+    )
+    assert np.abs(forward(turned, roots)[0] - before).max() < 1e-9
+
+
+def test_a_limb_out_of_reach_is_never_stretched(rng):
+    rotations, roots = poses(rng)
+    before, _ = forward(rotations, roots)
+    found = limbs.evaluate_poses(PARENTS, BONES, (LEG,), rotations, roots)
+    far = before[:, 4] + [0.0, -0.5, 0.3]
+    reached = two_bone.solve(found, LEG, np.zeros((30, 3)), far).reached
+    length = np.linalg.norm(reached - before[:, 2], axis=-1)
+    whole = np.linalg.norm(BONES[3]) + np.linalg.norm(BONES[4])
+    assert (length <= whole).all() and (length > 0.99 * whole).all()
+
+
+@pytest.mark.parametrize("firm", [0.7, 0.79])
+def test_reach_is_firm_and_then_soft(firm):
+    distance = np.linspace(0.5, 1.0, 500)
+    found = two_bone.soften(distance, np.full(500, firm), 0.8)
+    assert (found[distance <= firm] == distance[distance <= firm]).all()
+    assert (np.diff(found) >= 0.0).all() and found.max() <= 0.8
+    assert np.diff(found).max() <= np.diff(distance).max() * (1.0 + 1e-9)
