@@ -21,7 +21,7 @@ from posefield.locomotion import floor_plane
 from posefield.motion.foot_contacts import FootContact
 
 # Time over which a change of the path is spread, s.
-SPREAD = 0.12
+SPREAD = 0.1
 # A foot keeps its place over the floor for this time before and after a swing, while it is low, s.
 HOLD = 0.04
 # Step from which on a swing is lifted to the full clearance, m, and the exponent of its lift.

@@ -13,7 +13,7 @@ from posefield.feet.limbs import Limb, LimbPoses
 # Gaussian that is half as wide.
 SPREAD, SMOOTHING = 0.06, 0.03
 # It is lowered no more than this, m.
-MOST = 0.08
+MOST = 0.05
 
 
 def need(poses: LimbPoses, leg: Limb, target: RootPath, sunk: float) -> Frames:

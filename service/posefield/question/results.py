@@ -137,12 +137,13 @@ class Trust:
     sentence for each control outside its sampled range, or one for controls in a gap between the
     samples, one for each deviation, and one for each target that is not reached. performer:
     requested name; None for an unseen performer. level: of detail. supported: whether clips with
-    similar controls were captured. performer_seen: whether the requested performer was captured; None where the model
-    does not distinguish performers. inferred: names of the controls that were not given and were
-    set to the most typical values for the given ones. measured: values in this result of the
-    controls for which the recipe has a measure. targets: residuals of the constraints. joint_sigma
-    (J,), m: sigma of each joint; empty unless requested. deviations: requested controls whose value
-    the motion does not have. labels: requested names or weights besides the performer, by label
+    similar controls were captured. performer_seen: whether the requested performer was
+    captured; None where the model does not distinguish performers. inferred: names of the
+    controls that were not given and were set to the most typical values for the given ones.
+    measured: values in this result of the controls for which the recipe has a measure. targets:
+    residuals of the constraints. joint_sigma (J,), m: sigma of each joint; empty unless
+    requested. deviations: requested controls whose value the motion does not have. labels:
+    requested names or weights besides the performer, by label
     set. feet: of a clip that were made to stand; None for feet as predicted.
     """
 

@@ -8,6 +8,7 @@ import pytest
 from posefield.feet import ball_path, stances
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
+from posefield.motion import foot_skate
 from posefield.motion.foot_contacts import FootContact
 
 RATE = 60.0
@@ -94,3 +95,19 @@ def test_a_swing_at_an_end_of_the_clip_is_lifted(ends):
     assert heights[swing].max() > FOOT.height + 0.6 * FOOT.clearance
     still = replace(FOOT, clearance=0.0)
     assert (ball_path.plan_path(path, held, still).positions[swing, 1] == FOOT.height).all()
+
+
+def test_locking_a_dragged_foot_without_swing_rules_makes_it_slide_faster():
+    """Negative control: a foot that is only locked goes its way in less time, as low as before."""
+    ahead = np.linspace(0.0, 0.4, 60) + 0j
+    path = FootPath(floor_plane.at_height(ahead, np.full(60, FOOT.height)), RATE)
+    held = [Interval(0, 22), Interval(38, 60)]
+    locked = ball_path.smooth_change(path.floor, held, RATE)
+    planned = ball_path.plan_path(path, held, FOOT).positions
+    slid, lock, plan = (
+        foot_skate.mean_skate_speed(found[:, None], RATE)
+        for found in (path.positions, floor_plane.at_height(locked, path.heights), planned)
+    )
+    moving = np.abs(np.diff(locked))[22:37].mean() * RATE
+    assert lock > 0.95 * slid and moving > 2.0 * slid
+    assert plan < 0.3 * slid

@@ -51,7 +51,8 @@ def apart(a, b):
 
 @pytest.mark.parametrize("fps", [1.0, 24.0, 29.97, 120.0])
 def test_a_loop_is_the_whole_cycle_in_even_steps(walker, fps):
-    found = clips.synthesize_clip(walker, ClipQuestion(controls=STROLL, fps=fps, loop=True))
+    asked = ClipQuestion(controls=STROLL, fps=fps, loop=True, feet="as_predicted")
+    found = clips.synthesize_clip(walker, asked)
     _, duration = end_of(walker, STROLL)
     steps = max(1, round(duration * fps))
     assert len(found.clip) == steps + 1
@@ -83,7 +84,8 @@ def test_a_loop_in_place_ends_in_every_number_as_it_begins(walker):
 
 
 def test_a_loop_that_travels_ends_as_it_begins_but_for_its_way_and_turn(walker):
-    found, (end, _) = clip(walker, STROLL, loop=True), end_of(walker, STROLL)
+    found = clip(walker, STROLL, loop=True, feet="as_predicted")
+    end, _ = end_of(walker, STROLL)
     assert np.array_equal(found.rotations[-1, 1:], found.rotations[0, 1:])
     assert found.root_path[-1, 1] == found.root_path[0, 1]
     turned = quat.mul(found.rotations[-1, 0], quat.conj(found.rotations[0, 0]))
@@ -104,7 +106,7 @@ def test_a_loop_goes_on_as_smoothly_over_its_seam_as_elsewhere(walker):
 
 
 def test_a_cycle_in_place_is_posed_as_in_crowds(walker):
-    found = clip(walker, STROLL, root="in_place")
+    found = clip(walker, STROLL, root="in_place", feet="as_predicted")
     point = np.array([[STROLL[c.name] for c in walker.session.card.controls]])
     count = len(found)
     _, duration = end_of(walker, STROLL)
