@@ -17,14 +17,16 @@ from posefield.locomotion import floor_plane
 
 @dataclass(frozen=True)
 class PlacedFrames:
-    """Frames whose feet are placed.
-
-    rotations: (S, J, 4). roots: (S, 3), m. before, after: paths of the joints that contact
-    (S, K, 3), m, as predicted and as placed.
-    """
+    """Frames whose feet are placed: rotations (S, J, 4) and roots (S, 3), m."""
 
     rotations: Rotations
     roots: RootPath
+
+
+@dataclass(frozen=True)
+class FootPaths:
+    """Paths of K feet (F, K, 3), m, over the grid of a plan: predicted and placed."""
+
     before: Annotated[Floats, "frames feet 3"]
     after: Annotated[Floats, "frames feet 3"]
 
@@ -39,35 +41,46 @@ def place_feet(
     """
     body, at = plan.character, times * plan.rate
     poses = limbs.evaluate_poses(body.parents, body.bones, body.limbs, rotations, roots)
-    shift = -_interpolate(_extended(plan.lowered, plan.cycle), at)[:, None] * UP
-    turned, before, after = rotations.copy(), [], []
-    for leg, target in _targets(plan, poses, at):
+    shift = _shift(plan, at)
+    turned = rotations.copy()
+    for limb, target in _targets(plan, poses, at):
+        found = two_bone.solve(poses, limb, two_bone.reach(poses, limb, shift, target))
+        turned[:, limb.upper] = found.upper
+        turned[:, limb.middle] = found.middle
+        turned[:, limb.lower] = found.lower
+    return PlacedFrames(turned, roots + shift)
+
+
+def foot_paths(plan: FeetPlan) -> FootPaths:
+    """Return the paths of the planted feet over the grid of the plan."""
+    poses, legs = plan.poses, plan.character.legs
+    at = np.arange(float(len(plan.lowered)))
+    shift = _shift(plan, at)
+    before, after = np.empty((2, len(at), len(legs), 3))
+    for foot, (leg, target) in enumerate(list(_targets(plan, poses, at))[: len(legs)]):
+        upper = poses.position(leg.upper) + shift
         arm = poses.position(leg.tip) - poses.position(leg.lower)
-        found = two_bone.solve(poses, leg, shift, target - arm)
-        for joint, own in zip(
-            (leg.upper, leg.middle, leg.lower),
-            (found.upper, found.middle, found.lower),
-            strict=True,
-        ):
-            turned[:, joint] = own
-        before.append(poses.position(leg.tip))
-        after.append(found.reached + arm)
-    feet = len(body.legs)
-    shape = (len(times), 0, 3)
-    both = [np.stack(own[:feet], axis=1) if feet else np.zeros(shape) for own in (before, after)]
-    return PlacedFrames(turned, roots + shift, *both)
+        before[:, foot] = poses.position(leg.tip)
+        after[:, foot] = upper + two_bone.reach(poses, leg, shift, target) + arm
+    return FootPaths(before, after)
+
+
+def _shift(plan: FeetPlan, at: Frames) -> RootPath:
+    """Return the movement (S, 3), m, of the root at fractional frames (S,)."""
+    return -_interpolate(_extended(plan.lowered, plan.cycle), at)[:, None] * UP
 
 
 def _targets(
     plan: FeetPlan, poses: limbs.LimbPoses, at: Frames
 ) -> Iterator[tuple[limbs.Limb, RootPath]]:
-    """Yield each limb with the target (S, 3), m, of its tip."""
+    """Yield each limb with the target (S, 3), m, of its end, the legs first."""
     body = plan.character
     for leg, steps, change in zip(body.legs, plan.steps, plan.changes, strict=True):
         moved = _interpolate(_extended_path(change, plan.cycle), at)
-        yield leg, _anchored(steps, plan, at, poses.position(leg.tip) + moved)
+        tip = poses.position(leg.tip)
+        yield leg, _anchored(steps, plan, at, tip + moved) - (tip - poses.position(leg.lower))
     for limb in body.kept:
-        yield limb, poses.position(limb.tip)
+        yield limb, poses.position(limb.lower)
 
 
 def _anchored(steps: Footsteps, plan: FeetPlan, at: Frames, path: RootPath) -> RootPath:

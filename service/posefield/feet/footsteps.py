@@ -65,7 +65,7 @@ class FeetPlan:
 
     rate: of the grid, frames a second. cycle: as of the motion. steps: of each leg. changes: of the
     path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m, with what brings
-    the character to the floor. grounded: the latter, m.
+    the character to the floor. grounded: the latter, m. poses: predicted, of the limbs.
     """
 
     character: Character
@@ -75,6 +75,7 @@ class FeetPlan:
     changes: Annotated[Floats, "feet frames 3"]
     lowered: Frames
     grounded: float
+    poses: LimbPoses
 
 
 def plan_feet(
@@ -121,7 +122,7 @@ def plan_feet(
         [own.positions - path.positions for own, path in zip(steps, paths, strict=True)]
     ).reshape(-1, *motion.roots.shape)
     cycle, rate = motion.cycle, motion.rate
-    return FeetPlan(character, rate, cycle, tuple(steps), changes, sunk + lowered, sunk)
+    return FeetPlan(character, rate, cycle, tuple(steps), changes, sunk + lowered, sunk, poses)
 
 
 @dataclass(frozen=True)

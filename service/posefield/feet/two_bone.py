@@ -23,12 +23,11 @@ LEAST_BEND = 0.01
 
 @dataclass(frozen=True)
 class LimbTurns:
-    """Local rotations (F, 4) of the three joints of a limb, and the place that its end reached."""
+    """Local rotations (F, 4) of the three joints of a limb."""
 
     upper: Annotated[Floats, "frames 4"]
     middle: Annotated[Floats, "frames 4"]
     lower: Annotated[Floats, "frames 4"]
-    reached: RootPath
 
 
 def firm_reach(poses: LimbPoses, limb: Limb) -> Frames:
@@ -48,32 +47,40 @@ def soften(distance: Frames, firm: Frames, length: float) -> Frames:
     return np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
 
 
-def solve(poses: LimbPoses, limb: Limb, shift: RootPath, target: RootPath) -> LimbTurns:
-    """Return the rotations with which the end of a limb is at a target (F, 3), m.
+def reach(poses: LimbPoses, limb: Limb, shift: RootPath, target: RootPath) -> RootPath:
+    """Return the vectors (F, 3), m, from the upper joint of a limb to where its end comes.
 
-    shift: movement (F, 3), m, of the upper joint from its place in the poses. The end's
-    orientation is kept. A target out of reach is approached along its direction.
+    shift: movement (F, 3), m, of the upper joint from its place in the poses. target: (F, 3), m; it
+    is approached along its direction if it is out of reach.
+    """
+    above, below = poses.length(limb.middle), poses.length(limb.lower)
+    apart = target - poses.position(limb.upper) - shift
+    distance = np.linalg.norm(apart, axis=-1)
+    soft = soften(distance, firm_reach(poses, limb), above + below)
+    within = np.clip(soft, 1.001 * abs(above - below) + 1e-6, above + below)
+    return apart * (within / np.maximum(distance, 1e-9))[:, None]
+
+
+def solve(poses: LimbPoses, limb: Limb, end: Annotated[Floats, "frames 3"]) -> LimbTurns:
+    """Return the rotations with which the end of a limb is `end` (F, 3), m, from its upper joint.
+
+    The end's orientation is kept.
     """
     above, below = poses.length(limb.middle), poses.length(limb.lower)
     upper, middle = poses.position(limb.upper), poses.position(limb.middle)
     lower = poses.position(limb.lower)
-    apart = target - upper - shift
-    distance = np.linalg.norm(apart, axis=-1)
-    reach = soften(distance, firm_reach(poses, limb), above + below)
-    reach = np.clip(reach, 1.001 * abs(above - below) + 1e-6, above + below)
-    towards = apart / np.maximum(distance, 1e-9)[:, None]
+    distance = np.linalg.norm(end, axis=-1)
+    towards = end / distance[:, None]
     side = _bend_direction(poses, limb, towards)
-    along = (np.square(above) + np.square(reach) - np.square(below)) / (2.0 * reach)
+    along = (np.square(above) + np.square(distance) - np.square(below)) / (2.0 * distance)
     across = np.sqrt(np.maximum(np.square(above) - np.square(along), 0.0))
     knee = along[:, None] * towards + across[:, None] * side
-    end = reach[:, None] * towards
     thigh = quat.mul(shortest_turn(middle - upper, knee), poses.orientation(limb.upper))
     shin = quat.mul(shortest_turn(lower - middle, end - knee), poses.orientation(limb.middle))
     return LimbTurns(
         quat.mul(quat.conj(poses.parent_orientation(limb.upper)), thigh),
         quat.mul(quat.conj(thigh), shin),
         quat.mul(quat.conj(shin), poses.orientation(limb.lower)),
-        upper + shift + end,
     )
 
 

@@ -10,7 +10,6 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.constraints.targets import ConstraintSet
 from posefield.feet import foot_placement, footsteps, limb_choice, stances
-from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import FeetPlan, SampledMotion
 from posefield.feet.stances import Cycle
 from posefield.inference.graph_ports import CONTACTS
@@ -98,16 +97,16 @@ def stand(
     own = [known[place] for place in choice.feet] if known else []
     likely = _probabilities(model, question, own, times * motion.stretch) if known else None
     plan = footsteps.plan_feet(choice.character, sampled, own, likely)
-    whole = foot_placement.place_feet(plan, times, poses.rotations, poses.root_position)
-    told = replace(describe(plan, whole, card.skeleton.names), left=left)
-    measured = _measured(card, goals, answer, poses, whole)
+    told = replace(describe(plan, card.skeleton.names), left=left)
+    measured = _measured(card, goals, answer, poses, plan)
     placed = foot_placement.place_feet(plan, answer.times, answer.rotations, answer.root_position)
     trust = replace(answer.trust, feet=told, measured=measured)
     return replace(answer, rotations=placed.rotations, root_position=placed.roots, trust=trust)
 
 
-def describe(plan: FeetPlan, whole: PlacedFrames, names: Sequence[str]) -> FeetResult:
+def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
     """Return the facts about the placed feet of a whole motion."""
+    whole = foot_placement.foot_paths(plan)
     found, swings, drift = [], 0, 0.0
     count, cyclic = len(plan.lowered), plan.cycle is not None
     for foot, (leg, steps) in enumerate(zip(plan.character.legs, plan.steps, strict=True)):
@@ -157,11 +156,11 @@ def _measured(
     goals: ConstraintSet,
     answer: PoseAnswer[np.float64],
     before: PoseAnswer[np.float64],
-    after: PlacedFrames,
+    plan: FeetPlan,
 ) -> dict[str, float]:
     """Return the measured controls of an answer, moved by as much as the feet's placing moves them.
 
-    before, after: the whole motion. Those that constrain it stay.
+    before: the whole motion, on the grid of the plan. Controls that constrain it stay.
     """
     found, held = dict(answer.trust.measured), {name for name, _, _ in goals.controls}
     moving = [
@@ -173,6 +172,8 @@ def _measured(
     if not moving:
         return found
     bones, parents = answer.bone_offsets, card.skeleton.parents
+    times = np.arange(len(plan.lowered)) / plan.rate
+    after = foot_placement.place_feet(plan, times, before.rotations, before.root_position)
     both = [
         skeleton.positions(parents, rotations, skeleton.translations(bones, roots))
         for rotations, roots in (
