@@ -34,7 +34,7 @@ def test_a_long_detail_is_cut_and_keeps_both_ends(ask):
     answer = ask("POST", "/v1/models/reach/pose", json={"begin" + "x" * 5000 + "end": 1})
     detail = answer.json()["detail"]
     assert answer.status_code == 400 and len(detail) <= MAX_DETAIL_LENGTH
-    assert detail.startswith("beginxxx") and detail.endswith("targets, times")
+    assert detail.startswith("beginxxx") and detail.endswith("detail, times")
     assert all(len(error["detail"]) <= MAX_DETAIL_LENGTH for error in answer.json()["errors"])
 
 

@@ -87,6 +87,9 @@ def clip(
     exact: Exact | None = None,
     targets: Targets | None = None,
     feet: Feet | None = None,
+    take: int | None = None,
+    variety: float | None = None,
+    detail: bool | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Files:
@@ -96,6 +99,7 @@ def clip(
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
         **asking.said(body=body, joint_sigma=joint_sigma, feet=feet, labels=labels),
+        **asking.said(take=take, variety=variety, detail=detail),
         **holding.said(exact, targets),
     )
     ask = partial(asking.either, "ClipInFormat", model, question)

@@ -74,6 +74,9 @@ def pose(
     extrapolate: Extrapolate | None = None,
     exact: Exact | None = None,
     targets: Targets | None = None,
+    take: int | None = None,
+    variety: float | None = None,
+    detail: bool | None = None,
     controls: Controls | None = None,
     **named: float,
 ) -> Call[Pose]:
@@ -83,6 +86,7 @@ def pose(
         times=asking.numbers("times", times),
         **asking.said(extrapolate=extrapolate, performer=performer, level=level),
         **asking.said(joint_sigma=joint_sigma, labels=labels),
+        **asking.said(take=take, variety=variety, detail=detail),
         **holding.said(exact, targets),
     )
     return Call(asking.either("PoseInFormat", model, question, "msgpack"), numbers.pose)

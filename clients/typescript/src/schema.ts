@@ -700,6 +700,21 @@ export interface components {
          */
         FeetMode: "stand" | "as_predicted" | null;
         /**
+         * @description Seed of another take of the motion, equal for equal seeds. 0 is the prediction. A take deviates as captured clips do; `sigma` stays that of the prediction, and exact controls and targets are met.
+         * @default 0
+         */
+        Take: number;
+        /**
+         * @description Size of a take's deviations from the prediction; 1 is that of captured clips.
+         * @default 0.7
+         */
+        Variety: number;
+        /**
+         * @description Whether to add details of a cycle that no control predicts, sampled by the take's seed.
+         * @default false
+         */
+        Detail: boolean;
+        /**
          * @description Unit of length in the file; null for the format's usual unit. glTF is always in metres.
          * @default null
          * @enum {string|null}

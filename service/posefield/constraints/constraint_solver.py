@@ -16,6 +16,7 @@ from posefield.constraints import constrained_motion, constraint, overshoot
 from posefield.constraints import targets as goals
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.constraint import Constraint, PositionConstraint
+from posefield.constraints.take_variation import TakeVariation
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet, JointTarget
 from posefield.inference.session import PredictionState, Session
 from posefield.model_file.model_card import ModelCard
@@ -52,6 +53,7 @@ class ConstraintSolver:
 
     def __init__(self, session: Session) -> None:
         self._session = session
+        self._variation = TakeVariation(session)
         self._correctors: dict[int, LevelCorrector] = {}
         self._solve_cached = lru_cache(CACHE_SIZE)(self._solve)
         self._positions_cached = lru_cache(CACHE_SIZE)(self._captured_positions)
@@ -120,8 +122,8 @@ class ConstraintSolver:
     def solve(self, question: ValidatedQuestion, found: ConstraintSet) -> ConstrainedMotion:
         """Return the motion that satisfies its constraints, as far as captured motions reach.
 
-        Without constraints, it is the predicted motion. Raises InvalidField for a target at a time
-        outside the clip.
+        Without constraints, it is the predicted motion or its take. Raises InvalidField for a
+        target at a time outside the clip.
         """
         point, labels = question.point.tobytes(), question.labels.tobytes()
         return self._solve_cached(_CacheKey(question, found, point, labels, question.level))
@@ -179,8 +181,11 @@ class ConstraintSolver:
     def _solve(self, asked: _CacheKey) -> ConstrainedMotion:
         question, bench = asked.question, self._corrector(asked.question.level)
         state = self._session.state(question.point, np.zeros(1), question.labels, question.level)
-        begun = held = bench.predict(state)
-        if not asked.constraints:
+        begun = bench.predict(state)
+        if asked.constraints.take:
+            begun = self._variation.vary(bench, begun, question, asked.constraints.take)
+        held = begun
+        if not asked.constraints.corrects:
             return begun
         aims = constraint.from_controls(asked.constraints.controls, bench.reduced.frames)
         last = bench.reduced.frames - 1.0

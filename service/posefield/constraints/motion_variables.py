@@ -62,7 +62,7 @@ class MotionVariables:
 
     def positions(self, numbers: Variables, joint: int, places: Frames) -> RootPath:
         """Return the positions (S, 3), m, of a joint at canonical frames (S,)."""
-        moves = self.reduced.rows(places) @ self.motion(numbers)
+        moves = self.reduced.moves(self.motion(numbers), places)
         return (
             self.chain(joint)
             .compute_poses(moves, self._travel_so_far(numbers, places))
@@ -80,11 +80,10 @@ class MotionVariables:
 
         All other variables, such as the travel, are those of this motion.
         """
-        row, gone = (
-            self.reduced.row(at),
-            self._travel_so_far(numbers, np.full(len(motions), at, np.float64)),
-        )
+        places = np.full(len(motions), at, np.float64)
+        row, gone = self.reduced.row(at), self._travel_so_far(numbers, places)
         moves = row @ motions.reshape(len(motions), len(row), -1)
+        moves = self.reduced.with_detail(moves, places)
         return self.chain(joint).compute_poses(moves, gone).positions[:, -1]
 
     def position_and_gradient(
@@ -93,9 +92,8 @@ class MotionVariables:
         """Return a joint's position (3,), m, at a canonical frame, and gradient (3, numbers)."""
         places = np.array([at], np.float64)
         row, own = self.reduced.row(at), self.chain(joint)
-        pose = own.compute_poses(
-            row[None] @ self.motion(numbers), self._travel_so_far(numbers, places)
-        )
+        moves = self.reduced.with_detail(row[None] @ self.motion(numbers), places)
+        pose = own.compute_poses(moves, self._travel_so_far(numbers, places))
         by_freedoms, by_turn = own.gradient(pose, 0)
         inner = (row[:, None] * by_freedoms[:, None, :]).reshape(3, -1)
         if self.cyclic:

@@ -24,7 +24,7 @@ class ReducedTensor:
     core: (r2, r1, r3), modes of time, degrees of freedom and samples. time: (T, r2). directions:
     (r1, D) and mean: (D,), pose vectors of the root's position and a rotation vector for each joint
     about its mean rotation, and then of the curves. rotations: mean rotations (J, 4). curves: of
-    the family.
+    the family. detail (T, r1): added to the moves of every motion; None for none.
     """
 
     core: Annotated[Floats, "times freedoms modes"]
@@ -33,6 +33,7 @@ class ReducedTensor:
     mean: Annotated[Floats, "dof"]
     rotations: JointRotations
     curves: tuple[Curve, ...] = ()
+    detail: Annotated[Floats, "frames freedoms"] | None = None
 
     @property
     def frames(self) -> int:
@@ -56,11 +57,23 @@ class ReducedTensor:
         """Return the time coefficients (S, r2) at canonical frames (S,)."""
         return blend.interpolate_rows(self.time, places)
 
+    def moves(
+        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+    ) -> Annotated[Floats, "frames freedoms"]:
+        """Return the coefficients (S, r1) of the directions in a reduced motion (r2, r1)."""
+        return self.with_detail(self.rows(places) @ motion, places)
+
+    def with_detail(
+        self, moves: Annotated[Floats, "frames freedoms"], places: Frames
+    ) -> Annotated[Floats, "frames freedoms"]:
+        """Return moves (S, r1) at canonical frames (S,) with the detail added."""
+        return moves if self.detail is None else moves + blend.interpolate_rows(self.detail, places)
+
     def poses(
         self, motion: Annotated[Floats, "times freedoms"], places: Frames
     ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
-        numbers = self.mean + self.rows(places) @ motion @ self.directions
+        numbers = self.mean + self.moves(motion, places) @ self.directions
         vectors = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(places), -1, 3)
         return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
 
@@ -69,7 +82,7 @@ class ReducedTensor:
     ) -> Annotated[Floats, "frames curves"]:
         """Return the values (S, C) of the curves in a reduced motion (r2, r1)."""
         own = slice(3 + 3 * len(self.rotations), None)
-        numbers = self.mean[own] + self.rows(places) @ motion @ self.directions[:, own]
+        numbers = self.mean[own] + self.moves(motion, places) @ self.directions[:, own]
         return curves.clamp(self.curves, numbers)
 
 

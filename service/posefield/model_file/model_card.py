@@ -111,7 +111,9 @@ class TrainingParameters:
     joints whose weight in the metric is not one. in_phase: whether cycles were shifted to begin in
     phase. takes (N,): number of each captured clip's take; empty where each file is a take.
     facing: degrees from the root's +z in the files to the body's facing, to the left; None for
-    motions without one.
+    motions without one. take_root (4, r3 + 4): of a cycle, last rows of a root of the covariance of
+    the errors of the coefficients, of the duration's logarithm and of the travel, for a sigma of
+    one metre. detail: of a cycle, deviations that no control predicts (`motion_detail`).
     """
 
     fields: Mapping[Name, tuple[NonNegative, ...]] = field(default_factory=dict)
@@ -120,6 +122,8 @@ class TrainingParameters:
     in_phase: bool = False
     takes: tuple[Index, ...] = ()
     facing: Number | None = 0.0
+    take_root: tuple[tuple[Number, ...], ...] = ()
+    detail: bytes = b""
 
 
 @dataclass(frozen=True)

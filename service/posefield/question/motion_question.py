@@ -10,6 +10,8 @@ from posefield.common.units import LengthUnit, UpAxis
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import Body
 
+MAX_TAKE = 999_999_999
+"""Largest seed of a take: whole numbers in text have at most nine digits."""
 ExtrapolationPolicy = Literal["ok", "warn", "refuse"]
 RootMode = Literal["travelling", "in_place"]
 FeetMode = Literal["stand", "as_predicted"]
@@ -101,11 +103,33 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             extra={"word": "target", "metavar": "JOINT@MOMENT=X,Y,Z"},
         ),
     ] = ()
+    take: Annotated[
+        int,
+        Meta(
+            ge=0,
+            le=MAX_TAKE,
+            description="seed of another take of the motion, equal for equal seeds; 0 is the mean",
+        ),
+    ] = 0
+    variety: Annotated[
+        float,
+        Meta(
+            ge=0.0, le=1.0, description="size of a take's deviations; 1 is that of captured clips"
+        ),
+    ] = 0.7
+    detail: Annotated[
+        bool, Meta(description="add details that no control predicts, sampled by the take's seed")
+    ] = False
 
     @property
     def has_constraints(self) -> bool:
-        """Return whether there are constraints besides the given controls."""
-        return self.exact != "auto" or bool(self.targets)
+        """Return whether the answer is more than the prediction at the given controls."""
+        return (
+            self.exact != "auto"
+            or bool(self.targets)
+            or bool(self.take)
+            or self.detail
+        )
 
 
 CONSTRAINING = ("targets", "feet")

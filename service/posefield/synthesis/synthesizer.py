@@ -15,6 +15,7 @@ from posefield.question.results import ConstraintResult, Deviation, Trust, split
 from posefield.validation import input_limits, question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
+NO_DETAIL = "detail: this model's file has none to sample"
 MICROMETRES = 6
 """Decimals of a length in metres."""
 
@@ -84,6 +85,8 @@ class Synthesizer(NamedModel):
         """Return the trust of an answer with this duration, s, and sigma, m."""
         who, apart = question.performer, question.deviations
         warnings = question_validation.merge_warnings(question.warnings, apart, asked.extrapolate)
+        if asked.detail and not self.session.card.making.detail:
+            warnings = (*warnings, NO_DETAIL)
         named = who is not None or PERFORMER in question.named
         seen = named if self.session.card.performers else None
         shares = self.session.card.joint_sigma if asked.joint_sigma else ()

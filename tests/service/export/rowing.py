@@ -17,6 +17,7 @@ TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}
 TYPES |= {"performer": pa.string(), "extrapolate": pa.string()}
 TYPES |= {"names": pa.string(), "root": pa.string(), "loop": pa.bool_()}
 TYPES |= {"exact": pa.string(), "targets": pa.string(), "feet": pa.string()}
+TYPES |= {"take": pa.int64(), "variety": pa.float64(), "detail": pa.bool_()}
 
 
 def columns(rows):

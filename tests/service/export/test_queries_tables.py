@@ -150,8 +150,8 @@ def test_the_same_table_in_other_words(model, tmp_path, content):
         (
             f"{HEADING},zzz",
             "1: unknown column 'zzz', expected one of stature, hip_height, turn, target_height, "
-            "format, extrapolate, performer, level, exact, targets, fps, start, end, names, "
-            "root, ",
+            "format, extrapolate, performer, level, exact, targets, take, variety, detail, fps, "
+            "start, end, names, ",
         ),
         (
             "stature [cm],hip_height,turn,target_height",

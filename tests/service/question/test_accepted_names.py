@@ -30,7 +30,7 @@ TARGET = '{"controls": {}, "times": [0], "targets": [{"joint": "A", %s}]}'
         (
             '{"colour": 1}',
             "colour: Object contains unknown field `colour`, expected some of controls, extrapolate"
-            ", performer, labels, level, joint_sigma, exact, targets, times",
+            ", performer, labels, level, joint_sigma, exact, targets, take, variety, detail, times",
         ),
     ],
 )

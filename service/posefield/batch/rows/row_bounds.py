@@ -11,9 +11,10 @@ import numpy as np
 
 from posefield.batch.rows.columns import CONTROL_PREFIX, LABEL_PREFIX
 from posefield.common.units import Floats
+from posefield.kriging import random_field
 from posefield.kriging.support import Support
 from posefield.model_file.model_card import PERFORMER, ModelCard
-from posefield.question.motion_question import CONSTRAINING, ClipQuestion
+from posefield.question.motion_question import CONSTRAINING, MAX_TAKE, ClipQuestion
 from posefield.synthesis import frame_times
 from posefield.validation import input_limits
 
@@ -32,6 +33,7 @@ def all_valid(card: ModelCard, support: Support, values: Values, usual: ClipQues
         and _window_valid(card, values, usual)
         and _loops_valid(card, values, usual)
         and _constraints_valid(values)
+        and _takes_valid(card, values, usual)
         and _labels_valid(card, values, usual)
         and (bool(card.roles) or {*values.get("names", ()), usual.names} <= {"own", None})
     )
@@ -85,6 +87,13 @@ def _constraints_valid(values: Values) -> bool:
     """
     plain = {"auto", "none", None}.issuperset(values.get("exact", ()))
     return plain and not any(any(values.get(name, ())) for name in CONSTRAINING)
+
+
+def _takes_valid(card: ModelCard, values: Values, usual: ClipQuestion) -> bool:
+    seeds = _column(values, "take", usual.take)
+    drawn = random_field.has_features(card.kriging) or not seeds.any()
+    variety = _column(values, "variety", usual.variety)
+    return drawn and _within(seeds, 0, MAX_TAKE) and _within(variety, 0.0, 1.0)
 
 
 def _column(values: Values, field: str, usual: float) -> Floats:

@@ -1,0 +1,58 @@
+"""Variation of a predicted motion: another take of it, and details that no control predicts."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from posefield.common.array_shapes import Values, Variables
+from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
+from posefield.constraints.motion_variables import CYCLE_VARIABLES
+from posefield.inference import motion_detail
+from posefield.inference.session import Session
+from posefield.inference.takes import EVENTFUL_TIMES, TakeSampler, TakeSettings
+from posefield.validation.question_validation import ValidatedQuestion
+
+
+class TakeVariation:
+    """Variation of the motions of one model."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._sampler = TakeSampler(session)
+
+    def vary(
+        self,
+        bench: LevelCorrector,
+        begun: ConstrainedMotion,
+        question: ValidatedQuestion,
+        take: TakeSettings,
+    ) -> ConstrainedMotion:
+        """Return a take of a prediction at the controls and labels of its question."""
+        if take.seed:
+            by = self._sampler.deviations(question.point, question.labels, take.seed)
+            moved = begun.numbers + take.variety * self._change(bench, by)
+            begun = replace(begun, numbers=moved)
+        return self._with_detail(bench, begun, take.seed) if take.detail else begun
+
+    def _change(self, bench: LevelCorrector, by: Values) -> Variables:
+        """Return the change of a motion's variables; by (m,): `TakeSampler.deviations`."""
+        card, (times, freedoms, modes) = self._session.card, bench.reduced.core.shape
+        # A coarser level has the leading coefficients, and these have the leading part of the root.
+        count = min(modes, bench.spread.residuals.shape[1])
+        motion = (bench.spread.residuals @ by[:count]).reshape(times, freedoms)
+        if not card.cyclic:
+            motion[EVENTFUL_TIMES:] = 0.0
+            return motion.ravel()
+        # Files of earlier versions have no joint root; their cycles last and travel as predicted.
+        root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, len(by))))
+        return np.concatenate([motion.ravel(), root @ by])
+
+    def _with_detail(
+        self, bench: LevelCorrector, begun: ConstrainedMotion, seed: int
+    ) -> ConstrainedMotion:
+        """Return the motion with the detail of a seed in every pose."""
+        reduced = bench.reduced
+        found = motion_detail.deviations(self._session.card)[:, : len(reduced.directions)]
+        sampled = motion_detail.sample(found, reduced.frames, seed)
+        scene = replace(begun.scene, reduced=replace(reduced, detail=sampled))
+        return replace(begun, scene=scene)

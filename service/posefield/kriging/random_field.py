@@ -1,0 +1,162 @@
+"""Random fields with the covariance of a kriging model, and their conditioning on its samples.
+
+An unconditional field is a sum of random Fourier features (Rahimi and Recht, "Random features for
+large-scale kernel machines", NIPS 2007). Conditioning adds the kriging of its errors at the samples
+(Matheron's rule; Chilès and Delfiner, "Geostatistics", 2012, section 7.3).
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Points, PointValues, SampleValues, Values
+from posefield.common.units import Floats
+from posefield.kriging import kriging_model, philox
+from posefield.kriging.covariance import RATE32, RATE52
+from posefield.kriging.kriging_model import Hyper, KrigingWeights
+
+FREQUENCIES = 64
+"""Random frequencies of a field. Each has a cosine and a sine, so that the variance at a point does
+not depend on chance, as it would with 128 cosines of random phases.
+"""
+VALUE_DECIMALS = 9
+"""Decimals of a conditional field: cosines and sums differ between machines in the last digits."""
+
+SMOOTHNESS = {"exponential": (3.0, 1), "matern32": (RATE32, 3), "matern52": (RATE52, 5)}
+"""Rate at unit range, and degrees of freedom of Student's distribution, of the frequencies."""
+GAUSSIAN_RATE = np.sqrt(6.0)
+"""Standard deviation of the frequencies of exp(-3 h²)."""
+
+FIELD, SIGNS, NUGGETS = range(3)
+"""Streams of a seed; `motion_detail` has another one."""
+
+
+def has_features(hyper: Hyper) -> bool:
+    """Return whether the covariance has a distribution of frequencies to draw from."""
+    return hyper.covariance == "gaussian" or hyper.covariance in SMOOTHNESS
+
+
+@dataclass(frozen=True)
+class RandomField:
+    """Independent Gaussian fields (m) with the covariance of kriging parameters.
+
+    frequencies (d, K): per half-range of the controls. signs (p + sets, K), offsets (p + sets, m):
+    of the names of all label sets, with one more row for each set, of a name without samples.
+    common (sets, K): signs that the names of a set share. amplitudes (2 K, m): of cosines and
+    sines. slopes (d, m): along the controls.
+    """
+
+    hyper: Hyper
+    frequencies: Annotated[Floats, "controls frequencies"]
+    signs: Annotated[Floats, "names frequencies"]
+    common: Annotated[Floats, "sets frequencies"]
+    amplitudes: Annotated[Floats, "features values"]
+    offsets: Annotated[Floats, "names values"]
+    slopes: Annotated[Floats, "controls values"]
+
+    def evaluate(self, points: Points) -> PointValues:
+        """Return the values (B, m) at points (B, d + p), the controls in half-ranges."""
+        d = len(self.hyper.scales)
+        controls, names = points[:, :d], _with_unsampled(self.hyper, points)
+        angles = controls @ self.frequencies
+        scale = np.full_like(angles, FREQUENCIES**-0.5)
+        sets = kriging_model.label_columns(0, _row_counts(self.hyper))
+        for own, common, rows in zip(self.hyper.labels, self.common, sets, strict=True):
+            kept = np.sqrt(own.correlation) * common
+            scale *= kept + np.sqrt(1.0 - own.correlation) * (names[:, rows] @ self.signs[rows])
+        features = np.hstack([scale * np.cos(angles), scale * np.sin(angles)])
+        linear = names @ self.offsets + controls @ self.slopes
+        return np.asarray(features @ self.amplitudes + linear)
+
+
+@dataclass(frozen=True)
+class ConditionalField:
+    """Random deviations (m) from a kriging prediction: one smooth function of the point.
+
+    Their mean over seeds is zero and their variance is the kriging variance, in sills. errors (n,
+    m): values of the field at the samples with their nuggets. own (m,): nugget of the new
+    observation, equal at all points.
+    """
+
+    field: RandomField
+    weights: KrigingWeights
+    errors: SampleValues
+    own: Values
+
+    def evaluate(self, points: Points) -> PointValues:
+        """Return the deviations (B, m) at points (B, d + p)."""
+        kriged = self.weights.weights(points) @ self.errors
+        return np.round(self.field.evaluate(points) - kriged + self.own, VALUE_DECIMALS)
+
+
+def draw_field(hyper: Hyper, seed: int, count: int) -> RandomField:
+    """Return independent fields (count) of a seed; ValueError without distribution of frequencies.
+
+    A product of independent features has the product of their covariances, so that each label set
+    multiplies them by signs: common ones and those of the name.
+    """
+    if not has_features(hyper):
+        raise ValueError(f"covariance {hyper.covariance!r}, expected gaussian or {[*SMOOTHNESS]}")
+    d, sets, names = len(hyper.scales), len(hyper.labels), sum(_row_counts(hyper))
+    _, freedoms = SMOOTHNESS.get(hyper.covariance, (0.0, 0))
+    shapes = [(d + freedoms, FREQUENCIES), *((n, count) for n in (2 * FREQUENCIES, names, d))]
+    # One call for all numbers: the overhead of a call is a tenth of a field's time.
+    drawn = philox.normals(seed, FIELD, 1, sum(rows * columns for rows, columns in shapes))[0]
+    ends = np.cumsum([rows * columns for rows, columns in shapes])
+    parts = zip(np.split(drawn, ends[:-1]), shapes, strict=True)
+    spectrum, amplitudes, offsets, slopes = (part.reshape(shape) for part, shape in parts)
+    signs = philox.signs(seed, SIGNS, sets + names, FREQUENCIES)
+    scales = np.repeat([own.offset for own in hyper.labels], _row_counts(hyper))
+    return RandomField(
+        hyper,
+        _frequencies(hyper, spectrum),
+        signs[sets:],
+        signs[:sets],
+        amplitudes,
+        np.sqrt(scales)[:, None] * offsets,
+        np.sqrt(hyper.trend) * slopes,
+    )
+
+
+def simulate(weights: KrigingWeights, seed: int, count: int) -> ConditionalField:
+    """Return independent deviations (count) of a seed from a kriging prediction.
+
+    Raises ValueError as `draw_field` does.
+    """
+    field, samples = draw_field(weights.hyper, seed, count), weights.samples
+    nuggets = philox.normals(seed, NUGGETS, len(samples) + 1, count)
+    nuggets *= np.sqrt(weights.hyper.nugget)
+    return ConditionalField(field, weights, field.evaluate(samples) + nuggets[1:], nuggets[0])
+
+
+def _row_counts(hyper: Hyper) -> list[int]:
+    """Return the number of rows of each label set: its names and one without samples."""
+    return [own.count + 1 for own in hyper.labels]
+
+
+def _frequencies(
+    hyper: Hyper, normals: Annotated[Floats, "rows frequencies"]
+) -> Annotated[Floats, "controls frequencies"]:
+    """Return frequencies (d, K) of the covariance's spectrum, per half-range of the controls.
+
+    normals: (d, K), and for Student's distribution as many more rows as it has degrees of freedom.
+    """
+    directions, lengths = np.split(normals, [len(hyper.scales)])
+    rate = np.full(FREQUENCIES, GAUSSIAN_RATE)
+    if len(lengths):
+        rate = SMOOTHNESS[hyper.covariance][0] / np.sqrt(np.sum(np.square(lengths), axis=0))
+    return hyper.scales[:, None] * directions * rate
+
+
+def _with_unsampled(hyper: Hyper, points: Points) -> Annotated[Floats, "points names"]:
+    """Return the weights of names with what is left of unit length, for each label set.
+
+    It counts as a name without samples, as in `kriging_model.prior_variances`.
+    """
+    parts = [np.zeros((len(points), 0))]
+    for columns in kriging_model.label_columns(len(hyper.scales), hyper.label_counts):
+        own = points[:, columns]
+        left = np.sqrt(np.maximum(1.0 - np.sum(np.square(own), axis=1), 0.0))
+        parts += [own, left[:, None]]
+    return np.hstack(parts)
