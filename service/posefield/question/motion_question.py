@@ -106,8 +106,6 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     take: Annotated[
         int,
         Meta(
-            ge=0,
-            le=MAX_TAKE,
             description="seed of another take of the motion, equal for equal seeds; 0 is the mean",
         ),
     ] = 0

@@ -1,0 +1,194 @@
+"""Tests of takes: conditional simulations of a motion, as clips and as poses."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.constraints.targets import NO_CONSTRAINTS
+from posefield.inference import session
+from posefield.inference.takes import EVENTFUL_TIMES, TakeSampler, TakeSettings
+from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
+
+SEED = 7
+
+
+@pytest.fixture(scope="module")
+def reach(labelled_path) -> Synthesizer:
+    """A model of reaches with performers."""
+    return Synthesizer("reach", session.load(labelled_path))
+
+
+@pytest.fixture(scope="module")
+def walk(walk_path) -> Synthesizer:
+    """A model of a walk."""
+    return Synthesizer("walk", session.load(walk_path))
+
+
+@pytest.fixture(params=["reach", "walk"])
+def model(request) -> Synthesizer:
+    return request.getfixturevalue(request.param)
+
+
+def middle(model, **changed):
+    return {c.name: c.default for c in model.session.card.controls} | changed
+
+
+def clip(model, controls=None, **asked):
+    """Joint positions (F, J, 3) of a clip, and its trust."""
+    answer = clips.synthesize_clip(
+        model, ClipQuestion(controls=controls or middle(model), **{"exact": "none"} | asked)
+    )
+    return answer.clip.positions(), answer.trust
+
+
+def apart(a, b):
+    """Root mean square distance of two motions' joints in the frames that both have, m."""
+    count = min(len(a), len(b))
+    return float(np.sqrt(np.mean(np.sum(np.square(a[:count] - b[:count]), axis=-1))))
+
+
+def test_takes_differ_and_are_the_mean_without_seed_or_variety(model):
+    mean, trust = clip(model)
+    assert np.array_equal(clip(model, take=0, variety=1.0)[0], mean)
+    assert apart(clip(model, take=SEED, variety=0.0)[0], mean) < 1e-6
+    first, own = clip(model, take=SEED)
+    other, _ = clip(model, take=SEED + 1)
+    assert apart(first, mean) > 1e-3 and apart(first, other) > 1e-3
+    assert own.sigma == trust.sigma and own.controls == trust.controls
+
+
+def test_takes_vary_as_much_as_sigma_says(model):
+    """The mean square over seeds is sigma's, but for the part that is not varied."""
+    mean, trust = clip(model)
+    squares = [apart(clip(model, take=seed, variety=1.0)[0], mean) ** 2 for seed in range(1, 41)]
+    assert 0.3 < np.sqrt(np.mean(squares)) / trust.sigma < 1.5
+    halved = [apart(clip(model, take=seed, variety=0.5)[0], mean) ** 2 for seed in range(1, 41)]
+    assert np.sqrt(np.mean(halved) / np.mean(squares)) == pytest.approx(0.5, abs=0.05)
+
+
+def test_a_captured_clip_is_its_own_only_take_without_nugget(model):
+    card = model.session.card
+    exact = replace(card, kriging=replace(card.kriging, nugget=0.0))
+    row = np.array(card.examples[:1]), card.clip_labels[:1]
+    found = TakeSampler(replace(model.session, card=exact)).deviations(*row, SEED)
+    noisy = TakeSampler(model.session).deviations(*row, SEED)
+    # Without nugget the system is badly conditioned.
+    assert np.abs(found).max() < 1e-3 * np.abs(noisy).max()
+
+
+def test_a_take_is_a_smooth_function_of_the_controls(model):
+    control = model.session.card.controls[0]
+    values = np.linspace(control.minimum, control.maximum, 41)
+    points = np.array([[*middle(model, **{control.name: value}).values()] for value in values])
+    nobody = np.zeros((1, sum(model.session.card.label_counts)))
+    sampler = TakeSampler(model.session)
+
+    def largest_step(seeds):
+        pairs = zip(points, seeds, strict=True)
+        path = np.array([sampler.deviations(own[None], nobody, seed) for own, seed in pairs])
+        return np.abs(np.diff(path, axis=0)).max() / np.ptp(path, axis=0).max()
+
+    assert largest_step([SEED] * 41) < 0.15
+    assert largest_step(range(1, 42)) > 0.5
+
+
+def test_a_pose_of_a_take_is_the_frame_of_its_clip(model):
+    answer = clips.synthesize_clip(
+        model, ClipQuestion(controls=middle(model), fps=20.0, take=SEED, detail=True)
+    )
+    pose = poses.synthesize_poses(
+        model, PoseQuestion(controls=middle(model), times=[0.2], take=SEED, detail=True)
+    )
+    # Products of matrices of other sizes round differently.
+    assert np.allclose(pose.rotations[0], answer.clip.rotations[4], rtol=0.0, atol=1e-12)
+    assert np.allclose(pose.root_position[0], answer.clip.root_path[4], rtol=0.0, atol=1e-12)
+    plain = poses.synthesize_poses(model, PoseQuestion(controls=middle(model), times=[0.2]))
+    assert not np.allclose(plain.rotations[0], answer.clip.rotations[4], atol=1e-4)
+
+
+def test_targets_are_met_after_the_take(reach):
+    mean, trust = clip(reach)
+    hand = reach.session.card.skeleton.names.index("RightHand")
+    goal = mean[-1, hand] + [0.02, 0.01, -0.02]
+    rate = 10.0 / trust.duration
+    target = Target("RightHand", tuple(goal), trust.duration)
+    free, _ = clip(reach, fps=rate, take=SEED)
+    held, said = clip(reach, fps=rate, take=SEED, targets=(target,))
+    assert np.linalg.norm(free[-1, hand] - goal) > 0.01
+    assert np.linalg.norm(held[-1, hand] - goal) < 1e-4
+    assert all(met.reached for met in said.targets)
+    assert apart(held, clip(reach, fps=rate, targets=(target,))[0]) > 1e-3
+
+
+def test_a_reach_varies_in_its_first_time_functions_alone(reach):
+    question = reach.question(ClipQuestion(controls=middle(reach)))
+    begun = reach.solver.solve(question, NO_CONSTRAINTS)
+    settings = TakeSettings(SEED, 1.0, detail=False)
+    taken = reach.solver.solve(question, replace(NO_CONSTRAINTS, take=settings))
+    change = taken.scene.motion(taken.numbers) - begun.scene.motion(begun.numbers)
+    assert np.abs(change[:EVENTFUL_TIMES]).max() > 1e-3
+    assert np.abs(change[EVENTFUL_TIMES:]).max() == 0.0
+
+
+def test_a_coarse_level_varies_less_but_alike(walk):
+    asked = {"variety": 1.0, "end": 0.5}
+
+    def change(level, seed):
+        mean = clip(walk, level=level, **asked)[0]
+        return (clip(walk, level=level, take=seed, **asked)[0] - mean).ravel()
+
+    def cosine(a, b):
+        return float(a @ b / np.sqrt((a @ a) * (b @ b)))
+
+    fine, coarse = ([change(level, seed) for seed in range(1, 13)] for level in (0, 1))
+    same = [cosine(a, b) for a, b in zip(fine, coarse, strict=True)]
+    other = [cosine(a, b) for a, b in zip(fine, coarse[1:], strict=False)]
+    assert np.mean(same) > 0.6 and abs(np.mean(other)) < 0.4
+
+
+def test_other_processes_answer_with_the_same_bytes(walk, walk_path):
+    mean = middle(walk)
+    question = f"PoseQuestion(controls={mean!r}, times=[0.3], take={SEED}, detail=True)"
+    drawn = (
+        "from pathlib import Path\n"
+        "from posefield.inference import session\n"
+        "from posefield.question.motion_question import PoseQuestion\n"
+        "from posefield.synthesis import poses\n"
+        "from posefield.synthesis.synthesizer import Synthesizer\n"
+        f"model = Synthesizer('walk', session.load(Path({str(walk_path)!r})))\n"
+        f"print(poses.synthesize_poses(model, {question}).rotations.tobytes().hex())"
+    )
+    said = subprocess.run([sys.executable, "-c", drawn], capture_output=True, check=True, text=True)
+    here = poses.synthesize_poses(
+        walk, PoseQuestion(controls=mean, times=[0.3], take=SEED, detail=True)
+    )
+    assert said.stdout.strip() == here.rotations.tobytes().hex()
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"take": -1}, "take: -1, expected 0 to 999999999"),
+        ({"take": 10**9}, "take: 1000000000, expected 0 to 999999999"),
+        ({"take": 1, "variety": 1.1}, "variety: 1.1, expected 0 to 1"),
+        ({"variety": float("nan")}, "variety: nan, expected 0 to 1"),
+    ],
+)
+def test_seeds_and_varieties_out_of_range_are_refused(walk, asked, said):
+    with pytest.raises(InvalidField) as caught:
+        clip(walk, **asked)
+    assert str(caught.value) == said
+
+
+def test_a_spherical_covariance_has_no_takes(walk):
+    card = walk.session.card
+    spherical = replace(card, kriging=replace(card.kriging, covariance="spherical"))
+    model = Synthesizer("walk", replace(walk.session, card=spherical))
+    with pytest.raises(InvalidField, match="take: 7, but no takes can be drawn of spherical"):
+        clip(model, take=SEED)
