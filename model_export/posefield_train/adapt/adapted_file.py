@@ -188,7 +188,10 @@ def _card(
         sources=(*old.sources, *(clip.row.source for clip in clips)),
         left_out=left_out,
         kriging=onnx_export.plain_parameters(bank.pose.hyper),
-        making=replace(reopened.making, fields=made, takes=_takes(old, clips)),
+        # The statistics of takes are in the parent's bases, which the new clips change.
+        making=replace(
+            reopened.making, fields=made, takes=_takes(old, clips), take_root=(), detail=b""
+        ),
         diagnostics=_diagnostics(reopened, adapted, newcomer, left_out, parity),
         provenance=_provenance(reopened, newcomer),
         contacts=adapted.contacts.statistics if adapted.contacts else (),
@@ -247,8 +250,10 @@ def _diagnostics(
     shape = freedoms, frames, samples + len(newcomer.examples)
     kept = model.decoder.reduced.core.shape
     compression = asdict(truncation_cost.shape_compression(shape, kept, len(model.bank.low)))
+    # The statistics of takes are not carried over.
+    kept_facts = {name: fact for name, fact in old.items() if name != "detail"}
     return {
-        **old,
+        **kept_facts,
         "compression": {name: _rounded(ratio) for name, ratio in compression.items()},
         "leave_one_out_rms_m": _rounded(np.sqrt(np.mean(np.square(left_out)))),
         "scales": [_rounded(scale) for scale in model.bank.pose.hyper.scales],

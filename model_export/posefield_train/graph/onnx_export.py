@@ -29,7 +29,7 @@ from posefield.model_file.model_card import (
     TrainingParameters,
 )
 from posefield_train.contacts.contact_model import FittedContacts
-from posefield_train.graph import levels, training_notes, truncation_cost
+from posefield_train.graph import levels, take_statistics, training_notes, truncation_cost
 from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points, thinning
@@ -74,8 +74,10 @@ def export_model(recipe: Recipe, trained: TrainedModel, notes: list[str]) -> Exp
     """
     notes = training_notes.training_notes(recipe, trained, notes)
     laddered = levels.build_levels(recipe, trained)
+    takes = take_statistics.estimate(trained)
     return check_and_export(
-        laddered.model, lambda parity: _card(recipe, trained, laddered.levels, notes, parity)
+        laddered.model,
+        lambda parity: takes.on_card(_card(recipe, trained, laddered.levels, notes, parity)),
     )
 
 

@@ -4,6 +4,7 @@ A model whose card passes answers every valid question: lengths agree, indices a
 divisors are not zero.
 """
 
+import struct
 from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sized
 from itertools import pairwise
@@ -19,6 +20,8 @@ DURATION_RANGE = 1e-3, 1e4
 """Shortest and longest clip, s."""
 MAX_LENGTH = 1e3
 """Longest bone, m, and largest entry of `beside`."""
+HALF_BYTES = 2
+"""Bytes of a number in half precision."""
 CYCLE_VARIABLES = 4
 """Rows and columns of a cycle's `beside`: logarithm of the duration, and travel."""
 MAX_SHOWN = 60
@@ -232,8 +235,27 @@ def _check_training_parameters(card: ModelCard) -> None:
         sets = len(card.labels)
         expected = f"a nugget, a trend and an offset for each of {sets} label sets"
         _expect(len(own) == 2 + sets, f"making.fields.{name}", list(own), expected)
+    _check_take_statistics(card)
     for joint in card.making.joint_weights:
         _expect(joint in card.skeleton.names, "making.joint_weights", joint, "a joint")
+
+
+def _check_take_statistics(card: ModelCard) -> None:
+    """Check what takes of a cycle are drawn from; other motions, and older files, have none."""
+    root, stored = card.making.take_root, card.making.detail
+    freedoms, _, modes = card.levels[0].ranks
+    _expect(len(root) in (0, len(card.beside)), "making.take_root", len(root), "0 or 4 rows")
+    for index, row in enumerate(root):
+        path = f"making.take_root[{index}]"
+        _expect_length(row, path, modes + CYCLE_VARIABLES)
+        _expect(max(map(abs, row)) <= MAX_LENGTH, path, list(row), f"at most {MAX_LENGTH:g}")
+    rows, rest = divmod(len(stored), HALF_BYTES * freedoms)
+    _expect(rest == 0, "making.detail", len(stored), f"bytes of rows of {freedoms} numbers")
+    right = rows == 0 or (bool(root) and rows < card.frames // 2)
+    _expect(right, "making.detail", rows, "fewer harmonics than half the frames of a cycle")
+    sizes = struct.unpack(f"<{rows * freedoms}e", stored)
+    right = all(0.0 <= size <= MAX_LENGTH for size in sizes)
+    _expect(right, "making.detail", "negative or too large", f"deviations from 0 to {MAX_LENGTH:g}")
 
 
 def _check_presets(card: ModelCard) -> None:

@@ -47,6 +47,18 @@ class ContactAccuracy(TypedDict):
     climatology: NonNegative
 
 
+class DetailFacts(TypedDict):
+    """Size of the sampled detail, and accelerations over that of captured clips.
+
+    acceleration: of left-out predictions. sampled: of the same with detail.
+    """
+
+    harmonics: Count
+    directions: Count
+    acceleration: NonNegative
+    sampled: NonNegative
+
+
 class Diagnostics(TypedDict):
     """Errors (m), sizes and parameters, written by `posefield_train.graph.onnx_export`."""
 
@@ -65,6 +77,7 @@ class Diagnostics(TypedDict):
     labels: Mapping[Name, LabelParameters]
     tensor: tuple[Count, Count, Count]
     parity_m: NonNegative
+    detail: NotRequired[DetailFacts]
     notes: tuple[Text, ...]
     contacts: NotRequired[ContactAccuracy]
 
