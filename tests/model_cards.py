@@ -66,7 +66,13 @@ CARD = ModelCard(
     left_out=(0.01, 0.02, 0.5),
     joint_sigma=(0.5, 1.32),
     making=TrainingParameters(
-        {"warp": (0.25, 1.0, 0.0)}, {"peak": 0.4}, {"chest": 2.0}, True, takes=(0, 0, 1)
+        {"warp": (0.25, 1.0, 0.0)},
+        {"peak": 0.4},
+        {"chest": 2.0},
+        True,
+        takes=(0, 0, 1),
+        take_root=((0.1,) * 28, (0.2,) * 28, (0.3,) * 28, (0.4,) * 28),
+        detail=np.full((3, 22), 0.5, dtype="<f2").tobytes(),
     ),
     roles={"hips": "hips", "upperChest": "chest"},
     event=Event(1, 0.75),

@@ -138,6 +138,8 @@ class Tried:
             self.post("/pose.json", controls=controls, times=[0], targets=[{**target, "at": at}])
         if card.feet and card.root == "travelling":
             self.get("/clip.npz", **controls, feet="stand")
+        drawn = card.kriging.covariance != "spherical"
+        self.get("/pose.json", **controls, time=0, take=7 * drawn, detail="true")
         if card.cyclic:
             self.get("/crowd.usdc", count=2, seconds=0.5)
 

@@ -5,11 +5,15 @@ from dataclasses import replace
 import numpy as np
 
 from posefield.common.array_shapes import Values, Variables
+from posefield.common.errors import InvalidField
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES
 from posefield.inference import motion_detail
 from posefield.inference.session import Session
 from posefield.inference.takes import EVENTFUL_TIMES, TakeSampler, TakeSettings
+from posefield.kriging import random_field
+from posefield.model_file.model_card import ModelCard
+from posefield.question.motion_question import MAX_TAKE, MotionQuestion
 from posefield.validation.question_validation import ValidatedQuestion
 
 
@@ -56,3 +60,20 @@ class TakeVariation:
         sampled = motion_detail.sample(found, reduced.frames, seed)
         scene = replace(begun.scene, reduced=replace(reduced, detail=sampled))
         return replace(begun, scene=scene)
+
+
+def check(card: ModelCard, asked: MotionQuestion) -> None:
+    """Raise InvalidField for a seed or a variety out of range, and for a model without takes."""
+    if not 0 <= asked.take <= MAX_TAKE:
+        raise InvalidField("take", f"{asked.take}, expected 0 to {MAX_TAKE}")
+    if not 0.0 <= asked.variety <= 1.0:
+        raise InvalidField("variety", f"{asked.variety:g}, expected 0 to 1")
+    if asked.take and not random_field.has_features(card.kriging):
+        found = card.kriging.covariance
+        raise InvalidField("take", f"{asked.take}, but no takes can be drawn of {found} kriging")
+
+
+def settings(card: ModelCard, asked: MotionQuestion) -> TakeSettings | None:
+    """Return the take of a question, or None for the prediction."""
+    found = TakeSettings(asked.take, asked.variety, asked.detail and bool(card.making.detail))
+    return found if found.seed or found.detail else None

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
+from posefield.constraints import take_variation
 from posefield.inference.takes import TakeSettings
-from posefield.kriging import random_field
 from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import Control, ModelCard
 from posefield.motion.measures import POSITION_AXES, Measure
 from posefield.question import value_validation
-from posefield.question.motion_question import MAX_TAKE, MotionQuestion, Target
+from posefield.question.motion_question import MotionQuestion, Target
 from posefield.validation import input_limits
 from posefield.validation.question_validation import ValidatedQuestion
 
@@ -95,24 +95,7 @@ def from_question(
             continue
         goal = answer_bounds.limit_control(control, question.controls[control.name])
         controls.append((control.name, own, goal))
-    return ConstraintSet(tuple(controls), targets, take_settings(card, asked))
-
-
-def take_settings(card: ModelCard, asked: MotionQuestion) -> TakeSettings | None:
-    """Return the take of a question, or None for the prediction.
-
-    Raises InvalidField for a seed or a variety out of range, and for a model of whose covariance no
-    takes can be drawn.
-    """
-    if not 0 <= asked.take <= MAX_TAKE:
-        raise InvalidField("take", f"{asked.take}, expected 0 to {MAX_TAKE}")
-    if not 0.0 <= asked.variety <= 1.0:
-        raise InvalidField("variety", f"{asked.variety:g}, expected 0 to 1")
-    if asked.take and not random_field.has_features(card.kriging):
-        found = card.kriging.covariance
-        raise InvalidField("take", f"{asked.take}, but no takes can be drawn of {found} kriging")
-    settings = TakeSettings(asked.take, asked.variety, asked.detail and bool(card.making.detail))
-    return settings if settings.seed or settings.detail else None
+    return ConstraintSet(tuple(controls), targets, take_variation.settings(card, asked))
 
 
 def _exact_controls(

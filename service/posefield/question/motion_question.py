@@ -106,14 +106,11 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     take: Annotated[
         int,
         Meta(
-            description="seed of another take of the motion, equal for equal seeds; 0 is the mean",
+            description="seed of another take of the motion, equal for equal seeds; 0 is the mean"
         ),
     ] = 0
     variety: Annotated[
-        float,
-        Meta(
-            ge=0.0, le=1.0, description="size of a take's deviations; 1 is that of captured clips"
-        ),
+        float, Meta(description="size of a take's deviations; 1 is that of captured clips")
     ] = 0.7
     detail: Annotated[
         bool, Meta(description="add details that no control predicts, sampled by the take's seed")

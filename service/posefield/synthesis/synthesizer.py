@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from posefield.common.errors import OutOfReach, OutsideSamples
+from posefield.constraints import take_variation
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
@@ -50,6 +51,7 @@ class Synthesizer(NamedModel):
         The means are conditional on the given controls and the targets. Raises InvalidField and
         OutsideSamples as the validation does.
         """
+        take_variation.check(self.session.card, asked)
         policy, who, level = asked.extrapolate, asked.performer, asked.level
         given = self.validator.question(asked.controls, policy, who, level, asked.labels)
         found = self.solver.controls(given, asked, self.validator.imputer)

@@ -1,5 +1,6 @@
 """Tests of the serialised model card: JSON in a fixed order, without internal fields."""
 
+import base64
 import json
 from dataclasses import replace
 
@@ -18,6 +19,8 @@ def test_making_is_in_the_file_and_not_sent_to_clients():
         "joint_weights": {"chest": 2.0},
         "in_phase": True,
         "takes": [0, 0, 1],
+        "take_root": [[row] * 28 for row in (0.1, 0.2, 0.3, 0.4)],
+        "detail": base64.b64encode(CARD.making.detail).decode(),
     }
     assert "making" not in model_card.plain_values(CARD)
 

@@ -70,6 +70,12 @@ def test_a_card_without_an_entry_is_refused_by_its_name(name):
         (["durations"], [1], "Expected `array` of length 2"),
         (["making", "in_phase"], 1, "Expected `bool`, got `int` - at `$.in_phase`"),
         (["making"], True, "Expected `object`, got `bool`"),
+        (["making", "detail"], "x", "Invalid base64 encoded string - at `$.detail`"),
+        (
+            ["making", "take_root", 0, 1],
+            "x",
+            "Expected `float`, got `str` - at `$.take_root[0][1]`",
+        ),
         (["skeleton", "names", 0], "", "Expected `str` of length >= 1 - at `$.names[0]`"),
         (["skeleton", "offsets", 1, 2], "x", "Expected `float`, got `str` - at `$[1][2]`"),
         (["roles"], {"hips": 3}, "Expected `str`, got `int` - at `$[...]`"),

@@ -1,0 +1,99 @@
+"""Tests of takes and detail over HTTP: answers, caching and errors."""
+
+import numpy as np
+import pytest
+from asking import unpacked
+
+MODEL = "/v1/models/walk"
+
+
+@pytest.fixture(scope="module")
+def clip(ask):
+    """Ask for a clip's JSON with parameters."""
+    return lambda **asked: ask("GET", f"{MODEL}/clip.json", params={"fps": 20, **asked})
+
+
+def apart(a, b):
+    """Largest difference of two answers' rotations, over the frames that both have."""
+    first, second = (np.array(answer.json()["rotations"]) for answer in (a, b))
+    count = min(len(first), len(second))
+    return float(np.abs(first[:count] - second[:count]).max())
+
+
+def test_a_take_is_another_clip_and_has_an_entity_tag_of_its_own(clip):
+    mean, zero, take, other = (
+        clip(**asked) for asked in ({}, {"take": 0}, {"take": 7}, {"take": 8})
+    )
+    assert zero.content == mean.content
+    assert apart(mean, take) > 1e-3 and apart(take, other) > 1e-3
+    assert clip(take=7).content == take.content
+    tags = [answer.headers["etag"] for answer in (mean, take, other, clip(take=7, variety=0.3))]
+    assert len({*tags}) == 4
+    assert take.json()["trust"]["sigma"] == mean.json()["trust"]["sigma"]
+
+
+def test_variety_scales_a_take(clip):
+    mean, half, whole = (clip(take=7, variety=variety) for variety in (0, 0.5, 1))
+    assert apart(mean, clip()) < 1e-5
+    assert apart(mean, whole) == pytest.approx(2.0 * apart(mean, half), rel=0.2)
+
+
+def test_a_pose_of_a_take_is_that_of_its_clip(ask, clip):
+    pose = ask("GET", f"{MODEL}/pose.json", params={"time": 0.2, "take": 7}).json()
+    frame = clip(take=7).json()["rotations"][4]
+    assert np.abs(np.array(pose["rotations"][0]) - frame).max() < 1e-6
+    plain = ask("GET", f"{MODEL}/pose.json", params={"time": 0.2}).json()
+    assert np.abs(np.array(plain["rotations"][0]) - frame).max() > 1e-3
+
+
+def test_bodies_and_archives_have_takes(ask, clip):
+    controls = clip().json()["trust"]["controls"]
+    taken = clip(take=7, **controls)
+    body = {"controls": controls, "fps": 20, "take": 7}
+    posted = ask("POST", f"{MODEL}/clip.json", json=body)
+    assert posted.json()["rotations"] == taken.json()["rotations"]
+    clips = [{"controls": controls, "take": seed} for seed in (0, 7, 7)]
+    packed = ask("POST", f"{MODEL}/clips", json={"format": "bvh", "clips": clips})
+    files = unpacked("zip", packed.content).items()
+    mean, first, second = (content for name, content in files if name.endswith(".bvh"))
+    assert first == second != mean
+
+
+def test_a_model_without_detail_warns(clip):
+    answer = clip(detail="true")
+    assert answer.json()["trust"]["warnings"] == ["detail: this model's file has none to sample"]
+    assert apart(answer, clip()) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "status", "said"),
+    [
+        ("take", "-1", 400, "'-1', expected a whole number"),
+        ("take", "1.5", 400, "'1.5', expected a whole number"),
+        ("take", "1000000000", 400, "'1000000000', expected a whole number"),
+        ("variety", "1.01", 422, "1.01, expected 0 to 1"),
+        ("variety", "-0.1", 422, "-0.1, expected 0 to 1"),
+        ("detail", "yes", 400, "'yes', expected one of true, false"),
+    ],
+)
+def test_bad_words_are_refused(clip, name, words, status, said):
+    answer = clip(**{name: words})
+    assert answer.status_code == status and said in answer.json()["detail"]
+    assert answer.json()["errors"][0]["parameter"] == name
+
+
+@pytest.mark.parametrize(
+    ("fields", "status", "place"),
+    [
+        ({"take": -1}, 422, "/take"),
+        ({"take": 10**9}, 422, "/take"),
+        ({"take": 0.5}, 400, "/take"),
+        ({"take": "index"}, 400, "/take"),
+        ({"variety": 2}, 422, "/variety"),
+        ({"detail": 1}, 400, "/detail"),
+    ],
+)
+def test_bad_fields_are_refused(ask, fields, status, place):
+    answer = ask("POST", f"{MODEL}/clip.json", json={"controls": {}, **fields})
+    assert answer.status_code == status
+    assert answer.json()["errors"][0]["pointer"] == place
