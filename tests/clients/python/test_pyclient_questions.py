@@ -111,6 +111,17 @@ def test_targets_and_exact_controls_in_a_query():
     assert target(questions.pose("m", 0, exact="a")) == target(questions.pose("m", 0, exact=["a"]))
 
 
+def test_takes_and_detail():
+    asked = files.clip("m", take=7, variety=0.5, detail=True, a=1)
+    assert parse_qsl(urlsplit(asked.request("bvh").target).query) == [
+        ("a", "1"),
+        ("take", "7"),
+        ("variety", "0.5"),
+        ("detail", "true"),
+    ]
+    assert target(questions.pose("m", 0, take=7)) != target(questions.pose("m", 0))
+
+
 def test_targets_and_exact_controls_in_a_body():
     # More than a line takes.
     many = {f"control_{number:04}": number for number in range(400)}
