@@ -44,6 +44,9 @@ ROWS = st.fixed_dictionaries(
         "names": st.sampled_from(["own", "vrm", None]),
         "root": st.sampled_from(["travelling", "in_place", None]),
         "loop": st.sampled_from([False, False, True, None]),
+        "take": st.sampled_from([0, 7, 999_999_999, 1_000_000_000, -1, None]),
+        "variety": st.sampled_from([0.0, 0.5, 1.0, 1.1, -0.1, None]),
+        "detail": st.sampled_from([False, True, None]),
     },
 )
 CYCLES = st.fixed_dictionaries(
