@@ -1,11 +1,13 @@
 """Variation of a predicted motion: another take of it, and details that no control predicts."""
 
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Values, Variables
+from posefield.common.array_shapes import PointControls, PointLabels, Variables
 from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES
 from posefield.inference import motion_detail
@@ -33,13 +35,18 @@ class TakeVariation:
     ) -> ConstrainedMotion:
         """Return a take of a prediction at the controls and labels of its question."""
         if take.seed:
-            by = self._sampler.deviations(question.point, question.labels, take.seed)
-            moved = begun.numbers + take.variety * self._change(bench, by)
-            begun = replace(begun, numbers=moved)
-        return self._with_detail(bench, begun, take.seed) if take.detail else begun
+            change = self.change(bench, question.point, question.labels, take.seed)
+            begun = replace(begun, numbers=begun.numbers + take.variety * change)
+        if not take.detail:
+            return begun
+        detailed = replace(bench.reduced, detail=self.detail(bench, take.seed))
+        return replace(begun, scene=replace(begun.scene, reduced=detailed))
 
-    def _change(self, bench: LevelCorrector, by: Values) -> Variables:
-        """Return the change of a motion's variables; by (m,): `TakeSampler.deviations`."""
+    def change(
+        self, bench: LevelCorrector, controls: PointControls, labels: PointLabels, seed: int
+    ) -> Variables:
+        """Return the change of a motion's variables at controls (1, d) and labels (1, p)."""
+        by = self._sampler.deviations(controls, labels, seed)
         card, (times, freedoms, modes) = self._session.card, bench.reduced.core.shape
         # A coarser level has the leading coefficients, and these have the leading part of the root.
         count = min(modes, bench.spread.residuals.shape[1])
@@ -51,15 +58,11 @@ class TakeVariation:
         root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, len(by))))
         return np.concatenate([motion.ravel(), root @ by])
 
-    def _with_detail(
-        self, bench: LevelCorrector, begun: ConstrainedMotion, seed: int
-    ) -> ConstrainedMotion:
-        """Return the motion with the detail of a seed in every pose."""
-        reduced = bench.reduced
-        found = motion_detail.deviations(self._session.card)[:, : len(reduced.directions)]
-        sampled = motion_detail.sample(found, reduced.frames, seed)
-        scene = replace(begun.scene, reduced=replace(reduced, detail=sampled))
-        return replace(begun, scene=scene)
+    def detail(self, bench: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
+        """Return the detail (T, r1) of a seed."""
+        found = motion_detail.deviations(self._session.card)
+        sampled = motion_detail.sample(found, bench.reduced.frames, seed)
+        return sampled[:, : len(bench.reduced.directions)]
 
 
 def check(card: ModelCard, asked: MotionQuestion) -> None:

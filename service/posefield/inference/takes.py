@@ -15,8 +15,10 @@ from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import ConditionalField
 from posefield.model_file import subgraph
 
-CACHE_SIZE = 64
-"""Number of cached fields; one takes about 200 kB."""
+FIELD_CACHE, DEVIATION_CACHE = 64, 4096
+"""Numbers of cached fields, of about 200 kB each, and of deviations at one point, of 300 bytes. A
+crowd asks for the same points in every frame.
+"""
 EVENTFUL_TIMES = 3
 """Time functions of a motion without cycle that a take varies, the first ones. Residuals of further
 ones are differences in footing and timing, which are no independent Gaussian numbers.
@@ -41,7 +43,8 @@ class TakeSampler:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._field_cached = lru_cache(CACHE_SIZE)(self._field)
+        self._field_cached = lru_cache(FIELD_CACHE)(self._field)
+        self._deviations_cached = lru_cache(DEVIATION_CACHE)(self._deviations)
 
     @property
     def is_available(self) -> bool:
@@ -54,10 +57,12 @@ class TakeSampler:
         They are uncorrelated, each with the variance of sigma, m²: of the coefficients of the
         finest level, and of a cycle's duration and travel.
         """
-        session = self._session
-        limited = session.bounds.limit(controls)
-        points = kriging_model.half_ranges(limited, *session.card.sampled_ranges)
-        found = self._field_cached(seed).evaluate(np.hstack([points, labels]))
+        limited = self._session.bounds.limit(controls)
+        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
+        return self._deviations_cached(tuple(np.hstack([points, labels])[0].tolist()), seed)
+
+    def _deviations(self, point: tuple[float, ...], seed: int) -> Values:
+        found = self._field_cached(seed).evaluate(np.array([point]))
         return np.asarray(self._root_of_sill * found[0])
 
     def _field(self, seed: int) -> ConditionalField:
