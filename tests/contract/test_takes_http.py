@@ -97,3 +97,36 @@ def test_bad_fields_are_refused(ask, fields, status, place):
     answer = ask("POST", f"{MODEL}/clip.json", json={"controls": {}, **fields})
     assert answer.status_code == status
     assert answer.json()["errors"][0]["pointer"] == place
+
+
+def crowd_body(**more):
+    return {"controls": {"haste": 3.96, "veer": [-200, -200]}, "time": 0.2, **more}
+
+
+def test_characters_of_a_crowd_have_takes(ask):
+    path = f"{MODEL}/crowd.json"
+    plain, taken = (ask("POST", path, json=crowd_body(**m)) for m in ({}, {"take": "index"}))
+    assert (plain.status_code, taken.status_code) == (200, 200)
+    first, second = np.array(taken.json()["rotations"])
+    assert np.abs(first - second).max() > 1e-3
+    assert len(np.unique(plain.json()["rotations"], axis=0)) == 1
+    again = ask("POST", path, json=crowd_body(take=[1, 2]))
+    assert again.json()["rotations"] == taken.json()["rotations"]
+
+
+@pytest.mark.parametrize(
+    ("fields", "place"),
+    [
+        ({"take": [1, -1]}, "/take/1"),
+        ({"take": [1, 0.5]}, "/take/1"),
+        ({"take": 1e300}, "/take"),
+        ({"take": "all"}, "/take"),
+        ({"take": [1, 2, 3]}, "/take"),
+        ({"variety": [0, 2]}, "/variety/1"),
+        ({"detail": [True, False]}, "/detail"),
+    ],
+)
+def test_bad_takes_of_a_crowd_are_refused(ask, fields, place):
+    answer = ask("POST", f"{MODEL}/crowd.json", json=crowd_body(**fields))
+    assert answer.status_code in (400, 422)
+    assert answer.json()["errors"][0]["pointer"] == place

@@ -158,6 +158,9 @@ def crowd(
     budget_ms: float | None = None,
     root: Root | None = None,
     extrapolate: Extrapolate | None = None,
+    take: int | Sequence[int] | Literal["index"] | None = None,
+    variety: Any = None,
+    detail: bool | None = None,
     controls: Mapping[str, Any] | None = None,
     **named: Any,
 ) -> Files:
@@ -172,7 +175,8 @@ def crowd(
         **asking.columns(position=position, heading=heading, level=level, blend=blend),
         **asking.columns(previous_level=previous_level, from_level=from_level),
         **asking.said(performer=performer, camera=camera, pixels=pixels, budget_ms=budget_ms),
-        **asking.said(root=root, extrapolate=extrapolate, labels=labels),
+        **asking.said(root=root, extrapolate=extrapolate, labels=labels, detail=detail),
+        **asking.columns(take=take, variety=variety),
     )
     ask = partial(asking.body, "queryCrowdInFormat", model, question)
     return Files(CROWD, ask, about=asking.about(model, question))

@@ -151,6 +151,9 @@ class CrowdQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     budget_ms: float | UnsetType | None = UNSET
     root: Literal["travelling", "in_place"] | UnsetType = UNSET
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
+    take: int | tuple[int, ...] | Literal["index"] | UnsetType = UNSET
+    variety: float | tuple[float, ...] | UnsetType = UNSET
+    detail: bool | UnsetType = UNSET
 
 
 class SigmaQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -1568,6 +1568,19 @@ export interface components {
              */
             root: "travelling" | "in_place";
             extrapolate?: components["schemas"]["Extrapolate"];
+            /**
+             * @description Seed of each character's take, or `index` for seeds from 1 on in the order of the
+             *     characters. At most 2,000 characters may have a take. Durations and travel stay those of
+             *     the prediction. Since 3.3.0.
+             * @default 0
+             */
+            take: components["schemas"]["Take"] | components["schemas"]["Take"][] | "index";
+            /**
+             * @description Size of each take's deviations. Since 3.3.0.
+             * @default 0.7
+             */
+            variety: components["schemas"]["Variety"] | components["schemas"]["Variety"][];
+            detail?: components["schemas"]["Detail"];
         };
         /** @description One pose per character, in the order of the request, of the joints in `names`. */
         CrowdPoses: {
@@ -4080,7 +4093,10 @@ export const KEYS = {
     "pixels",
     "budget_ms",
     "root",
-    "extrapolate"
+    "extrapolate",
+    "take",
+    "variety",
+    "detail"
   ],
   "SigmaQuestion": [
     "across",

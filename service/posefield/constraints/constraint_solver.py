@@ -53,7 +53,7 @@ class ConstraintSolver:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._variation = TakeVariation(session)
+        self.variation = TakeVariation(session)
         self._correctors: dict[int, LevelCorrector] = {}
         self._solve_cached = lru_cache(CACHE_SIZE)(self._solve)
         self._positions_cached = lru_cache(CACHE_SIZE)(self._captured_positions)
@@ -128,6 +128,10 @@ class ConstraintSolver:
         point, labels = question.point.tobytes(), question.labels.tobytes()
         return self._solve_cached(_CacheKey(question, found, point, labels, question.level))
 
+    def corrector(self, level: int) -> LevelCorrector:
+        """Return the data for corrections at a level, computed once."""
+        return self._corrector(level)
+
     def measured(self, question: ValidatedQuestion, held: ConstrainedMotion) -> dict[str, float]:
         """Return the measured controls of a motion."""
         return self._corrector(question.level).measured(held)
@@ -183,7 +187,7 @@ class ConstraintSolver:
         state = self._session.state(question.point, np.zeros(1), question.labels, question.level)
         begun = bench.predict(state)
         if asked.constraints.take:
-            begun = self._variation.vary(bench, begun, question, asked.constraints.take)
+            begun = self.variation.vary(bench, begun, question, asked.constraints.take)
         held = begun
         if not asked.constraints.corrects:
             return begun

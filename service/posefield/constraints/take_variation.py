@@ -1,13 +1,14 @@
 """Variation of a predicted motion: another take of it, and details that no control predicts."""
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PointControls, PointLabels, Variables
+from posefield.common.array_shapes import PointControls, PointLabels
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Indices
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES
 from posefield.inference import motion_detail
@@ -18,6 +19,9 @@ from posefield.model_file.model_card import ModelCard
 from posefield.question.motion_question import MAX_TAKE, MotionQuestion
 from posefield.validation.question_validation import ValidatedQuestion
 
+DETAIL_CACHE = 512
+"""Number of cached details, of 12 kB each: a crowd asks for the same ones in every frame."""
+
 
 class TakeVariation:
     """Variation of the motions of one model."""
@@ -25,6 +29,7 @@ class TakeVariation:
     def __init__(self, session: Session) -> None:
         self._session = session
         self._sampler = TakeSampler(session)
+        self._detail_cached = lru_cache(DETAIL_CACHE)(self._detail)
 
     def vary(
         self,
@@ -35,34 +40,44 @@ class TakeVariation:
     ) -> ConstrainedMotion:
         """Return a take of a prediction at the controls and labels of its question."""
         if take.seed:
-            change = self.change(bench, question.point, question.labels, take.seed)
-            begun = replace(begun, numbers=begun.numbers + take.variety * change)
+            seeds = np.array([take.seed])
+            changes = self.changes(bench, question.point, question.labels, seeds)
+            begun = replace(begun, numbers=begun.numbers + take.variety * changes[0])
         if not take.detail:
             return begun
         detailed = replace(bench.reduced, detail=self.detail(bench, take.seed))
         return replace(begun, scene=replace(begun.scene, reduced=detailed))
 
-    def change(
-        self, bench: LevelCorrector, controls: PointControls, labels: PointLabels, seed: int
-    ) -> Variables:
-        """Return the change of a motion's variables at controls (1, d) and labels (1, p)."""
-        by = self._sampler.deviations(controls, labels, seed)
+    def changes(
+        self,
+        bench: LevelCorrector,
+        controls: PointControls,
+        labels: PointLabels,
+        seeds: Annotated[Indices, "points"],
+    ) -> Annotated[Floats, "points variables"]:
+        """Return the changes (B, numbers) of motions at controls (B, d) and labels (B, p).
+
+        seeds (B,): of their takes; zero changes nothing.
+        """
+        by = self._sampler.deviations(controls, labels, seeds)
         card, (times, freedoms, modes) = self._session.card, bench.reduced.core.shape
         # A coarser level has the leading coefficients, and these have the leading part of the root.
         count = min(modes, bench.spread.residuals.shape[1])
-        motion = (bench.spread.residuals @ by[:count]).reshape(times, freedoms)
+        motions = by[:, :count] @ bench.spread.residuals.T
         if not card.cyclic:
-            motion[EVENTFUL_TIMES:] = 0.0
-            return motion.ravel()
+            motions.reshape(-1, times, freedoms)[:, EVENTFUL_TIMES:] = 0.0
+            return motions
         # Files of earlier versions have no joint root; their cycles last and travel as predicted.
-        root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, len(by))))
-        return np.concatenate([motion.ravel(), root @ by])
+        root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, by.shape[1])))
+        return np.hstack([motions, by @ root.T])
 
     def detail(self, bench: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
         """Return the detail (T, r1) of a seed."""
-        found = motion_detail.deviations(self._session.card)
-        sampled = motion_detail.sample(found, bench.reduced.frames, seed)
-        return sampled[:, : len(bench.reduced.directions)]
+        return self._detail_cached(seed)[:, : len(bench.reduced.directions)]
+
+    def _detail(self, seed: int) -> Annotated[Floats, "frames freedoms"]:
+        card = self._session.card
+        return motion_detail.sample(motion_detail.deviations(card), card.frames, seed)
 
 
 def check(card: ModelCard, asked: MotionQuestion) -> None:

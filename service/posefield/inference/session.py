@@ -129,6 +129,27 @@ class Session:
         found = self._state(self.bounds.limit(controls), time * stretch, labels, level)
         return replace(found, duration=found.duration / stretch, asked_sigma=asked)
 
+    def states(
+        self,
+        controls: PointControls,
+        times: Annotated[Floats, "points 1"],
+        labels: Annotated[Floats, "points labels"],
+        level: int = 0,
+    ) -> tuple[Annotated[Floats, "points modes"], Frames, Annotated[Floats, "points 3"]]:
+        """Return coefficients (B, r3), canonical frames (B,) and travel (B, 3) of many questions.
+
+        controls (B, d), times (B, 1), s, and labels (B, p). Bounded as the answers of `run` are.
+        """
+        if not self.bounds.is_inside(controls):
+            raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
+            controls, times = self.bounds.limit(controls), times * (raw / bounded)[:, None]
+        feed = self._feed(controls, labels)
+        feed["time"] = times.astype(np.float32, copy=False)
+        names = [name for name in ("coefficients", "frame", "way") if name in self._state_outputs]
+        found = [a.astype(float) for a in self.state_sessions[level].run(names, feed)]
+        ways = found[2] if self.card.cyclic else np.zeros((len(controls), 3))
+        return found[0], found[1][:, 0, 0], ways
+
     @cached_property
     def bounds(self) -> AnswerBounds:
         """Bounds of the answers outside the sampled ranges."""

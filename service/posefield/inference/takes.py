@@ -6,10 +6,13 @@ of the controls and labels, which is zero at captured clips up to the nugget (de
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import PointControls, PointLabels, Values
+from posefield.common import cancellation
+from posefield.common.array_shapes import PointControls, PointLabels, PointValues, Values
+from posefield.common.units import Indices
 from posefield.inference.session import Session
 from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import ConditionalField
@@ -51,24 +54,36 @@ class TakeSampler:
         """Return whether the model's covariance can be simulated."""
         return random_field.has_features(self._session.card.kriging)
 
-    def deviations(self, controls: PointControls, labels: PointLabels, seed: int) -> Values:
-        """Return a take's deviations (m,) at controls (1, d) and labels (1, p).
+    def deviations(
+        self, controls: PointControls, labels: PointLabels, seeds: Annotated[Indices, "points"]
+    ) -> PointValues:
+        """Return the deviations (B, m) of takes at controls (B, d) and labels (B, p).
 
         They are uncorrelated, each with the variance of sigma, m²: of the coefficients of the
-        finest level, and of a cycle's duration and travel.
+        finest level, and of a cycle's duration and travel. Zero for seeds (B,) of zero.
         """
-        limited = self._session.bounds.limit(controls)
+        limited = np.asarray(self._session.bounds.limit(controls), np.float64)
         points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
-        return self._deviations_cached(tuple(np.hstack([points, labels])[0].tolist()), seed)
+        rows = np.hstack([points, labels]).tolist()
+        found = np.zeros((len(rows), self._count))
+        # Takes of one seed come one after another, while its field is in the cache.
+        for place in np.argsort(seeds, kind="stable").tolist():
+            if seeds[place]:
+                cancellation.check()
+                found[place] = self._deviations_cached(tuple(rows[place]), int(seeds[place]))
+        return found
 
     def _deviations(self, point: tuple[float, ...], seed: int) -> Values:
         found = self._field_cached(seed).evaluate(np.array([point]))
         return np.asarray(self._root_of_sill * found[0])
 
-    def _field(self, seed: int) -> ConditionalField:
+    @property
+    def _count(self) -> int:
         card = self._session.card
-        count = card.levels[0].ranks[2] + len(card.beside)
-        return random_field.simulate(self._session.kriging_weights, seed, count)
+        return card.levels[0].ranks[2] + len(card.beside)
+
+    def _field(self, seed: int) -> ConditionalField:
+        return random_field.simulate(self._session.kriging_weights, seed, self._count)
 
     @cached_property
     def _root_of_sill(self) -> float:

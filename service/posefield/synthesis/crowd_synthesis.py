@@ -11,14 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.units import Floats, Indices, Singles
+from posefield.common.units import Booleans, Floats, Indices, Singles
 from posefield.inference import level_selection
 from posefield.inference.level_selection import LevelCriteria, LevelTable
 from posefield.motion import blend
 from posefield.motion.crowd_clip import CrowdPoses, Placement
-from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis import crowd_takes
+from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 from posefield.validation import crowd_question, crowd_validation
-from posefield.validation.crowd_question import Blending, CrowdQuestion
+from posefield.validation.crowd_question import Blending, CharacterTakes, CrowdQuestion
 
 # Poses of one call: the fewest, the most, and the number of calls to aim for in between. Smaller
 # calls are dominated by their overhead; larger ones exceed a core's cache between operators. The
@@ -36,11 +37,17 @@ _WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
 
 @dataclass(frozen=True)
 class _GraphInputs:
-    """Inputs of the graph: controls (N, d), times (N, 1) and labels (N, p)."""
+    """Inputs of the graph: controls (N, d), times (N, 1) and labels (N, p); and takes.
+
+    seeds, variety, detail (N,): of the characters' takes.
+    """
 
     controls: Singles
     times: Singles
     labels: Singles
+    seeds: Indices
+    variety: Floats
+    detail: Booleans
 
     def __len__(self) -> int:
         return len(self.times)
@@ -78,8 +85,14 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     early = question.times < 0.0
     crowd_validation.raise_for_first("time", question.times, early, "s, expected 0 s or later")
     levels, error_px, sentences = _levels(model, question)
+    takes = crowd_validation.check_takes(card, question)
+    asked_detail = question.takes is not None and bool(question.takes.detail.any())
+    missing = (NO_DETAIL,) if asked_detail and not card.making.detail else ()
     asked = _GraphInputs(
-        controls.astype(np.float32), question.times.astype(np.float32)[:, None], labels
+        controls.astype(np.float32),
+        question.times.astype(np.float32)[:, None],
+        labels,
+        *vars(takes).values(),
     )
     block = _run_graph(model, asked, levels)
     if question.blending is not None:
@@ -106,7 +119,7 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         block.duration,
         block.sigma,
         supported,
-        (*said, *sentences),
+        (*said, *sentences, *missing),
     )
 
 
@@ -161,10 +174,24 @@ def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _Gra
         answers = model.session.run(*given, *vars(block), labels=labels, level=level)
         for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
             whole[rows] = answer[:, 0] if name in _PER_TIME else answer
+        _pose_takes(model, asked, block, level, np.arange(len(asked))[rows])
 
     # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
     list(_WORKERS.map(cancellation.bind_context(fill), list(_calls(levels))))
     return block
+
+
+def _pose_takes(
+    model: Synthesizer, asked: _GraphInputs, block: _GraphOutputs, level: int, rows: Indices
+) -> None:
+    """Replace the poses of those of the characters that have a take, in place."""
+    varied = rows[(asked.seeds[rows] > 0) | asked.detail[rows]]
+    if len(varied):
+        own = asked.rows(varied)
+        takes = CharacterTakes(own.seeds, own.variety, own.detail)
+        given = (own.controls.astype(float), own.times.astype(float), own.labels.astype(float))
+        poses = crowd_takes.pose_takes(model, takes, *given, level)
+        block.rotations[varied], block.root_position[varied] = poses
 
 
 def _blend(

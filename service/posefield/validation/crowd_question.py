@@ -38,6 +38,24 @@ class LabelColumn:
 
 
 @dataclass(frozen=True)
+class CharacterTakes:
+    """Takes of N characters.
+
+    seeds (N,): 0 for the prediction. variety (N,): size of the deviations. detail (N,): whether
+    details are added.
+    """
+
+    seeds: Indices
+    variety: Floats
+    detail: Booleans
+
+    @property
+    def columns(self) -> dict[str, Indices | Floats]:
+        """Return the columns by the names of their fields in a request."""
+        return {"take": self.seeds, "variety": self.variety}
+
+
+@dataclass(frozen=True)
 class CrowdQuestion:
     """Question for one pose of each of N characters.
 
@@ -45,7 +63,7 @@ class CrowdQuestion:
     performers: the distinct performers, None for an unseen performer. performer: (N,), index into
     `performers`. labels: of further label sets. detail: levels of detail (N,), or the view that
     chooses them. extrapolate: policy for controls without similar captured clips. blending:
-    transitions between levels, None without.
+    transitions between levels, None without. takes: of the characters, None for the predictions.
 
     Raises InvalidField, with the index of the first character at fault, for columns of different
     lengths, numbers that are not finite, and positions beyond the precision of float32.
@@ -61,6 +79,7 @@ class CrowdQuestion:
     extrapolate: ExtrapolationPolicy
     blending: "Blending | None" = None
     labels: Mapping[str, LabelColumn] = field(default_factory=dict)
+    takes: "CharacterTakes | None" = None
 
     def __post_init__(self) -> None:
         for name, column in self._columns().items():
@@ -89,6 +108,7 @@ class CrowdQuestion:
             **{f"labels/{name}": column.index for name, column in self.labels.items()},
             **({} if levels is None else {"previous_level" if seen else "level": levels}),
             **({} if own is None else {"from_level": own.levels, "blend": own.shares}),
+            **({} if self.takes is None else self.takes.columns),
         }
 
 

@@ -4,11 +4,16 @@ import numpy as np
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import Booleans, Floats, Indices, Singles
+from posefield.kriging import random_field
 from posefield.kriging.support import Support
 from posefield.model_file import answer_bounds
 from posefield.model_file.model_card import Control, ModelCard
+from posefield.question.motion_question import MAX_TAKE
 from posefield.validation import input_limits, question_validation
-from posefield.validation.crowd_question import CrowdQuestion
+from posefield.validation.crowd_question import CharacterTakes, CrowdQuestion
+
+MAX_TAKES = 2_000
+"""Largest number of characters with a take; each takes up to a millisecond."""
 
 
 def check_controls(
@@ -104,6 +109,28 @@ def raise_for_first(field: str, values: Floats, bad: Booleans, expected: str) ->
     if bad.any():
         first = int(np.argmax(bad))
         raise InvalidField(field, f"{values[first]:.9g} {expected}", first)
+
+
+def check_takes(card: ModelCard, question: CrowdQuestion) -> CharacterTakes:
+    """Return the takes of the characters; detail is false where the model has none.
+
+    Raises InvalidField for a seed or a variety out of range, for more takes than `MAX_TAKES`, and
+    for a model without takes.
+    """
+    count = len(question)
+    none = CharacterTakes(np.zeros(count, np.int64), np.zeros(count), np.zeros(count, dtype=bool))
+    found = question.takes or none
+    seeds, variety = found.seeds, found.variety
+    outside = (seeds < 0) | (seeds > MAX_TAKE)
+    raise_for_first("take", seeds, outside, f"expected 0 to {MAX_TAKE}")
+    raise_for_first("variety", variety, (variety < 0.0) | (variety > 1.0), "expected 0 to 1")
+    taken = int(np.count_nonzero(seeds))
+    if taken > MAX_TAKES:
+        raise InvalidField("take", f"{taken} characters with takes, expected at most {MAX_TAKES}")
+    if taken and not random_field.has_features(card.kriging):
+        name = card.kriging.covariance
+        raise InvalidField("take", f"given, but no takes can be drawn of {name} kriging")
+    return CharacterTakes(seeds, variety, found.detail & bool(card.making.detail))
 
 
 def check_times(times: Floats, durations: Singles, slack: Floats) -> None:

@@ -26,15 +26,26 @@ from posefield.motion.crowd_clip import Placement
 from posefield.motion.skeleton import Skeleton
 from posefield.question import json_decoding as bodies
 from posefield.question.body_kind import DEFAULT_BODY
-from posefield.question.motion_question import ExtrapolationPolicy, LabelValue, RootMode
+from posefield.question.motion_question import (
+    MAX_TAKE,
+    ExtrapolationPolicy,
+    LabelValue,
+    RootMode,
+)
 from posefield.question.walk_question import WalkQuestion
-from posefield.validation.crowd_question import Blending, CrowdQuestion, LabelColumn
+from posefield.validation.crowd_question import (
+    Blending,
+    CharacterTakes,
+    CrowdQuestion,
+    LabelColumn,
+)
 
 DEFAULT_PIXELS = 1.0
 VALUES, FEWEST = 64, 100_000
 """Maximum values of a character, and minimum number of characters that the limit allows for."""
 # float, since JSON has one number type: 1.0 is a valid level.
 Level = Annotated[float, msgspec.Meta(ge=0, le=127)]
+Seed = Annotated[float, msgspec.Meta(ge=0, le=MAX_TAKE)]
 Share = Annotated[float, msgspec.Meta(ge=0, le=1)]
 Numbers = float | list[float]
 
@@ -65,6 +76,9 @@ class CrowdBody(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     budget_ms: Annotated[float, msgspec.Meta(gt=0)] | None = None
     root: RootMode = "travelling"
     extrapolate: ExtrapolationPolicy = "warn"
+    take: Seed | list[Seed] | Literal["index"] = 0.0
+    variety: Share | list[Share] = 0.7
+    detail: bool = False
 
 
 def of_body(content: bytes, most: float) -> CrowdQuestion:
@@ -88,6 +102,7 @@ def of_body(content: bytes, most: float) -> CrowdQuestion:
         body.extrapolate,
         _blending(body, count),
         {name: LabelColumn(*_distinct(given, count)) for name, given in body.labels.items()},
+        _takes(body, count),
     )
 
 
@@ -143,16 +158,28 @@ def _detail(body: CrowdBody, count: int) -> Indices | LevelCriteria:
     for name in ("previous_level", "camera", "pixels", "budget_ms"):
         if getattr(body, name) is not None:
             raise InvalidField(name, 'given without level "auto", expected only with it')
-    return _levels("level", body.level if isinstance(body.level, list) else [body.level] * count)
+    return _whole("level", body.level if isinstance(body.level, list) else [body.level] * count)
 
 
-def _levels(name: str, given: Sequence[float]) -> Indices:
+def _whole(name: str, given: Sequence[float]) -> Indices:
+    """Return whole numbers (N,); FormError for another number."""
     values = np.array(given)
     parts = np.flatnonzero(values % 1.0)
     if len(parts):
         place, found = str(parts[0]), values[parts[0]]
         raise FormError(f"{name}/{place}", f"{found:g}, expected a whole number")
     return values.astype(np.int64)
+
+
+def _takes(body: CrowdBody, count: int) -> CharacterTakes | None:
+    """Return the takes of the characters; "index" is a seed of its own for each, from 1 on."""
+    if body.take == 0.0 and not body.detail:
+        return None
+    if body.take == "index":
+        seeds = 1 + np.arange(count)
+    else:
+        seeds = _whole("take", body.take if isinstance(body.take, list) else [body.take] * count)
+    return CharacterTakes(seeds, _column(body.variety, count), np.full(count, body.detail))
 
 
 def _blending(body: CrowdBody, count: int) -> Blending | None:
@@ -162,7 +189,7 @@ def _blending(body: CrowdBody, count: int) -> Blending | None:
         raise InvalidField("blend", "expected from_level and blend, or neither")
     if body.level == "auto" and body.previous_level is None:
         raise InvalidField("previous_level", 'missing; level "auto" with blend holds it')
-    return Blending(_levels("from_level", body.from_level), _column(body.blend, count))
+    return Blending(_whole("from_level", body.from_level), _column(body.blend, count))
 
 
 def _view(body: CrowdBody) -> LevelCriteria:
@@ -174,7 +201,7 @@ def _view(body: CrowdBody) -> LevelCriteria:
         Camera(np.array(lens.position), lens.fov, lens.height),
         DEFAULT_PIXELS if body.pixels is None else body.pixels,
         None if body.budget_ms is None else body.budget_ms / 1000.0,
-        None if previous is None else _levels("previous_level", previous),
+        None if previous is None else _whole("previous_level", previous),
     )
 
 

@@ -76,8 +76,8 @@ def test_a_captured_clip_is_its_own_only_take_without_nugget(model):
     card = model.session.card
     exact = replace(card, kriging=replace(card.kriging, nugget=0.0))
     row = np.array(card.examples[:1]), card.clip_labels[:1]
-    found = TakeSampler(replace(model.session, card=exact)).deviations(*row, SEED)
-    noisy = TakeSampler(model.session).deviations(*row, SEED)
+    found = TakeSampler(replace(model.session, card=exact)).deviations(*row, np.array([SEED]))
+    noisy = TakeSampler(model.session).deviations(*row, np.array([SEED]))
     # Without nugget the system is badly conditioned.
     assert np.abs(found).max() < 1e-3 * np.abs(noisy).max()
 
@@ -91,7 +91,9 @@ def test_a_take_is_a_smooth_function_of_the_controls(model):
 
     def largest_step(seeds):
         pairs = zip(points, seeds, strict=True)
-        path = np.array([sampler.deviations(own[None], nobody, seed) for own, seed in pairs])
+        path = np.array(
+            [sampler.deviations(own[None], nobody, np.array([seed]))[0] for own, seed in pairs]
+        )
         return np.abs(np.diff(path, axis=0)).max() / np.ptp(path, axis=0).max()
 
     assert largest_step([SEED] * 41) < 0.15
