@@ -13,6 +13,7 @@ from posefield.model_file import model_card, subgraph
 from posefield_train.contacts import contact_labels, contact_model, contact_table
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
+from posefield_train.report.provenance import Provenance
 from posefield_train.sample import sample_walk
 
 # The graph computes in float32; a label rises within one canonical frame.
@@ -276,3 +277,11 @@ def test_equal_questions_in_one_batch_have_equal_contacts(opened):
         pair = [array[row : row + 1].repeat(2, axis=0) for array in (points, times, weights)]
         (found,) = opened.run(pair[0], pair[1][:, :1], CONTACTS, labels=pair[2])
         assert np.array_equal(found[0], found[1]) and np.array_equal(found[0], whole[row])
+
+
+def test_the_training_report_has_the_accuracy_of_contacts(walk_exported, exported):
+    own = walk_exported.card.diagnostics["contacts"]
+    told = dict(Provenance(walk_exported, ()).figures())
+    assert told["contacts of left-out clips that agree"] == f"{100 * own['agreement']:.1f} %"
+    assert f"{own['brier']:.3f}" in told["their Brier score (of the mean clip)"]
+    assert not [name for name, _ in Provenance(exported, ()).figures() if "contacts" in name]

@@ -1,6 +1,6 @@
 """Provenance of a model: card, file size, notes and the time of each training step."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,9 +87,22 @@ class Provenance:
             ("error by truncation (RMS)", f"{100 * found['truncation_rms_m']:.2f} cm"),
             ("error of a left-out clip (RMS)", f"{100 * found['leave_one_out_rms_m']:.2f} cm"),
             ("of the motion explained by controls", f"{100 * found['explained']['pose']:.0f} %"),
+            *_contact_figures(found),
             ("largest difference from the reference", f"{100 * found['parity_m']:.5f} cm"),
             ("training time", f"{self.seconds:.1f} s"),
         ]
+
+
+def _contact_figures(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the accuracy of contacts, if the model has them."""
+    own = found.get("contacts")
+    if own is None:
+        return []
+    scores = f"{own['brier']:.3f} ({own['climatology']:.3f})"
+    return [
+        ("contacts of left-out clips that agree", f"{100 * own['agreement']:.1f} %"),
+        ("their Brier score (of the mean clip)", scores),
+    ]
 
 
 def _times(sizes: Sequence[int]) -> str:
