@@ -8,7 +8,8 @@ import pytest
 from posefield.common.units import UP
 from posefield.motion import quat
 from posefield_train.evaluate import compared_motion, motion_errors
-from posefield_train.evaluate.compared_motion import FRAMES, ComparedMotion
+from posefield_train.evaluate.compared_motion import ComparedMotion
+from posefield_train.tensor.uniform_motion import FRAMES
 
 ROUNDING = 1e-9
 FEET = (1,)

@@ -271,7 +271,9 @@ def _motions_of_values(
 ) -> list[ComparedMotion]:
     """Return motions of predicted values, with the model's timing, travel, chart and bones."""
     beside, model = values.beside, trained.model
-    poses = uniform_motion.predicted_poses(model.timing, trained.tensor, values.numbers, beside)
+    poses = uniform_motion.predicted_poses(
+        model.timing, trained.tensor, values.numbers, beside["warp"], beside.get("travel")
+    )
     offsets = model.proportions.numpy(beside["offsets"])
     durations = np.exp(beside["duration"][:, 0])
     return _motions(trained, poses.rotations, poses.path, offsets, durations, beside["warp"], event)

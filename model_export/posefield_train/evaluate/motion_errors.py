@@ -9,7 +9,8 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import foot_skate
 from posefield_train.align import dtw, time_alignment
-from posefield_train.evaluate.compared_motion import FRAMES, ComparedMotion
+from posefield_train.evaluate.compared_motion import ComparedMotion
+from posefield_train.tensor.uniform_motion import FRAMES
 
 
 @dataclass(frozen=True)

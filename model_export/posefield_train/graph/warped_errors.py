@@ -78,7 +78,9 @@ def predicted_positions(
     slices: of the whitened tensor (D', T, N). values: of the other quantities by name. Points of
     the curves follow those of the joints.
     """
-    found = uniform_motion.predicted_poses(timing, tensor, tensor.numbers(slices), values)
+    found = uniform_motion.predicted_poses(
+        timing, tensor, tensor.numbers(slices), values["warp"], values.get("travel")
+    )
     translations = skeleton.translations(proportions.numpy(values["offsets"]), found.path)
     joints = skeleton.positions(parents, found.rotations, translations)
     return _with_curves(joints, tensor.curves, found.curves)

@@ -1,5 +1,6 @@
 """ONNX graph of the bank of coefficient models; `kriging_bank` is its NumPy counterpart."""
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -224,7 +225,7 @@ def _sigma(
 
 def _log_sill(bank: KrigingBank) -> float:
     """Return the logarithm of the sill, m²; clips without any error have a sill of zero."""
-    return float(np.log(max(bank.sill, np.finfo(np.float32).tiny)))
+    return math.log(max(bank.sill, float(np.finfo(np.float32).tiny)))
 
 
 def _sill(bank: KrigingBank, net: GraphBuilder) -> str:

@@ -1,12 +1,11 @@
 """Motions at uniform times, captured and predicted, whatever their duration."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import ClipPaths, ClipRotations, Rotations
+from posefield.common.array_shapes import ClipPaths, ClipRotations, ClipTravel, Rotations
 from posefield.common.units import Floats
 from posefield.motion import curves, skeleton
 from posefield.motion.clip import Clip
@@ -41,19 +40,20 @@ def predicted_poses(
     timing: CanonicalTiming,
     tensor: MotionTensor,
     numbers: Annotated[Floats, "clips canonical dof"],
-    values: Mapping[str, Floats],
+    logs: Annotated[Floats, "clips knots"],
+    travels: ClipTravel | None,
 ) -> UniformPoses:
     """Return the poses of predicted pose vectors (N, T, D) on canonical time.
 
-    values: of the other quantities by name, of which `warp` and, for cycles, `travel` are used.
+    logs: log increments (N, knots) of their warps. travels: (N, 3) of cycles.
     """
     steps = np.tile(UNIFORM_SHARES, (len(numbers), 1))
-    _, place = timing.numpy(np.zeros((len(steps), 1)), values["warp"], steps)
+    _, place = timing.numpy(np.zeros((len(steps), 1)), logs, steps)
     share = place / (timing.frames - 1)
     pairs = zip(numbers, share, strict=True)
     found = np.stack([time_alignment.interpolate(*pair) for pair in pairs])
     rotations, path = tensor.chart.poses(found)
-    if "travel" in values:
-        rotations, path = travel.put_back(rotations, path, values["travel"], share)
+    if travels is not None:
+        rotations, path = travel.put_back(rotations, path, travels, share)
     own = curves.clamp(tensor.curves, found[..., tensor.chart.curve_numbers])
     return UniformPoses(rotations, path, own)
