@@ -1,0 +1,1 @@
+"""Measures of standing feet, and the service's answers that are measured on folds."""

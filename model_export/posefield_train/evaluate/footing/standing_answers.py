@@ -1,0 +1,86 @@
+"""Answers of the service with feet as predicted and with standing feet, for held-out clips."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.feet import limbs
+from posefield.inference import session
+from posefield.motion.clip import Clip
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train.evaluate import compared_motion, motion_errors
+from posefield_train.evaluate.footing import foot_quality
+from posefield_train.evaluate.footing.foot_quality import FootQuality
+from posefield_train.source.ingest import Example
+
+
+@dataclass(frozen=True)
+class FeetAnswer:
+    """Measures of one held-out clip: as captured, as predicted, and with standing feet.
+
+    predicted_error, standing_error: mean relative distance from the captured clip after time
+    warping, m. lowered: largest distance by which the pelvis was lowered, m.
+    """
+
+    captured: FootQuality
+    predicted: FootQuality
+    standing: FootQuality
+    predicted_error: float
+    standing_error: float
+    lowered: float
+
+
+def feet_answers(name: str, file: bytes, held: Sequence[Example]) -> list[FeetAnswer]:
+    """Return the answers of a model file for held-out clips, with their labels known.
+
+    Empty for a model that names no feet with legs.
+    """
+    model = Synthesizer(name, session.open_bytes(file, name))
+    card = model.session.card
+    bones = card.skeleton.offsets
+    legs = [limbs.find_limb(card.skeleton.parents, bones, foot) for foot in card.feet]
+    known = [leg for leg in legs if leg]
+    if not known:
+        return []
+    feet, knees = tuple(leg.tip for leg in known), tuple(leg.middle for leg in known)
+    return [_feet_answer(model, example, feet, knees) for example in held]
+
+
+def _feet_answer(
+    model: Synthesizer, example: Example, feet: tuple[int, ...], knees: tuple[int, ...]
+) -> FeetAnswer:
+    clip = example.captured or example.clip
+    rate = min(foot_quality.HIGHEST_RATE, clip.rate)
+    predicted = clips.synthesize_clip(model, _question(model, example, rate, "as_predicted"))
+    standing = clips.synthesize_clip(model, _question(model, example, rate, "stand"))
+    errors = [_relative_error(answer.clip, clip) for answer in (predicted, standing)]
+    quality = [
+        foot_quality.measure(own, rate, feet, knees)
+        for own in (clip, predicted.clip, standing.clip)
+    ]
+    report = standing.trust.feet
+    return FeetAnswer(*quality, *errors, report.lowered if report else 0.0)
+
+
+def _question(model: Synthesizer, example: Example, rate: float, feet: str) -> ClipQuestion:
+    card = model.session.card
+    known = {own.name: set(own.names) for own in card.labels}
+    labels: Mapping[str, str] = {
+        name: value for name, value in example.row.labels.items() if value in known.get(name, ())
+    }
+    controls = {
+        control.name: float(value)
+        for control, value in zip(card.controls, example.controls, strict=True)
+    }
+    return ClipQuestion(
+        controls=controls, labels=labels, extrapolate="ok", exact="none", fps=rate, feet=feet
+    )
+
+
+def _relative_error(made: Clip, captured: Clip) -> float:
+    """Return the mean relative distance of a clip from the captured one, m."""
+    one, other = (compared_motion.motion_of_clip(own, None) for own in (made, captured))
+    return float(motion_errors.compare_motions(one, other, ()).relative.mean)
