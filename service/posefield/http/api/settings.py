@@ -34,7 +34,7 @@ class Settings:
     crowd_limit: characters of a crowd. crowd_poses: poses of all motions of a walking crowd.
     crowd_frames: frames of each motion of a walking crowd. clips_limit: clips of an archive.
     clips_poses: frames of all clips of an archive. clips_targets: targets of all clips of an
-    archive; one of a clip with open controls counts as four, each pinned foot counts as four more.
+    archive; one of a clip with open controls counts as four.
     grid_limit: points of a grid of sigma.
 
     reload: time between two checks for new models; 0 for never. versions: older versions of a model

@@ -70,8 +70,7 @@ def _check_targets(model: Synthesizer, queries: Sequence[ClipQuery], most: int) 
         raise InvalidField(
             "clips",
             f"targets of all clips cost {cost}, expected at most {most}; a target counts as one, "
-            f"as {targets.OPEN_COST} where controls are left open, "
-            f"each pinned foot as {targets.PIN_COST}",
+            f"as {targets.OPEN_COST} where controls are left open",
         )
 
 
