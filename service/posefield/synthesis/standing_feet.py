@@ -158,7 +158,7 @@ def _measured(
     before: PoseAnswer[np.float64],
     plan: FeetPlan,
 ) -> dict[str, float]:
-    """Return the measured controls of an answer, moved by as much as the feet's placing moves them.
+    """Return the measured controls of an answer, changed as the placing of the feet changes them.
 
     before: the whole motion, on the grid of the plan. Controls that constrain it stay.
     """
