@@ -77,7 +77,9 @@ def _crowd(person: Skeleton, made: Motions, played: Indices) -> CrowdClip:
 
 def _batches(made: Motions) -> Iterator[Motions]:
     for start in range(0, len(made), BATCH):
-        yield Motions(*(value[start : start + BATCH] for value in vars(made).values()))
+        part = slice(start, start + BATCH)
+        arrays = (None if value is None else value[part] for value in vars(made).values())
+        yield Motions(*arrays)
 
 
 def _person() -> Skeleton:

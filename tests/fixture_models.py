@@ -1,11 +1,15 @@
 """Trained models of the fixtures, each built once and cached by `fixture_cache`."""
 
+import csv
 import functools
+import re
 import tomllib
 from pathlib import Path
 
 import fixture_cache
+import numpy as np
 
+from posefield.common.units import Floats
 from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
@@ -68,7 +72,16 @@ def curves_recipe() -> Recipe:
     return Recipe.model_validate(alone)
 
 
+@functools.cache
+def treading_recipe() -> Recipe:
+    """Return the recipe of the procedural walk with the pressure of both soles as curves."""
+    whole = tomllib.loads(sample_walk.RECIPE_TEXT)
+    curves = {"suffix": ".curves.csv", "range": [0.0, 1.0]}
+    return Recipe.model_validate({**whole, "name": "treading", "curves": curves})
+
+
 RECIPES = {
+    "treading": treading_recipe,
     "reaching": small_recipe,
     "labelled": labelled_recipe,
     "stroll": sample_walk.recipe,
@@ -130,3 +143,25 @@ def _write_styles(folder: Path) -> None:
 def _write_strides(folder: Path) -> None:
     folder.mkdir()
     sample_walk.write_walk(folder)
+    with (folder / "strides.csv").open(newline="") as table:
+        for row in csv.DictReader(table):
+            _write_soles(folder / row["file"], float(row["haste"]) / 3.6)
+
+
+SOLES = {"soleLeft": 0.3, "soleRight": 0.8}
+"""Curves of the procedural walk: the phase of the stride at which each sole presses most."""
+
+
+def sole_pressure(phases: Floats, speed: float) -> Floats:
+    """Return the pressure (F, 2) of both soles at phases (F,) of a stride at a speed, m/s."""
+    peaks = np.array(list(SOLES.values()))
+    return (0.1 + 0.4 * speed / 1.5) * (1.0 + np.cos(2.0 * np.pi * (phases[:, None] - peaks)))
+
+
+def _write_soles(motion: Path, speed: float) -> None:
+    """Write the curves of a stride beside its motion file."""
+    frames = int(re.search(r"Frames: (\d+)", motion.read_text())[1])
+    values = sole_pressure(np.linspace(0.0, 1.0, frames), speed)
+    lines = [f"frame,{','.join(SOLES)}"]
+    lines += [f"{frame},{left:.6f},{right:.6f}" for frame, (left, right) in enumerate(values)]
+    motion.with_suffix(".curves.csv").write_text("\n".join(lines) + "\n")

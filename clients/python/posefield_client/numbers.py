@@ -95,7 +95,8 @@ class CrowdPoses(Arrays, frozen=True, eq=False):
     rotations: (N, J, 4), the root's in world space. root_position: (N, 3) in world space, m.
     bone_offsets: (N, J, 3), m. duration: (N,), s. sigma: (N,), m. levels: (N,). error_px: (N,);
     None without a camera. supported: (N,), True near captured clips; None from services that do not
-    report it.
+    report it. curves: values (N, C) of the curves with names curve_names; None for a model without
+    them.
     """
 
     model: str
@@ -111,6 +112,8 @@ class CrowdPoses(Arrays, frozen=True, eq=False):
     levels: Array
     error_px: Array | None = None
     supported: Array | None = None
+    curve_names: tuple[str, ...] = ()
+    curves: Array | None = None
 
 
 def _array(kind: type, found: Any) -> Array:
@@ -159,6 +162,8 @@ SHAPES: dict[Any, dict[str, str]] = {
         "levels": "N",
         "error_px": "N",
         "supported": "N",
+        "curve_names": "C",
+        "curves": "NC",
     },
 }
 """Axes of the arrays: a letter is one length throughout a response, a digit that length."""

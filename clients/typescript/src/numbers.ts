@@ -57,6 +57,8 @@ export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
     supported: "supported" in found ? truths(found, "supported", [count]) : null,
     levels: Int32Array.from(int8(found, "levels", [count])),
     errorPx: "error_px" in found ? float32(found, "error_px", [count]) : null,
+    curveNames: "curve_names" in found ? strings(found, "curve_names") : [],
+    curves: "curves" in found ? curvesOf(found, count) : null,
   };
 }
 
@@ -72,9 +74,9 @@ function posesOf(found: Packed): Poses {
   };
 }
 
-function curvesOf(found: Packed, frames: number): Float32Array {
+function curvesOf(found: Packed, rows: number): Float32Array {
   const [, curves = 0] = array(found, "curves").shape;
-  return float32(found, "curves", [frames, curves]);
+  return float32(found, "curves", [rows, curves]);
 }
 
 function unpacked(content: Uint8Array<ArrayBuffer>): Packed {

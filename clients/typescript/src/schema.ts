@@ -1610,6 +1610,10 @@ export interface components {
             levels: components["schemas"]["LevelNumber"][];
             /** @description Pixels that the error of the level covers. Absent without a camera. */
             error_px?: number[];
+            /** @description Names of the curves. Absent for models without curves. */
+            curve_names?: string[];
+            /** @description Value of each curve for each character, within the limits on the card. Absent for models without curves. */
+            curves?: number[][];
         };
         ModelSummary: {
             name: string;

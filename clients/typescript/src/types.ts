@@ -88,6 +88,10 @@ export interface CrowdPoses {
   readonly levels: Int32Array;
   /** N, where a camera was given. */
   readonly errorPx: Float32Array | null;
+  /** Names of the curves; empty for models without them. */
+  readonly curveNames: readonly string[];
+  /** N × C, for models with curves. */
+  readonly curves: Float32Array | null;
 }
 
 /** What the head of an answer says of a file. */

@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { encode } from "@msgpack/msgpack";
 
 import { Unexpected } from "../src/index.ts";
-import { motion, poses } from "../src/numbers.ts";
+import { crowd, motion, poses } from "../src/numbers.ts";
 
 const TRUST = {
   model: "face@0123456789abcdef",
@@ -47,6 +47,31 @@ test("poses and motions have their curves", () => {
   const found = motion(answer(CURVES));
   assert.deepEqual(found.curveNames, ["jawOpen", "smile"]);
   assert.deepEqual(found.curves, Float32Array.of(0, 1, 2, 3, 4, 5));
+});
+
+function characters(more: object): Uint8Array<ArrayBuffer> {
+  const plain = {
+    model: TRUST.model,
+    warnings: [],
+    names: ["a", "b"],
+    parents: [-1, 0],
+    rotations: packed("<f4", 3, 2, 4),
+    root_position: packed("<f4", 3, 3),
+    bone_offsets: packed("<f4", 3, 2, 3),
+    duration: packed("<f4", 3),
+    sigma: packed("<f4", 3),
+    levels: { dtype: "|i1", shape: [3], data: new Uint8Array(3) },
+  };
+  return Uint8Array.from(encode({ ...plain, ...more }));
+}
+
+test("a crowd has the curves of each character, or none", () => {
+  const found = crowd(characters(CURVES));
+  assert.deepEqual(found.curveNames, ["jawOpen", "smile"]);
+  assert.deepEqual(found.curves, Float32Array.of(0, 1, 2, 3, 4, 5));
+  const { curves, curveNames } = crowd(characters({}));
+  assert.deepEqual([curves, curveNames], [null, []]);
+  assert.throws(() => crowd(characters({ ...CURVES, curves: packed("<f4", 2, 2) })), Unexpected);
 });
 
 test("answers without curves have none", () => {

@@ -79,9 +79,13 @@ class ClipEncoder(Format):
         return self.write([answer], convention or self.usual)[0]
 
 
-def max_poses(size: int, joints: int, per_joint: int) -> int:
+CURVES_PER_JOINT = 4
+"""Curves that take as many bytes as a joint, of four numbers or more."""
+
+
+def max_poses(size: int, joints: int, per_joint: int, curves: int = 0) -> int:
     """Return how many poses fit in `size` bytes; the root position counts as a joint."""
-    return size // ((joints + 1) * per_joint)
+    return size // ((joints + 1 + math.ceil(curves / CURVES_PER_JOINT)) * per_joint)
 
 
 def sequential_writer(

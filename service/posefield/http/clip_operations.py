@@ -44,9 +44,10 @@ async def validate(context: Clips, question: FileQuestion) -> ClipTask:
     """Return the question with the limits that its format sets; synthesis checks the rest."""
     encoder, model = context.form, context.model
     convention = encoder.convention(question.unit, question.up, question.body)
-    joints = len(model.session.card.skeleton)
-    fits = max_poses(context.service.settings.output_limit, joints, encoder.bytes_per_joint)
-    stands = standing_feet.wants_standing_feet(model.session.card, question)
+    card = model.session.card
+    sizes = len(card.skeleton), encoder.bytes_per_joint, len(card.curves)
+    fits = max_poses(context.service.settings.output_limit, *sizes)
+    stands = standing_feet.wants_standing_feet(card, question)
     corrected = bool(model.solver.measures or question.has_constraints or stands)
     return ClipTask(question, min(fits, MAX_POSES), convention, corrected)
 

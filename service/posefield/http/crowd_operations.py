@@ -52,8 +52,9 @@ async def read_crowd(context: Crowds, request: Request) -> bytes:
 async def limit_crowd(context: Crowds, content: bytes) -> CrowdTask:
     """Return the body with the limits of the settings and the format."""
     settings, encoder = context.service.settings, context.form
-    joints = len(context.model.session.card.skeleton)
-    fits = max_poses(settings.output_limit, joints, encoder.bytes_per_joint)
+    card = context.model.session.card
+    sizes = len(card.skeleton), encoder.bytes_per_joint, len(card.curves)
+    fits = max_poses(settings.output_limit, *sizes)
     return CrowdTask(content, min(settings.crowd_limit, encoder.most, fits))
 
 
@@ -95,9 +96,8 @@ class WalkTask:
 
 async def limit_walk(context: Walks, question: WalkQuestion) -> WalkTask:
     """Return the order of a walking crowd; InvalidField beyond the limits."""
-    skeleton = context.model.session.card.skeleton
-    settings = context.service.settings
-    order = crowd_query.checked_order(question, context.form.extension, skeleton, settings)
+    card, settings = context.model.session.card, context.service.settings
+    order = crowd_query.checked_order(question, context.form.extension, card, settings)
     return WalkTask(order, question.instancing, question.body or DEFAULT_BODY)
 
 

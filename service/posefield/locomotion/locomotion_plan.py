@@ -115,7 +115,8 @@ def synthesize_poses(
     own = stride.synthesize_poses(session, plan.controls[pair], labels, plan.phases[pair], level)
     headings = plan.headings[pair]
     places = plan.places[pair] + own.places * floor_plane.unit_vectors(headings)
-    return RelativePoses(floor_plane.turn_roots(own.rotations, headings), own.heights, places)
+    rotations = floor_plane.turn_roots(own.rotations, headings)
+    return RelativePoses(rotations, own.heights, places, own.curves)
 
 
 def _measure_strides(

@@ -6,14 +6,15 @@ frame the last pose of a cycle equals its first, and the sway about the arc is p
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.array_shapes import PerPoint, PointControls, PointLabels
 from posefield.common.units import Floats, Indices, Singles
+from posefield.inference import graph_ports
 from posefield.inference.session import Session
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
@@ -75,11 +76,18 @@ class RelativePoses:
     """K poses in frames that travel with the characters.
 
     rotations: (K, J, 4). heights: (K,), of the root, m. places: (K,), of the root over the floor.
+    curves: values (K, C); None for a model without curves.
     """
 
     rotations: Annotated[Floats, "poses joints 4"]
     heights: Annotated[Floats, "poses"]
     places: Annotated[FloorVectors, "poses"]
+    curves: Annotated[Floats, "poses curves"] | None = None
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """Return the arrays that the poses have, by name."""
+        return {name: whole for name, whole in vars(self).items() if whole is not None}
 
 
 def strides(
@@ -122,9 +130,10 @@ def synthesize_poses(
     """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
     own = strides(session, controls, labels, level)
     times = (phases * own.durations)[:, None]
-    asked = ("rotations", "root_position")
-    rotations, roots = _run_batches(session, controls, times, labels, level, *asked)
-    return relative_poses(own, phases, rotations[:, 0], roots[:, 0])
+    asked = ["rotations", "root_position"] + [graph_ports.CURVES] * bool(session.card.curves)
+    rotations, roots, *curves = _run_batches(session, controls, times, labels, level, *asked)
+    posed = relative_poses(own, phases, rotations[:, 0], roots[:, 0])
+    return replace(posed, curves=curves[0][:, 0]) if curves else posed
 
 
 def relative_poses(

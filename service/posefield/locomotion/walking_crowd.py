@@ -24,7 +24,7 @@ from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.routes import Route
 from posefield.locomotion.stride import RelativePoses
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import blend, foot_skate, skeleton
+from posefield.motion import blend, curves, foot_skate, skeleton
 from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 
 # Poses of one batch of motions: 8 MB at 31 joints, or one longer motion.
@@ -109,6 +109,7 @@ def build_crowd(session: Session, plan: LocomotionPlan, shown: LevelSchedule) ->
         np.arange(characters),
         _batches(session, plan.relative_to_start(), shown),
         {**_facts(session, plan), "level_shares": _level_shares(session, shown)},
+        tuple(curve.name for curve in session.card.curves),
     )
 
 
@@ -157,16 +158,20 @@ def motions(
     count, joints = shape[0] * shape[1], len(session.card.skeleton)
     rotations = np.empty((count, joints, 4), np.float32)
     roots = np.empty((count, 3), np.float32)
+    values = np.empty((count, len(session.card.curves)), np.float32)
     for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
         character, frame = np.divmod(np.arange(count)[rows], shape[1])
         posed = _blended_poses(session, plan, (who[character], frame), shown.rows(rows))
         rotations[rows] = posed.rotations
         roots[rows] = floor_plane.at_height(posed.places, posed.heights)
+        if posed.curves is not None:
+            values[rows] = curves.clamp(session.card.curves, posed.curves)
     # Bone lengths must not vary with the speed: they are those at the mean controls.
     usual = plan.controls[who].mean(axis=1)
     bones = stride.bones(session, usual, plan.labels.weights[plan.who[who]])
     turns = rotations.reshape(*shape, joints, 4)
-    return Motions(turns, roots.reshape(*shape, 3), bones, shown.levels)
+    own_curves = values.reshape(*shape, -1) if values.size else None
+    return Motions(turns, roots.reshape(*shape, 3), bones, shown.levels, own_curves)
 
 
 def _blended_poses(
@@ -181,7 +186,7 @@ def _blended_poses(
     if len(between):
         some = pairs[0][between], pairs[1][between]
         before = _at_levels(session, plan, some, shown.previous[between])
-        for name, whole in vars(after).items():
+        for name, whole in after.arrays.items():
             mix = blend.nlerp if name == "rotations" else blend.lerp
             whole[between] = mix(getattr(before, name), whole[between], shares[between])
     return after
@@ -190,14 +195,17 @@ def _blended_poses(
 def _at_levels(
     session: Session, plan: LocomotionPlan, pairs: Pairs, levels: Indices
 ) -> RelativePoses:
-    joints, count = len(session.card.skeleton), len(levels)
+    joints, channels, count = len(session.card.skeleton), len(session.card.curves), len(levels)
     poses = RelativePoses(
-        np.empty((count, joints, 4)), np.empty(count), np.empty(count, dtype=complex)
+        np.empty((count, joints, 4)),
+        np.empty(count),
+        np.empty(count, dtype=complex),
+        np.empty((count, channels)) if channels else None,
     )
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
         own = locomotion_plan.synthesize_poses(session, plan, pairs[0][rows], pairs[1][rows], level)
-        for name, whole in vars(poses).items():
+        for name, whole in poses.arrays.items():
             whole[rows] = getattr(own, name)
     return poses
 

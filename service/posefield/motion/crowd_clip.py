@@ -41,13 +41,15 @@ class Motions:
     """Motions of equal length, each in its character's own frame.
 
     rotations: (M, F, J, 4). root_position: (M, F, 3), m. bone_offsets: (M, J, 3), m. levels (M, F):
-    level of detail at which each pose was computed.
+    level of detail at which each pose was computed. curves: values (M, F, C) of the crowd's curves;
+    None without them.
     """
 
     rotations: Annotated[Singles, "motions frames joints 4"]
     root_position: Annotated[Singles, "motions frames 3"]
     bone_offsets: Annotated[Singles, "motions joints 3"]
     levels: Annotated[Indices, "motions frames"]
+    curves: Annotated[Singles, "motions frames curves"] | None = None
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -61,7 +63,8 @@ class CrowdPoses:
     root_position (N, 3): in the world, m. bone_offsets: (N, J, 3), m. levels (N,): level of detail
     of each character. error_px (N,): projected error of the level, pixels; None without a camera.
     duration (N,): of each character's clip, s. sigma (N,), m, and supported (N,): as in Trust.
-    warnings: sentences about the crowd as a whole.
+    warnings: sentences about the crowd as a whole. curves: values (N, C) of the curves with names
+    curve_names; None for a model without them.
     """
 
     model: str
@@ -75,6 +78,8 @@ class CrowdPoses:
     sigma: Annotated[Singles, "characters"]
     supported: Annotated[Booleans, "characters"]
     warnings: tuple[str, ...]
+    curve_names: tuple[str, ...] = ()
+    curves: Annotated[Singles, "characters curves"] | None = None
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -86,7 +91,8 @@ class CrowdClip:
 
     frames: of each motion. rate: frames a second. motion (N,): index of the motion that each
     character plays. batches: the motions in order, several at a time, computed lazily to bound
-    memory; they can be iterated once. facts: provenance as plain values.
+    memory; they can be iterated once. facts: provenance as plain values. curves: names of the
+    motions' curves; empty where they have none.
     """
 
     skeleton: Skeleton
@@ -96,6 +102,7 @@ class CrowdClip:
     motion: Annotated[Indices, "characters"]
     batches: Iterable[Motions]
     facts: Mapping[str, Any]
+    curves: tuple[str, ...] = ()
 
     @property
     def shared(self) -> bool:

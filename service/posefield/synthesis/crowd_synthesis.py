@@ -12,9 +12,10 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.units import Booleans, Floats, Indices, Singles
-from posefield.inference import level_selection
+from posefield.inference import graph_ports, level_selection
 from posefield.inference.level_selection import LevelCriteria, LevelTable
-from posefield.motion import blend
+from posefield.model_file.model_card import ModelCard
+from posefield.motion import blend, curves
 from posefield.motion.crowd_clip import CrowdPoses, Placement
 from posefield.synthesis import crowd_takes
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
@@ -59,7 +60,10 @@ class _GraphInputs:
 
 @dataclass(frozen=True)
 class _GraphOutputs:
-    """Outputs of the graph for N characters, each in the frame of its own clip."""
+    """Outputs of the graph for N characters, each in the frame of its own clip.
+
+    curves: (N, C); None for a model without them.
+    """
 
     rotations: Singles
     root_position: Singles
@@ -67,6 +71,12 @@ class _GraphOutputs:
     duration: Singles
     sigma: Singles
     travel: Singles
+    curves: Singles | None = None
+
+    @property
+    def arrays(self) -> dict[str, Singles]:
+        """Return the outputs that the graph has, by name."""
+        return {name: whole for name, whole in vars(self).items() if whole is not None}
 
 
 def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
@@ -120,6 +130,8 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         block.sigma,
         supported,
         (*said, *sentences, *missing),
+        tuple(curve.name for curve in card.curves),
+        block.curves,
     )
 
 
@@ -164,15 +176,13 @@ def _levels_in_transition(
 
 
 def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _GraphOutputs:
-    joints = len(model.session.card.skeleton)
-    shapes = ((joints, 4), (3,), (joints, 3), (), (), (3,))
-    block = _GraphOutputs(*(np.empty((len(asked), *shape), np.float32) for shape in shapes))
+    block = _empty_outputs(model.session.card, len(asked))
 
     def fill(part: tuple[int, Indices | slice]) -> None:
         level, rows = part
         given, labels = (asked.controls[rows], asked.times[rows]), asked.labels[rows]
-        answers = model.session.run(*given, *vars(block), labels=labels, level=level)
-        for (name, whole), answer in zip(vars(block).items(), answers, strict=True):
+        answers = model.session.run(*given, *block.arrays, labels=labels, level=level)
+        for (name, whole), answer in zip(block.arrays.items(), answers, strict=True):
             whole[rows] = answer[:, 0] if name in _PER_TIME else answer
         _pose_takes(model, asked, block, level, np.arange(len(asked))[rows])
 
@@ -190,8 +200,17 @@ def _pose_takes(
         own = asked.rows(varied)
         takes = CharacterTakes(own.seeds, own.variety, own.detail)
         given = (own.controls.astype(float), own.times.astype(float), own.labels.astype(float))
-        poses = crowd_takes.pose_takes(model, takes, *given, level)
-        block.rotations[varied], block.root_position[varied] = poses
+        turned, path, values = crowd_takes.pose_takes(model, takes, *given, level)
+        block.rotations[varied], block.root_position[varied] = turned, path
+        if block.curves is not None:
+            block.curves[varied] = values
+
+
+def _empty_outputs(card: ModelCard, count: int) -> _GraphOutputs:
+    joints = len(card.skeleton)
+    shapes = [(joints, 4), (3,), (joints, 3), (), (), (3,)]
+    shapes += [(len(card.curves),)] if card.curves else []
+    return _GraphOutputs(*(np.empty((count, *shape), np.float32) for shape in shapes))
 
 
 def _blend(
@@ -206,12 +225,15 @@ def _blend(
     if len(rows):
         before = _run_graph(model, asked.rows(rows), blending.levels[rows])
         shares = blending.shares[rows].astype(np.float32)
-        for name, whole in vars(block).items():
+        for name, whole in block.arrays.items():
             mixing = blend.nlerp if name == "rotations" else blend.lerp
             whole[rows] = mixing(getattr(before, name), whole[rows], shares)
+        if block.curves is not None:
+            # Rounding of the blend may leave the limits.
+            block.curves[rows] = curves.clamp(model.session.card.curves, block.curves[rows])
 
 
-_PER_TIME = ("rotations", "root_position", "travel")
+_PER_TIME = ("rotations", "root_position", "travel", graph_ports.CURVES)
 
 
 def _calls(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:

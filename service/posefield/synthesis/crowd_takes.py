@@ -10,7 +10,7 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.array_shapes import Frames, PointControls, PointLabels
 from posefield.common.units import Floats
-from posefield.motion import blend, quat, root_travel
+from posefield.motion import blend, curves, quat, root_travel
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.crowd_question import CharacterTakes
 
@@ -22,8 +22,14 @@ def pose_takes(
     times: Annotated[Floats, "points 1"],
     labels: PointLabels,
     level: int,
-) -> tuple[Annotated[Floats, "points joints 4"], Annotated[Floats, "points 3"]]:
-    """Return rotations (N, J, 4) and root positions (N, 3), m, of characters in their own frames.
+) -> tuple[
+    Annotated[Floats, "points joints 4"],
+    Annotated[Floats, "points 3"],
+    Annotated[Floats, "points curves"],
+]:
+    """Return rotations (N, J, 4), root positions (N, 3), m, and values (N, C) of the curves.
+
+    The characters are in their own frames.
 
     controls (N, d), times (N, 1), s, and labels (N, p) are those of the characters.
     """
@@ -36,10 +42,12 @@ def pose_takes(
     moves = np.einsum("nt,ntd->nd", reduced.rows(frames), motions.reshape(-1, r2, r1))
     moves += _details(model, takes, frames, level)
     numbers = reduced.mean + moves @ reduced.directions
-    vectors = numbers[:, 3 : 3 + 3 * len(reduced.rotations)].reshape(len(numbers), -1, 3)
+    end = 3 + 3 * len(reduced.rotations)
+    vectors = numbers[:, 3:end].reshape(len(numbers), -1, 3)
     rotations = quat.mul(reduced.rotations, quat.exp(vectors))
     share = frames / (reduced.frames - 1)
-    return root_travel.add_travel(rotations, numbers[:, :3], share[:, None] * travel)
+    turned, path = root_travel.add_travel(rotations, numbers[:, :3], share[:, None] * travel)
+    return turned, path, curves.clamp(model.session.card.curves, numbers[:, end:])
 
 
 def _details(

@@ -61,3 +61,28 @@ def test_an_answer_without_curves_has_none():
 def test_curves_that_do_not_fit_are_refused(shape):
     with pytest.raises(ValueError, match="curves has the shape"):
         clip(curve_names=["jawOpen", "smile"], curves=packed(np.zeros(shape)))
+
+
+def crowd(**more):
+    count, joints = 3, 2
+    head = {"model": TRUST["model"], "names": ["a", "b"], "parents": [-1, 0]}
+    arrays = {
+        "rotations": packed(np.zeros((count, joints, 4))),
+        "root_position": packed(np.zeros((count, 3))),
+        "bone_offsets": packed(np.zeros((count, joints, 3))),
+        "duration": packed(np.ones(count)),
+        "sigma": packed(np.ones(count)),
+        "levels": {"dtype": "|i1", "shape": [count], "data": bytes(count)},
+    }
+    plain = {**head, "units": {}, "warnings": [], **arrays, **more}
+    return numbers.crowd(reply(msgspec.msgpack.encode(plain)))
+
+
+def test_a_crowd_has_the_curves_of_each_character_or_none():
+    values = np.arange(6.0).reshape(3, 2)
+    found = crowd(curve_names=["jawOpen", "smile"], curves=packed(values))
+    assert found.curve_names == ("jawOpen", "smile")
+    assert np.array_equal(found.curves, values)
+    assert (crowd().curves, crowd().curve_names) == (None, ())
+    with pytest.raises(ValueError, match="curves has the shape"):
+        crowd(curve_names=["jawOpen"], curves=packed(values))

@@ -14,7 +14,11 @@ FACTS = {
 }
 
 
-def motions(person, count, frames, seed=5):
+CURVES = ("jawOpen", "Sole Left", "眉")
+"""Names of curves that USD does not allow for prims."""
+
+
+def motions(person, count, frames, seed=5, curves=0):
     """Smooth turns of every joint by up to a radian along lines, of people unlike in size."""
     rng = np.random.default_rng(seed)
     t = np.arange(frames) / 30
@@ -25,14 +29,17 @@ def motions(person, count, frames, seed=5):
     path = person.offsets[0] + speed * t[:, None]
     size = rng.uniform(0.85, 1.15, (count, len(person), 1))
     levels = np.repeat(rng.integers(0, 3, (count, -(-frames // 10))), 10, axis=1)[:, :frames]
-    return Motions(*(a.astype("f4") for a in (signs * turns, path, size * person.offsets)), levels)
+    arrays = (a.astype("f4") for a in (signs * turns, path, size * person.offsets))
+    values = rng.uniform(0.0, 1.0, (count, frames, curves)).astype("f4") if curves else None
+    return Motions(*arrays, levels, values)
 
 
 def cut(made, size):
     """The same motions in batches of a size."""
     for start in range(0, len(made), size):
         part = slice(start, start + size)
-        yield Motions(*(value[part] for value in vars(made).values()))
+        arrays = (None if value is None else value[part] for value in vars(made).values())
+        yield Motions(*arrays)
 
 
 def placement(count, seed=6):
@@ -54,6 +61,7 @@ def crowd(person, made, motion, size=3):
         motion=np.asarray(motion),
         batches=cut(made, size),
         facts=FACTS,
+        curves=() if made.curves is None else CURVES[: made.curves.shape[2]],
     )
 
 

@@ -9,6 +9,7 @@ import tempfile
 import tracemalloc
 import weakref
 import zipfile
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 
@@ -180,8 +181,9 @@ def watched(made, alive):
 
 
 def watch(batch, earlier):
-    copy = type(batch)(*(value.copy() for value in vars(batch).values()))
-    earlier.extend(weakref.ref(value) for value in vars(copy).values())
+    copy = deepcopy(batch)
+    arrays = (value for value in vars(copy).values() if value is not None)
+    earlier.extend(map(weakref.ref, arrays))
     return copy
 
 
@@ -236,7 +238,7 @@ def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, tempor
 def written_layers(clip, press):
     rig = character.rig(clip.skeleton)
     each = crowd_motions.all_motions(clip, rig)
-    return [crowd_motions.motion_layer(rig, clip.rate, motion.samples, press) for motion in each]
+    return [crowd_motions.motion_layer(clip, rig, motion.samples, press) for motion in each]
 
 
 def test_motions_are_written_by_template_and_without_one_the_same(clip, made):

@@ -93,7 +93,7 @@ export class Offline implements Source {
 
   async crowd(_: string, question: CrowdQuestion): Promise<CrowdPoses> {
     const rows = columns.rows(question).map((row) => this.#row(row, question.root));
-    const { skeleton, identity } = this.#card;
+    const { skeleton, identity, curves = [] } = this.#card;
     return {
       model: identity,
       names: skeleton.names,
@@ -107,6 +107,10 @@ export class Offline implements Source {
       supported: rows.map(({ clip }) => clip.trust.supported ?? false),
       levels: Int32Array.from(rows, ({ clip }) => clip.trust.level),
       errorPx: null,
+      curveNames: curves.map(({ name }) => name),
+      curves: curves.length
+        ? columns.joined(rows.map(({ clip, time }) => curvesAt(clip, time)!))
+        : null,
     };
   }
 
@@ -127,7 +131,7 @@ export class Offline implements Source {
     const clip = this.#motion(asked, root ?? "travelling");
     const slack = 1 + (asked.level ? COARSE : ROUNDING);
     door.within("time", row.time, 0, clip.trust.duration * slack);
-    return { asked, clip, now: at(clip, row.time) };
+    return { asked, clip, time: row.time, now: at(clip, row.time) };
   }
 
   #asked(question: Asked["question"] & { readonly level?: number }): Asked {

@@ -1,5 +1,6 @@
 """Crowd poses as tables of one row per character."""
 
+from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,8 @@ def _columns(poses: CrowdPoses) -> dict[str, Column]:
     found["levels"] = poses.levels.astype(np.int8)
     if poses.error_px is not None:
         found["error_px"] = as_float32(poses.error_px)
+    if poses.curves is not None:
+        found["curves"] = as_float32(poses.curves)
     return found
 
 
@@ -41,6 +44,7 @@ def _facts(poses: CrowdPoses) -> dict[str, Any]:
         "model": poses.model,
         "names": list(poses.skeleton.names),
         "parents": list(poses.skeleton.parents),
+        **({"curve_names": list(poses.curve_names)} if poses.curve_names else {}),
         "units": {name: UNITS[name] for name in _UNIT_NAMES}
         | {"error_px": "pixel", "frame": "world"},
         "warnings": list(poses.warnings),
@@ -51,12 +55,13 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
     """Write a crowd to an .npz file.
 
     rotations: (N, F, J, 4). root_position: (N, F, 3), m. bone_offsets: (N, J, 3), m. rate: frames a
-    second. joints: names. Raises FileError if the file cannot be written.
+    second. joints: names. With curves also their values, curves: (N, F, C), and curve_names. Raises
+    FileError if the file cannot be written.
     """
     made = list(crowd.batches)
-    rotations, roots, bones = (
+    rotations, roots, bones, *curves = (
         np.concatenate([getattr(motions, part) for motions in made])[crowd.motion]
-        for part in _MOTION_ARRAYS
+        for part in (*_MOTION_ARRAYS, *(["curves"] if crowd.curves else []))
     )
     turned, moved = _world_motion(crowd, rotations, roots)
     content = BytesIO()
@@ -67,11 +72,17 @@ def write_npz(crowd: CrowdClip, path: Path) -> None:
         bone_offsets=bones,
         rate=crowd.rate,
         joints=np.array(crowd.skeleton.names),
+        **_curve_arrays(crowd, curves),
     )
     atomic_files.write(content.getvalue(), path)
 
 
 _MOTION_ARRAYS = ("rotations", "root_position", "bone_offsets")
+
+
+def _curve_arrays(crowd: CrowdClip, curves: Sequence[Singles]) -> dict[str, Any]:
+    """Return the curves (N, F, C), if there are any, and their names."""
+    return {"curves": curves[0], "curve_names": np.array(crowd.curves)} if curves else {}
 
 
 def _world_motion(crowd: CrowdClip, rotations: Singles, roots: Singles) -> tuple[Singles, Singles]:

@@ -7,12 +7,12 @@ from itertools import chain
 
 import numpy as np
 
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Floats, Indices, Singles
 from posefield.encode.character import animation_samples
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.files.file_convention import METRES
 from posefield.encode.usd import custom_data
-from posefield.encode.usd.layer_content import LayerContent, Samples
+from posefield.encode.usd.layer_content import WEIGHTS, LayerContent, Samples
 from posefield.encode.usd.template_cache import CRATE_CACHE, TemplateCache
 from posefield.encode.usd.usd_animation import AnimationLayerBuilder
 from posefield.encode.usd_crowd import crowd_extent
@@ -35,7 +35,8 @@ class MotionSummary:
 class MotionSamples:
     """Samples of one motion and its note.
 
-    samples: translations (F, J, 3), and rotations (F, J, 4), real part last.
+    samples: translations (F, J, 3), rotations (F, J, 4), real part last, and weights of the curves
+    (F, C) where the crowd has some.
     """
 
     samples: Samples
@@ -62,11 +63,11 @@ def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
 
 
 def motion_layer(
-    rig: CharacterRig, rate: float, samples: Samples, press: TemplateCache = CRATE_CACHE
+    crowd: CrowdClip, rig: CharacterRig, samples: Samples, press: TemplateCache = CRATE_CACHE
 ) -> bytes:
-    """Return the binary layer of one motion, written by `press`."""
+    """Return the binary layer of one motion of a crowd, written by `press`."""
     return press.write(
-        AnimationLayerBuilder(rate, METRES, rig.paths),
+        AnimationLayerBuilder(crowd.rate, METRES, rig.paths, crowd.curves),
         LayerContent(samples, {}, custom_data.NO_FACTS),
     )
 
@@ -75,11 +76,27 @@ def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Itera
     expected = (crowd.frames, len(crowd.skeleton), 4)
     if batch.rotations.shape[1:] != expected:
         raise ValueError(f"motions of {batch.rotations.shape[1:]}, expected {expected}")
+    weights = _weights(crowd, batch)
     made = animation_samples.from_motions(batch)
     boxes = crowd_extent.boxes(rig, made)
-    for part, box, levels in zip(made.parts(1), boxes, batch.levels, strict=True):
+    for index, (part, box) in enumerate(zip(made.parts(1), boxes, strict=True)):
         samples = {"translations": part.translations, "rotations": part.rotations}
-        yield MotionSamples(samples, MotionSummary(box, _level_changes(levels)))
+        if weights is not None:
+            samples[WEIGHTS] = weights[index]
+        yield MotionSamples(samples, MotionSummary(box, _level_changes(batch.levels[index])))
+
+
+def _weights(crowd: CrowdClip, batch: Motions) -> Singles | None:
+    """Return the weights (M, F, C) of the curves of a batch; None for a crowd without curves.
+
+    Raises ValueError for other curves than the crowd names.
+    """
+    found = () if batch.curves is None else batch.curves.shape
+    expected = (len(batch), crowd.frames, len(crowd.curves)) if crowd.curves else ()
+    if found != expected:
+        raise ValueError(f"curves of {found}, expected {expected}")
+    # USD's deduplication does not distinguish -0 from 0.
+    return None if batch.curves is None else batch.curves + np.float32(0.0)
 
 
 def _level_changes(levels: Indices) -> dict[int, int]:

@@ -23,12 +23,18 @@ FOLDER, CHARACTER, SUMMARY = "crowd_clips", "character.usdc", "summary.usdc"
 # Upper bounds in bytes: samples of a joint in a frame; heads of both samples, time codes and level
 # of a frame; the rest of a motion's layer; a character; and the rest of the entry and the body.
 SAMPLE, FRAME, LAYER, EACH, REST = 4 * (3 + 4), 40, 8_000, 2_000, 100_000
+# Of a curve: a weight in a frame with its share of the head; its name in a layer; its blend shape.
+WEIGHT, NAME, SHAPE = 12, 200, 1_000
 
 
 def size_bound(crowd: CrowdClip) -> int:
     """Return an upper bound of the bytes of all layers."""
-    layer = LAYER + crowd.frames * (FRAME + SAMPLE * len(crowd.skeleton))
-    return REST + crowd_motions.motion_count(crowd) * layer + len(crowd.motion) * EACH
+    curves = len(crowd.curves)
+    frame = FRAME + SAMPLE * len(crowd.skeleton) + WEIGHT * curves
+    layer = LAYER + NAME * curves + crowd.frames * frame
+    return (
+        REST + SHAPE * curves + crowd_motions.motion_count(crowd) * layer + len(crowd.motion) * EACH
+    )
 
 
 def check_size(crowd: CrowdClip) -> None:
@@ -63,13 +69,14 @@ def referenced_layers(crowd: CrowdClip, body: BodyKind) -> Iterator[tuple[str, b
     rig, notes = character.rig(crowd.skeleton, body), []
     standing = _layer("Character", crowd)
     prim = character_prims.root(standing, "Character", rig)
+    character_prims.add_blend_shapes(prim, rig, crowd.curves)
     character_prims.set_values(prim, character_prims.values(character.rest_pose_arrays(rig)))
     yield CHARACTER, layer_metadata.crate_bytes(standing)
     for index, motion in enumerate(crowd_motions.all_motions(crowd, rig)):
         notes.append(motion.summary)
         yield (
             f"{crowd_scene.motion_name(index)}.usdc",
-            crowd_motions.motion_layer(rig, crowd.rate, motion.samples),
+            crowd_motions.motion_layer(crowd, rig, motion.samples),
         )
     last = _layer(crowd_scene.ROOT.name, crowd)
     crowd_summary.add_to_references(last, crowd, notes)

@@ -15,41 +15,46 @@ POSE, JOINT = 40, 4 * (3 + 4)
 POINT, TEXT_POINT = 60, 220
 # Bytes of a joint of a pose, and of a joint of a skeleton at rest, as text.
 TEXT_JOINT, TEXT_REST = 120, 600
+# Bytes of a blend shape of a body in memory and as text, and of a weight in a frame.
+SHAPE, TEXT_SHAPE, WEIGHT, TEXT_WEIGHT = 3_000, 500, 4, 20
 
 
 @dataclass(frozen=True)
 class CrowdCounts:
-    """Number of joints, of characters, of motions, of frames of each, and of points of a body."""
+    """Number of joints, characters, motions, frames of each, points of a body, and curves."""
 
     joints: int
     characters: int
     motions: int
     frames: int
     points: int
+    curves: int = 0
 
 
 def file_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     """Return an upper bound of the bytes of a crowd as usda, usdc or usdz."""
-    body = POINT * counts.points
+    body = POINT * counts.points + SHAPE * counts.curves
     binary = body + _characters(counts, flat) + counts.motions * _motion(counts)
     if ending != "usda":
         return binary
     played = counts.characters if flat else counts.motions
-    text = TEXT_JOINT * (counts.joints + 1) * counts.frames * played
-    bodies = counts.characters if flat else 1
-    return max(binary, text) + bodies * (TEXT_REST * counts.joints + TEXT_POINT * counts.points)
+    pose = TEXT_JOINT * (counts.joints + 1) + TEXT_WEIGHT * counts.curves
+    text = pose * counts.frames * played
+    rest = TEXT_REST * counts.joints + TEXT_POINT * counts.points + TEXT_SHAPE * counts.curves
+    return max(binary, text) + (counts.characters if flat else 1) * rest
 
 
 def layer_size_bound(counts: CrowdCounts, ending: str, flat: bool) -> int:
     """Return an upper bound of the bytes of the largest layer of a crowd."""
     if ending == "usdz" and not flat:
-        return max(_characters(counts, flat), _motion(counts), POINT * counts.points)
+        body = POINT * counts.points + SHAPE * counts.curves
+        return max(_characters(counts, flat), _motion(counts), body)
     return file_size_bound(counts, ending, flat)
 
 
 def _characters(counts: CrowdCounts, flat: bool) -> int:
-    return counts.characters * (FLAT if flat else CHARACTER)
+    return counts.characters * (FLAT + SHAPE * counts.curves if flat else CHARACTER)
 
 
 def _motion(counts: CrowdCounts) -> int:
-    return MOTION + counts.frames * (POSE + JOINT * counts.joints)
+    return MOTION + counts.frames * (POSE + JOINT * counts.joints + WEIGHT * counts.curves)

@@ -73,6 +73,7 @@ def stream(
         crowd_motions.motion_count(crowd),
         crowd.frames,
         character.body_size(crowd.skeleton, body),
+        len(crowd.curves),
     )
     apart = (
         crowd_size.layer_size_bound(counts, ending, instancing == "flatten") > CHILD_PROCESS_SIZE

@@ -9,7 +9,6 @@ import numpy as np
 from pxr import Sdf
 
 from posefield.common import cancellation
-from posefield.common.units import Indices
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.usd import character_prims, prim_specs
@@ -24,12 +23,14 @@ def referencing_layer(crowd: CrowdClip, form: str, instanced: bool, body: BodyKi
     made, rig = crowd_scene.new_layer(crowd, form), character.rig(crowd.skeleton, body)
     root = made.GetPrimAtPath(crowd_scene.ROOT)
     prototype = character_prims.root(root, crowd_scene.PROTOTYPE.name, rig)
+    character_prims.add_blend_shapes(prototype, rig, crowd.curves)
     character_prims.set_values(prototype, character_prims.values(character.rest_pose_arrays(rig)))
     prototype.specifier = Sdf.SpecifierClass
     group = prim_specs.prim(root, crowd_scene.MOTIONS.name, "Scope")
     notes = []
     for index, motion in enumerate(crowd_motions.all_motions(crowd, rig)):
-        animation = character_prims.animation(group, crowd_scene.motion_name(index), rig.paths)
+        name = crowd_scene.motion_name(index)
+        animation = character_prims.animation(group, name, rig.paths, crowd.curves)
         prim_specs.set_time_samples(animation, motion.samples)
         notes.append(motion.summary)
     crowd_scene.add_references(made, crowd, instanced)
@@ -43,7 +44,7 @@ def flat_layer(crowd: CrowdClip, form: str, body: BodyKind) -> Any:
     _copy_prototype(made, crowd, rig)
     notes = []
     for index, motion in enumerate(crowd_motions.all_motions(crowd, rig)):
-        _copy_motion(made, np.flatnonzero(crowd.motion == index), rig, motion)
+        _copy_motion(made, crowd, index, rig, motion)
         notes.append(motion.summary)
     crowd_summary.add_to_flat(made, crowd, notes)
     return made
@@ -60,21 +61,24 @@ def _copy_prototype(made: Any, crowd: CrowdClip, rig: CharacterRig) -> None:
         with Sdf.ChangeBlock():
             prims = [character_prims.root(group, crowd_scene.character_name(i), rig) for i in some]
             for prim in prims:
+                character_prims.add_blend_shapes(prim, rig, crowd.curves)
                 character_prims.set_values(prim, values)
             crowd_scene.set_transforms(prims, crowd.placement.select(some))
 
 
-def _copy_motion(layer: Any, characters: Indices, rig: CharacterRig, motion: MotionSamples) -> None:
-    """Give each character that plays a motion a copy of it.
+def _copy_motion(
+    layer: Any, crowd: CrowdClip, played: int, rig: CharacterRig, motion: MotionSamples
+) -> None:
+    """Give each character that plays a motion, of an index, a copy of it.
 
     The copy has the character's name: some readers identify an animation by the name of its prim
     alone.
     """
     first = None
-    for index in characters:
+    for index in np.flatnonzero(crowd.motion == played):
         cancellation.check()
         root = layer.GetPrimAtPath(crowd_scene.character_path(index))
-        own = character_prims.animation(root, root.name, rig.paths)
+        own = character_prims.animation(root, root.name, rig.paths, crowd.curves)
         if first is None:
             prim_specs.set_time_samples(own, motion.samples)
             first = own.path

@@ -44,9 +44,9 @@ def decode_order(
     queries = [_clip_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
     _check_names(queries)
     _check_targets(model, queries, settings.clips_targets)
-    within = max_poses(
-        settings.output_limit, len(model.session.card.skeleton), encoder.bytes_per_joint
-    )
+    card = model.session.card
+    sizes = len(card.skeleton), encoder.bytes_per_joint, len(card.curves)
+    within = max_poses(settings.output_limit, *sizes)
     prospects = _check_prospects(model, queries, min(within, MAX_POSES), settings.clips_poses)
     return ArchiveOrder(model, encoder, convention, queries, prospects)
 

@@ -22,8 +22,8 @@ from posefield.inference.level_selection import Camera, LevelCriteria
 from posefield.locomotion import crowd_order as orders
 from posefield.locomotion import walking_crowd
 from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.model_file.model_card import ModelCard
 from posefield.motion.crowd_clip import Placement
-from posefield.motion.skeleton import Skeleton
 from posefield.question import json_decoding as bodies
 from posefield.question.body_kind import DEFAULT_BODY
 from posefield.question.motion_question import (
@@ -206,18 +206,19 @@ def _view(body: CrowdBody) -> LevelCriteria:
 
 
 def checked_order(
-    question: WalkQuestion, ending: str, skeleton: Skeleton, settings: Settings
+    question: WalkQuestion, ending: str, card: ModelCard, settings: Settings
 ) -> CrowdOrder:
     """Return the order of a question.
 
-    ending: extension of the format. skeleton: the model's. Raises InvalidField for
-    characters, poses, frames or bytes beyond the limits of the settings.
+    ending: extension of the format. card: of the model. Raises InvalidField for characters, poses,
+    frames or bytes beyond the limits of the settings.
     """
     made, flat = orders.from_question(question), question.instancing == "flatten"
     _check_size(made, flat, settings)
+    skeleton, curves = card.skeleton, len(card.curves)
     points = character.body_size(skeleton, question.body or DEFAULT_BODY)
     motions, frames = made.motions or made.count, walking_crowd.frames(made.seconds, made.fps)
-    counts = CrowdCounts(len(skeleton), made.count, motions, frames, points)
+    counts = CrowdCounts(len(skeleton), made.count, motions, frames, points, curves)
     _check_output(counts, flat, ending, settings)
     return made
 

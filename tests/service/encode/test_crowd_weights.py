@@ -1,0 +1,123 @@
+"""Curves of crowds in USD and npz, with usd-core as the oracle, and the predicted sizes."""
+
+from dataclasses import replace
+
+import conftest
+import crowds
+import numpy as np
+import pytest
+from pxr import Usd, UsdSkel
+
+from posefield.encode import usd_crowd
+from posefield.encode.character import character, joint_names
+from posefield.encode.tables import crowd_tables
+from posefield.encode.usd_crowd import STREAMS, crowd_package, crowd_size, crowd_writer
+from posefield.encode.usd_crowd.crowd_size import CrowdCounts
+
+MOTION, FRAMES = [0, 1, 2, 0], 7
+FLOAT32 = 1e-7
+
+
+@pytest.fixture(scope="module")
+def made():
+    return crowds.motions(conftest.person(), 3, FRAMES, curves=len(crowds.CURVES))
+
+
+def crowd(made):
+    return crowds.crowd(conftest.person(), made, MOTION, size=2)
+
+
+def written(made, path, instancing, body="mannequin"):
+    crowd_writer.write(crowd(made), path, instancing, body)
+    return Usd.Stage.Open(str(path))
+
+
+def skinned(stage):
+    """The animation and the skinned body of each character, and what has to be kept for both."""
+    cache, found = UsdSkel.Cache(), []
+    for prim in stage.GetPrimAtPath("/Crowd/Characters").GetChildren():
+        root = UsdSkel.Root(prim)
+        assert cache.Populate(root, Usd.TraverseInstanceProxies())
+        (binding,) = cache.ComputeSkelBindings(root, Usd.TraverseInstanceProxies())
+        query = cache.GetSkelQuery(binding.GetSkeleton()).GetAnimQuery()
+        found.append((query, binding.GetSkinningTargets()[0]))
+    return (stage, cache), found
+
+
+def weights(query):
+    return np.array([query.ComputeBlendShapeWeights(frame) for frame in range(FRAMES)])
+
+
+@pytest.mark.parametrize("ending", usd_crowd.FILES)
+@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
+def test_usd_skel_reads_the_weights_of_every_character(made, ending, instancing, tmp_path):
+    _kept, found = skinned(written(made, tmp_path / f"crowd.{ending}", instancing))
+    assert len(found) == len(MOTION)
+    for (query, body), played in zip(found, MOTION, strict=True):
+        assert tuple(query.GetBlendShapeOrder()) == crowds.CURVES
+        assert np.abs(weights(query) - made.curves[played]).max() < FLOAT32
+        assert np.abs(weights(query) - made.curves[played - 1]).max() > 0.1
+        # The body of each character takes all of them.
+        assert tuple(body.GetBlendShapeOrder()) == crowds.CURVES
+        assert body.HasBlendShapes()
+
+
+def test_without_a_body_the_motions_have_their_weights_still(made, tmp_path):
+    stage = written(made, tmp_path / "crowd.usda", "references", "none")
+    animation = UsdSkel.Animation(stage.GetPrimAtPath("/Crowd/Motions/m00001"))
+    times = animation.GetBlendShapeWeightsAttr()
+    found = np.array([times.Get(frame) for frame in times.GetTimeSamples()])
+    assert np.abs(found - made.curves[1]).max() < FLOAT32
+
+
+def test_the_shapes_of_the_body_have_legal_names(made, tmp_path):
+    stage = written(made, tmp_path / "crowd.usda", "references")
+    body = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Crowd/Characters/c00000/Body"))
+    targets = [path.name for path in body.GetBlendShapeTargetsRel().GetForwardedTargets()]
+    assert targets == list(joint_names.legal_names(crowds.CURVES))
+
+
+@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
+def test_a_crowd_without_curves_has_no_shapes(made, instancing):
+    def text(own):
+        return b"".join(crowd_writer.stream(crowd(own), "usda", instancing))
+
+    assert b"lendShape" not in text(replace(made, curves=None))
+    assert b"lendShape" in text(made)
+
+
+def test_curves_that_the_crowd_does_not_name_are_refused(made, tmp_path):
+    nameless = replace(crowd(made), curves=())
+    with pytest.raises(ValueError, match=r"curves of \(2, 7, 3\), expected \(\)"):
+        crowd_writer.write(nameless, tmp_path / "crowd.usdc")
+    missing = replace(crowd(replace(made, curves=None)), curves=crowds.CURVES)
+    with pytest.raises(ValueError, match=r"curves of \(\), expected \(2, 7, 3\)"):
+        crowd_writer.write(missing, tmp_path / "crowd.usdc")
+
+
+def test_npz_has_the_curves_of_every_character(made, tmp_path):
+    crowd_tables.write_npz(crowd(made), tmp_path / "crowd.npz")
+    with np.load(tmp_path / "crowd.npz") as found:
+        assert found["curve_names"].tolist() == list(crowds.CURVES)
+        assert np.array_equal(found["curves"], made.curves[MOTION])
+    crowd_tables.write_npz(crowd(replace(made, curves=None)), tmp_path / "crowd.npz")
+    with np.load(tmp_path / "crowd.npz") as found:
+        assert not [name for name in found.files if "curve" in name]
+
+
+@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
+@pytest.mark.parametrize("ending", STREAMS)
+def test_a_file_with_many_curves_is_no_larger_than_said(made, ending, instancing):
+    person = conftest.person()
+    for curves, characters, frames in ((52, 3, 200), (52, 40, 2)):
+        values = np.random.default_rng(1).uniform(0.0, 1.0, (3, frames, curves)).astype("f4")
+        many = replace(crowds.motions(person, 3, frames), curves=values)
+        names = tuple(f"shape{index}" for index in range(curves))
+        played = np.arange(characters) % 3
+        given = replace(crowds.crowd(person, many, played), curves=names)
+        size = sum(map(len, crowd_writer.stream(given, ending, instancing)))
+        points = character.body_size(person, "mannequin")
+        counts = CrowdCounts(len(person), characters, 3, frames, points, curves)
+        assert size - 40_000 < crowd_size.file_size_bound(counts, ending, instancing == "flatten")
+        if ending == "usdz":
+            assert size < crowd_package.size_bound(given) or instancing == "flatten"
