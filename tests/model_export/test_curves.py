@@ -15,7 +15,6 @@ from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
-from posefield_train.adapt import model_reconstruction
 from posefield_train.sample.face import face_motion
 from posefield_train.source.recipe import Recipe
 
@@ -204,8 +203,3 @@ def test_a_card_whose_curves_contradict_it_is_refused(models_trained, change, sa
     content = made.model.onnx(model_card.dump(card), {"producer_name": "t"})
     with pytest.raises(ModelError, match=said):
         session.open_bytes(content, "face")
-
-
-def test_a_performer_cannot_be_added_to_a_model_with_curves(models_trained):
-    with pytest.raises(ModelError, match=r"found curves \['jawOpen'.*expected a model without"):
-        model_reconstruction.reconstruct(models_trained.exported("face").content, "face.onnx")

@@ -139,11 +139,12 @@ def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> Level
     def exam(questions: int) -> LevelTest:
         return level_errors.level_test_against(uncut, parents, moment, questions)
 
+    weights = np.append(known.joint_weights, np.ones(len(extended.tensor.curves)))
     return LevelBuilder(
         extended.full,
         replace(adapted.model, bank=bank),
         {"rms": 1.0},
-        TruncationReference(extended.tensor, parents, offsets, known.joint_weights, moment, whole),
+        TruncationReference(extended.tensor, parents, offsets, weights, moment, whole),
         exam(TEST_INPUTS),
         exam(FINALS),
         thinning.thinning_data(bank),

@@ -9,6 +9,7 @@ import numpy as np
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats, Indices
 from posefield.motion.clip import assemble
+from posefield.motion.curves import CurveValues
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment
@@ -98,8 +99,8 @@ class CanonicalClips:
 
     examples: clips at the model's phase. numbers: pose vectors (k, T, D). offsets: (k, J, 3), m.
     travels: (k, 3), m, of cycles, otherwise empty. distances: root mean square distance (k,), m,
-    over joints and frames of each clip from the prediction for an unseen performer, relative to the
-    root.
+    over joints, curves and frames of each clip from the prediction for an unseen performer,
+    relative to the root.
     """
 
     examples: tuple[Example, ...]
@@ -144,6 +145,8 @@ def _to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> Can
     jumps = [replace(jump, clip=i) for i, e in enumerate(examples) for jump in e.jumps]
     findings = jumps + flipped + own_chart.far_joints(rotations)
     numbers = own_chart.numbers(rotations, aligned.root_path)
+    if aligned.curves is not None:
+        numbers = np.concatenate([numbers, aligned.curves], axis=-1)
     return CanonicalClips(tuple(examples), aligned, numbers, offsets, gone, findings, distances)
 
 
@@ -159,7 +162,9 @@ def _predicted_trace(adaptable: AdaptableModel, example: Example) -> Floats:
     answer = model.outputs_at_frames(example.controls[None], place, labels, 0)
     motion = answer.rotations[0], answer.root_position[0], example.offsets
     clip = assemble(adaptable.skeleton, *motion, (FINE - 1) / example.clip.duration)
-    return time_alignment.trace(clip, np.sqrt(adaptable.joint_weights))
+    own = model.decoder.curves
+    values = None if answer.curves is None else CurveValues(own, answer.curves[0])
+    return time_alignment.trace(replace(clip, curves=values), np.sqrt(adaptable.joint_weights))
 
 
 def _distances(
@@ -173,7 +178,8 @@ def _distances(
         warped = time_alignment.interpolate(
             trace, adaptable.canonical_time.basis.invert(log, times)
         )
-        squares = np.sum(np.square(warped - reference), axis=1) / weights.sum()
+        weight = weights.sum() + len(adaptable.model.decoder.curves)
+        squares = np.sum(np.square(warped - reference), axis=1) / weight
         found.append(np.sqrt(squares.mean()))
     return np.array(found)
 
@@ -205,6 +211,9 @@ def _refuse_other_sizes(model: FloatModel, examples: Sequence[Example]) -> None:
     """
     own = model.proportions.numpy(model.bank.sample_values("offsets"))
     usual = np.median(np.linalg.norm(own, axis=-1).sum(axis=-1))
+    if usual == 0.0:
+        # A single joint has no bones, such as that of curves without a skeleton.
+        return
     for example in examples:
         size = np.linalg.norm(example.offsets, axis=-1).sum() / usual
         if not 1.0 / bone_lengths.SIZE_LIMIT <= size <= bone_lengths.SIZE_LIMIT:

@@ -79,17 +79,9 @@ def load(path: Path) -> ReconstructedModel:
 def reconstruct(content: bytes, source: str) -> ReconstructedModel:
     """Return the model of one level, and its card, from the bytes of a file.
 
-    source: name of the file in errors. Raises ModelError for an invalid checksum, graph or
-    card, and for a model with curves.
+    source: name of the file in errors. Raises ModelError for an invalid checksum, graph or card.
     """
     own_card = checked_file.load_card(content, source)
-    if own_card.curves:
-        names = [curve.name for curve in own_card.curves]
-        message = (
-            f"found curves {names}, expected a model without: train a model with curves again to "
-            "add a performer"
-        )
-        raise ModelError(source, message)
     numbers = {name: _as_float64(array) for name, array in subgraph.initializers(content).items()}
     file = _ModelFile(numbers, own_card, own_card.making, source)
     return ReconstructedModel(
@@ -139,7 +131,7 @@ def _timing(file: _ModelFile) -> CanonicalTiming:
 def _proportions(file: _ModelFile) -> Proportions:
     directions = file["offset_directions"]
     mean = file["offset_mean"].reshape(-1, 3)
-    return Proportions(mean, directions.reshape(len(directions), -1, 3))
+    return Proportions(mean, directions.reshape(len(directions), len(mean), 3))
 
 
 def _bank(file: _ModelFile) -> KrigingBank:
@@ -253,13 +245,12 @@ def _solve_recovered(
 def _decoder(file: _ModelFile, bank: KrigingBank) -> Decoder:
     """Return a decoder with the core's coordinates for the first mode."""
     finest = file.card.levels[0]
-    held = reduced_motion.read(file.numbers, replace(finest, event=0))
+    held = reduced_motion.read(file.numbers, replace(finest, event=0), file.card.curves)
     core = held.core.transpose(1, 0, 2)
     bases = np.eye(len(core)), held.time, bank.pose.values
     blend = _event_blend(file.card, core, held.time) if finest.event else None
-    return Decoder(
-        TuckerTensor(core, bases), held.mean, held.directions.T, held.rotations, event=blend
-    )
+    tensor, rotations = TuckerTensor(core, bases), held.rotations
+    return Decoder(tensor, held.mean, held.directions.T, rotations, event=blend, curves=held.curves)
 
 
 def _event_blend(card: ModelCard, core: Floats, basis: Floats) -> EventBlend | None:

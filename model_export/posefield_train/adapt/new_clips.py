@@ -16,9 +16,10 @@ from posefield.model_file.model_card import PERFORMER, Control
 from posefield.motion import measures
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
+from posefield_train.adapt import new_curves
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
+from posefield_train.adapt.new_curves import NewFiles
 from posefield_train.source import (
-    bvh,
     clip_joints,
     clip_landmarks,
     clip_notes,
@@ -31,6 +32,7 @@ from posefield_train.source import (
 from posefield_train.source.bvh import end_sites
 from posefield_train.source.canonical import placement
 from posefield_train.source.clip_table import ClipRow
+from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe_sections.control_sources import TIME_NAMES
 from posefield_train.source.recipe_sections.data_sections import Source
@@ -42,11 +44,17 @@ Labels = Mapping[str, str]
 
 
 def examples_of_files(
-    reopened: ReconstructedModel, paths: Sequence[Path], source: Source, labels: Labels
+    reopened: ReconstructedModel,
+    paths: Sequence[Path],
+    source: Source,
+    labels: Labels,
+    rate: float | None = None,
 ) -> tuple[list[Example], list[str]]:
     """Return examples of whole files, with all controls measured, and notes on assumptions.
 
-    labels: name of all clips in each label set; the performer's is required.
+    labels: name of all clips in each label set; the performer's is required. Curves are in a file
+    beside each motion file, as `new_curves.SUFFIX` says. rate: frames a second of files of curves
+    alone.
 
     Raises RecipeError for a control that cannot be measured, a file given twice, and a clip of
     another skeleton; BvhError for a file that cannot be read.
@@ -59,43 +67,52 @@ def examples_of_files(
             f"nothing says {', '.join(map(repr, needed))}, which cannot be measured, expected a "
             "table with a column for each",
         )
-    rows = [_row(path, labels) for path in paths]
+    rows = [_row(reopened, path, labels) for path in paths]
     clip_table.refuse_repeats(rows)
-    return _examples(reopened, rows, source, [{} for _ in rows])
+    return _examples(reopened, rows, NewFiles(source, rate), [{} for _ in rows])
 
 
 def examples_of_table(
-    reopened: ReconstructedModel, path: Path, source: Source, labels: Labels
+    reopened: ReconstructedModel,
+    path: Path,
+    source: Source,
+    labels: Labels,
+    rate: float | None = None,
 ) -> tuple[list[Example], list[str]]:
     """Return examples of a table's rows, and notes on assumptions.
 
     Columns: `file`, relative to the table; optionally `first_frame` and `last_frame`; landmarks;
     controls by name, optional for those that can be measured; label sets by name, if `labels` does
-    not give the name of all clips. Raises RecipeError, naming line and
-    column, for an invalid cell, and as `examples_of_files`.
+    not give the name of all clips; `curves`, the file of a clip's curves, for a model with curves
+    and a skeleton. Raises RecipeError, naming line and column, for an invalid cell, and as
+    `examples_of_files`.
     """
     own = table_cells.open_table(path)
     landmarks, controls = _landmark_columns(reopened), reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
     sets = _open_sets(reopened, labels)
+    curves = [new_curves.COLUMN] * new_curves.have_files(reopened.card)
     own.require(
         {
             "file": "the motion file",
             **dict.fromkeys(landmarks, "a landmark"),
             **dict.fromkeys(typed, "a control that cannot be measured"),
             **dict.fromkeys(sets, "a label set"),
+            **dict.fromkeys(curves, "the file of the clip's curves"),
         }
     )
-    known = (*landmarks, *(control.name for control in controls), *sets)
+    known = (*landmarks, *(control.name for control in controls), *sets, *curves)
     own.expect_only({"file", "first_frame", "last_frame", *known})
     rows, given = [], []
     for line, record in own.records:
         told = {**labels, **{name: _label(reopened, own, line, record, name) for name in sets}}
-        rows.append(_table_row(own, line, record, told, tuple(landmarks)))
+        row = _table_row(own, line, record, told, tuple(landmarks))
+        places = [_place(own, line, record, column) for column in curves]
+        rows.append(replace(row, curve_place=places[0]) if places else row)
         names = [control.name for control in controls if control.name in record]
         given.append({name: own.number(line, record, name) for name in names})
     clip_table.refuse_repeats(rows)
-    return _examples(reopened, rows, source, given)
+    return _examples(reopened, rows, NewFiles(source, rate), given)
 
 
 def _open_sets(reopened: ReconstructedModel, labels: Mapping[str, str]) -> list[str]:
@@ -115,9 +132,11 @@ def _label(
     return record[name]
 
 
-def _row(path: Path, labels: Mapping[str, str]) -> ClipRow:
+def _row(reopened: ReconstructedModel, path: Path, labels: Mapping[str, str]) -> ClipRow:
     who, others = _split(labels)
-    return ClipRow(path, str(path), None, who, 0, None, np.zeros(0), (), other_labels=others)
+    beside = new_curves.place_beside(reopened.card, path)
+    own = ClipRow(path, str(path), None, who, 0, None, np.zeros(0), (), other_labels=others)
+    return replace(own, curve_place=beside)
 
 
 def _split(labels: Labels) -> tuple[str, dict[str, str]]:
@@ -137,40 +156,49 @@ def _table_row(
     last = own.frame(line, record, "last_frame") if "last_frame" in record else None
     if last is not None and last <= first:
         raise RecipeError(own.name, f"frames {first} to {last}, expected at least two", line)
-    try:
-        place = data_folder.find(Path(own.name).parent, record["file"])
-    except RecipeError as fault:
-        raise RecipeError(own.name, f"column 'file': {fault.message}", line) from fault
+    place = _place(own, line, record, "file")
     marks = tuple(own.frame(line, record, column) for column in landmarks)
     who, others = _split(labels)
     return ClipRow(place, own.name, line, who, first, last, np.zeros(0), marks, other_labels=others)
 
 
+def _place(own: ClipTable, line: int, record: dict[str, str], column: str) -> FileLocation:
+    """Return the file that a cell names, relative to its table."""
+    try:
+        return data_folder.find(Path(own.name).parent, record[column])
+    except RecipeError as fault:
+        raise RecipeError(own.name, f"column {column!r}: {fault.message}", line) from fault
+
+
 def _examples(
     reopened: ReconstructedModel,
     rows: Sequence[ClipRow],
-    source: Source,
+    conventions: NewFiles,
     given: Sequence[Mapping[str, float]],
 ) -> tuple[list[Example], list[str]]:
-    files = ingest.read_files(rows)
+    files = {} if new_curves.are_alone(reopened.card) else ingest.read_files(rows)
     examples, notes, stretches = [], list[str](), []
     for row, values in zip(rows, given, strict=True):
-        example, said, stretch = _example(reopened, row, source, files[str(row.place)])
+        whole, left_out = new_curves.whole_clip(reopened.card, row, files, conventions)
+        example, said, stretch = _example(reopened, row, whole)
         controls = _controls(reopened, example, values)
         examples.append(replace(example, controls=controls))
-        notes += [note for note in said if note not in notes]
+        notes += [note for note in (*left_out, *said) if note not in notes]
         stretches.append(stretch)
-    if source.root_offset is None:
+    if conventions.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
     return examples, notes + clip_notes.stretch_notes(rows, stretches)
 
 
 def _example(
-    reopened: ReconstructedModel, row: ClipRow, source: Source, file: bvh.BvhFile
+    reopened: ReconstructedModel, row: ClipRow, whole: Clip
 ) -> tuple[Example, list[str], float]:
-    """Return the example of a row, notes on it, and the stretch of its bones, m."""
+    """Return the example of a row, notes on it, and the stretch of its bones, m.
+
+    whole: all frames of its file.
+    """
     own = reopened.card
-    cut, last = ingest.cut_frames(ingest.clip_of_file(file, source), row)
+    cut, last = ingest.cut_frames(whole, row)
     clip, notes = _reduce_to_skeleton(_without_dummies(cut, own.skeleton), own.skeleton, row)
     ahead = reopened.making.facing
     clip = facing.turn_basis(clip, ahead or 0.0)

@@ -11,7 +11,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield_train.graph.float_model import FloatModel
-from posefield_train.tensor import hosvd, motion_tensor, pose_metric
+from posefield_train.tensor import hosvd, motion_tensor
 from posefield_train.tensor.decoder import Decoder
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import CONSTANT_RANGE, MotionTensor
@@ -37,9 +37,9 @@ class ExtendedTensor:
 class _PoseSpace:
     """Metric of the model's poses, and a basis of its degrees of freedom.
 
-    varies: mask (D,) of degrees of freedom that vary. root, inverse: (D', D'), to the metric's
-    coordinates and back. directions: orthonormal (D', r1). turn: (r1, r1), from the core's
-    coordinates to those of the directions.
+    varies: mask (D,) of numbers that vary, those of curves included. root, inverse: (D', D'), to
+    the metric's coordinates and back. directions: orthonormal (D', r1). turn: (r1, r1), from the
+    core's coordinates to those of the directions.
     """
 
     varies: Floats
@@ -60,7 +60,8 @@ def extend(
 
     joint_weights: (J,). allowed: root mean square error, m, that truncation may add.
     """
-    decoder, weight = model.decoder, float(joint_weights.sum())
+    decoder = model.decoder
+    weight = float(joint_weights.sum()) + len(decoder.curves)
     old = _reduced(decoder)
     space = _pose_space(model, parents, joint_weights, numbers, old)
     centred = (numbers - decoder.mean)[..., space.varies] @ space.root
@@ -99,7 +100,7 @@ def _pose_space(
     gram = motion_tensor.sampled_gram(known, own_chart, parents, offsets, joint_weights)
     moves = np.ptp(numbers.reshape(-1, numbers.shape[-1]), axis=0) > CONSTANT_RANGE
     varies = moves | np.any(decoder.directions != 0.0, axis=0)
-    root, inverse = pose_metric.whitening(gram[np.ix_(varies, varies)])
+    root, inverse = motion_tensor.metric_roots(gram, decoder.curves, varies)
     mixed = (decoder.directions[:, varies] @ root).T
     directions = hosvd.fix_signs(np.linalg.qr(mixed)[0])
     return _PoseSpace(varies, root, inverse, directions, directions.T @ mixed)
@@ -127,4 +128,5 @@ def _tensor(
     whiten[:, space.varies] = directions.T @ space.root
     unwhiten[:, space.varies] = directions.T @ space.inverse
     own_chart = PoseChart(decoder.means)
-    return MotionTensor(values, decoder.mean, whiten, unwhiten.T, own_chart, weight)
+    own_curves = decoder.curves
+    return MotionTensor(values, decoder.mean, whiten, unwhiten.T, own_chart, weight, own_curves)

@@ -29,7 +29,8 @@ class ClipArguments:
     clips: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="BVH files of one new performer: one or more, typically up to five",
+            help="BVH files of one new performer: one or more, typically up to five; for a model "
+            "with curves with a file NAME.curves.csv beside each; CSV files for curves alone",
             metavar="CLIP",
         ),
     ] = None
@@ -37,12 +38,20 @@ class ClipArguments:
         Path | None,
         typer.Option(
             help="instead of clips: CSV with columns file, first_frame, last_frame and one column "
-            "per control; controls that the model can measure may be omitted"
+            "per control; controls that the model can measure may be omitted; for a model with "
+            "curves also column curves"
         ),
     ] = None
     root_offset: Annotated[
         RootOffset | None,
         typer.Option(help="whether root position channels replace the root's OFFSET or add to it"),
+    ] = None
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            help="frames a second of CSV files, for a model of curves without a skeleton",
+            metavar="FPS",
+        ),
     ] = None
     label: Annotated[
         list[str] | None,
@@ -81,6 +90,8 @@ def adapt(
         raise InvalidField("clips", "expected either motion files or --table")
     if not (0.0 < files.unit < float("inf")):
         raise InvalidField("unit", f"{files.unit}, expected a length in metres")
+    if files.rate is not None and not (0.0 < files.rate < float("inf")):
+        raise InvalidField("rate", f"{files.rate}, expected frames a second above 0")
     if not licence.strip():
         raise InvalidField("licence", "blank, expected a text")
     with ProgressPrinter("adapting", STEPS) as progress:
@@ -93,9 +104,11 @@ def adapt(
         source = Source(metres_per_unit=files.unit, up=files.up, root_offset=files.root_offset)
         progress("reading clips")
         if files.table:
-            examples, notes = new_clips.examples_of_table(known, files.table, source, labels)
+            found = new_clips.examples_of_table(known, files.table, source, labels, files.rate)
         else:
-            examples, notes = new_clips.examples_of_files(known, files.clips or [], source, labels)
+            paths = files.clips or []
+            found = new_clips.examples_of_files(known, paths, source, labels, files.rate)
+        examples, notes = found
         progress("adapting, and comparing the graph with the reference")
         made = adapted_file.export_adapted(known, NewPerformer(performer, examples, licence, notes))
         atomic_files.write(made.content, output)

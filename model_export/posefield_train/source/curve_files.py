@@ -40,8 +40,7 @@ class CurveReader:
         table = table_cells.open_table(place)
         _expect_frames(table)
         _expect_columns(table, [curve.name for curve in self.curves], self.keys)
-        columns = [_column(table, curve) for curve in self.curves]
-        return CurveValues(self.curves, np.stack(columns, axis=-1))
+        return _values(table, self.curves)
 
 
 def reader(keys: Curves, rows: Sequence[ClipRow]) -> CurveReader:
@@ -60,6 +59,22 @@ def reader(keys: Curves, rows: Sequence[ClipRow]) -> CurveReader:
             text = f"curves.of.{name}{did_you_mean(name, names)}, expected one of {names}"
             raise RecipeError(first.name, text, 1)
     return CurveReader(keys, tuple(map(keys.curve, names)))
+
+
+def read_known(place: FileLocation, curves: tuple[Curve, ...]) -> tuple[CurveValues, list[str]]:
+    """Return the curves of a trained model from a file, and the names of its other columns.
+
+    Raises RecipeError for a missing column or frame, and for a cell that is not a number within the
+    curve's range.
+    """
+    table, names = table_cells.open_table(place), [curve.name for curve in curves]
+    _expect_frames(table)
+    missing = [name for name in names if name not in table.columns]
+    if missing:
+        hint = did_you_mean(missing[0], table.columns)
+        raise RecipeError(table.name, f"found no curves {missing}{hint}, expected {names}", 1)
+    others = [name for name in table.columns if name not in (FRAME, *names)]
+    return _values(table, curves), others
 
 
 def with_curves(clip: Clip, own: CurveValues, row: ClipRow) -> Clip:
@@ -103,6 +118,10 @@ def _expect_columns(table: ClipTable, names: Sequence[str], keys: Curves) -> Non
         parts = [f"no curves {missing}{hint}"] * bool(missing)
         parts += [f"curves {more} that the first clip lacks"] * bool(more)
         raise RecipeError(table.name, f"found {' and '.join(parts)}, expected {list(names)}", 1)
+
+
+def _values(table: ClipTable, curves: tuple[Curve, ...]) -> CurveValues:
+    return CurveValues(curves, np.stack([_column(table, curve) for curve in curves], axis=-1))
 
 
 def _column(table: ClipTable, curve: Curve) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 
 from posefield.common.array_shapes import ClipBones, JointWeights, PoseVectors
 from posefield.common.errors import TrainingError
-from posefield.common.units import Floats
+from posefield.common.units import Booleans, Floats
 from posefield.motion.curves import Curve, distances
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.source.canonical import half_turns
@@ -86,16 +86,31 @@ def build_tensor(
     if not varies.any():
         raise TrainingError("found no joint and no curve that moves, expected motion in some clip")
     own_gram = sampled_gram(numbers, own_chart, parents, offsets, joint_weights)
-    moves = varies[: len(own_gram)]
-    root, inverse = pose_metric.whitening(own_gram[np.ix_(moves, moves)])
-    # Curves are no part of the body, so their metric is diagonal.
-    units = distances(curves)[varies[len(own_gram) :]]
-    whiten, unwhiten = np.zeros((2, len(root) + len(units), len(mean)))
-    whiten[:, varies] = _block_diagonal(root, np.diag(units))
-    unwhiten[:, varies] = _block_diagonal(inverse, np.diag(1.0 / units))
+    root, inverse = metric_roots(own_gram, curves, varies)
+    whiten, unwhiten = np.zeros((2, len(root), len(mean)))
+    whiten[:, varies], unwhiten[:, varies] = root, inverse
     values = _whiten(numbers, mean, whiten)
     weight = float(joint_weights.sum()) + len(curves)
     return MotionTensor(values, mean, whiten, unwhiten.T, own_chart, weight, curves)
+
+
+def metric_roots(
+    gram: Annotated[Floats, "freedoms freedoms"],
+    curves: tuple[Curve, ...],
+    varies: Annotated[Booleans, "dof"],
+) -> tuple[Annotated[Floats, "varying varying"], Annotated[Floats, "varying varying"]]:
+    """Return the square root (D', D') of the metric and its inverse, of numbers that vary.
+
+    gram: of the joints (3 + 3 J, 3 + 3 J). curves: of the last numbers. varies: mask (D,).
+    """
+    moves = varies[: len(gram)]
+    root, inverse = pose_metric.whitening(gram[np.ix_(moves, moves)])
+    # Curves are no part of the body, so their metric is diagonal.
+    units = distances(curves)[varies[len(gram) :]]
+    return (
+        _block_diagonal(root, np.diag(units)),
+        _block_diagonal(inverse, np.diag(1.0 / units)),
+    )
 
 
 def _block_diagonal(

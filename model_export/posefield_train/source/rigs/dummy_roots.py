@@ -68,7 +68,7 @@ def collapse_roots(clip: Clip, count: int) -> Clip:
     )
     rotations, translations = clip.rotations[:, count:].copy(), clip.translations[:, count:].copy()
     rotations[:, 0], translations[:, 0] = turns[:, -1], places[:, -1]
-    return Clip(smaller, quat.normalize(rotations), translations, clip.rate)
+    return Clip(smaller, quat.normalize(rotations), translations, clip.rate, clip.curves)
 
 
 def describe(names: Sequence[str], count: int) -> str:
