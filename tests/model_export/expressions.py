@@ -14,7 +14,8 @@ RAISED = {"a": 0.0, "b": 0.1, "d": 0.2, "cy": 0.25}
 """How far each performer's brows are raised and funnel is open, beyond those of `face_motion`."""
 OWN = ("mouthFunnel", "browInnerUp")
 HEADING = "file,curves,smile,openness,who"
-POINTS = [(0.1 + 0.2 * (i % 5), 0.15 + 0.2 * ((3 * i) % 5)) for i in range(15)]
+POINTS = [(0.1 + 0.8 * i / 14, 0.1 + 0.8 * ((4 * i) % 15) / 14) for i in range(15)]
+"""Controls of the clips, spread over the square."""
 
 
 def values(who: str, smile: float, openness: float, shares: Floats) -> Floats:

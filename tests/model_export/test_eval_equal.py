@@ -57,7 +57,7 @@ def test_clips_that_agree_within_takes_count_as_one(rng):
 def test_the_verdict_follows_the_paired_difference(rng, shift, verdict):
     noise = 0.001 * rng.standard_normal(len(TAKES))
     found = result({"posefield": OURS, "gp": OURS + shift + noise - noise.mean()})
-    one = equal_information.compare(found, equal_information.MEASURES[0], "posefield", "gp")
+    one = equal_information.compare(found, equal_information.POSITIONS[0], "posefield", "gp")
     assert one.verdict == verdict
     assert one.difference == pytest.approx(100 * shift, abs=1e-9)
     expected = equal_information.clustered_standard_error(noise, np.array(TAKES))

@@ -31,6 +31,7 @@ from posefield_train.evaluate.methods import Queries
 from posefield_train.evaluate.pages import evaluation_charts, evaluation_page
 from posefield_train.evaluate.peers import interpolation_peers, predicted_values
 from posefield_train.evaluate.peers.predicted_values import OPEN
+from posefield_train.evaluate.summary import performer_summary
 from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.report.drawing import svg_chart
 from posefield_train.source import ingest
@@ -282,7 +283,7 @@ def test_an_unknown_performer_is_trusted_less(results):
 def test_a_name_is_worth_something_and_so_are_clips(results):
     """Three clips say more than one, and a name than none; the figures are those of the rows."""
     (clips, performers), _ = results
-    facts = evaluation_summary.performer_facts([clips, performers])
+    facts = performer_summary.performer_facts([clips, performers])
     one, three = (facts[f"posefield_adapt_{count}"] for count in (1, 3))
     assert facts["named_nearer"] > 0.0
     assert three["relative_cm"] < one["relative_cm"] < three["shown_none_cm"]
@@ -293,10 +294,10 @@ def test_a_name_is_worth_something_and_so_are_clips(results):
         three["relative_cm"] / three["shown_all_cm"] - 1.0, abs=1e-4
     )
     assert (
-        evaluation_summary.performer_facts([clips]) == {}
-        and evaluation_summary.performer_text([performers]) == []
+        performer_summary.performer_facts([clips]) == {}
+        and performer_summary.performer_text([performers]) == []
     )
-    assert len(evaluation_summary.performer_text([clips, performers])) == 4
+    assert len(performer_summary.performer_text([clips, performers])) == 4
 
 
 def test_clips_are_shown_as_far_apart_as_they_come_and_never_the_asked_ones_take(family):

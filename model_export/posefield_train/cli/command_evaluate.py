@@ -238,6 +238,7 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
     """Run the protocols and print each result when it is complete."""
     from posefield.console.progress import ProgressBar
     from posefield_train.evaluate import corrections, evaluation_summary, protocol
+    from posefield_train.evaluate.summary import performer_summary
 
     names = wanted.protocols or protocol.protocols(own.recipe, own.examples)
     counts = [protocol.count_jobs(own.examples, name) for name in names]
@@ -256,7 +257,7 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
             wanted.print(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
             if results[-1].corrections:
                 wanted.print(f"{corrections.table(results[-1])}\n")
-    for text in evaluation_summary.performer_text(results):
+    for text in performer_summary.performer_text(results):
         wanted.print(text)
     return results
 
@@ -274,13 +275,14 @@ def _extra_results(
     wanted: EvaluateOptions,
 ) -> dict[str, Any]:
     """Print and return the results for a joined family, for performers and for suggested clips."""
-    from posefield_train.evaluate import evaluation_summary, learning_curves
+    from posefield_train.evaluate import learning_curves
+    from posefield_train.evaluate.summary import performer_summary
 
     more: dict[str, Any] = {}
     if other:
         wanted.print(f"\n{own.recipe.name} and {other.name} joined, {other.flags.text()}")
         more["joined"] = {"family": other.name, "support": other.flags.facts()}
-    if named := evaluation_summary.performer_facts(results):
+    if named := performer_summary.performer_facts(results):
         more["performers"] = named
     if curve:
         more["learning"] = learning_curves.facts(curve)

@@ -1,15 +1,17 @@
 """Motions in the form that is compared: joints and points around them at uniform time steps."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
+from posefield.motion.curves import Curve, CurveValues
 from posefield_train.align import time_alignment
 from posefield_train.tensor import uniform_motion
+from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
 
 # Distance of three points at right angles from a joint, m, as in the Animation Compression Library.
 SHELL_RADIUS = 0.03
@@ -20,12 +22,14 @@ class ComparedMotion:
     """A motion of J joints.
 
     points: each joint and three points around it (FRAMES, J, 4, 3), m. duration: s. event: position
-    (3,) of the event's joint at its event, m; None without an event.
+    (3,) of the event's joint at its event, m; None without an event. curves: values (FRAMES, C);
+    None for a family without curves.
     """
 
     points: Floats
     duration: float
     event: Floats | None
+    curves: CurveValues | None = None
 
     @property
     def joints(self) -> Floats:
@@ -48,7 +52,21 @@ class MotionEvent:
 def motion_of_clip(clip: Clip, event: MotionEvent | None) -> ComparedMotion:
     """Return the motion of a captured clip on its own skeleton."""
     poses = uniform_motion.captured_poses(clip)
-    return motion_of_poses(clip.skeleton.parents, *poses, clip.duration, event)
+    own = motion_of_poses(clip.skeleton.parents, *poses, clip.duration, event)
+    if clip.curves is None:
+        return own
+    values = time_alignment.interpolate(clip.curves.values, UNIFORM_SHARES)
+    return replace(own, curves=replace(clip.curves, values=values))
+
+
+def with_curves(
+    motions: Sequence[ComparedMotion], curves: tuple[Curve, ...], values: Floats
+) -> list[ComparedMotion]:
+    """Return motions with the values (Q, FRAMES, C) of their curves, if there are any."""
+    if not curves:
+        return list(motions)
+    pairs = zip(motions, values, strict=True)
+    return [replace(motion, curves=CurveValues(curves, own)) for motion, own in pairs]
 
 
 def motion_of_poses(

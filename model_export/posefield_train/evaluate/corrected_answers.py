@@ -113,7 +113,10 @@ class _MotionCorrector:
         translations = skeleton.translations(state.bones, path)
         share = float(np.interp(self.event.frame, state.frames, UNIFORM_SHARES))
         own = MotionEvent(self.event.joint, share)
-        return compared_motion.motion_of_poses(parents, rotations, translations, held.duration, own)
+        made = compared_motion.motion_of_poses(parents, rotations, translations, held.duration, own)
+        curves = self.opened.card.curves
+        values = held.curve_values(state.frames) if curves else np.zeros(0)
+        return compared_motion.with_curves([made], curves, values[None])[0]
 
 
 def event_target(captured: ComparedMotion, event: MotionEvent) -> EventTarget:

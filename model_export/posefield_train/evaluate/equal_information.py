@@ -30,16 +30,26 @@ HEAD = ("measure", "posefield", "best peer", "its error", "difference", "±", "v
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure of errors. key: name in the JSON. title: in tables. unit: of `scale` times it."""
+    """A measure of errors. key: name in the JSON. title: in tables. unit: of `scale` times it.
+
+    squared: whether means are root mean squares. curve: index of the curve that it is of. decimals:
+    in tables.
+    """
 
     key: str
     title: str
     unit: str
     scale: float
     squared: bool = False
+    curve: int | None = None
+    decimals: int = 2
 
     def of(self, error: MotionErrors) -> float:
         """Return the error of one clip; its square where means are root mean squares."""
+        if self.curve is not None:
+            return float(error.curves[self.curve])
+        if self.key == CURVES:
+            return float(np.mean(error.counted))
         if self.key == "effector":
             return error.effector
         if self.key == "duration":
@@ -53,12 +63,26 @@ class Measure:
         return self.scale * (np.sqrt(average) if self.squared else average)
 
 
-MEASURES = (
+POSITIONS = (
     Measure("relative", "relative (cm)", "cm", 100.0),
     Measure("global", "global (cm)", "cm", 100.0),
     Measure("effector", "effector (cm)", "cm", 100.0),
-    Measure("duration", "duration (%)", "%", 100.0, squared=True),
 )
+DURATION = Measure("duration", "duration (%)", "%", 100.0, squared=True)
+CURVES = "curves"
+"""Key of the error of all curves, as the distance that they count as."""
+
+
+def measures(result: EvaluationResult) -> tuple[Measure, ...]:
+    """Return the measures of a result: of positions if it has some, durations, and each curve."""
+    found = (*(POSITIONS if result.has_positions else ()), DURATION)
+    if not result.curves:
+        return found
+    each = (
+        Measure(f"curve {name}", name, "", 1.0, squared=True, curve=index, decimals=4)
+        for index, name in enumerate(result.curves)
+    )
+    return (*found, Measure(CURVES, "curves (cm)", "cm", 100.0, squared=True, decimals=3), *each)
 
 
 @dataclass(frozen=True)
@@ -146,7 +170,7 @@ def best_peers(result: EvaluationResult, information: str) -> dict[str, PairedDi
     """Return the difference from the best single peer of each measure, by its key."""
     ours, peers = rivals(result, information)
     found = {}
-    for measure in MEASURES:
+    for measure in measures(result):
         all_of_them = [compare(result, measure, ours, name) for name in peers]
         defined = [one for one in all_of_them if one]
         if defined:
@@ -167,7 +191,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
                 "peers": {
                     name: {
                         measure.key: found_one.facts()
-                        for measure in MEASURES
+                        for measure in measures(result)
                         if (found_one := compare(result, measure, ours, name))
                     }
                     for name in peers
@@ -190,16 +214,18 @@ def table(result: EvaluationResult) -> str:
 
 def best_rows(result: EvaluationResult, information: str) -> Sequence[tuple[str, ...]]:
     """Return the rows of a table under HEAD."""
-    titles = {measure.key: measure.title for measure in MEASURES}
-    return [
-        (
-            titles[key],
-            f"{one.ours:.2f}",
-            one.name,
-            f"{one.theirs:.2f}",
-            f"{one.difference:+.2f}",
-            f"{one.standard_error:.2f}",
-            one.verdict,
-        )
-        for key, one in best_peers(result, information).items()
-    ]
+    known = {measure.key: measure for measure in measures(result)}
+    return [_row(known[key], one) for key, one in best_peers(result, information).items()]
+
+
+def _row(measure: Measure, one: PairedDifference) -> tuple[str, ...]:
+    digits = measure.decimals
+    return (
+        measure.title,
+        f"{one.ours:.{digits}f}",
+        one.name,
+        f"{one.theirs:.{digits}f}",
+        f"{one.difference:+.{digits}f}",
+        f"{one.standard_error:.{digits}f}",
+        one.verdict,
+    )

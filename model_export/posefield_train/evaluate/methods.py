@@ -146,7 +146,10 @@ def predict_posefield(
     times = np.exp(fields["duration"]) * UNIFORM_SHARES
     found = model.evaluate(asked.controls, times, labels)
     places = found.rotations, found.root_position, found.bone_offsets
-    return _motions(trained, *places, found.duration, fields["warp"], event)
+    motions = _motions(trained, *places, found.duration, fields["warp"], event)
+    if found.curves is None:
+        return motions
+    return compared_motion.with_curves(motions, model.decoder.curves, found.curves)
 
 
 def _motions(
@@ -276,4 +279,7 @@ def _motions_of_values(
     )
     offsets = model.proportions.numpy(beside["offsets"])
     durations = np.exp(beside["duration"][:, 0])
-    return _motions(trained, poses.rotations, poses.path, offsets, durations, beside["warp"], event)
+    motions = _motions(
+        trained, poses.rotations, poses.path, offsets, durations, beside["warp"], event
+    )
+    return compared_motion.with_curves(motions, trained.tensor.curves, poses.curves)

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.motion import foot_skate
+from posefield.motion import curves, foot_skate
 from posefield_train.align import dtw, time_alignment
 from posefield_train.evaluate.compared_motion import ComparedMotion
 from posefield_train.tensor.uniform_motion import FRAMES
@@ -36,7 +36,9 @@ class MotionErrors:
     without the root's position. effector: distance at the event, m; NaN without an event.
     acceleration: mean magnitude, synthesized over captured, at equal durations. skate,
     skate_captured: mean speed of feet on the ground, m/s. duration: logarithm of synthesized over
-    captured. joints: mean squared absolute distance (J,) of each joint, m².
+    captured. joints: mean squared absolute distance (J,) of each joint, m². curves: mean squared
+    error (C,) of each curve after time warping, in the square of its own unit. counted: the same as
+    the distances that curves count as, m².
     """
 
     relative: DistanceStatistics
@@ -50,11 +52,15 @@ class MotionErrors:
     skate_captured: float
     duration: float
     joints: Floats
+    curves: Floats = field(default_factory=lambda: np.zeros(0))
+    counted: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def mean_squared_error(self) -> float:
-        """Return the mean squared absolute distance, m², which sigma predicts."""
-        return self.absolute.rms**2
+        """Return the mean squared distance of joints and curves, m², which sigma predicts."""
+        if not len(self.counted):
+            return self.absolute.rms**2
+        return float(np.mean([*self.joints, *self.counted]))
 
 
 def compare_motions(
@@ -69,8 +75,10 @@ def compare_all(
 ) -> list[MotionErrors]:
     """Return the errors of several motions against one captured motion. feet: joint indices."""
     own, true = np.stack([motion.points for motion in made]), captured.points
-    features = np.broadcast_to(_warping_features(true), (len(made), FRAMES, true.shape[1] * 3))
-    phases = dtw.warp(features, _warping_features(own))
+    known = np.concatenate([_warping_features(true), _curve_features(captured)], axis=-1)
+    shown = [np.concatenate([_warping_features(m.points), _curve_features(m)], -1) for m in made]
+    features = np.broadcast_to(known, (len(made), *known.shape))
+    phases = dtw.warp(features, np.stack(shown))
     warped = np.stack([_resample(*pair) for pair in zip(own, phases, strict=True)])
     apart = _joint_distances(warped, true)
     shell = np.linalg.norm(_root_relative(warped) - _root_relative(true), axis=-1)
@@ -82,8 +90,9 @@ def compare_all(
         _distances(shell[..., 1:].max(axis=-1)),
         strict=True,
     )
-    jerks = acceleration(own) / acceleration(true)
+    jerks = _ratios(acceleration(own), acceleration(true))
     slid = skate(captured, feet)
+    channels = [_curve_errors(*pair, captured) for pair in zip(made, phases, strict=True)]
     squares = np.mean(np.square(apart), axis=1)
     return [
         MotionErrors(
@@ -94,9 +103,37 @@ def compare_all(
             slid,
             float(np.log(motion.duration / captured.duration)),
             joints,
+            *errors,
         )
-        for motion, found, jerk, joints in zip(made, spreads, jerks, squares, strict=True)
+        for motion, found, jerk, joints, errors in zip(
+            made, spreads, jerks, squares, channels, strict=True
+        )
     ]
+
+
+def _curve_features(motion: ComparedMotion) -> Floats:
+    """Return the curves (FRAMES, C) as the distances that they count as, m, for time warping."""
+    own = motion.curves
+    return np.zeros((FRAMES, 0)) if own is None else own.values * curves.distances(own.curves)
+
+
+def _curve_errors(
+    made: ComparedMotion, phase: Floats, captured: ComparedMotion
+) -> tuple[Floats, Floats]:
+    """Return mean squared errors (C,) of the curves, in their own units and as distances, m².
+
+    phase: (FRAMES,), places of the made motion after time warping.
+    """
+    if made.curves is None or captured.curves is None:
+        return np.zeros(0), np.zeros(0)
+    apart = time_alignment.interpolate(made.curves.values, phase) - captured.curves.values
+    squares = np.mean(np.square(apart), axis=0)
+    return squares, squares * np.square(curves.distances(captured.curves.curves))
+
+
+def _ratios(made: Floats, captured: Floats) -> Floats:
+    """Return the ratios of accelerations (M,); NaN for a captured motion that rests."""
+    return made / captured if captured > 0.0 else np.full(len(made), np.nan)
 
 
 def compare_methods(
@@ -149,9 +186,11 @@ def _distances(apart: Floats) -> list[DistanceStatistics]:
 def acceleration(points: Floats) -> Floats:
     """Return mean sizes (...) of second differences of points (..., FRAMES, J, 4, 3), m.
 
-    The points are taken relative to the root.
+    The points are taken relative to the root. Zero for a single joint.
     """
     joints = _root_relative(points)[..., 1:, 0, :]
+    if not joints.shape[-2]:
+        return np.zeros(points.shape[:-4])
     return np.linalg.norm(np.diff(joints, n=2, axis=-3), axis=-1).mean(axis=(-2, -1))
 
 
@@ -186,6 +225,8 @@ def mean(errors: Sequence[MotionErrors]) -> MotionErrors:
         skate_captured=average("skate_captured"),
         duration=float(np.sqrt(np.mean(np.square([error.duration for error in errors])))),
         joints=np.mean([error.joints for error in errors], axis=0),
+        curves=np.mean([error.curves for error in errors], axis=0),
+        counted=np.mean([error.counted for error in errors], axis=0),
     )
 
 

@@ -58,7 +58,8 @@ class EvaluationResult:
     predictions to the captured event (C,); empty without an event. flags: accuracy of the support
     flag; None against the truth, which has no held-out clips. bodies: at the event, of captured
     clips and of posefield's predictions. parents: of the joints. contacts: accuracy of posefield's
-    (C,); empty without contacts, and against the truth.
+    (C,); empty without contacts, and against the truth. curves: names. has_positions: False for
+    clips of curves without a skeleton, of which measures of positions say nothing.
     """
 
     family: str
@@ -74,6 +75,8 @@ class EvaluationResult:
     bodies: EventBodies = field(default_factory=dict)
     parents: tuple[int, ...] = ()
     contacts: tuple[ContactAccuracy, ...] = ()
+    curves: tuple[str, ...] = ()
+    has_positions: bool = True
 
     def asked(self, name: str) -> list[int]:
         """Return the indices of the clips that a method predicted."""
@@ -148,7 +151,8 @@ def run_protocol(
     joints, takes = examples[0].clip.skeleton.names, sample_points.take_numbers(examples)
     asked = _ResultNames(f"leave_one_{protocol}_out", names, joints, takes.tolist())
     parts = with_progress(jobs.run(run_fold, each, (recipe, examples)), len(each), report)
-    return replace(_merge_parts(recipe, asked, parts), flags=found)
+    curves = tuple(examples[0].clip.curves.names) if examples[0].clip.curves else ()
+    return replace(_merge_parts(recipe, asked, parts), flags=found, curves=curves)
 
 
 def run_against_truth(
@@ -321,4 +325,5 @@ def _merge_parts(
         parents=listed[0].parents,
         # A fold without a clip in contact has no contacts.
         contacts=tuple(contacts[i] for i in order) if len(contacts) == len(order) else (),
+        has_positions=recipe.curves is None or not recipe.curves.alone,
     )

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 
 from posefield.common.units import Floats
 from posefield_train.evaluate import evaluation_summary, event_bodies
-from posefield_train.evaluate.evaluation_summary import MethodSummary
 from posefield_train.evaluate.event_bodies import CAPTURED, EventBodies, EventBody
 from posefield_train.evaluate.learning_curves import Learning
 from posefield_train.evaluate.methods import EXACT, OURS
 from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS
 from posefield_train.evaluate.protocol import EvaluationResult
+from posefield_train.evaluate.summary.method_summary import MethodSummary
 from posefield_train.report.drawing import stick_figures, svg_chart
 from posefield_train.report.drawing.svg_chart import Chart
 
@@ -42,10 +42,12 @@ PANELS: dict[str, dict[str, str]] = {
 
 def method_bars(found: Sequence[MethodSummary]) -> Chart:
     """Return the mean distances of all methods."""
+    *most, last = _bar_columns(found)
+    titles = f"{', '.join(most)} and {last}" if most else last
     return svg_chart.draw(
         0.9 + 0.27 * len(found),
         partial(paint_bars, found),
-        f"Bar charts of the root-relative, global and effector error of {len(found)} methods.",
+        f"Bar charts of the {titles} error of {len(found)} methods.",
         "Mean error by method, posefield in orange. The axes end at two and a half times the error "
         "of posefield. Black lines are standard errors over clips.",
     )
@@ -55,19 +57,27 @@ def paint_bars(found: Sequence[MethodSummary], figure: Figure) -> None:
     """Draw a panel for each kind of distance, with a bar for each method."""
     names = [one.name.replace("_", " ") for one in found]
     colours = [svg_chart.ORANGE if one.name.startswith(OURS) else svg_chart.BLUE for one in found]
-    columns = {
-        "root-relative": [one.mean.relative.mean for one in found],
-        "global": [one.mean.absolute.mean for one in found],
-        "effector": [one.mean.effector for one in found],
-    }
-    axes = figure.subplots(1, 3, sharey=True)
+    columns = _bar_columns(found)
+    axes = figure.subplots(1, len(columns), sharey=True, squeeze=False)[0]
+    ranked = next(iter(columns))
     for ax, (title, values) in zip(axes, columns.items(), strict=True):
-        spread = [100 * one.standard_error for one in found] if title == "root-relative" else None
+        spread = [100 * one.standard_error for one in found] if title == ranked else None
         ax.barh(names, 100 * np.nan_to_num(values), color=colours, xerr=spread)
         # A few methods have much larger errors, which would hide the differences of the others.
         ax.set(title=title, xlabel="cm", xlim=(0, 250 * float(np.nan_to_num(values[0])) or 1.0))
         ax.grid(visible=False, axis="y")
     axes[0].invert_yaxis()
+
+
+def _bar_columns(found: Sequence[MethodSummary]) -> dict[str, list[float]]:
+    """Return the errors of all methods, m, by title; those by which methods are ranked first."""
+    curves = [one.curve_distance for one in found] if found[0].curves else []
+    positions = {
+        "root-relative": [one.mean.relative.mean for one in found],
+        "global": [one.mean.absolute.mean for one in found],
+        "effector": [one.mean.effector for one in found],
+    }
+    return (positions if found[0].has_positions else {}) | ({"curves": curves} if curves else {})
 
 
 def clips(result: EvaluationResult, rival: str) -> Chart:
@@ -84,12 +94,14 @@ def clips(result: EvaluationResult, rival: str) -> Chart:
 
 def _paint_clips(result: EvaluationResult, rival: str, figure: Figure) -> None:
     left, right = figure.subplots(1, 2)
-    ours = 100 * evaluation_summary.relative_distances(result.of(OURS, result.asked(OURS)))
-    theirs = 100 * evaluation_summary.relative_distances(result.of(rival, result.asked(rival)))
+    ours, theirs = (
+        100 * evaluation_summary.clip_distances(result, result.of(name, result.asked(name)))
+        for name in (OURS, rival)
+    )
     left.plot(theirs, ours, ".", color=svg_chart.BLUE, rasterized=len(ours) > MAX_MARKERS)
     far = 1.05 * max(ours.max(), theirs.max())
     left.plot([0, far], [0, far], color=svg_chart.GREY, linewidth=0.8)
-    title = "root-relative error"
+    title = "root-relative error" if result.has_positions else "error of the curves"
     left.set(xlabel=f"{rival} (cm)", ylabel="posefield (cm)", title=title, aspect="equal")
     worst = np.argsort(-ours)[:MAX_NAMED_CLIPS]
     right.barh(

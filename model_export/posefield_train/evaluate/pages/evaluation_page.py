@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from posefield_train.evaluate import corrections, equal_information, evaluation_summary
-from posefield_train.evaluate.evaluation_summary import MethodSummary
 from posefield_train.evaluate.learning_curves import Learning
 from posefield_train.evaluate.methods import OURS, TOLD, definition
 from posefield_train.evaluate.pages import evaluation_charts
 from posefield_train.evaluate.protocol import EvaluationResult
+from posefield_train.evaluate.summary import method_summary
+from posefield_train.evaluate.summary.method_summary import NOT_APPLICABLE, MethodSummary
 from posefield_train.report.drawing.html_page import Page, Section, Table
 
 TITLES = {
@@ -29,8 +32,7 @@ def html(
     """Return the page of a recipe's results and learning curve; equal results, equal bytes."""
     first = evaluation_summary.summarize(results[0])[0]
     figures = [
-        ("root-relative error", f"{100 * first.mean.relative.mean:.2f} cm"),
-        ("global error", f"{100 * first.mean.absolute.mean:.2f} cm"),
+        *_distance_figures(first),
         ("error of the duration", f"{100 * first.mean.duration:.1f} %"),
         ("sigma ratio (1 is ideal)", f"{evaluation_summary.sigma_ratio(results[0]):.2f}"),
     ]
@@ -40,22 +42,38 @@ def html(
     return Page("evaluation", results[0].family, description, figures, sections).html()
 
 
+def _distance_figures(first: MethodSummary) -> list[tuple[str, str]]:
+    """Return the errors of posefield that the page begins with."""
+    found = {
+        "root-relative error": first.mean.relative.mean,
+        "global error": first.mean.absolute.mean,
+    }
+    shown = [
+        (title, f"{100 * metres:.2f} cm" if first.has_positions else NOT_APPLICABLE)
+        for title, metres in found.items()
+    ]
+    if first.curves:
+        shown.append(("error of the curves", f"{100 * first.curve_distance:.3f} cm"))
+    return shown
+
+
 def _section(result: EvaluationResult) -> Section:
     found = evaluation_summary.summarize(result)
     caption = "Mean error of each method (cm; columns are explained under Methods and columns)"
-    head = tuple(title for title, _ in evaluation_summary.COLUMNS)
+    head = tuple(title for title, _ in method_summary.columns(result))
     rival = min(_other_methods(found), key=lambda one: one.worse).name
     return Section(
         result.protocol,
         TITLES[result.protocol],
         (
-            evaluation_summary.UNITS,
+            *method_summary.units(result),
             EQUAL,
             *map(_sentence, evaluation_summary.trust_text(result)),
         ),
         (
             *_equal_information(result),
             Table(caption, head, tuple(one.cells() for one in found)),
+            *_curves(result, found),
             *_corrections(result),
         ),
         (
@@ -65,6 +83,13 @@ def _section(result: EvaluationResult) -> Section:
             *evaluation_charts.event_charts(result),
         ),
     )
+
+
+def _curves(result: EvaluationResult, found: Sequence[MethodSummary]) -> list[Table]:
+    """Return the table of the error of each curve by method; none without curves."""
+    rows = [(one.name, *(f"{error:.4f}" for error in np.sqrt(one.mean.curves))) for one in found]
+    caption = "Root mean square error of each curve, in its own unit"
+    return [Table(caption, ("method", *result.curves), tuple(rows))] if result.curves else []
 
 
 def _sentence(text: str) -> str:
@@ -95,9 +120,16 @@ def _distances(result: EvaluationResult) -> Section:
     """Return the statistics of every distance of every method."""
     heading = ("method", "distance", "mean", "RMS", "p95", "p99", "largest")
     rows = [
-        (one.name, title, *(f"{100 * value:.2f}" for value in vars(spread).values()))
+        (
+            one.name,
+            title,
+            *(
+                f"{100 * value:.2f}" if one.has_positions else NOT_APPLICABLE
+                for value in vars(spread).values()
+            ),
+        )
         for one in evaluation_summary.summarize(result)
-        for name, title in evaluation_summary.DISTANCES.items()
+        for name, title in method_summary.DISTANCES.items()
         for spread in (getattr(one.mean, name),)
     ]
     paragraphs = (
@@ -123,6 +155,7 @@ def _learning(curve: Learning) -> Section:
 
 def _legend(results: Sequence[EvaluationResult]) -> Section:
     names = dict.fromkeys(name for result in results for name in result.errors)
+    columns = dict.fromkeys(one for own in results for one in method_summary.columns(own)[1:])
     methods = tuple((name, definition(name)) for name in names)
     paragraphs = (
         "All methods get the same aligned clips, and predict motion, bone lengths and timing.",
@@ -130,8 +163,6 @@ def _legend(results: Sequence[EvaluationResult]) -> Section:
     )
     tables = (
         Table("Methods", ("method", "definition"), methods),
-        Table(
-            "Columns", ("column", "meaning"), tuple(dict.fromkeys(evaluation_summary.COLUMNS[1:]))
-        ),
+        Table("Columns", ("column", "meaning"), tuple(columns)),
     )
     return Section("methods", "Methods and columns", paragraphs, tables)

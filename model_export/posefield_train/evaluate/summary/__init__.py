@@ -1,0 +1,1 @@
+"""Summaries of an evaluation: of each method, and of performers."""
