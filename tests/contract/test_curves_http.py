@@ -1,10 +1,12 @@
 """Curves over HTTP: a model with them names them on its card and in its answers, others do not."""
 
+import json
+
 import jsonschema
 import msgspec
 import numpy as np
 import pytest
-from asking import asker
+from asking import asker, unpacked
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
@@ -96,3 +98,41 @@ def test_a_model_without_curves_says_nothing_of_them(ask, face, path):
     asked = "" if path == "" else f"{first}{QUERY}"
     assert "curve" not in ask("GET", f"/v1/models/reach{path}").text
     assert "curve" in face("GET", f"/v1/models/face{path}{asked}").text
+
+
+def warnings(found):
+    return [json.loads(text) for text in found.headers.get_list("Posefield-Warning")]
+
+
+def test_bvh_says_that_it_carries_no_curves_and_what_does(face, ask):
+    found = face("GET", f"/v1/models/face/clip.bvh?{QUERY}")
+    (said,) = warnings(found)
+    assert said.startswith("bvh files carry no curves: 11 are left out (jawOpen, ")
+    assert said.endswith("usda, usdc, usdz, json, glb, npz, arrow, msgpack have them")
+    for other in ("usdc", "glb", "json", "npz"):
+        assert warnings(face("GET", f"/v1/models/face/clip.{other}?{QUERY}")) == []
+    # A model without curves has none to leave out.
+    assert warnings(ask("GET", "/v1/models/reach/clip.bvh")) == []
+
+
+def test_archives_and_exports_of_bvh_say_so_in_the_manifest(face, model_file, posefield, tmp_path):
+    body = {"format": "bvh", "clips": [{"controls": CONTROLS, "name": "one"}]}
+    found = face("POST", "/v1/models/face/clips.zip", json=body)
+    (said,) = warnings(found)
+    assert "bvh files carry no curves" in said
+    entry = json.loads(unpacked("zip", found.content)["manifest.jsonl"])
+    assert entry["warnings"] == [said]
+    table = tmp_path / "queries.jsonl"
+    table.write_text(json.dumps({**CONTROLS, "name": "one"}) + "\n")
+    for form, expected in (("bvh", [said]), ("usdc", [])):
+        words = ("export", model_file("face"), table, "-o", tmp_path / form, "--format", form)
+        assert posefield(*words)[0] == 0
+        assert json.loads((tmp_path / form / "manifest.jsonl").read_bytes())["warnings"] == expected
+
+
+def test_the_clip_command_prints_what_bvh_leaves_out(model_file, posefield, tmp_path):
+    asked = ("-c", "smile=0.7", "-c", "openness=0.5", "-o")
+    code, _, err = posefield("clip", model_file("face"), *asked, tmp_path / "laugh.bvh")
+    assert code == 0 and "warning: bvh files carry no curves: 11 are left out" in err
+    code, _, err = posefield("clip", model_file("face"), *asked, tmp_path / "laugh.usdc")
+    assert code == 0 and "curves" not in err

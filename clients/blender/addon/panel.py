@@ -102,6 +102,7 @@ def draw_trust(layout, scene, card) -> None:
         draw_text(layout, f"A captured clip would lie about {far} from this", "INFO")
         draw_mark(layout, marks.support(clip.trust), "CHECKMARK", "ERROR")
         draw_mark(layout, marks.performer(clip.trust), "USER", "GHOST_DISABLED")
+        draw_mark(layout, marks.curves(clip.curves), "SHAPEKEY_DATA", "SHAPEKEY_DATA")
     for warning in card.warnings(now):
         draw_text(layout, f"Outside: {warning}", "ERROR")
 

@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield_train.contacts import held_out_contacts
 from posefield_train.evaluate import corrections, equal_information, motion_errors
-from posefield_train.evaluate.methods import ASKED_OPEN, EXACT, OURS, TOLD, definition
+from posefield_train.evaluate.methods import EXACT, OURS, TOLD, definition
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.evaluate.summary import method_summary

@@ -126,7 +126,8 @@ class _ChunkInProgress:
             except QueryError as fault:
                 self._record_fault(row.place, str(fault))
             else:
-                yield _SynthesizedClip(path(number, row.name, row.format), row, answer)
+                noted = CLIP_ENCODERS[row.format].noted(answer)
+                yield _SynthesizedClip(path(number, row.name, row.format), row, noted)
 
     def _record_fault(self, place: str, message: str) -> None:
         # The table's folder is not part of the job and must not affect its files.

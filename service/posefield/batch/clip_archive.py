@@ -7,7 +7,7 @@ from posefield.batch import manifest
 from posefield.batch.rows.row_query import ClipQuery
 from posefield.common import cancellation
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.formats import ClipEncoder
+from posefield.encode.formats import ClipEncoder, left_out
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clips
 from posefield.synthesis.clips import ClipPreview
@@ -44,7 +44,11 @@ class ArchiveOrder:
             "miss some target": sum(prospect.missed for prospect in self.prospects),
         }
         every = len(self.prospects)
-        return [f"{count} of {every} clips {said}" for said, count in counts.items() if count]
+        found = [f"{count} of {every} clips {said}" for said, count in counts.items() if count]
+        curves = [curve.name for curve in self.model.session.card.curves]
+        if curves and not self.encoder.has_curves:
+            found.append(left_out(curves, self.encoder.extension))
+        return found
 
 
 def archive_members(order: ArchiveOrder) -> Iterator[tuple[str, bytes]]:
@@ -63,7 +67,7 @@ def archive_members(order: ArchiveOrder) -> Iterator[tuple[str, bytes]]:
 def _files(
     order: ArchiveOrder, queries: Sequence[ClipQuery], lines: bytearray
 ) -> Iterator[tuple[str, bytes]]:
-    answers = [_clip(order.model, query) for query in queries]
+    answers = [order.encoder.noted(_clip(order.model, query)) for query in queries]
     contents = order.encoder.write(answers, order.convention)
     for query, answer, content in zip(queries, answers, contents, strict=True):
         file = f"{query.name}.{query.format}"

@@ -36,13 +36,13 @@ def clip(
 ) -> None:
     """Write a clip to a file: USD, glTF, BVH or numbers.
 
-    The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack. Blender plays
-    USD files at the scene's frame rate, 24 by default: write them with --fps 24, or set the scene's
-    rate.
+    The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack; bvh carries no
+    curves. Blender plays USD files at the scene's frame rate, 24 by default: write them with
+    --fps 24, or set the scene's rate.
     """
     found = encoder_for(output)
     convention = found.convention(question.unit, question.up, question.body)
-    answer = clips.synthesize_clip(open_model(model), question)
+    answer = found.noted(clips.synthesize_clip(open_model(model), question))
     atomic_files.write(found.encode(answer, convention), output)
     print_warnings(answer.trust)
     typer.echo(written_message(output, answer, json))

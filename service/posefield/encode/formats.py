@@ -5,7 +5,7 @@ The table of archives is `archives.ARCHIVE_WRITERS`.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 from posefield.common import cancellation
@@ -45,7 +45,7 @@ class ClipEncoder(Format):
     whether the format allows no other convention. at_once: number of frames up to which a file is
     written in a millisecond or two, so that other requests may wait for it. per_joint: largest
     number of bytes of a joint in a frame, without the parts that all frames share. has_body:
-    whether the format carries a body.
+    whether the format carries a body. has_curves: whether it carries curves.
     """
 
     write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
@@ -54,6 +54,7 @@ class ClipEncoder(Format):
     convention_fixed: bool = False
     inline_limit: int = 200
     has_body: bool = False
+    has_curves: bool = True
 
     def convention(
         self, unit: LengthUnit | None, up: UpAxis | None, body: BodyKind | None = None
@@ -74,6 +75,13 @@ class ClipEncoder(Format):
             conventions.check_convention(found, self.usual, self.extension)
         return found
 
+    def noted(self, answer: ClipAnswer) -> ClipAnswer:
+        """Return a result with a warning of its curves if the format carries none."""
+        if self.has_curves or answer.clip.curves is None:
+            return answer
+        warnings = (*answer.trust.warnings, left_out(answer.clip.curves.names, self.extension))
+        return replace(answer, trust=replace(answer.trust, warnings=warnings))
+
     def encode(self, answer: ClipAnswer, convention: Convention | None = None) -> bytes:
         """Return the file of one result, in the format's default convention unless one is given."""
         return self.write([answer], convention or self.usual)[0]
@@ -81,6 +89,15 @@ class ClipEncoder(Format):
 
 CURVES_PER_JOINT = 4
 """Curves that take as many bytes as a joint, of four numbers or more."""
+
+
+def left_out(curves: Sequence[str], extension: str) -> str:
+    """Return the sentence on curves that files of a format do not have."""
+    others = [name for name, encoder in CLIP_ENCODERS.items() if encoder.has_curves]
+    return (
+        f"{extension} files carry no curves: {len(curves)} are left out ({', '.join(curves)}); "
+        f"{', '.join(others)} have them"
+    )
 
 
 def max_poses(size: int, joints: int, per_joint: int, curves: int = 0) -> int:
@@ -140,7 +157,9 @@ CLIP_ENCODERS = by_extension(
         "usdz", "model/vnd.usdz+zip", _lazy_usd_writer("usdz"), 48, inline_limit=0, has_body=True
     ),
     ClipEncoder("json", JSON, sequential_writer(clip_tables.clip_json), 96),
-    ClipEncoder("bvh", "application/x-bvh", sequential_writer(bvh), 72, CENTIMETRES),
+    ClipEncoder(
+        "bvh", "application/x-bvh", sequential_writer(bvh), 72, CENTIMETRES, has_curves=False
+    ),
     ClipEncoder(
         "glb",
         "model/gltf-binary",

@@ -77,7 +77,7 @@ async def encode(context: Clips, task: ClipTask, answer: ClipAnswer) -> bytes:
 
 def respond(context: Clips, answer: ClipAnswer, content: bytes) -> Response:
     """Return the response, with the facts of trust in its headers."""
-    return responses.clip_file(content, context.form, answer.trust)
+    return responses.clip_file(content, context.form, context.form.noted(answer).trust)
 
 
 # The default of Accept is binary USD.

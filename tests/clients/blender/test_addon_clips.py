@@ -67,6 +67,15 @@ def test_of_what_an_older_service_does_not_say_nothing_is_said():
     assert told() == [None, None]
 
 
+def test_curves_that_the_panel_does_not_animate_are_counted():
+    names = np.array(["jawOpen", "smile"])
+    clip = clips.decode(packed(plain(curve_names=names, curves=np.zeros((3, 2)))))
+    assert clip.curves == ("jawOpen", "smile")
+    found = marks.curves(clip.curves)
+    assert not found.held and found.words.startswith("2 curves are not animated")
+    assert marks.curves(clips.decode(packed(plain())).curves) is None
+
+
 def test_a_clip_is_no_answer_to_another_question():
     clip = clips.decode(packed(plain(trust=np.array(json.dumps(TRUST | {"performer": "kim"})))))
     kim = {"performer": "kim"}

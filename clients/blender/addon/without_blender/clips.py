@@ -59,7 +59,7 @@ class Clip:
     parents: of each joint by name, None for the root. rotations: (F, J, 4), unit quaternions w x y
     z local to the parent, with continuous signs. path: of the root (F, 3). offsets: from the
     parents (J, 3), zero for the root. rate: frames per second. trust: the service's trust
-    information.
+    information. curves: names of the curves of the answer, which are not animated here.
     """
 
     parents: dict[str, str | None]
@@ -68,6 +68,7 @@ class Clip:
     offsets: Floats
     rate: float
     trust: dict[str, Any] = field(default_factory=dict)
+    curves: tuple[str, ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -120,6 +121,7 @@ def _clip(found: Any) -> Clip:
         offsets=axes.z_up(offsets),
         rate=rate,
         trust=trust,
+        curves=tuple(map(str, found["curve_names"])) if "curve_names" in found else (),
     )
 
 

@@ -1,5 +1,6 @@
-"""Support and performer of a clip's trust, and weights of labels, in words."""
+"""Support, performer and curves of a clip, and weights of labels, in words."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,3 +47,14 @@ def performer(trust: dict[str, Any]) -> Mark | None:
         return Mark(found, "Moves as a mixture of performers")
     known = f"{trust['performer']} was captured"
     return Mark(found, known if found else "Moves as an unseen performer")
+
+
+def curves(names: Sequence[str]) -> Mark | None:
+    """Return the mark of curves of the answer, which the add-on does not animate; None without."""
+    if not names:
+        return None
+    return Mark(
+        False,
+        f"{len(names)} curves are not animated by this panel: import the clip as usdc or glb, "
+        "whose shape keys have them",
+    )

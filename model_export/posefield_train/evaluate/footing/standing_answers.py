@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from posefield.feet import limbs
 from posefield.inference import session
 from posefield.motion.clip import Clip
