@@ -13,7 +13,6 @@ from posefield.motion.curves import distances
 from posefield_train.evaluate import (
     compared_motion,
     equal_information,
-    evaluation_summary,
     methods,
     motion_errors,
     new_performers,
@@ -21,7 +20,7 @@ from posefield_train.evaluate import (
 )
 from posefield_train.evaluate.methods import OURS, Queries
 from posefield_train.evaluate.pages import evaluation_page
-from posefield_train.evaluate.summary import method_summary
+from posefield_train.evaluate.summary import evaluation_summary, method_summary
 from posefield_train.evaluate.summary.method_summary import NOT_APPLICABLE
 from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.sample.face import face_motion

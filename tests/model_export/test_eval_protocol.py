@@ -18,7 +18,6 @@ from posefield_train.evaluate import (
     compared_motion,
     corrected_answers,
     corrections,
-    evaluation_summary,
     folds,
     ground_truth,
     learning_curves,
@@ -31,7 +30,7 @@ from posefield_train.evaluate.methods import Queries
 from posefield_train.evaluate.pages import evaluation_charts, evaluation_page
 from posefield_train.evaluate.peers import interpolation_peers, predicted_values
 from posefield_train.evaluate.peers.predicted_values import OPEN
-from posefield_train.evaluate.summary import performer_summary
+from posefield_train.evaluate.summary import evaluation_summary, performer_summary
 from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.report.drawing import svg_chart
 from posefield_train.source import ingest

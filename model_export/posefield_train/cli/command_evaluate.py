@@ -173,7 +173,7 @@ class _Family:
 
 
 def _evaluate(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> None:
-    from posefield_train.evaluate import evaluation_summary
+    from posefield_train.evaluate.summary import evaluation_summary
 
     # Errors in the arguments are reported before minutes of work.
     own = _family(recipe_file, data, wanted)
@@ -237,8 +237,8 @@ def _joined(own: _Family, data: Path, wanted: EvaluateOptions) -> _JoinedFamily 
 def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]":
     """Run the protocols and print each result when it is complete."""
     from posefield.console.progress import ProgressBar
-    from posefield_train.evaluate import corrections, evaluation_summary, protocol
-    from posefield_train.evaluate.summary import performer_summary
+    from posefield_train.evaluate import corrections, protocol
+    from posefield_train.evaluate.summary import evaluation_summary, performer_summary
 
     names = wanted.protocols or protocol.protocols(own.recipe, own.examples)
     counts = [protocol.count_jobs(own.examples, name) for name in names]

@@ -10,12 +10,13 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from posefield.common.units import Floats
-from posefield_train.evaluate import evaluation_summary, event_bodies
+from posefield_train.evaluate import event_bodies
 from posefield_train.evaluate.event_bodies import CAPTURED, EventBodies, EventBody
 from posefield_train.evaluate.learning_curves import Learning
 from posefield_train.evaluate.methods import EXACT, OURS
 from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS
 from posefield_train.evaluate.protocol import EvaluationResult
+from posefield_train.evaluate.summary import evaluation_summary
 from posefield_train.evaluate.summary.method_summary import MethodSummary
 from posefield_train.report.drawing import stick_figures, svg_chart
 from posefield_train.report.drawing.svg_chart import Chart

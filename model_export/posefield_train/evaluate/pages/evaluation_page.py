@@ -4,12 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from posefield_train.evaluate import corrections, equal_information, evaluation_summary
+from posefield_train.evaluate import corrections, equal_information
 from posefield_train.evaluate.learning_curves import Learning
 from posefield_train.evaluate.methods import OURS, TOLD, definition
 from posefield_train.evaluate.pages import evaluation_charts
 from posefield_train.evaluate.protocol import EvaluationResult
-from posefield_train.evaluate.summary import method_summary
+from posefield_train.evaluate.summary import evaluation_summary, method_summary
 from posefield_train.evaluate.summary.method_summary import NOT_APPLICABLE, MethodSummary
 from posefield_train.report.drawing.html_page import Page, Section, Table
 

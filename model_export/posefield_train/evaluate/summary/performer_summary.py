@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from typing import Any
 
-from posefield_train.evaluate import evaluation_summary
 from posefield_train.evaluate.methods import OURS
 from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS, ASKED_OPEN
 from posefield_train.evaluate.protocol import EvaluationResult
+from posefield_train.evaluate.summary import evaluation_summary
 from posefield_train.evaluate.summary.method_summary import centimetres
 from posefield_train.report.drawing import significant_digits
 
