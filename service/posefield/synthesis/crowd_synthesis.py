@@ -230,7 +230,8 @@ def _blend(
             whole[rows] = mixing(getattr(before, name), whole[rows], shares)
         if block.curves is not None:
             # Rounding of the blend may leave the limits.
-            block.curves[rows] = curves.clamp(model.session.card.curves, block.curves[rows])
+            blended = block.curves[rows].astype(np.float64)
+            block.curves[rows] = curves.clamp(model.session.card.curves, blended)
 
 
 _PER_TIME = ("rotations", "root_position", "travel", graph_ports.CURVES)

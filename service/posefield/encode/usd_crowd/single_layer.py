@@ -75,7 +75,7 @@ def _copy_motion(
     alone.
     """
     first = None
-    for index in np.flatnonzero(crowd.motion == played):
+    for index in np.flatnonzero(crowd.motion == played).tolist():
         cancellation.check()
         root = layer.GetPrimAtPath(crowd_scene.character_path(index))
         own = character_prims.animation(root, root.name, rig.paths, crowd.curves)
