@@ -13,9 +13,7 @@ FOOT, KNEE = 2, 1
 
 @pytest.fixture
 def leg():
-    return Skeleton(
-        ("Hip", "Knee", "Foot"), (-1, 0, 1), np.zeros((3, 3)), (2,), np.zeros((1, 3))
-    )
+    return Skeleton(("Hip", "Knee", "Foot"), (-1, 0, 1), np.zeros((3, 3)), (2,), np.zeros((1, 3)))
 
 
 def moving(leg, path, knee=None):

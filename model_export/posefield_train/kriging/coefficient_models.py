@@ -11,8 +11,9 @@ from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.power_law import PowerLawFit
+from posefield_train.kriging.predictive_density import PredictiveDensityLoss
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.tuning_loss import OTHER_STRENGTH, TuningProblem
+from posefield_train.kriging.tuning_loss import OTHER_STRENGTH, LeaveOneOutLoss, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe_sections.training_sections import Kriging
 from posefield_train.tensor.decoder import Proportions
@@ -61,12 +62,14 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
 
     Leave-one-out predictions tell by how much: their differences from the mean are multiplied by
     the share that fits the values best. A choice between model and mean does worse than either: a
-    sample that is left out pulls the choice away from itself.
+    sample that is left out pulls the choice away from itself. A single value, as the duration is,
+    is tuned by the density of its left-out takes.
     """
     if np.ptp(values, axis=0).max() == 0.0:
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
     problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
-    found = kriging_tuning.tune_beside(problem, pose)
+    loss = PredictiveDensityLoss if values.shape[1] == 1 else LeaveOneOutLoss
+    found = kriging_tuning.tune_beside(problem, pose, loss)
     from_mean, mean = samples.from_mean(values), values.mean(axis=0)
     predicted = from_mean - found.residuals
     # Where the recipe gives a nugget, it has decided that the controls explain the samples.

@@ -70,21 +70,28 @@ def tune(problem: TuningProblem, covariance: str, degree: int | None) -> TunedKr
     return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts])
 
 
-def tune_beside(problem: TuningProblem, pose: Hyper) -> TunedKriging:
-    """Return a model with the scales and correlation of the pose's, and other parameters tuned."""
+def tune_beside(
+    problem: TuningProblem, pose: Hyper, loss: type[LeaveOneOutLoss] = LeaveOneOutLoss
+) -> TunedKriging:
+    """Return a model with the scales and correlation of the pose's, and other parameters tuned.
+
+    loss: to minimize.
+    """
     trend = pose.drifts == (0,) and pose.trend > 0.0
-    return _tune_at_scales(problem, replace(pose, trend=0.0), trend)
+    return _tune_at_scales(problem, replace(pose, trend=0.0), trend, loss)
 
 
 def tune_with_trend(problem: TuningProblem, hyper: Hyper) -> TunedKriging:
     """Return a model with the scales, correlation and trend of `hyper`, and the others tuned."""
-    return _tune_at_scales(problem, hyper, trend=False)
+    return _tune_at_scales(problem, hyper, trend=False, loss=LeaveOneOutLoss)
 
 
-def _tune_at_scales(problem: TuningProblem, hyper: Hyper, trend: bool) -> TunedKriging:
+def _tune_at_scales(
+    problem: TuningProblem, hyper: Hyper, trend: bool, loss: type[LeaveOneOutLoss]
+) -> TunedKriging:
     names = tuple(own for own in _free(problem, trend) if own[0] != "correlation")
-    loss = LeaveOneOutLoss(problem, hyper.without_offsets(), names, own_scales=False)
-    return _best(loss, [loss.start(0.0, np.log(nugget)) for _, nugget in STARTS])
+    own = loss(problem, hyper.without_offsets(), names, own_scales=False)
+    return _best(own, [own.start(0.0, np.log(nugget)) for _, nugget in STARTS])
 
 
 def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:

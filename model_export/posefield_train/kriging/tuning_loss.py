@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 from scipy.special import expit
 
-from posefield.common.array_shapes import SampleValues
+from posefield.common.array_shapes import SampleMatrix, SampleValues
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model, leave_one_out
 from posefield.kriging.kriging_model import LabelKernel
@@ -127,14 +127,21 @@ class LeaveOneOutLoss:
     ) -> tuple[float, Annotated[Floats, "units"]]:
         """Return the loss and its gradient in search units."""
         hyper = self.read(x)
-        squares, slope = self._squares(hyper)
-        groups = self._count
+        value, slope = self.of_samples(hyper)
         deviations = np.array([prior.deviation for prior in self.priors])
         apart = (x - [prior.mean for prior in self.priors]) / deviations
         strength = self.problem.strength
-        value = 0.5 * groups * np.log(squares) + 0.5 * strength * float(apart @ apart)
         changes = np.array([np.sum(slope * change) for change in self._changes(hyper)])
-        return value, 0.5 * groups / squares * changes + strength * apart / deviations
+        return (
+            value + 0.5 * strength * float(apart @ apart),
+            changes + strength * apart / deviations,
+        )
+
+    def of_samples(self, hyper: Hyper) -> tuple[float, SampleMatrix]:
+        """Return the loss without the prior, and its derivative (n, n) by the covariances."""
+        squares, slope = self._squares(hyper)
+        half = 0.5 * len(np.unique(self.problem.samples.groups))
+        return half * float(np.log(squares)), half / squares * slope
 
     def _squares(self, hyper: Hyper) -> tuple[float, Floats]:
         """Return the weighted squared residuals, and their derivative (n, n) by the covariances.
@@ -142,16 +149,16 @@ class LeaveOneOutLoss:
         With the inverse B of the kriging system's sample block and U = B values, the residuals of a
         group g are R_g = B_gg⁻¹ U_g; see the closed form of `leave_one_out`.
         """
-        block = self._inverse(hyper)
-        product = block @ self._values
-        residuals = leave_one_out.divide_groups(block, product, self._takes)
+        block = self.inverse(hyper)
+        product = block @ self.values
+        residuals = leave_one_out.divide_groups(block, product, self.takes)
         weighted = self._weighted(residuals)
-        backward = leave_one_out.divide_groups(block, weighted, self._takes)
-        paired = np.where(self._together, backward @ residuals.T, 0.0)
+        backward = leave_one_out.divide_groups(block, weighted, self.takes)
+        paired = np.where(self.together, backward @ residuals.T, 0.0)
         slope = block @ (paired @ block - backward @ product.T)
         return float(np.sum(weighted * residuals)), slope + slope.T
 
-    def _inverse(self, hyper: Hyper) -> Floats:
+    def inverse(self, hyper: Hyper) -> Floats:
         """Return the sample block (n, n) of the inverse of the kriging system."""
         points, degree = self.problem.samples.points, max(hyper.drifts)
         inverse: Floats = np.asarray(
@@ -171,7 +178,7 @@ class LeaveOneOutLoss:
         return found
 
     @cached_property
-    def _values(self) -> Floats:
+    def values(self) -> Floats:
         """Values (n, m) in at most n coordinates, which keep their inner products."""
         values = self.problem.values
         if values.shape[1] <= len(values):
@@ -180,19 +187,15 @@ class LeaveOneOutLoss:
         return np.asarray(left * lengths)
 
     @cached_property
-    def _takes(self) -> list[Indices]:
+    def takes(self) -> list[Indices]:
         """Sample indices (groups, size) of the groups of each size above one."""
         return leave_one_out.equal_sized_groups(self.problem.samples.groups)
 
     @cached_property
-    def _together(self) -> Floats:
+    def together(self) -> Floats:
         """Matrix (n, n) of truth values: two samples are left out together."""
         groups = self.problem.samples.groups
         return np.asarray(groups[:, None] == groups[None])
-
-    @cached_property
-    def _count(self) -> int:
-        return len(np.unique(self.problem.samples.groups))
 
     @cached_property
     def _gaps(self) -> Floats:

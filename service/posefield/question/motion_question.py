@@ -119,12 +119,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     @property
     def has_constraints(self) -> bool:
         """Return whether the answer is more than the prediction at the given controls."""
-        return (
-            self.exact != "auto"
-            or bool(self.targets)
-            or bool(self.take)
-            or self.detail
-        )
+        return self.exact != "auto" or bool(self.targets) or bool(self.take) or self.detail
 
 
 CONSTRAINING = ("targets", "feet")

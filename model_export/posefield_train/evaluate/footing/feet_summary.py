@@ -14,7 +14,10 @@ RATIOS: dict[str, tuple[str, Callable[[FootQuality], float]]] = {
     "skate": ("planted feet, speed over captured", lambda own: own.skate),
     "weighted_skate": ("low feet, weighted speed over captured", lambda own: own.weighted_skate),
     "acceleration": ("acceleration over captured", lambda own: own.acceleration),
-    "knee_peak": ("99th percentile of the knees' acceleration over captured", lambda own: own.knee_peak),
+    "knee_peak": (
+        "99th percentile of the knees' acceleration over captured",
+        lambda own: own.knee_peak,
+    ),
     "knee_mean": ("mean of the knees' acceleration over captured", lambda own: own.knee_mean),
 }
 """Measures that are told as a ratio of means over clips, and their meanings."""
@@ -69,9 +72,7 @@ def table(found: Sequence[FeetAnswer]) -> str:
     return markdown_table.markdown_table(HEADER, rows)
 
 
-def _ratio(
-    found: Sequence[FeetAnswer], name: str, value: Callable[[FootQuality], float]
-) -> float:
+def _ratio(found: Sequence[FeetAnswer], name: str, value: Callable[[FootQuality], float]) -> float:
     """Return the mean of a measure over that of the captured clips."""
     captured = np.mean([value(own.captured) for own in found])
     return float(np.mean([value(getattr(own, name)) for own in found]) / max(captured, 1e-9))

@@ -34,9 +34,7 @@ class FootQuality:
     lowest: float
 
 
-def measure(
-    clip: Clip, rate: float, feet: tuple[int, ...], knees: tuple[int, ...]
-) -> FootQuality:
+def measure(clip: Clip, rate: float, feet: tuple[int, ...], knees: tuple[int, ...]) -> FootQuality:
     """Return the measures of a clip at a frame rate.
 
     feet, knees: joint indices, at least one of either.

@@ -1,0 +1,111 @@
+"""Tests of the tuning of single values by the density of left-out takes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from label_kernels import performers
+
+from posefield_train.kriging import coefficient_models, kriging_tuning, universal_kriging
+from posefield_train.kriging.kriging_tuning import PRIORS, LeaveOneOutLoss, TuningProblem
+from posefield_train.kriging.predictive_density import PredictiveDensityLoss
+from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.universal_kriging import Hyper
+from posefield_train.source.recipe import Kriging
+
+COUNT, TAKES, PEOPLE = 30, 12, 3
+HYPER = Hyper("matern52", (0,), np.array([0.6, 0.4]), 0.2, 0.5, performers(PEOPLE, 0.7, 0.6))
+NAMES = (("offset", 0), ("trend", 0), ("nugget", 0))
+
+
+@pytest.fixture
+def laid(rng):
+    takes = np.arange(COUNT) % TAKES
+    points = np.hstack([rng.uniform(-1.0, 1.0, (COUNT, 2)), np.eye(PEOPLE)[takes % PEOPLE]])
+    return SamplePoints(points, 2, takes, (PEOPLE,))
+
+
+def loss_of(laid, values, kind=PredictiveDensityLoss):
+    return kind(TuningProblem(laid, values), HYPER, NAMES, own_scales=False)
+
+
+def in_search_units(hyper):
+    return np.log([hyper.labels[0].offset, hyper.trend, hyper.nugget])
+
+
+def take_density(laid, values, take):
+    """Squared residual in units of its covariance, and the logarithm of the determinant."""
+    own = laid.groups == take
+    known, asked = laid.points[~own], laid.points[own]
+    inverse = np.linalg.inv(universal_kriging.noisy(HYPER, known))
+    near = universal_kriging.covariances(HYPER, asked, known)
+    left = 1.0 - near @ inverse.sum(axis=1)
+    spread = universal_kriging.noisy(HYPER, asked) - near @ inverse @ near.T
+    spread += np.outer(left, left) / inverse.sum()
+    field = universal_kriging.solve(HYPER, known, values[~own])
+    missed = (values[own] - field.predict(asked))[:, 0]
+    return missed @ np.linalg.solve(spread, missed), np.linalg.slogdet(spread)[1]
+
+
+def test_loss_is_the_density_of_takes_left_out_one_by_one(laid, rng):
+    values = rng.normal(size=(COUNT, 1))
+    squares, logarithms = zip(*(take_density(laid, values, t) for t in range(TAKES)), strict=True)
+    expected = 0.5 * COUNT * np.log(sum(squares)) + 0.5 * sum(logarithms)
+    assert loss_of(laid, values).of_samples(HYPER)[0] == pytest.approx(expected, rel=1e-9)
+    # Negative control: clips left out one by one have another density.
+    single = replace(laid, groups=np.arange(COUNT))
+    assert abs(loss_of(single, values).of_samples(HYPER)[0] - expected) > 0.1
+
+
+def test_gradient_is_that_of_finite_differences(laid, rng):
+    loss, x = loss_of(laid, rng.normal(size=(COUNT, 1))), in_search_units(HYPER)
+    values = [
+        [loss.value_and_slope(x + sign * step)[0] for sign in (1, -1)] for step in 1e-5 * np.eye(3)
+    ]
+    expected = np.array([(after - before) / 2e-5 for after, before in values])
+    slope = loss.value_and_slope(x)[1]
+    assert np.abs(slope - expected).max() < 1e-6 * np.abs(expected).max()
+    assert np.abs(loss.value_and_slope(x + 0.05)[1] - expected).max() > 1e-3
+
+
+def errors(laid, loss, rng, families=40):
+    """Mean squared error of tuned models in new points of drawn fields with a nugget of one."""
+    true = replace(HYPER, nugget=1.0)
+    asked = laid.points[rng.permutation(COUNT)].copy()
+    asked[:, :2] = rng.uniform(-1.0, 1.0, (COUNT, 2))
+    both = np.vstack([laid.points, asked])
+    root = np.linalg.cholesky(
+        universal_kriging.covariances(true, both, both) + 1e-9 * np.eye(2 * COUNT)
+    )
+    found = []
+    for _ in range(families):
+        field = root @ rng.normal(size=(2 * COUNT, 1))
+        values = field[:COUNT] + rng.normal(size=(COUNT, 1))
+        problem = TuningProblem(laid, values, strength=kriging_tuning.OTHER_STRENGTH)
+        tuned = kriging_tuning.tune_beside(problem, true, loss)
+        predicted = universal_kriging.solve(tuned.hyper, laid.points, values).predict(asked)
+        found.append(np.mean(np.square(predicted - field[COUNT:])))
+    return float(np.mean(found))
+
+
+def test_single_values_are_predicted_better_than_by_squared_residuals(laid):
+    drawn = (np.random.Generator(np.random.PCG64(7)) for _ in range(2))
+    density, squares = (
+        errors(laid, loss, own)
+        for loss, own in zip((PredictiveDensityLoss, LeaveOneOutLoss), drawn, strict=True)
+    )
+    assert density < 0.98 * squares
+
+
+def test_only_a_single_value_is_tuned_by_its_density(laid, rng):
+    values = rng.normal(size=(COUNT, 2)) + laid.half_ranges
+    for columns, kind in ((1, PredictiveDensityLoss), (2, LeaveOneOutLoss)):
+        own = values[:, :columns]
+        problem = TuningProblem(laid, own, strength=kriging_tuning.OTHER_STRENGTH)
+        expected, other = (
+            kriging_tuning.tune_beside(problem, HYPER, loss).hyper
+            for loss in (kind, ({PredictiveDensityLoss, LeaveOneOutLoss} - {kind}).pop())
+        )
+        found = coefficient_models.fit(Kriging(), HYPER, laid, own).field.hyper
+        assert found.nugget == expected.nugget != other.nugget
+        assert PRIORS["nugget"].low <= np.log(found.nugget) <= PRIORS["nugget"].high
