@@ -43,6 +43,18 @@ def test_gaussian_is_chosen_only_where_clearly_better(laid, values):
     assert matern.unexplained != gaussian.unexplained
 
 
+def test_differences_of_performers_without_names_are_expected_to_be_noise(laid, rng):
+    """Of few values the prior decides on the nugget."""
+    own = rng.normal(size=(24, 2)) + laid.points
+    nuggets = [
+        coefficient_models.choose_covariance(
+            Kriging(covariance="matern52"), replace(laid, unnamed=unnamed), own
+        ).hyper.nugget
+        for unnamed in (False, True)
+    ]
+    assert nuggets[1] > 1.2 * nuggets[0]
+
+
 @pytest.mark.parametrize(("drift", "degree"), [(0, 0), (1, 1), ("chosen", 0)])
 def test_what_the_recipe_names_is_not_chosen_again(laid, values, drift, degree):
     settings = Kriging(covariance="exponential", drift=drift)

@@ -7,8 +7,12 @@ import pytest
 from label_kernels import performers
 
 from posefield_train.kriging import coefficient_models, kriging_tuning, universal_kriging
-from posefield_train.kriging.kriging_tuning import PRIORS, LeaveOneOutLoss, TuningProblem
-from posefield_train.kriging.predictive_density import PredictiveDensityLoss
+from posefield_train.kriging.tuning_loss import (
+    PRIORS,
+    LeaveOneOutLoss,
+    PredictiveDensityLoss,
+    TuningProblem,
+)
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe import Kriging

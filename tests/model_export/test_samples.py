@@ -46,6 +46,12 @@ def test_without_a_label_nobody_is_told_apart():
     laid, labels = sample_points.make_samples(recipe(label=None), examples())
     assert labels == {}
     assert (laid.points.shape, laid.labels) == ((6, 1), ())
+    assert laid.unnamed
+
+
+def test_one_performer_and_named_ones_are_not_unnamed():
+    assert not sample_points.make_samples(recipe(), examples())[0].unnamed
+    assert not sample_points.make_samples(recipe(label=None), examples(who=["ann"] * 6))[0].unnamed
 
 
 def test_clips_of_one_file_are_one_group():

@@ -224,6 +224,27 @@ def test_the_prior_decides_where_data_do_not(samples, rng):
     assert np.log(many.nugget) < PRIORS["nugget"].mean - 1.5 * PRIORS["nugget"].deviation
 
 
+def test_the_prior_without_names_is_that_of_two_unknown_performers(samples, people):
+    """Of the prior's means: what is left of the sill between performers, relative to it."""
+    usual = Hyper(
+        "matern52",
+        (0,),
+        np.exp([SCALE_PRIOR.mean] * 2),
+        np.exp(PRIORS["nugget"].mean),
+        0.0,
+        performers(2, 0.5, np.exp(PRIORS["offset"].mean)),
+    )
+    here = np.hstack([np.zeros((2, 2)), np.eye(2)])
+    between = universal_kriging.noisy(usual, here)
+    expected = between[0, 0] / between[0, 1] - 1.0
+    assert np.exp(tuning_loss.UNNAMED_NUGGET.mean) == pytest.approx(expected)
+    assert expected == pytest.approx(1.8)
+    problem = TuningProblem(alone(samples), wave(samples), unnamed=True)
+    assert problem.prior("nugget") == tuning_loss.UNNAMED_NUGGET
+    assert problem.prior("trend") == PRIORS["trend"]
+    assert replace(problem, unnamed=False).prior("nugget") == PRIORS["nugget"]
+
+
 def test_control_that_matters_more_gets_the_larger_scale(samples):
     values = wave(samples)
     x, y = tuned_at(samples, values).hyper.scales

@@ -11,9 +11,15 @@ from posefield_train.kriging import kriging_tuning, universal_kriging
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.power_law import PowerLawFit
-from posefield_train.kriging.predictive_density import PredictiveDensityLoss
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.kriging.tuning_loss import OTHER_STRENGTH, LeaveOneOutLoss, TuningProblem
+from posefield_train.kriging.tuning_loss import (
+    OTHER_STRENGTH,
+    POSE_STRENGTH,
+    UNNAMED_STRENGTH,
+    LeaveOneOutLoss,
+    PredictiveDensityLoss,
+    TuningProblem,
+)
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe_sections.training_sections import Kriging
 from posefield_train.tensor.decoder import Proportions
@@ -49,7 +55,10 @@ def choose_covariance(
     A covariance is clearly better if its leave-one-out error is below CLEAR_IMPROVEMENT times the
     first's. effector: as in `TuningProblem`.
     """
-    problem = TuningProblem(samples, values, settings.nugget, effector)
+    strength = UNNAMED_STRENGTH if samples.unnamed else POSE_STRENGTH
+    problem = TuningProblem(
+        samples, values, settings.nugget, effector, strength, unnamed=samples.unnamed
+    )
     first, *others = (
         kriging_tuning.tune(problem, name, settings.fixed_degree) for name in settings.covariances
     )

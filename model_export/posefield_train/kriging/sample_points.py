@@ -14,6 +14,7 @@ from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
+from posefield_train.source.recipe_sections.data_sections import PERFORMER
 
 LabelNames = Mapping[str, tuple[str, ...]]
 """Names of each label set, in the order of their columns."""
@@ -25,13 +26,15 @@ class SamplePoints:
 
     points: (n, d + p), controls in half-ranges, then the weights of labels. controls: d. groups:
     group (n,) of each sample; a group is left out together. labels: number of names of each label
-    set, p together.
+    set, p together. unnamed: there are several performers, and their names are not among the
+    labels.
     """
 
     points: Samples
     controls: int
     groups: Annotated[Indices, "samples"]
     labels: tuple[int, ...] = ()
+    unnamed: bool = False
 
     def __post_init__(self) -> None:
         if self.points.shape[1] != self.controls + sum(self.labels):
@@ -88,7 +91,12 @@ def make_samples(recipe: Recipe, examples: Sequence[Example]) -> tuple[SamplePoi
     known = {label_set: names for label_set, names in every.items() if len(names) > 1}
     both = np.hstack([points, label_weights(given, known)])
     counts = tuple(map(len, known.values()))
-    return SamplePoints(both, points.shape[1], _groups(recipe, examples, points), counts), known
+    groups, several = (
+        _groups(recipe, examples, points),
+        len({e.row.performer for e in examples}) > 1,
+    )
+    unnamed = several and PERFORMER not in known
+    return SamplePoints(both, points.shape[1], groups, counts, unnamed), known
 
 
 def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:

@@ -52,10 +52,26 @@ PRIORS = {
 
 Each label set has a correlation and an offset of its own with these priors.
 """
+
+
+def _without_names() -> ParameterPrior:
+    """Return the prior of the nugget where performers have no names.
+
+    It is that of the model with names, for two clips of unknown performers: what a performer adds
+    to the covariance is noise, and the sill is what remains common to all.
+    """
+    offset, nugget = np.exp(PRIORS["offset"].mean), np.exp(PRIORS["nugget"].mean)
+    common = float(expit(PRIORS["correlation"].mean))
+    return replace(PRIORS["nugget"], mean=float(np.log((nugget + offset + 1.0 - common) / common)))
+
+
+UNNAMED_NUGGET = _without_names()
+"""Prior of the pose's nugget where several performers have no names: 1.8 instead of 0.1."""
 Parameter = tuple[str, int]
 """Name of a parameter, and the index of its label set; 0 for the others."""
-POSE_STRENGTH, OTHER_STRENGTH = 2.0, 1.0
-"""Weight of the prior for the pose, and for the few values of other quantities."""
+POSE_STRENGTH, OTHER_STRENGTH, UNNAMED_STRENGTH = 2.0, 1.0, 1.0
+"""Weight of the prior for the pose, for the few values of other quantities, and for the pose where
+several performers have no names: how much they differ there is less certain."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +79,8 @@ class TuningProblem:
     """Values (n, m) in a Euclidean metric, and what is known of their kriging model.
 
     nugget: fixed value; None to tune it. effector: matrices (n, k, m') that map the first m'
-    residuals of each sample to weighted displacements of the event's joint, or None.
+    residuals of each sample to weighted displacements of the event's joint, or None. unnamed: the
+    samples are of several performers who have no names, and their differences are noise.
     """
 
     samples: SamplePoints
@@ -71,6 +88,11 @@ class TuningProblem:
     nugget: float | None = None
     effector: Annotated[Floats, "samples _ _"] | None = None
     strength: float = POSE_STRENGTH
+    unnamed: bool = False
+
+    def prior(self, name: str) -> ParameterPrior:
+        """Return the prior of a parameter besides the scales."""
+        return UNNAMED_NUGGET if self.unnamed and name == "nugget" else PRIORS[name]
 
 
 @dataclass(frozen=True)
@@ -85,7 +107,8 @@ class LeaveOneOutLoss:
 
     def __post_init__(self) -> None:
         scales = [SCALE_PRIOR] * (self.problem.samples.controls if self.own_scales else 0)
-        object.__setattr__(self, "priors", scales + [PRIORS[name] for name, _ in self.names])
+        own = (name for name, _ in self.names)
+        object.__setattr__(self, "priors", scales + list(map(self.problem.prior, own)))
 
     def start(self, scale: float, nugget: float) -> Annotated[Floats, "units"]:
         """Return a start of the search from the logarithms of a scale and a nugget."""
@@ -253,3 +276,32 @@ def _product(shares: Sequence[Floats]) -> Floats | float:
     for share in shares:
         found = found * share
     return found
+
+
+@dataclass(frozen=True)
+class PredictiveDensityLoss(LeaveOneOutLoss):
+    """Negative logarithm of the density that left-out takes have by the prediction from all others.
+
+    The squared residuals of a single value say little about the nugget: a model that follows every
+    sample and one that smooths them may miss alike. The density also asks whether the variances
+    that the model states fit the residuals (Rasmussen & Williams 2006, section 5.4.2); here whole
+    takes are left out, with the sill that fits best. The event's joint has no weight.
+    """
+
+    def of_samples(self, hyper: Hyper) -> tuple[float, SampleMatrix]:
+        """Return the loss without the prior, and its derivative (n, n) by the covariances.
+
+        With B and U as in `LeaveOneOutLoss` a take's residuals B_gg⁻¹ U_g have the covariance
+        B_gg⁻¹, in units of the sill. Of several values the loss is that of their mean density.
+        """
+        block = self.inverse(hyper)
+        product = block @ self.values
+        residuals = leave_one_out.divide_groups(block, product, self.takes)
+        own = np.where(self.together, block, 0.0)
+        squares, count = float(np.sum(residuals * product)), len(block)
+        loss = 0.5 * count * float(np.log(squares)) - 0.5 * float(np.linalg.slogdet(own)[1])
+        paired = np.where(self.together, residuals @ residuals.T, 0.0)
+        slope = block @ paired @ block - 2.0 * (block @ residuals) @ product.T
+        spread = block @ np.linalg.inv(own) @ block
+        both = 0.5 * count / squares * slope + 0.5 * spread
+        return loss, 0.5 * (both + both.T)
