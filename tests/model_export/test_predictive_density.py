@@ -7,13 +7,13 @@ import pytest
 from label_kernels import performers
 
 from posefield_train.kriging import coefficient_models, kriging_tuning, universal_kriging
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     PRIORS,
     LeaveOneOutLoss,
     PredictiveDensityLoss,
     TuningProblem,
 )
-from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.source.recipe import Kriging
 
@@ -85,7 +85,7 @@ def errors(laid, loss, rng, families=40):
     for _ in range(families):
         field = root @ rng.normal(size=(2 * COUNT, 1))
         values = field[:COUNT] + rng.normal(size=(COUNT, 1))
-        problem = TuningProblem(laid, values, strength=kriging_tuning.OTHER_STRENGTH)
+        problem = TuningProblem(laid, values, strength=tuning_loss.OTHER_STRENGTH)
         tuned = kriging_tuning.tune_beside(problem, true, loss)
         predicted = universal_kriging.solve(tuned.hyper, laid.points, values).predict(asked)
         found.append(np.mean(np.square(predicted - field[COUNT:])))
@@ -105,7 +105,7 @@ def test_only_a_single_value_is_tuned_by_its_density(laid, rng):
     values = rng.normal(size=(COUNT, 2)) + laid.half_ranges
     for columns, kind in ((1, PredictiveDensityLoss), (2, LeaveOneOutLoss)):
         own = values[:, :columns]
-        problem = TuningProblem(laid, own, strength=kriging_tuning.OTHER_STRENGTH)
+        problem = TuningProblem(laid, own, strength=tuning_loss.OTHER_STRENGTH)
         expected, other = (
             kriging_tuning.tune_beside(problem, HYPER, loss).hyper
             for loss in (kind, ({PredictiveDensityLoss, LeaveOneOutLoss} - {kind}).pop())
