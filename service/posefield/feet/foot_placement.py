@@ -67,7 +67,8 @@ def foot_paths(plan: FeetPlan) -> FootPaths:
 
 def _shift(plan: FeetPlan, at: Frames) -> RootPath:
     """Return the movement (S, 3), m, of the root at fractional frames (S,)."""
-    return -_interpolate(_extended(plan.lowered, plan.cycle), at)[:, None] * UP
+    found: RootPath = -_interpolate(_extended(plan.lowered, plan.cycle), at)[:, None] * UP
+    return found
 
 
 def _targets(

@@ -75,16 +75,18 @@ class FootPath:
     @property
     def heights(self) -> Frames:
         """Return the heights (F,), m."""
-        return self.positions @ UP
+        found: Frames = self.positions @ UP
+        return found
 
     def places(self, frames: Sequence[int]) -> Annotated[FloorVectors, "frames"]:
         """Return floor points at frames, which may lie within a cycle after the last."""
         index = np.asarray(frames)
-        found = self.floor[index % len(self)]
+        found: FloorVectors = self.floor[index % len(self)]
         if self.cycle is None:
             return found
         after = self.cycle.way + self.cycle.factor * found
-        return np.where(index >= len(self), after, found)
+        moved: FloorVectors = np.where(index >= len(self), after, found)
+        return moved
 
 
 def tidy(down: Annotated[Booleans, "frames"], rate: float, cyclic: bool) -> list[Interval]:

@@ -34,7 +34,8 @@ def firm_reach(poses: LimbPoses, limb: Limb) -> Frames:
     """Return the distance (F,), m, up to which the end of a limb follows its target exactly."""
     length = poses.length(limb.middle) + poses.length(limb.lower)
     source = np.linalg.norm(poses.position(limb.lower) - poses.position(limb.upper), axis=-1)
-    return np.maximum(source, REACH * length - SOFTNESS)
+    found: Frames = np.maximum(source, REACH * length - SOFTNESS)
+    return found
 
 
 def soften(distance: Frames, firm: Frames, length: float) -> Frames:
@@ -44,7 +45,8 @@ def soften(distance: Frames, firm: Frames, length: float) -> Frames:
     """
     soft = np.maximum(np.maximum(REACH * length, firm) - firm, 1e-9)
     beyond = np.maximum(distance - firm, 0.0)
-    return np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
+    found: Frames = np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
+    return found
 
 
 def reach(poses: LimbPoses, limb: Limb, shift: RootPath, target: RootPath) -> RootPath:
@@ -58,7 +60,8 @@ def reach(poses: LimbPoses, limb: Limb, shift: RootPath, target: RootPath) -> Ro
     distance = np.linalg.norm(apart, axis=-1)
     soft = soften(distance, firm_reach(poses, limb), above + below)
     within = np.clip(soft, 1.001 * abs(above - below) + 1e-6, above + below)
-    return apart * (within / np.maximum(distance, 1e-9))[:, None]
+    found: RootPath = apart * (within / np.maximum(distance, 1e-9))[:, None]
+    return found
 
 
 def solve(poses: LimbPoses, limb: Limb, end: Annotated[Floats, "frames 3"]) -> LimbTurns:

@@ -45,7 +45,8 @@ class WholeMotion:
     def times(self) -> Annotated[Floats, "frames"]:
         """Return times (F,), s, of the grid; a cycle's lack its last frame."""
         steps = min(max(round(self.duration * RATE), FEWEST), MOST)
-        return np.arange(steps + (self.cycle is None)) * (self.duration / steps)
+        found: Floats = np.arange(float(steps + (self.cycle is None))) * (self.duration / steps)
+        return found
 
 
 def wants_standing_feet(card: ModelCard, asked: ClipQuestion) -> bool:
@@ -123,8 +124,15 @@ def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
         for paths in (whole.before, whole.after)
     )
     lowered = float((plan.lowered - plan.grounded).max())
-    figures = (before, after, drift, lowered, plan.grounded)
-    return FeetResult(tuple(found), swings, *map(_rounded, figures))
+    return FeetResult(
+        tuple(found),
+        swings,
+        _rounded(before),
+        _rounded(after),
+        _rounded(drift),
+        _rounded(lowered),
+        _rounded(plan.grounded),
+    )
 
 
 def _rounded(value: float) -> float:
