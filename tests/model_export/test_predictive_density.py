@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from label_kernels import performers
 
-from posefield_train.kriging import coefficient_models, kriging_tuning, universal_kriging
+from posefield_train.kriging import (
+    coefficient_models,
+    kriging_tuning,
+    tuning_loss,
+    universal_kriging,
+)
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     PRIORS,

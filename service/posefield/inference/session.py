@@ -140,10 +140,11 @@ class Session:
 
         controls (B, d), times (B, 1), s, and labels (B, p). Bounded as the answers of `run` are.
         """
+        limited: Floats | Singles = controls
         if not self.bounds.is_inside(controls):
             raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
-            controls, times = self.bounds.limit(controls), times * (raw / bounded)[:, None]
-        feed = self._feed(controls, labels)
+            limited, times = self.bounds.limit(controls), times * (raw / bounded)[:, None]
+        feed = self._feed(limited, labels)
         feed["time"] = times.astype(np.float32, copy=False)
         names = [name for name in ("coefficients", "frame", "way") if name in self._state_outputs]
         found = [a.astype(float) for a in self.state_sessions[level].run(names, feed)]

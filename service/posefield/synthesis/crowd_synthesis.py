@@ -18,7 +18,7 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion import blend, curves
 from posefield.motion.crowd_clip import CrowdPoses, Placement
 from posefield.synthesis import crowd_takes
-from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
+from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import crowd_question, crowd_validation
 from posefield.validation.crowd_question import Blending, CharacterTakes, CrowdQuestion
 
@@ -96,8 +96,6 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
     crowd_validation.raise_for_first("time", question.times, early, "s, expected 0 s or later")
     levels, error_px, sentences = _levels(model, question)
     takes = crowd_validation.check_takes(card, question)
-    asked_detail = question.takes is not None and bool(question.takes.detail.any())
-    missing = (NO_DETAIL,) if asked_detail and not card.making.detail else ()
     asked = _GraphInputs(
         controls.astype(np.float32),
         question.times.astype(np.float32)[:, None],
@@ -129,7 +127,7 @@ def synthesize_crowd(model: Synthesizer, question: CrowdQuestion) -> CrowdPoses:
         block.duration,
         block.sigma,
         supported,
-        (*said, *sentences, *missing),
+        (*said, *sentences, *crowd_takes.detail_warnings(model, question.takes)),
         tuple(curve.name for curve in card.curves),
         block.curves,
     )

@@ -11,7 +11,7 @@ from posefield.common import cancellation
 from posefield.common.array_shapes import Frames, PointControls, PointLabels
 from posefield.common.units import Floats
 from posefield.motion import blend, curves, quat, root_travel
-from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 from posefield.validation.crowd_question import CharacterTakes
 
 
@@ -48,6 +48,12 @@ def pose_takes(
     share = frames / (reduced.frames - 1)
     turned, path = root_travel.add_travel(rotations, numbers[:, :3], share[:, None] * travel)
     return turned, path, curves.clamp(model.session.card.curves, numbers[:, end:])
+
+
+def detail_warnings(model: Synthesizer, takes: CharacterTakes | None) -> tuple[str, ...]:
+    """Return a warning if characters ask for detail and the model's file has none."""
+    missing = takes is not None and takes.detail.any() and not model.session.card.making.detail
+    return (NO_DETAIL,) if missing else ()
 
 
 def _details(

@@ -122,7 +122,7 @@ def check_takes(card: ModelCard, question: CrowdQuestion) -> CharacterTakes:
     found = question.takes or none
     seeds, variety = found.seeds, found.variety
     outside = (seeds < 0) | (seeds > MAX_TAKE)
-    raise_for_first("take", seeds, outside, f"expected 0 to {MAX_TAKE}")
+    raise_for_first("take", seeds.astype(float), outside, f"expected 0 to {MAX_TAKE}")
     raise_for_first("variety", variety, (variety < 0.0) | (variety > 1.0), "expected 0 to 1")
     taken = int(np.count_nonzero(seeds))
     if taken > MAX_TAKES:

@@ -120,6 +120,14 @@ def test_takes_and_detail():
         ("detail", "true"),
     ]
     assert target(questions.pose("m", 0, take=7)) != target(questions.pose("m", 0))
+    crowd = files.crowd("m", 0, take=np.array([3, 8]), variety=[0.5, 1.0], detail=True)
+    body = msgspec.json.decode(crowd.request("npz").body)
+    assert (body["take"], body["variety"], body["detail"]) == ([3, 8], [0.5, 1.0], True)
+    assert msgspec.json.decode(files.crowd("m", 0, take="index").request("npz").body) == {
+        "controls": {},
+        "time": 0,
+        "take": "index",
+    }
 
 
 def test_targets_and_exact_controls_in_a_body():
