@@ -8,7 +8,8 @@ from joblib import parallel_config
 
 from posefield_train.contacts import contact_labels, held_out_contacts
 from posefield_train.contacts.held_out_contacts import FRAMES, SHARES, HeldOutClips
-from posefield_train.evaluate import evaluation_summary, protocol
+from posefield_train.evaluate import protocol
+from posefield_train.evaluate.summary import evaluation_summary
 from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.sample import sample_walk
 from posefield_train.source.recipe import Recipe

@@ -238,6 +238,7 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
     """Run the protocols and print each result when it is complete."""
     from posefield.console.progress import ProgressBar
     from posefield_train.evaluate import corrections, protocol
+    from posefield_train.evaluate.footing import feet_summary
     from posefield_train.evaluate.summary import evaluation_summary, performer_summary
 
     names = wanted.protocols or protocol.protocols(own.recipe, own.examples)
@@ -257,6 +258,8 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
             wanted.print(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
             if results[-1].corrections:
                 wanted.print(f"{corrections.table(results[-1])}\n")
+            if results[-1].feet:
+                wanted.print(f"{feet_summary.table(results[-1].feet)}\n")
     for text in performer_summary.performer_text(results):
         wanted.print(text)
     return results

@@ -26,6 +26,8 @@ from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
 from posefield_train.evaluate.corrected_answers import Correction
 from posefield_train.evaluate.event_bodies import CAPTURED, EventBodies
 from posefield_train.evaluate.folds import Fold
+from posefield_train.evaluate.footing import standing_answers
+from posefield_train.evaluate.footing.standing_answers import FeetAnswer
 from posefield_train.evaluate.methods import EXACT, OURS, Queries
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.support_flags import SupportFlags
@@ -58,7 +60,8 @@ class EvaluationResult:
     predictions to the captured event (C,); empty without an event. flags: accuracy of the support
     flag; None against the truth, which has no held-out clips. bodies: at the event, of captured
     clips and of posefield's predictions. parents: of the joints. contacts: accuracy of posefield's
-    (C,); empty without contacts, and against the truth. curves: names. has_positions: False for
+    (C,); empty without contacts, and against the truth. feet: of the service's answers (C,); empty
+    without feet, in place, and against the truth. curves: names. has_positions: False for
     clips of curves without a skeleton, of which measures of positions say nothing.
     """
 
@@ -75,6 +78,7 @@ class EvaluationResult:
     bodies: EventBodies = field(default_factory=dict)
     parents: tuple[int, ...] = ()
     contacts: tuple[ContactAccuracy, ...] = ()
+    feet: tuple[FeetAnswer, ...] = ()
     curves: tuple[str, ...] = ()
     has_positions: bool = True
 
@@ -99,6 +103,7 @@ class PartialResult:
     bodies: EventBodies
     parents: tuple[int, ...]
     contacts: Sequence[ContactAccuracy] = ()
+    feet: Sequence[FeetAnswer] = ()
 
     def of(self, name: str) -> Sequence[MotionErrors | None]:
         """Return the errors of a method, None for each clip if it predicted none."""
@@ -203,7 +208,9 @@ def run_fold(
     else:
         more = new_performers.predict_adapted(recipe, made.trained, held)
     found = _compare_methods(made, fold.held, asked, _ReferenceMotions(captured, events, more))
-    return replace(found, contacts=_contact_accuracies(made, HeldOutClips(rest, held), asked))
+    contacts = _contact_accuracies(made, HeldOutClips(rest, held), asked)
+    feet = standing_answers.feet_answers(recipe.name, made.file, held) if protocol == "clip" else []
+    return replace(found, contacts=contacts, feet=feet)
 
 
 def _contact_accuracies(
@@ -303,6 +310,7 @@ def _merge_parts(
     order = np.argsort([place for part in listed for place in part.places])
     corrections = [correction for part in listed for correction in part.corrections]
     contacts = [accuracy for part in listed for accuracy in part.contacts]
+    feet = [answer for part in listed for answer in part.feet]
     # A fold that leaves one performer lacks the methods that distinguish performers.
     methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
     gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
@@ -325,5 +333,6 @@ def _merge_parts(
         parents=listed[0].parents,
         # A fold without a clip in contact has no contacts.
         contacts=tuple(contacts[i] for i in order) if len(contacts) == len(order) else (),
+        feet=tuple(feet[i] for i in order) if len(feet) == len(order) else (),
         has_positions=recipe.curves is None or not recipe.curves.alone,
     )

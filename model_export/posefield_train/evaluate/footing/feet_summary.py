@@ -50,26 +50,28 @@ def facts(found: Sequence[FeetAnswer]) -> dict[str, Any]:
     return told
 
 
-def table(found: Sequence[FeetAnswer]) -> str:
-    """Return the table in Markdown; empty without feet."""
+def rows(found: Sequence[FeetAnswer]) -> tuple[tuple[str, ...], ...]:
+    """Return the rows of the table under HEADER; empty without feet."""
     if not found:
-        return ""
+        return ()
     own = facts(found)
-    rows = [
+    ratios = [
         (words, "1", *(f"{own[key][name]:.2f}" for name in ("predicted", "standing")))
         for key, (words, _) in RATIOS.items()
     ]
-    rows += [
-        (
-            "relative distance (cm)",
-            "",
-            f"{own['predicted_error_cm']:.2f}",
-            f"{own['standing_error_cm']:.2f}",
-        ),
+    errors = [f"{own[key]:.2f}" for key in ("predicted_error_cm", "standing_error_cm")]
+    return (
+        *ratios,
+        ("relative distance (cm)", "", *errors),
         ("lowest foot (cm)", *(f"{value:.1f}" for value in own["lowest_cm"].values())),
         ("pelvis lowered, worst clip (cm)", "", "", f"{own['lowered_worst_cm']:.1f}"),
-    ]
-    return markdown_table.markdown_table(HEADER, rows)
+    )
+
+
+def table(found: Sequence[FeetAnswer]) -> str:
+    """Return the table in Markdown; empty without feet."""
+    listed = rows(found)
+    return markdown_table.markdown_table(HEADER, listed) if listed else ""
 
 
 def _ratio(found: Sequence[FeetAnswer], name: str, value: Callable[[FootQuality], float]) -> float:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from posefield.feet import limbs
+from posefield.feet import limb_choice
 from posefield.inference import session
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import ClipQuestion
@@ -34,16 +34,15 @@ class FeetAnswer:
 def feet_answers(name: str, file: bytes, held: Sequence[Example]) -> list[FeetAnswer]:
     """Return the answers of a model file for held-out clips, with their labels known.
 
-    Empty for a model that names no feet with legs.
+    Empty for a model whose feet do not stand: in place, without feet, or without legs.
     """
     model = Synthesizer(name, session.open_bytes(file, name))
     card = model.session.card
-    bones = card.skeleton.offsets
-    legs = [limbs.find_limb(card.skeleton.parents, bones, foot) for foot in card.feet]
-    known = [leg for leg in legs if leg]
-    if not known:
+    own = card.skeleton
+    legs = limb_choice.choose_limbs(own.parents, own.offsets, card.feet, ()).character.legs
+    if not legs or card.root != "travelling":
         return []
-    feet, knees = tuple(leg.tip for leg in known), tuple(leg.middle for leg in known)
+    feet, knees = tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs)
     return [_feet_answer(model, example, feet, knees) for example in held]
 
 

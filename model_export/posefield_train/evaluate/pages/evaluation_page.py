@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from posefield_train.evaluate import corrections, equal_information
+from posefield_train.evaluate.footing import feet_summary
 from posefield_train.evaluate.learning_curves import Learning
 from posefield_train.evaluate.methods import OURS, TOLD, definition
 from posefield_train.evaluate.pages import evaluation_charts
@@ -75,6 +76,7 @@ def _section(result: EvaluationResult) -> Section:
             Table(caption, head, tuple(one.cells() for one in found)),
             *_curves(result, found),
             *_corrections(result),
+            *_feet(result),
         ),
         (
             evaluation_charts.method_bars(found),
@@ -100,6 +102,12 @@ def _corrections(result: EvaluationResult) -> list[Table]:
     rows = corrections.rows(result)
     caption = "Answers corrected to the captured position of the effector"
     return [Table(caption, corrections.TABLE_HEADER, rows)] if rows else []
+
+
+def _feet(result: EvaluationResult) -> list[Table]:
+    rows = feet_summary.rows(result.feet)
+    caption = "Feet of the service's clips: as predicted, and standing"
+    return [Table(caption, feet_summary.HEADER, rows)] if rows else []
 
 
 def _other_methods(found: Sequence[MethodSummary]) -> list[MethodSummary]:

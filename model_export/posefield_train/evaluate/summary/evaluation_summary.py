@@ -8,6 +8,7 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield_train.contacts import held_out_contacts
 from posefield_train.evaluate import corrections, equal_information, motion_errors
+from posefield_train.evaluate.footing import feet_summary
 from posefield_train.evaluate.methods import EXACT, OURS, TOLD, definition
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.protocol import EvaluationResult
@@ -91,6 +92,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
         },
         **held,
         **({"contacts": contacts} if contacts else {}),
+        **({"feet": feet_summary.facts(result.feet)} if result.feet else {}),
         "equal_information": equal_information.facts(result),
         "methods": methods,
     }
