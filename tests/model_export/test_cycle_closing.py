@@ -6,8 +6,7 @@ from minimal import small_clip
 
 from posefield.common.units import UP
 from posefield.motion import quat
-from posefield_train.source.canonical import placement
-from posefield_train.source.cycles import cycle_closing
+from posefield_train.source.canonical import cycle_closing, placement
 
 FRAMES = 121
 

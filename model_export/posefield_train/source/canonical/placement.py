@@ -7,9 +7,8 @@ import numpy as np
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
-from posefield_train.source.canonical import half_turns
+from posefield_train.source.canonical import cycle_closing, half_turns
 from posefield_train.source.canonical.half_turns import Finding
-from posefield_train.source.cycles import cycle_closing
 
 
 def canonicalize(

@@ -1,1 +1,0 @@
-"""Cycles: the closing of their seam."""
