@@ -103,3 +103,9 @@ def test_values_that_never_change_are_a_constant(laid):
     found = coefficient_models.fit(Kriging(), POSE, laid, np.full((24, 2), 3.0))
     assert isinstance(found.field, ConstantModel)
     assert found.explained == 0.0 and not found.residuals.any()
+
+
+def test_values_that_differ_by_rounding_are_constant(laid, rng):
+    values = 0.3 + 1e-16 * rng.integers(0, 3, (24, 1))
+    found = coefficient_models.fit(Kriging(), POSE, laid, values)
+    assert isinstance(found.field, ConstantModel)

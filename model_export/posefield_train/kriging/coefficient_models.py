@@ -28,6 +28,8 @@ from posefield_train.tensor.decoder import Proportions
 SAME_BONE = 5e-4
 # A Gaussian covariance is conditioned worse than Matérn's; it must reduce the error to this share.
 CLEAR_IMPROVEMENT = 0.95
+# Values that differ by less than this share of the largest are equal but for rounding.
+ROUNDING = 1e-12
 # Shares of a model that count as none, and as the whole of it.
 NEGLIGIBLE, WHOLE = 0.05, 0.95
 
@@ -74,7 +76,7 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
     sample that is left out pulls the choice away from itself. A single value, as the duration is,
     is tuned by the density of its left-out takes.
     """
-    if np.ptp(values, axis=0).max() == 0.0:
+    if np.ptp(values, axis=0).max() <= ROUNDING * np.abs(values).max():
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
     problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
     loss = PredictiveDensityLoss if values.shape[1] == 1 else LeaveOneOutLoss

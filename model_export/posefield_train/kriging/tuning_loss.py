@@ -69,6 +69,8 @@ UNNAMED_NUGGET = _without_names()
 """Prior of the pose's nugget where several performers have no names: 1.8 instead of 0.1."""
 Parameter = tuple[str, int]
 """Name of a parameter, and the index of its label set; 0 for the others."""
+# Least sum of squares: a drift may fit all values exactly.
+TINY = float(np.finfo(np.float64).tiny)
 POSE_STRENGTH, OTHER_STRENGTH, UNNAMED_STRENGTH = 2.0, 1.0, 1.0
 """Weight of the prior for the pose, for the few values of other quantities, and for the pose where
 several performers have no names: how much they differ there is less certain."""
@@ -179,7 +181,7 @@ class LeaveOneOutLoss:
         backward = leave_one_out.divide_groups(block, weighted, self.takes)
         paired = np.where(self.together, backward @ residuals.T, 0.0)
         slope = block @ (paired @ block - backward @ product.T)
-        return float(np.sum(weighted * residuals)), slope + slope.T
+        return max(float(np.sum(weighted * residuals)), TINY), slope + slope.T
 
     def inverse(self, hyper: Hyper) -> Floats:
         """Return the sample block (n, n) of the inverse of the kriging system."""
@@ -298,7 +300,7 @@ class PredictiveDensityLoss(LeaveOneOutLoss):
         product = block @ self.values
         residuals = leave_one_out.divide_groups(block, product, self.takes)
         own = np.where(self.together, block, 0.0)
-        squares, count = float(np.sum(residuals * product)), len(block)
+        squares, count = max(float(np.sum(residuals * product)), TINY), len(block)
         loss = 0.5 * count * float(np.log(squares)) - 0.5 * float(np.linalg.slogdet(own)[1])
         paired = np.where(self.together, residuals @ residuals.T, 0.0)
         slope = block @ paired @ block - 2.0 * (block @ residuals) @ product.T
