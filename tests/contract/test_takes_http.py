@@ -30,6 +30,8 @@ def test_a_take_is_another_clip_and_has_an_entity_tag_of_its_own(clip):
     tags = [answer.headers["etag"] for answer in (mean, take, other, clip(take=7, variety=0.3))]
     assert len({*tags}) == 4
     assert take.json()["trust"]["sigma"] == mean.json()["trust"]["sigma"]
+    said = {"seed": 7, "variety": 0.7, "detail": False}
+    assert take.json()["trust"]["take"] == said and "take" not in mean.json()["trust"]
 
 
 def test_variety_scales_a_take(clip):

@@ -345,6 +345,14 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     contacts: tuple[FootContact, ...] = ()
 
 
+class TakeFacts(Struct, frozen=True, kw_only=True):
+    """The take of a response; absent if it is the prediction. Since 3.3.0."""
+
+    seed: int
+    variety: float
+    detail: bool
+
+
 class Deviation(Struct, frozen=True, kw_only=True):
     """A requested control whose value the motion does not have."""
 
@@ -394,6 +402,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     labels: dict[str, str | dict[str, float]] = {}
+    take: TakeFacts | None = None
     level: int
     duration: float
     sigma: float
@@ -493,6 +502,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     controls: dict[str, float]
     performer: str | None
     labels: dict[str, str | dict[str, float]] = {}
+    take: TakeFacts | None = None
     level: int
     duration: float
     sigma: float

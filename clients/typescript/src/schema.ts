@@ -1043,6 +1043,7 @@ export interface components {
             controls: components["schemas"]["Controls"];
             performer: string | null;
             labels?: components["schemas"]["RequestedLabels"];
+            take?: components["schemas"]["TakeFacts"];
             level: number;
             /** @description As in Trust, in seconds. */
             duration: number;
@@ -1063,6 +1064,13 @@ export interface components {
             /** @description As in Trust. */
             targets?: components["schemas"]["Met"][];
         };
+        /** @description The take of a response; absent if it is the prediction. Since 3.3.0. */
+        TakeFacts: {
+            seed: number;
+            variety: number;
+            /** @description Whether details that no control predicts were sampled. */
+            detail: boolean;
+        };
         /** @description Provenance and uncertainty of a response. */
         Trust: {
             model: components["schemas"]["Identity"];
@@ -1070,6 +1078,7 @@ export interface components {
             /** @description Requested performer; null for an unseen performer. */
             performer: string | null;
             labels?: components["schemas"]["RequestedLabels"];
+            take?: components["schemas"]["TakeFacts"];
             /** @description Level of detail, an index into the card's levels; 0 is the finest. */
             level: number;
             /** @description Natural duration of the whole clip at these controls, in seconds. */

@@ -1,6 +1,6 @@
 """Variation of a predicted motion: another take of it, and details that no control predicts."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from typing import Annotated
 
@@ -89,6 +89,12 @@ def check(card: ModelCard, asked: MotionQuestion) -> None:
     if asked.take and not random_field.has_features(card.kriging):
         found = card.kriging.covariance
         raise InvalidField("take", f"{asked.take}, but no takes can be drawn of {found} kriging")
+
+
+def facts(card: ModelCard, asked: MotionQuestion) -> dict[str, float]:
+    """Return seed, variety and detail of a take for the answer; empty for the prediction."""
+    found = settings(card, asked)
+    return {} if found is None else asdict(found)
 
 
 def settings(card: ModelCard, asked: MotionQuestion) -> TakeSettings | None:

@@ -143,8 +143,9 @@ class Trust:
     measured: values in this result of the controls for which the recipe has a measure. targets:
     residuals of the constraints. joint_sigma (J,), m: sigma of each joint; empty unless
     requested. deviations: requested controls whose value the motion does not have. labels:
-    requested names or weights besides the performer, by label
-    set. feet: of a clip that were made to stand; None for feet as predicted.
+    requested names or weights besides the performer, by label set. feet: of a clip that were made
+    to stand; None for feet as predicted. take: seed, variety and detail of the take; empty for the
+    prediction.
     """
 
     model: str
@@ -163,6 +164,7 @@ class Trust:
     deviations: tuple[Deviation, ...] = ()
     labels: Mapping[str, LabelValue] = field(default_factory=dict)
     feet: FeetResult | None = None
+    take: Mapping[str, float] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """Return the Trust (schema of the contract): the facts and the band of sigma."""
@@ -192,6 +194,7 @@ class Trust:
             "deviations": [deviation.facts() for deviation in self.deviations],
             "labels": dict(self.labels),
             "feet": {} if self.feet is None else asdict(self.feet),
+            "take": dict(self.take),
         }
         return seen | {name: fact for name, fact in more.items() if fact}
 

@@ -106,6 +106,7 @@ class Synthesizer(NamedModel):
             joint_sigma=tuple(round(share * sigma, MICROMETRES) for share in shares),
             deviations=apart,
             labels=question.named,
+            take=take_variation.facts(self.session.card, asked),
         )
 
     def constrained_trust(
