@@ -239,7 +239,7 @@ def _fit_event(
 
 
 # Shares of the leave-one-out errors that a truncation may add: squared, it adds 3 % to the mean
-# squared error of all joints, and 11 % to that of the event's joint.
+# squared error of all joints, and 6 % to that of the event's joint.
 ALL_JOINTS_SHARE, EFFECTOR_SHARE = 1 / 6, 1 / 4
 SMALLEST_LIMIT = 1e-4
 

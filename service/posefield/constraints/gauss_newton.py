@@ -85,9 +85,13 @@ def correct(
     if not aims:
         return Correction(begun, (), 0, 0.0)
     looked = constraint.evaluate(aims, scene, begun)
-    found = reachability.assess(scene, spread, sigma, begun, aims, looked)
+    judged, seen = begun, looked
+    if scene.predicted is not None:
+        # A take deviates from the prediction already; the spread is that about the prediction.
+        judged, seen = scene.predicted, constraint.evaluate(aims, scene, scene.predicted)
+    found = reachability.assess(scene, spread, sigma, judged, aims, seen)
     task = _Problem(scene, spread, begun, aims, found.weights)
-    numbers, values, steps = _descend(task, looked, looked[0] + found.reachable)
+    numbers, values, steps = _descend(task, looked, seen[0] + found.reachable)
     return Correction(numbers, tuple(_constraint_results(aims, values)), steps, found.distance)
 
 

@@ -23,13 +23,15 @@ class MotionVariables:
     """Skeleton and model level of a motion.
 
     reduced: reduced tensor. parents: of the joints. bones: (J, 3), m. cyclic: true for cycles,
-    which have a travel.
+    which have a travel. predicted: variables of the prediction from which a take deviates; None
+    for a motion that is no take.
     """
 
     reduced: ReducedTensor
     parents: tuple[int, ...]
     bones: Bones
     cyclic: bool
+    predicted: Variables | None = None
 
     @cached_property
     def _chains(self) -> dict[int, JointChain]:

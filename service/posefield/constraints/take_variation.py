@@ -42,7 +42,9 @@ class TakeVariation:
         if take.seed:
             seeds = np.array([take.seed])
             changes = self.changes(bench, question.point, question.labels, seeds)
-            begun = replace(begun, numbers=begun.numbers + take.variety * changes[0])
+            moved = begun.numbers + take.variety * changes[0]
+            scene = replace(begun.scene, predicted=begun.numbers)
+            begun = replace(begun, scene=scene, numbers=moved)
         if not take.detail:
             return begun
         detailed = replace(bench.reduced, detail=self.detail(bench, take.seed))

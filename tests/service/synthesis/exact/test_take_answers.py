@@ -128,6 +128,22 @@ def test_targets_are_met_after_the_take(reach):
     assert apart(held, clip(reach, fps=rate, targets=(target,))[0]) > 1e-3
 
 
+def test_a_target_within_reach_of_the_mean_is_within_reach_of_every_take(reach):
+    mean, trust = clip(reach)
+    hand = mean[-1, reach.session.card.skeleton.names.index("RightHand")]
+
+    def reached(offset, **asked):
+        goal = tuple((hand + np.array([0.0, 0.0, offset])).tolist())
+        target = Target("RightHand", goal, trust.duration)
+        return clip(reach, targets=(target,), extrapolate="ok", **asked)[1].targets[0].reached
+
+    offsets = np.arange(0.0, 1.0, 0.01)
+    farthest = max(offset for offset in offsets if reached(offset))
+    assert not reached(farthest + 0.05)
+    assert all(reached(farthest, take=seed, variety=1.0) for seed in range(1, 9))
+    assert not any(reached(farthest + 0.05, take=seed, variety=1.0) for seed in range(1, 9))
+
+
 def test_a_reach_varies_in_its_first_time_functions_alone(reach):
     question = reach.question(ClipQuestion(controls=middle(reach)))
     begun = reach.solver.solve(question, NO_CONSTRAINTS)
