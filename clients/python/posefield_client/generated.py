@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "3.3.0"
+CONTRACT = "4.0.0"
 """Version of the contract that this client was made for."""
 
 
@@ -60,6 +60,9 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     joint_sigma: bool | UnsetType = UNSET
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
+    take: int | UnsetType = UNSET
+    variety: float | UnsetType = UNSET
+    detail: bool | UnsetType = UNSET
 
 
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -80,6 +83,9 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
     feet: Literal["stand", "as_predicted"] | UnsetType | None = UNSET
+    take: int | UnsetType = UNSET
+    variety: float | UnsetType = UNSET
+    detail: bool | UnsetType = UNSET
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
     body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
@@ -104,6 +110,9 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
     feet: Literal["stand", "as_predicted"] | UnsetType | None = UNSET
+    take: int | UnsetType = UNSET
+    variety: float | UnsetType = UNSET
+    detail: bool | UnsetType = UNSET
 
 
 class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

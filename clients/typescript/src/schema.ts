@@ -801,6 +801,9 @@ export interface components {
             joint_sigma?: components["schemas"]["JointSigma"];
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
+            take?: components["schemas"]["Take"];
+            variety?: components["schemas"]["Variety"];
+            detail?: components["schemas"]["Detail"];
         };
         ClipQuestion: {
             controls: components["schemas"]["Controls"];
@@ -830,6 +833,9 @@ export interface components {
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
             feet?: components["schemas"]["FeetMode"];
+            take?: components["schemas"]["Take"];
+            variety?: components["schemas"]["Variety"];
+            detail?: components["schemas"]["Detail"];
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
@@ -1028,6 +1034,9 @@ export interface components {
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
             feet?: components["schemas"]["FeetMode"];
+            take?: components["schemas"]["Take"];
+            variety?: components["schemas"]["Variety"];
+            detail?: components["schemas"]["Detail"];
         };
         /** @description One clip of an archive, with its uncertainty. */
         ManifestEntry: {
@@ -2177,6 +2186,12 @@ export interface components {
         target: string[];
         /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
         feet: "stand" | "as_predicted";
+        /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
+        take: components["schemas"]["Take"];
+        /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
+        variety: components["schemas"]["Variety"];
+        /** @description Whether to add details of a cycle that no control predicts, sampled by the seed `take`. A warning reports a model that has none. */
+        detail: components["schemas"]["Detail"];
         /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
         unit: "m" | "cm";
         /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
@@ -2537,6 +2552,12 @@ export interface operations {
                  *     ]
                  */
                 target?: components["parameters"]["target"];
+                /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
+                take?: components["parameters"]["take"];
+                /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
+                variety?: components["parameters"]["variety"];
+                /** @description Whether to add details of a cycle that no control predicts, sampled by the seed `take`. A warning reports a model that has none. */
+                detail?: components["parameters"]["detail"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -2672,6 +2693,12 @@ export interface operations {
                  *     ]
                  */
                 target?: components["parameters"]["target"];
+                /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
+                take?: components["parameters"]["take"];
+                /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
+                variety?: components["parameters"]["variety"];
+                /** @description Whether to add details of a cycle that no control predicts, sampled by the seed `take`. A warning reports a model that has none. */
+                detail?: components["parameters"]["detail"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -2821,6 +2848,12 @@ export interface operations {
                 target?: components["parameters"]["target"];
                 /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
                 feet?: components["parameters"]["feet"];
+                /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
+                take?: components["parameters"]["take"];
+                /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
+                variety?: components["parameters"]["variety"];
+                /** @description Whether to add details of a cycle that no control predicts, sampled by the seed `take`. A warning reports a model that has none. */
+                detail?: components["parameters"]["detail"];
                 /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
@@ -2964,6 +2997,12 @@ export interface operations {
                 target?: components["parameters"]["target"];
                 /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
                 feet?: components["parameters"]["feet"];
+                /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
+                take?: components["parameters"]["take"];
+                /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
+                variety?: components["parameters"]["variety"];
+                /** @description Whether to add details of a cycle that no control predicts, sampled by the seed `take`. A warning reports a model that has none. */
+                detail?: components["parameters"]["detail"];
                 /** @description Unit of length in the file. Default: the format's usual unit. glTF accepts only `m`. */
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
@@ -3900,7 +3939,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "3.3.0";
+export const CONTRACT = "4.0.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -4051,7 +4090,10 @@ export const KEYS = {
     "level",
     "joint_sigma",
     "exact",
-    "targets"
+    "targets",
+    "take",
+    "variety",
+    "detail"
   ],
   "ClipQuestion": [
     "controls",
@@ -4069,6 +4111,9 @@ export const KEYS = {
     "exact",
     "targets",
     "feet",
+    "take",
+    "variety",
+    "detail",
     "unit",
     "up",
     "body"
@@ -4089,7 +4134,10 @@ export const KEYS = {
     "loop",
     "exact",
     "targets",
-    "feet"
+    "feet",
+    "take",
+    "variety",
+    "detail"
   ],
   "CrowdQuestion": [
     "controls",
