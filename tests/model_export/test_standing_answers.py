@@ -1,5 +1,6 @@
 """Tests of the feet of the service's answers for held-out clips."""
 
+import numpy as np
 import pytest
 
 from posefield_train.evaluate.folds import Fold
@@ -9,6 +10,16 @@ from posefield_train.sample import sample_walk
 from posefield_train.train import train
 
 
+def apart(made, captured):
+    """Root mean square distance of joints at even shares of two clips, from the root, m."""
+    paths = []
+    for clip in (made, captured):
+        positions = clip.positions() - clip.root_path[:, None]
+        frames = np.linspace(0, len(clip) - 1, 40).round().astype(int)
+        paths.append(positions[frames])
+    return float(np.sqrt(np.mean(np.square(paths[0] - paths[1]))))
+
+
 @pytest.fixture(scope="module")
 def found(strides):
     """Answers for three strides by a model of the others."""
@@ -16,7 +27,7 @@ def found(strides):
     recipe = sample_walk.recipe()
     trained = train(recipe, rest, lambda _: None)
     file = onnx_export.export_finest(recipe, trained)
-    return standing_answers.feet_answers(recipe.name, file, held)
+    return standing_answers.feet_answers(recipe.name, file, held, apart)
 
 
 def test_standing_feet_slide_less_and_cost_little(found):

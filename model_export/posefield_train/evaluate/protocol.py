@@ -8,6 +8,7 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
+from posefield.motion.clip import Clip
 from posefield_train.contacts import held_out_contacts
 from posefield_train.contacts.contact_model import ContactAccuracy
 from posefield_train.contacts.held_out_contacts import HeldOutClips
@@ -209,8 +210,15 @@ def run_fold(
         more = new_performers.predict_adapted(recipe, made.trained, held)
     found = _compare_methods(made, fold.held, asked, _ReferenceMotions(captured, events, more))
     contacts = _contact_accuracies(made, HeldOutClips(rest, held), asked)
-    feet = standing_answers.feet_answers(recipe.name, made.file, held) if protocol == "clip" else []
+    by_clip = held if protocol == "clip" else []
+    feet = standing_answers.feet_answers(recipe.name, made.file, by_clip, _relative_distance)
     return replace(found, contacts=contacts, feet=feet)
+
+
+def _relative_distance(made: Clip, captured: Clip) -> float:
+    """Return the mean distance of a clip from a captured one after time warping, m."""
+    one, other = (compared_motion.motion_of_clip(own, None) for own in (made, captured))
+    return float(motion_errors.compare_motions(one, other, ()).relative.mean)
 
 
 def _contact_accuracies(

@@ -1,6 +1,6 @@
 """Answers of the service with feet as predicted and with standing feet, for held-out clips."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from posefield.feet import limb_choice
@@ -9,10 +9,12 @@ from posefield.motion.clip import Clip
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.evaluate import compared_motion, motion_errors
 from posefield_train.evaluate.footing import foot_quality
 from posefield_train.evaluate.footing.foot_quality import FootQuality
 from posefield_train.source.ingest import Example
+
+Distance = Callable[[Clip, Clip], float]
+"""Distance of a made clip from a captured one, m."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,9 @@ class FeetAnswer:
     lowered: float
 
 
-def feet_answers(name: str, file: bytes, held: Sequence[Example]) -> list[FeetAnswer]:
+def feet_answers(
+    name: str, file: bytes, held: Sequence[Example], distance: Distance
+) -> list[FeetAnswer]:
     """Return the answers of a model file for held-out clips, with their labels known.
 
     Empty for a model whose feet do not stand: in place, without feet, or without legs.
@@ -43,20 +47,23 @@ def feet_answers(name: str, file: bytes, held: Sequence[Example]) -> list[FeetAn
     if not legs or card.root != "travelling":
         return []
     feet, knees = tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs)
-    return [_feet_answer(model, example, feet, knees) for example in held]
+    return [_feet_answer(model, example, (feet, knees), distance) for example in held]
 
 
 def _feet_answer(
-    model: Synthesizer, example: Example, feet: tuple[int, ...], knees: tuple[int, ...]
+    model: Synthesizer,
+    example: Example,
+    joints: tuple[tuple[int, ...], tuple[int, ...]],
+    distance: Distance,
 ) -> FeetAnswer:
+    """Return the measures of one clip. joints: of the feet and of the knees."""
     clip = example.captured or example.clip
     rate = min(foot_quality.HIGHEST_RATE, clip.rate)
     predicted = clips.synthesize_clip(model, _question(model, example, rate, "as_predicted"))
     standing = clips.synthesize_clip(model, _question(model, example, rate, "stand"))
-    errors = [_relative_error(answer.clip, clip) for answer in (predicted, standing)]
+    errors = [distance(answer.clip, clip) for answer in (predicted, standing)]
     quality = [
-        foot_quality.measure(own, rate, feet, knees)
-        for own in (clip, predicted.clip, standing.clip)
+        foot_quality.measure(own, rate, *joints) for own in (clip, predicted.clip, standing.clip)
     ]
     report = standing.trust.feet
     return FeetAnswer(*quality, *errors, report.lowered if report else 0.0)
@@ -75,9 +82,3 @@ def _question(model: Synthesizer, example: Example, rate: float, feet: str) -> C
     return ClipQuestion(
         controls=controls, labels=labels, extrapolate="ok", exact="none", fps=rate, feet=feet
     )
-
-
-def _relative_error(made: Clip, captured: Clip) -> float:
-    """Return the mean relative distance of a clip from the captured one, m."""
-    one, other = (compared_motion.motion_of_clip(own, None) for own in (made, captured))
-    return float(motion_errors.compare_motions(one, other, ()).relative.mean)
