@@ -1358,7 +1358,7 @@ export interface components {
             moved_by: number[];
             /** @description Indices of the joints that stand on the ground; empty if the recipe names none. */
             feet: number[];
-            /** @description Measurements of the training. */
+            /** @description Measurements of the training. `detail` is of the details of a cycle that are sampled, not predicted: its harmonics and directions, and the acceleration of left-out predictions over that of captured clips, without it (`acceleration`) and with it (`sampled`). */
             diagnostics: Record<string, never>;
             /** @description Recipe, hashes of the data, versions, licence. */
             provenance: Record<string, never>;
