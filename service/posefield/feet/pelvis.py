@@ -1,11 +1,12 @@
 """Lowering of the pelvis, so that the legs reach the places where the feet stand."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import UP, Booleans
+from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import two_bone
 from posefield.feet.limbs import Limb, LimbPoses
 
@@ -72,5 +73,5 @@ def beyond(needed: Frames, most: Frames) -> Booleans:
     return found
 
 
-def _padded(values: Frames, half: int, cyclic: bool) -> Frames:
+def _padded(values: Frames, half: int, cyclic: bool) -> Annotated[Floats, "padded"]:
     return np.pad(values, half, mode="wrap" if cyclic else "edge")

@@ -1,0 +1,146 @@
+"""Plans of whole motions: four feet, joined motions, floors, and limits of the pelvis."""
+
+import numpy as np
+import pytest
+
+from posefield.feet import foot_placement, footsteps, limb_choice, limbs, pelvis
+from posefield.feet.footsteps import SampledMotion
+from posefield.motion import quat, skeleton
+from posefield.motion.foot_contacts import FootContact
+
+RATE, FRAMES = 60.0, 90
+# A trunk with four legs: hip, knee, ankle of each; a head keeps the trunk from being a leg.
+PARENTS = (-1, *(j for leg in range(4) for j in (0, 3 * leg + 1, 3 * leg + 2)), 0)
+CORNERS = [(0.15, 0.3), (-0.15, 0.3), (0.15, -0.3), (-0.15, -0.3)]
+BONES = np.array(
+    [
+        [0.0, 0.0, 0.0],
+        *(
+            bone
+            for x, z in CORNERS
+            for bone in ([x, 0.0, z], [0.0, -0.4, 0.05], [0.0, -0.4, -0.05])
+        ),
+        [0.0, 0.2, 0.5],
+    ]
+)
+FEET = (3, 6, 9, 12)
+
+
+def body(feet=FEET, held=()):
+    return limb_choice.choose_limbs(PARENTS, BONES, feet, held).character
+
+
+def sliding(height=0.78, speed=0.3):
+    """All legs bent a little, the root going ahead: all feet slide."""
+    rotations = np.zeros((FRAMES, len(PARENTS), 4))
+    rotations[..., 0] = 1.0
+    for leg in range(4):
+        rotations[:, 3 * leg + 1] = quat.exp(np.array([-0.3, 0.0, 0.0]))
+        rotations[:, 3 * leg + 2] = quat.exp(np.array([0.6, 0.0, 0.0]))
+    roots = np.zeros((FRAMES, 3))
+    roots[:, 1], roots[:, 2] = height, speed * np.arange(FRAMES) / RATE
+    return SampledMotion(rotations, roots, RATE)
+
+
+def contact(motion, foot, lift=0.05):
+    return FootContact(foot, float(feet_of(motion)[0, FEET.index(foot), 1]), 0.3, 0.5, lift)
+
+
+def feet_of(motion, bones=BONES):
+    moved = skeleton.translations(bones, motion.roots)
+    return skeleton.positions(PARENTS, motion.rotations, moved)[:, list(FEET)]
+
+
+def alternating():
+    """Probabilities of a trot: diagonal legs swing together."""
+    likely = np.ones((FRAMES, 4))
+    likely[20:40, [0, 3]] = likely[50:70, [1, 2]] = 0.0
+    return likely
+
+
+def placed(motion, plan):
+    times = np.arange(FRAMES) / RATE
+    found = foot_placement.place_feet(plan, times, motion.rotations, motion.roots)
+    return SampledMotion(found.rotations, found.roots, RATE)
+
+
+def test_four_feet_stand_and_step():
+    motion = sliding()
+    plan = footsteps.plan_feet(
+        body(), motion, [contact(motion, foot) for foot in FEET], alternating()
+    )
+    feet = feet_of(placed(motion, plan))
+    for foot, steps in enumerate(plan.steps):
+        assert len(steps.stances) == 2
+        for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
+            apart = feet[stance.begin : stance.end, foot] - anchor
+            assert np.abs(apart).max() < 1e-9
+    told = foot_placement.foot_paths(plan)
+    assert np.abs(told.after - feet).max() < 1e-9
+    assert np.abs(told.before - feet_of(motion)).max() < 1e-9
+
+
+def test_a_join_of_two_motions_is_planned_as_one():
+    """Contacts of one motion until the join, of the other from then on."""
+    before, after = sliding(speed=0.3), sliding(speed=-0.2)
+    half = FRAMES // 2
+    roots = np.concatenate([before.roots[:half], after.roots[half:]])
+    roots[half:, 2] += before.roots[half, 2] - after.roots[half, 2]
+    motion = SampledMotion(before.rotations, roots, RATE)
+    likely = np.ones((FRAMES, 4))
+    likely[half - 10 : half + 10, :2] = 0.0
+    plan = footsteps.plan_feet(body(), motion, [contact(motion, f) for f in FEET], likely)
+    assert [len(steps.stances) for steps in plan.steps][2:] == [1, 1]
+    feet = feet_of(placed(motion, plan))
+    assert np.ptp(feet[:, 2:], axis=0).max() < 1e-9
+
+
+@pytest.mark.parametrize("floats", [-0.04, 0.04])
+def test_a_character_that_floats_is_moved_to_the_floor(floats):
+    motion = sliding()
+    known = [contact(motion, foot) for foot in FEET]
+    lifted = SampledMotion(motion.rotations, np.add(motion.roots, [0.0, floats, 0.0]), RATE)
+    plan = footsteps.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)))
+    assert plan.grounded == pytest.approx(floats - np.sign(floats) * footsteps.UNEVEN)
+    heights = feet_of(placed(lifted, plan))[..., 1]
+    assert np.abs(heights - known[0].height).max() <= footsteps.UNEVEN + 1e-9
+    # The height of the floor is a parameter.
+    raised = footsteps.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)), floor=floats)
+    assert raised.grounded == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_pelvis_is_lowered_within_its_limit_and_stances_end_that_need_more():
+    motion = sliding(speed=1.2)
+    plan = footsteps.plan_feet(
+        body(), motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
+    )
+    assert 0.0 < (plan.lowered - plan.grounded).max() <= pelvis.MOST + 1e-12
+    assert all(len(stance) < FRAMES for steps in plan.steps for stance in steps.stances)
+
+
+def test_a_kept_limb_keeps_its_path_while_the_pelvis_is_lowered():
+    motion = sliding(speed=0.8)
+    character = body(FEET[:2], {FEET[2]})
+    assert [limb.tip for limb in character.kept] == [FEET[2]]
+    known = [contact(motion, foot) for foot in FEET[:2]]
+    plan = footsteps.plan_feet(character, motion, known, np.ones((FRAMES, 2)))
+    assert plan.lowered.max() > 0.0
+    kept = feet_of(placed(motion, plan))[:, 2] - feet_of(motion)[:, 2]
+    assert np.abs(kept).max() < 1e-9
+
+
+def test_a_motion_of_a_trunk_target_keeps_its_height():
+    motion = sliding(speed=0.8)
+    character = body(held={0})
+    plan = footsteps.plan_feet(
+        character, motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
+    )
+    assert character.fixed and not plan.lowered.any()
+
+
+def test_the_cover_is_smooth_and_nowhere_below(rng):
+    needed = np.maximum(rng.normal(size=200), 0.0)
+    for cyclic in (False, True):
+        found = pelvis.cover(needed, RATE, cyclic)
+        assert (found >= needed - 1e-12).all()
+    assert limbs.find_limb(PARENTS, BONES, 3) is not None
