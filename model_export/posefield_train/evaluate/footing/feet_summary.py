@@ -76,7 +76,7 @@ def table(found: Sequence[FeetAnswer]) -> str:
 
 def _ratio(found: Sequence[FeetAnswer], name: str, value: Callable[[FootQuality], float]) -> float:
     """Return the mean of a measure over that of the captured clips."""
-    captured = np.mean([value(own.captured) for own in found])
+    captured = float(np.mean([value(own.captured) for own in found]))
     return float(np.mean([value(getattr(own, name)) for own in found]) / max(captured, 1e-9))
 
 

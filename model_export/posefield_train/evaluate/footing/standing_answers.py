@@ -1,12 +1,12 @@
 """Answers of the service with feet as predicted and with standing feet, for held-out clips."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from posefield.feet import limb_choice
 from posefield.inference import session
 from posefield.motion.clip import Clip
-from posefield.question.motion_question import ClipQuestion
+from posefield.question.motion_question import ClipQuestion, FeetMode, LabelValue
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.evaluate.footing import foot_quality
@@ -61,18 +61,21 @@ def _feet_answer(
     rate = min(foot_quality.HIGHEST_RATE, clip.rate)
     predicted = clips.synthesize_clip(model, _question(model, example, rate, "as_predicted"))
     standing = clips.synthesize_clip(model, _question(model, example, rate, "stand"))
-    errors = [distance(answer.clip, clip) for answer in (predicted, standing)]
-    quality = [
-        foot_quality.measure(own, rate, *joints) for own in (clip, predicted.clip, standing.clip)
-    ]
     report = standing.trust.feet
-    return FeetAnswer(*quality, *errors, report.lowered if report else 0.0)
+    return FeetAnswer(
+        foot_quality.measure(clip, rate, *joints),
+        foot_quality.measure(predicted.clip, rate, *joints),
+        foot_quality.measure(standing.clip, rate, *joints),
+        distance(predicted.clip, clip),
+        distance(standing.clip, clip),
+        report.lowered if report else 0.0,
+    )
 
 
-def _question(model: Synthesizer, example: Example, rate: float, feet: str) -> ClipQuestion:
+def _question(model: Synthesizer, example: Example, rate: float, feet: FeetMode) -> ClipQuestion:
     card = model.session.card
     known = {own.name: set(own.names) for own in card.labels}
-    labels: Mapping[str, str] = {
+    labels: dict[str, LabelValue] = {
         name: value for name, value in example.row.labels.items() if value in known.get(name, ())
     }
     controls = {

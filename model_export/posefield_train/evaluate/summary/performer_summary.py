@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from posefield_train.evaluate.methods import OURS
-from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS, ASKED_OPEN
+from posefield_train.evaluate.methods import ASKED_OPEN, OURS
+from posefield_train.evaluate.new_performers import ADAPTATION_COUNTS
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.evaluate.summary import evaluation_summary
 from posefield_train.evaluate.summary.method_summary import centimetres
