@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import expit
 
 from posefield.common.array_shapes import SampleMatrix, SampleValues
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Booleans, Floats, Indices
 from posefield.kriging import kriging_model, leave_one_out
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import universal_kriging
@@ -183,7 +183,7 @@ class LeaveOneOutLoss:
         slope = block @ (paired @ block - backward @ product.T)
         return max(float(np.sum(weighted * residuals)), TINY), slope + slope.T
 
-    def inverse(self, hyper: Hyper) -> Floats:
+    def inverse(self, hyper: Hyper) -> SampleMatrix:
         """Return the sample block (n, n) of the inverse of the kriging system."""
         points, degree = self.problem.samples.points, max(hyper.drifts)
         inverse: Floats = np.asarray(
@@ -203,7 +203,7 @@ class LeaveOneOutLoss:
         return found
 
     @cached_property
-    def values(self) -> Floats:
+    def values(self) -> SampleValues:
         """Values (n, m) in at most n coordinates, which keep their inner products."""
         values = self.problem.values
         if values.shape[1] <= len(values):
@@ -212,12 +212,12 @@ class LeaveOneOutLoss:
         return np.asarray(left * lengths)
 
     @cached_property
-    def takes(self) -> list[Indices]:
+    def takes(self) -> list[Annotated[Indices, "_ _"]]:
         """Sample indices (groups, size) of the groups of each size above one."""
         return leave_one_out.equal_sized_groups(self.problem.samples.groups)
 
     @cached_property
-    def together(self) -> Floats:
+    def together(self) -> Annotated[Booleans, "samples samples"]:
         """Matrix (n, n) of truth values: two samples are left out together."""
         groups = self.problem.samples.groups
         return np.asarray(groups[:, None] == groups[None])

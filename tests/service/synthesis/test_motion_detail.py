@@ -30,7 +30,8 @@ def walk(plain) -> Synthesizer:
 
 def asked(model, **more):
     controls = {c.name: c.default for c in model.session.card.controls}
-    return ClipQuestion(controls=controls, fps=50.0, **{"exact": "none"} | more)
+    own = {"exact": "none", "feet": "as_predicted"}
+    return ClipQuestion(controls=controls, fps=50.0, **own | more)
 
 
 def clip(model, **more):

@@ -42,7 +42,7 @@ def detect_contacts(
     cyclic: bool,
     moving_ground: Annotated[Floats, "3"] | None = None,
     thresholds: ContactThresholds = DEFAULT,
-) -> Booleans:
+) -> Annotated[Booleans, "frames"]:
     """Return True (F,) for the frames of a path (F, 3), m, in which a foot contacts the ground.
 
     rate: frames a second. cyclic: the frames are one cycle, and the last leads into the first:
@@ -60,8 +60,11 @@ def detect_contacts(
 
 
 def tidy_contacts(
-    contacts: Booleans, rate: float, cyclic: bool, thresholds: ContactThresholds = DEFAULT
-) -> Booleans:
+    contacts: Annotated[Booleans, "frames"],
+    rate: float,
+    cyclic: bool,
+    thresholds: ContactThresholds = DEFAULT,
+) -> Annotated[Booleans, "frames"]:
     """Return contacts (F,) without short ones, and with short gaps between two of them closed.
 
     A cycle is given without its last frame.
@@ -77,7 +80,7 @@ def tidy_contacts(
     return kept
 
 
-def runs(mask: Booleans, cyclic: bool) -> list[Indices]:
+def runs(mask: Annotated[Booleans, "frames"], cyclic: bool) -> list[Annotated[Indices, "_"]]:
     """Return the indices of each run of True in a mask (F,), in order.
 
     cyclic: a run goes on from the last frame to the first.
@@ -131,7 +134,7 @@ def _smooth(values: Annotated[Floats, "frames"], width: float, cyclic: bool) -> 
     return np.convolve(padded, kernel / kernel.sum(), mode="valid")
 
 
-def _grow(seeds: Booleans, possible: Booleans, cyclic: bool) -> Booleans:
+def _grow(seeds: Booleans, possible: Booleans, cyclic: bool) -> Annotated[Booleans, "frames"]:
     """Return the runs of `possible` frames that hold a seed."""
     grown = np.zeros_like(possible)
     for run in runs(possible, cyclic):

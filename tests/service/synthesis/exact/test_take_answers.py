@@ -102,7 +102,8 @@ def test_a_take_is_a_smooth_function_of_the_controls(model):
 
 def test_a_pose_of_a_take_is_the_frame_of_its_clip(model):
     answer = clips.synthesize_clip(
-        model, ClipQuestion(controls=middle(model), fps=20.0, take=SEED, detail=True)
+        model,
+        ClipQuestion(controls=middle(model), fps=20.0, take=SEED, detail=True, feet="as_predicted"),
     )
     pose = poses.synthesize_poses(
         model, PoseQuestion(controls=middle(model), times=[0.2], take=SEED, detail=True)
