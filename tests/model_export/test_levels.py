@@ -176,7 +176,7 @@ def test_joints_that_a_level_drops_do_not_move(still, trained):
 
 def test_what_a_still_hand_costs_is_counted(still, exported):
     own, other = still.levels[1], exported.card.levels[1]
-    # A still hand takes up a part of the error, so that the rest has to be nearer, with more samples.
+    # A still hand takes up a part of the error, so that the rest has to be nearer.
     assert own.rms > other.rms or own.samples > other.samples
     # At equal ranks and samples it saves numbers.
     assert own.ranks == other.ranks
