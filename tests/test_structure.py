@@ -200,7 +200,7 @@ def test_public_functions_have_few_parameters(own, tmp_path):
 
 
 def test_a_boolean_of_a_question_stands_in_few_files():
-    """`as_predicted`: type, contract, the Python client's signatures, the page's download."""
+    """`as_predicted`: type, contract, Python signatures, Blender's values, the page's download."""
     folders = (ROOT / folder for folder in ("service", "model_export", "clients", "api"))
     kinds = {".py", ".ts", ".yaml", ".json"}
     files = (path for folder in folders for path in folder.rglob("*") if path.suffix in kinds)
@@ -213,6 +213,7 @@ def test_a_boolean_of_a_question_stands_in_few_files():
     }
     assert found == {
         "api/openapi.yaml",
+        "clients/blender/addon/without_blender/variation.py",
         "clients/python/posefield_client/files.py",
         "clients/viewer/src/files.ts",
         "clients/viewer/test/product.page.ts",

@@ -77,6 +77,7 @@ if __name__ == "__main__":
     for given in json.loads(walks):
         addon_motion.walking(*given)
     addon_motion.styles("styled")
+    addon_motion.takes("stroll")
     addon_trouble.undone()
     addon_trouble.refused()
     addon_trouble.another_model(*json.loads(walks)[0][:2])

@@ -16,6 +16,11 @@ def _holds(*words: str) -> Any:
     return lambda said: all(word in str(said) for word in words)
 
 
+def joined(rows: Any) -> str:
+    """Return rows as one text, so that a sentence is whole although it is wrapped."""
+    return " ".join(rows) if isinstance(rows, list) else str(rows)
+
+
 def _is(value: Any) -> Any:
     return lambda found: found == value
 
@@ -92,6 +97,20 @@ FACTS: dict[str, Any] = {
     "unfit labels: unchanged": _is(True),
     "refresh keeps labels": _is(True),
     "performer of an older file": _is({"performer": "ben"}),
+    "drawn take": lambda rows: (
+        _holds("Next take", "Variety", "from the prediction", "Feet stand: ")(joined(rows))
+        and "Sampled detail" not in rows
+    ),
+    "drawn until the next take": lambda rows: "Take" in rows and "would lie" not in joined(rows),
+    "settings of a script": _is([3, "as_predicted"]),
+    "drawn as predicted": lambda rows: _holds("Feet are as predicted: as asked")(joined(rows)),
+    "no details": _holds("has no details to sample"),
+    "no details: unchanged": _is(True),
+    "take of another model": _is([0, "default"]),
+    "drawn without feet": lambda rows: (
+        _holds("Feet are as predicted: the model names no feet")(joined(rows))
+        and "Feet" not in rows
+    ),
     "drawn preferences": _holds("plain text", "Without https"),
     "slider": lambda found: found[2] < found[0] < found[1] < found[3],
     "slider words": _holds("stature (m)", "sampled: "),

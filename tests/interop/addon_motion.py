@@ -214,6 +214,34 @@ def styles(model):
     facts["performer of an older file"] = part("questions").question(bpy.context.scene).labels
 
 
+def takes(model):
+    """Takes, and feet that stand, of a model with contacts and without sampled details."""
+    afresh(model, take=7)
+    bpy.ops.posefield.import_clip()
+    record("a take", {"take": 0})
+    facts["drawn take"] = drawn()
+    settings().live = True
+    bpy.ops.posefield.next_take()
+    facts["drawn until the next take"] = drawn()
+    wait()
+    record("the next take, live", {"take": 7})
+    settings().live = False
+    bpy.ops.posefield.import_clip(take=3, variety=0.25, feet="as_predicted")
+    record("a take of a script", {"variety": 0.7})
+    record("feet of a script", {"feet": "stand"})
+    facts["settings of a script"] = [settings().take, settings().feet]
+    facts["drawn as predicted"] = drawn()
+    bpy.ops.posefield.import_clip(feet="stand")
+    record("feet stand", {"feet": "as_predicted"})
+    before = snapshot()
+    facts["no details"] = said(bpy.ops.posefield.import_clip, detail=True)
+    facts["no details: unchanged"] = snapshot() == before
+    settings().model = "reaching"
+    facts["take of another model"] = [settings().take, settings().feet]
+    bpy.ops.posefield.import_clip()
+    facts["drawn without feet"] = drawn()
+
+
 UNFIT_LABELS = {
     "no such label set": '{"mood": "glad"}',
     "no such label": '{"style": "marchng"}',

@@ -86,6 +86,10 @@ def record(name, wrong, frames=None, **more):
         "level": asked.level,
         "root": asked.root,
         "loop": asked.loop,
+        "take": asked.variation.seed,
+        "variety": asked.variation.variety,
+        "detail": asked.variation.detail,
+        "feet": None if asked.variation.feet == "default" else asked.variation.feet,
     }
     cases.append(
         {"name": name, "model": own.model, "joints": joints, "question": question, "wrong": wrong}

@@ -4,14 +4,25 @@ import json
 import math
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from . import action, label_sets, placing, preferences, questions, rig, session, sliders
+from . import (
+    action,
+    label_sets,
+    placing,
+    preferences,
+    properties,
+    questions,
+    rig,
+    session,
+    sliders,
+)
 from .questions import Picked
-from .without_blender import bones, cards, clips, faults, label_choice
+from .without_blender import bones, cards, clips, faults, label_choice, variation
 from .without_blender.cards import Card
 from .without_blender.clips import Clip
 from .without_blender.service import Service
+from .without_blender.variation import Variation
 
 FINISHED, CANCELLED = {"FINISHED"}, {"CANCELLED"}
 
@@ -55,6 +66,20 @@ class POSEFIELD_OT_reset(bpy.types.Operator):
         return FINISHED
 
 
+class POSEFIELD_OT_next_take(bpy.types.Operator):
+    """Choose the seed of the next take; with live updates the clip follows"""
+
+    bl_idname = "posefield.next_take"
+    bl_label = "Next take"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def execute(self, context):
+        """Raise the seed by one."""
+        own = context.scene.posefield
+        own.take = variation.next_seed(own.take)
+        return FINISHED
+
+
 class POSEFIELD_OT_import_clip(bpy.types.Operator):
     """Import the clip at these controls as an action"""
 
@@ -71,6 +96,33 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         name="Labels",
         description="JSON object of a name, weights by name, or null for unknown, by label set; "
         "the panel's for those it leaves out",
+    )
+    # Not saved, so that an import from the panel starts from the panel's settings.
+    take: IntProperty(
+        name="Take",
+        description="Seed of another take, 0 for the prediction; the panel's, if not given",
+        min=0,
+        max=variation.LARGEST_SEED,
+        options={"SKIP_SAVE"},
+    )
+    variety: FloatProperty(
+        name="Variety",
+        description="Size of a take's deviations; the panel's, if not given",
+        default=variation.VARIETY,
+        min=0.0,
+        max=1.0,
+        options={"SKIP_SAVE"},
+    )
+    detail: BoolProperty(
+        name="Sampled detail",
+        description="Add details that no control predicts; the panel's, if not given",
+        options={"SKIP_SAVE"},
+    )
+    feet: EnumProperty(
+        name="Feet",
+        description="Whether feet stand; the panel's, if not given",
+        items=properties.FEET_ITEMS,
+        options={"SKIP_SAVE"},
     )
     onto: EnumProperty(
         name="Onto",
@@ -100,7 +152,8 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             picked = self._picked(asked, context.scene)
             others = self._controls(picked.card)
             labels = label_choice.of_json(self.labels, picked.card.labels)
-            question = questions.question_of(context.scene, picked, others, labels)
+            varied = self._varied()
+            question = questions.question_of(context.scene, picked, others, labels, varied)
             clip = clips.ask(asked, question)
             _check(armature, clip)
         except faults.Fault as fault:
@@ -110,8 +163,27 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         said = self._put(context, armature, clip, question.loop)
         session.current.clip = clip
         label_sets.put(context.scene.posefield, labels)
+        questions.put_variation(context.scene.posefield, question.variation)
         sliders.put(context.scene, picked.card, others)
+        self._tell(question.variation, clip, picked.card)
         return _ended(self, said)
+
+    def _varied(self) -> dict[str, object]:
+        """Return the given ones of take, variety, detail and feet, as fields of Variation."""
+        given = variation.of_sliders(self.take, self.variety, self.detail, self.feet)
+        fields = {"take": "seed", "variety": "variety", "detail": "detail", "feet": "feet"}
+        return {
+            field: getattr(given, field)
+            for name, field in fields.items()
+            if self.properties.is_property_set(name)
+        }
+
+    def _tell(self, varied: Variation, clip: Clip, card: Card) -> None:
+        """Show take and feet as the operator's own settings, and report the feet to scripts."""
+        self.take, self.variety = varied.seed, varied.variety
+        self.detail, self.feet = varied.detail, varied.feet
+        for sentence in varied.feet_sentences(clip.trust, card.why_no_stances):
+            self.report({"INFO"}, sentence)
 
     def _armature(self, context):
         if self.onto == "NEW":
@@ -176,4 +248,9 @@ def _summary(card: Card, armature, clip: Clip) -> str:
     return f"{card.name} on {armature.name}: {len(clip)} frames at {clip.rate:g} a second"
 
 
-CLASSES = (POSEFIELD_OT_refresh, POSEFIELD_OT_reset, POSEFIELD_OT_import_clip)
+CLASSES = (
+    POSEFIELD_OT_refresh,
+    POSEFIELD_OT_reset,
+    POSEFIELD_OT_next_take,
+    POSEFIELD_OT_import_clip,
+)

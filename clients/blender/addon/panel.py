@@ -5,7 +5,7 @@ import textwrap
 import bpy
 
 from . import label_sets, preferences, questions, session, sliders
-from .without_blender import faults, marks
+from .without_blender import faults, marks, variation
 
 WIDTH = 44
 """Characters per row at the sidebar's default width."""
@@ -30,6 +30,7 @@ class VIEW3D_PT_posefield(bpy.types.Panel):
             return draw_said(layout)
         draw_controls(layout, scene, card)
         draw_labels(layout, scene.posefield)
+        draw_variation(layout, scene.posefield, card)
         draw_choices(layout, scene.posefield, card)
         draw_import(layout, context)
         draw_trust(layout, scene, card)
@@ -65,6 +66,20 @@ def draw_labels(layout, own) -> None:
             draw_mark(layout, marks.weights(choice.value), "INFO", "ERROR")
 
 
+def draw_variation(layout, own, card) -> None:
+    """Draw take and feet; details and feet for models that have them, or where they are set."""
+    row = layout.row(align=True)
+    row.prop(own, "take")
+    row.operator("posefield.next_take", icon="FORWARD")
+    row = layout.row()
+    row.enabled = own.take > 0
+    row.prop(own, "variety", slider=True)
+    if card.detail or own.detail:
+        layout.prop(own, "detail")
+    if card.feet or own.feet != variation.MODEL_DEFAULT:
+        layout.prop(own, "feet")
+
+
 def draw_choices(layout, own, card) -> None:
     """Draw the other settings of a request."""
     layout.prop(own, "level")
@@ -95,14 +110,17 @@ def draw_import(layout, context) -> None:
 def draw_trust(layout, scene, card) -> None:
     """Draw the clip's sigma and support, and controls outside the sampled range."""
     clip, now = session.current.clip, sliders.values(scene, card)
-    labels = label_sets.values(scene.posefield)
+    labels, varied = label_sets.values(scene.posefield), questions.variation_of(scene.posefield)
     # Sigma holds for the clip's controls and labels only; hide it when the settings differ.
-    if clip is not None and clip.answers(card.identity, now, labels):
-        far = f"{100 * clip.sigma:.1f} cm"
-        draw_text(layout, f"A captured clip would lie about {far} from this", "INFO")
+    same = clip is not None and clip.answers(card.identity, now, labels)
+    if same and varied.matches(clip.trust):
+        far, whom = f"{100 * clip.sigma:.1f} cm", "the prediction" if varied.seed else "this"
+        draw_text(layout, f"A captured clip would lie about {far} from {whom}", "INFO")
         draw_mark(layout, marks.support(clip.trust), "CHECKMARK", "ERROR")
         draw_mark(layout, marks.performer(clip.trust), "USER", "GHOST_DISABLED")
         draw_mark(layout, marks.curves(clip.curves), "SHAPEKEY_DATA", "SHAPEKEY_DATA")
+        for sentence in varied.feet_sentences(clip.trust, card.why_no_stances):
+            draw_text(layout, sentence, "INFO")
     for warning in card.warnings(now):
         draw_text(layout, f"Outside: {warning}", "ERROR")
 

@@ -12,6 +12,7 @@ from bpy.props import (
 )
 
 from . import label_sets, live, questions, session
+from .without_blender.variation import FEET, LARGEST_SEED, VARIETY
 
 # Blender keeps no reference to the strings of dynamic enum items, so they are kept here.
 _kept: dict[str, list[tuple[str, str, str]]] = {}
@@ -41,6 +42,13 @@ def _levels(own, _context):
     ]
     more = range(len(errors), own.level_number + 1)
     return _items("levels", found + [(str(level), str(level), "") for level in more])
+
+
+FEET_ITEMS = [
+    (FEET[0], "As the model", "Stand, if the character travels and the model knows its contacts"),
+    (FEET[1], "Stand", "Feet keep their places while they stand, and legs follow"),
+    (FEET[2], "As predicted", "The prediction, unchanged"),
+]
 
 
 def _place(items, identifier: str) -> int:
@@ -117,6 +125,32 @@ class PosefieldSettings(bpy.types.PropertyGroup):
     loop: BoolProperty(
         name="Loop",
         description="One whole cycle that ends as it began, repeated by Cycles modifiers",
+        update=_changed,
+    )
+    take: IntProperty(
+        name="Take",
+        description="Seed of another take of the motion; 0 is the prediction",
+        min=0,
+        max=LARGEST_SEED,
+        update=_changed,
+    )
+    variety: FloatProperty(
+        name="Variety",
+        description="Size of a take's deviations; 1 is that of captured clips",
+        default=VARIETY,
+        min=0.0,
+        max=1.0,
+        update=_changed,
+    )
+    detail: BoolProperty(
+        name="Sampled detail",
+        description="Add details that no control predicts, sampled by the take's seed",
+        update=_changed,
+    )
+    feet: EnumProperty(
+        name="Feet",
+        description="Whether feet stand where they contact the ground",
+        items=FEET_ITEMS,
         update=_changed,
     )
     rate: EnumProperty(

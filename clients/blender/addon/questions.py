@@ -1,13 +1,16 @@
 """Requests to the service for a scene."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 from . import label_sets, preferences, session, sliders
-from .without_blender import cards, faults, rates, service
+from .without_blender import cards, faults, rates, service, variation
 from .without_blender.cards import Card
 from .without_blender.clips import Question
 from .without_blender.label_choice import LabelValue
 from .without_blender.service import Service
+from .without_blender.variation import Variation
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ def take(scene, picked: Picked) -> None:
     if fresh:
         # Reset the sliders last, because each change can send a live request.
         own.level_number, own.loop = 0, False
+        put_variation(own, Variation())
         sliders.reset(scene, picked.card)
 
 
@@ -78,13 +82,20 @@ def card_of(scene) -> Card:
 
 def question(scene) -> Question:
     """Return the panel's request for a clip."""
-    return question_of(scene, Picked(scene.posefield.model_name, card_of(scene)), {}, {})
+    return question_of(scene, Picked(scene.posefield.model_name, card_of(scene)), {}, {}, {})
 
 
 def question_of(
-    scene, picked: Picked, others: dict[str, float], labels: dict[str, LabelValue | None]
+    scene,
+    picked: Picked,
+    others: dict[str, float],
+    labels: dict[str, LabelValue | None],
+    varied: Mapping[str, Any],
 ) -> Question:
-    """Return the request for a model with the panel's settings but some controls and labels."""
+    """Return the request for a model with the panel's settings, but for some of them.
+
+    others: controls. labels: by label set. varied: fields of Variation by name.
+    """
     card, own, had = picked.card, scene.posefield, _has(scene, picked)
     if had and own.loop and not card.cyclic:
         raise faults.Fault(f"{card.name} is no cycle, and cannot be a loop")
@@ -96,7 +107,33 @@ def question_of(
         level=own.level_number if had else 0,
         root=own.root,
         loop=had and own.loop,
+        variation=_variation(card, variation_of(own) if had else Variation(), varied),
     )
+
+
+def variation_of(own) -> Variation:
+    """Return the take and the feet of the panel's settings."""
+    return variation.of_sliders(own.take, own.variety, own.detail, own.feet)
+
+
+def put_variation(own, chosen: Variation) -> None:
+    """Set take and feet in the panel; settings that stay are not written, as that asks again."""
+    now = variation_of(own)
+    if chosen.seed != now.seed:
+        own.take = chosen.seed
+    if chosen.variety != now.variety:
+        own.variety = chosen.variety
+    if chosen.detail != now.detail:
+        own.detail = chosen.detail
+    if chosen.feet != now.feet:
+        own.feet = chosen.feet
+
+
+def _variation(card: Card, own: Variation, varied: Mapping[str, Any]) -> Variation:
+    chosen = replace(own, **varied)
+    if chosen.detail and not card.detail:
+        raise faults.Fault(f"{card.name} has no details to sample: switch them off")
+    return chosen
 
 
 def _values(scene, card: Card) -> dict[str, float]:

@@ -156,7 +156,8 @@ def test_the_same_answers_whole_are_taken(scripted):
 @pytest.mark.parametrize(
     ("said", "words"),
     [
-        ({"status": "live", "contract": "2.1.0"}, r"version 2\.1\.0 of its interface, .* 3\.x"),
+        ({"status": "live", "contract": "2.1.0"}, r"version 2\.1\.0 .* 3\.x and 4\.x"),
+        ({"status": "live", "contract": "5.0.0"}, r"version 5\.0\.0 of its interface"),
         ({"status": "fine"}, "is no posefield service"),
         ([], "answers a list"),
     ],
@@ -167,7 +168,7 @@ def test_another_version_or_another_service_is_refused(scripted, said, words):
         service.models(Service(server.address))
 
 
-@pytest.mark.parametrize("contract", [None, "3.0.0", "3.7.1"])
+@pytest.mark.parametrize("contract", [None, "3.0.0", "3.7.1", "4.0.0"])
 def test_its_own_version_is_taken(scripted, contract):
     said = {"status": "live"} | ({"contract": contract} if contract else {})
     server = scripted(answer(json.dumps(said).encode()))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from . import faults, label_choice
+from . import faults, label_choice, variation
 from .label_choice import LabelSet
 from .service import Service, fetch, path_of
 
@@ -64,7 +64,9 @@ class Card:
 
     identity: name@hash, for which responses never change. parents: of each joint by name. tips: end
     point (3,) of some joints, m, Y up. rate: frames per second. errors: of each level of detail,
-    root mean square, m. labels: label sets, such as performer and style.
+    root mean square, m. labels: label sets, such as performer and style. detail: True if there are
+    details to sample. feet: True if feet can be asked to stand. why_no_stances: why they do not
+    stand unless asked; empty if they do.
     """
 
     identity: str
@@ -77,6 +79,9 @@ class Card:
     rate: float
     labels: tuple[LabelSet, ...]
     errors: tuple[float, ...]
+    detail: bool = False
+    feet: bool = False
+    why_no_stances: str = ""
 
     @property
     def defaults(self) -> dict[str, float]:
@@ -123,6 +128,10 @@ def _card(plain: dict[str, Any]) -> Card:
         rate=float(plain["rate"]),
         labels=label_choice.of_card(plain),
         errors=tuple(float(level["rms"]) for level in plain["levels"]),
+        # Services older than 3.3.0 have no details, and their cards may lack these entries.
+        detail="detail" in plain.get("diagnostics", {}),
+        feet=bool(plain.get("feet")) and plain.get("root") != "in_place",
+        why_no_stances=variation.why_no_stances(plain),
     )
 
 

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from . import axes, faults, label_choice
+from . import axes, faults, label_choice, variation
 from .cards import parents_by_name
 from .label_choice import LabelValue
 from .service import Service, fetch, path_of
+from .variation import Variation
 
 Floats = npt.NDArray[np.float64]
 
@@ -27,7 +28,7 @@ class Question:
 
     model: name, or name@hash. controls: in the units of its card. fps: frames per second.
     labels: name or weights by label set, `performer` among them; sets that are not given are left
-    open. level: of detail, 0 is the finest.
+    open. level: of detail, 0 is the finest. variation: take and feet.
     """
 
     model: str
@@ -37,6 +38,7 @@ class Question:
     level: int = 0
     root: str = "travelling"
     loop: bool = False
+    variation: Variation = field(default_factory=Variation)
 
     def body(self) -> dict[str, Any]:
         """Return the request as the service's JSON."""
@@ -47,6 +49,7 @@ class Question:
             "level": self.level,
             "root": self.root,
             "loop": self.loop,
+            **self.variation.fields(),
             "unit": "m",
             "up": "y",
         }
@@ -153,3 +156,6 @@ def _check_said(rate: float, trust: dict[str, Any]) -> None:
             raise ValueError(f"{flag} is {trust[flag]!r}, expected true or false")
     if not isinstance(trust.get("labels", {}), dict):
         raise ValueError(f"labels are {trust['labels']!r}, expected values by label set")
+    variation.check_feet(trust.get("feet"))
+    if not isinstance(trust.get("take", {}), dict):
+        raise ValueError(f"take is {trust['take']!r}, expected seed, variety and detail")

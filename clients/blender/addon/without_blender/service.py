@@ -14,8 +14,11 @@ from typing import Any
 
 from . import faults, timely
 
-CONTRACT = "3"
-"""Major version of the contract that this add-on supports."""
+CONTRACTS = ("3", "4")
+"""Major versions of the contract that this add-on supports.
+
+Version 4 removed `pin_feet`, which it never sent.
+"""
 
 LARGEST = 512 * 1024 * 1024
 """Limit of a response, bytes; ten thousand frames of a hundred joints take 16 million."""
@@ -73,10 +76,11 @@ def check_version(service: Service) -> None:
     said = _object(fetch(service, "/livez"), service)
     if said.get("status") != "live":
         raise faults.Unintelligible(f"what answers at {service.address} is no posefield service")
-    contract = str(said.get("contract", f"{CONTRACT}.0.0"))
-    if contract.partition(".")[0] != CONTRACT:
+    contract = str(said.get("contract", f"{CONTRACTS[0]}.0.0"))
+    if contract.partition(".")[0] not in CONTRACTS:
+        known = " and ".join(f"{each}.x" for each in CONTRACTS)
         raise faults.Unintelligible(
-            f"the service speaks version {contract} of its interface, this add-on {CONTRACT}.x"
+            f"the service speaks version {contract} of its interface, this add-on {known}"
         )
 
 
