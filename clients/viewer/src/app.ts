@@ -200,8 +200,8 @@ export class App {
       .filter(([name]) => known.has(name))
       .map(([name, value]) => [name, String(value)] as const);
     const { state } = restored({ model, entries }, model, card);
-    const { playing, body, ghost, feet, loop, speed, view } = store.state;
-    const kept = { playing, body, ghost, feet, loop, speed, view };
+    const { playing, body, fan, ghost, feet, loop, speed, take, variety, view } = store.state;
+    const kept = { playing, body, fan, ghost, feet, loop, speed, take, variety, view };
     this.#show(model, shape, new Store({ ...state, ...kept }), models);
     this.#notice.remark("model", `${model} has been replaced on the service: this is the new one.`);
   }

@@ -13,6 +13,7 @@ import { curvesAt } from "./curves.ts";
 import type { Source } from "./page.ts";
 import { pose as posture, sample } from "./playback.ts";
 import type { State } from "./state.ts";
+import { manner, taken } from "./takes.ts";
 
 /** Frames a second that a clip is fetched at; poses between them are interpolated. */
 const RATE = 60;
@@ -25,7 +26,8 @@ export function clip(
 ): Promise<Motion> {
   const { controls, performer, labels, level, loop, model, root } = state;
   const whole = { root, fps: RATE, loop: card.cyclic && loop };
-  const question = { controls, performer, labels, level, ...whole };
+  const how = manner(source, card, state);
+  const question = { controls, performer, labels, level, ...whole, ...how };
   return source.clip(model, question, signal);
 }
 
@@ -45,11 +47,14 @@ export async function pose(
   signal: AbortSignal,
 ): Promise<Poses> {
   const whole = async () => at(await clip(source, card, state, signal), time);
+  // Crowds of takes last as long as the prediction does, and have no details.
+  const other = Object.keys(taken(source, card, state)).length > 0;
+  if (other && state.root !== card.root) return whole();
   // A refusal would be mended too, but browsers write each into their console.
   if (time > LATE * Math.min(duration, card.durations[0]!)) return whole();
   try {
     return state.root === card.root
-      ? await travelling(source, state, time, signal)
+      ? await travelling(source, card, state, time, signal)
       : await inPlace(source, card, state, time, signal);
   } catch (fault) {
     if (!(fault instanceof PosefieldError && /^times?\b/.test(detail(fault)))) throw fault;
@@ -62,9 +67,16 @@ function detail(fault: PosefieldError): string {
   return fault instanceof Problem ? fault.detail : fault.message;
 }
 
-function travelling(source: Source, state: State, time: number, signal: AbortSignal) {
+function travelling(
+  source: Source,
+  card: ModelCard,
+  state: State,
+  time: number,
+  signal: AbortSignal,
+) {
   const { controls, performer, labels, level, model } = state;
-  return source.pose(model, { controls, performer, labels, level, times: [time] }, signal);
+  const question = { controls, performer, labels, level, times: [time] };
+  return source.pose(model, { ...question, ...taken(source, card, state) }, signal);
 }
 
 /** A crowd of one: crowds alone may be asked for poses that stay where they are. */

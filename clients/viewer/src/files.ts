@@ -10,6 +10,7 @@ import { saveFile } from "./save-file.ts";
 import type { Session } from "./session.ts";
 import { title } from "./slider.ts";
 import type { State } from "./state.ts";
+import { MANNER, manner, unplaceable } from "./takes.ts";
 import { videoButton } from "./video-button.ts";
 import { figure } from "./written.ts";
 
@@ -49,7 +50,6 @@ interface Choice {
   names: Names;
   unit: "" | "m" | "cm";
   up: "" | "y" | "z";
-  stands: boolean;
   exact: "auto" | "none";
   text: Text;
 }
@@ -68,10 +68,6 @@ export function mount(host: HTMLElement, session: Session): void {
 
 const NONE =
   "Animation files need a service: this page runs without one, on answers computed beforehand. A video can be recorded.";
-
-/** Whether the service places the feet of a model's clips unless it is told otherwise. */
-const standing = (card: Page["card"]): boolean =>
-  card.root === "travelling" && Boolean(card.feet.length && card.contacts?.length);
 
 function titled(...content: readonly HTMLElement[]): HTMLElement {
   return el(
@@ -104,7 +100,6 @@ class Files {
       names: "own",
       unit: "",
       up: "",
-      stands: standing(page.card),
       exact: "auto",
       text: "curl",
     };
@@ -156,8 +151,9 @@ class Files {
 
   /** What differs from what is usual, so that texts stay short. */
   get #question(): ClipQuestion {
-    const { controls, labels, performer, level, root } = this.#page.store.state;
-    const { fps, loop, names, unit, up, format, stands, exact } = this.#choice;
+    const { card, source, store } = this.#page;
+    const { controls, labels, performer, level, root } = store.state;
+    const { fps, loop, names, unit, up, format, exact } = this.#choice;
     const targets = this.#targets;
     const measured = format === "glb" ? {} : { ...(unit && { unit }), ...(up && { up }) };
     return {
@@ -169,7 +165,7 @@ class Files {
       ...(root === "in_place" && { root }),
       ...(loop && { loop }),
       ...(targets && { targets }),
-      ...(stands !== standing(this.#page.card) && { feet: stands ? "stand" : "as_predicted" }),
+      ...manner(source, card, store.state),
       ...(exact !== "auto" && { exact }),
       ...(names !== "own" && { names }),
       ...measured,
@@ -187,7 +183,8 @@ class Files {
   }
 
   #changed(changed: ReadonlySet<keyof State>): void {
-    if (["root", "level", "target"].some((key) => changed.has(key as "root"))) this.#draw();
+    const drawn = ["root", "level", "target", ...MANNER] as const;
+    if (drawn.some((key) => changed.has(key))) this.#draw();
     else if (["controls", "performer", "labels"].some((key) => changed.has(key as "labels")))
       this.#tell();
   }
@@ -297,14 +294,23 @@ class Files {
     return check("Closed loop", (loop) => this.#take({ loop }));
   }
 
+  /** As the stage has it. */
+  #standing(): HTMLElement {
+    const { store } = this.#page;
+    const row = check("Feet stand where they contact the ground", (stand) =>
+      store.set({ footing: stand ? "stand" : "as_predicted" }),
+    );
+    this.#shows.push(() => {
+      row.querySelector("input")!.checked = store.state.footing === "stand";
+    });
+    return row;
+  }
+
   /** What the file holds exactly, where the shown motion only comes near. */
   #holds(): HTMLElement[] {
     const { card, store } = this.#page;
     const rows: HTMLElement[] = card.cyclic ? [this.#cycle()] : [];
-    if (card.feet.length && card.root === "travelling") {
-      const take = (stands: boolean) => this.#take({ stands });
-      rows.push(check("Feet stand where they contact the ground", take, standing(card)));
-    }
+    if (!unplaceable(card)) rows.push(this.#standing());
     const measured = card.controls.filter(({ measure }) => measure).map(({ name }) => title(name));
     if (measured.length) {
       const words = `Match exactly: ${measured.join(", ")}`;

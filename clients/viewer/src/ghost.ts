@@ -41,7 +41,7 @@ class Ghost {
     player.onTrust(() => this.#soon());
     const leave = store.listen((_, changed) => {
       if (["ghost", "view", "body"].some((key) => changed.has(key as "ghost"))) this.#appear();
-      if (changed.has("root") || changed.has("loop")) this.#of = "";
+      if (["root", "loop", "footing"].some((key) => changed.has(key as "root"))) this.#of = "";
     });
     signal.addEventListener("abort", () => {
       clearTimeout(this.#timer);
@@ -84,10 +84,12 @@ class Ghost {
       const [first] = nearest;
       if (!first || signal.aborted) return;
       this.label.textContent = says(first);
-      const of = `${first.source} ${store.state.level} ${store.state.root} ${store.state.loop}`;
+      const { footing, level, loop, root } = store.state;
+      const of = `${first.source} ${level} ${root} ${loop} ${footing}`;
       if (of === this.#of) return;
       const own = { performer: first.performer, labels: first.labels ?? {} };
-      const there = { ...store.state, controls: first.controls, ...own };
+      const predicted = { ...own, take: 0, detail: false };
+      const there = { ...store.state, controls: first.controls, ...predicted };
       this.#clip = await ask.clip(source, card, there, signal);
       this.#of = of;
       this.#figure.group.visible = this.#wanted;

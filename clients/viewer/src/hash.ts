@@ -8,6 +8,7 @@ import type { ModelCard } from "@posefield/client";
 
 import { otherSets } from "./examples.ts";
 import type { State } from "./state.ts";
+import { detailed, LAST, unplaceable, usual, VARIETY } from "./takes.ts";
 import { read as number } from "./written.ts";
 
 export interface Address {
@@ -62,7 +63,12 @@ export function initial(model: string, card: ModelCard): State {
     root: card.root,
     body: "mannequin",
     ghost: false,
+    fan: false,
     feet: false,
+    footing: usual(card),
+    take: 0,
+    variety: VARIETY,
+    detail: false,
     target: null,
     view: "one",
     across,
@@ -153,7 +159,23 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   root: one("travelling", "in_place"),
   body: one("stick", "mannequin"),
   ghost: yes(),
+  fan: yes(),
   feet: yes(),
+  footing: {
+    expected: (card) =>
+      unplaceable(card) ? `as_predicted: ${unplaceable(card)}` : "stand or as_predicted",
+    read: (text, card) =>
+      text === "as_predicted" || (text === "stand" && !unplaceable(card)) ? text : undefined,
+    write: (value) => value,
+  },
+  take: between(() => [0, LAST], Number.isInteger),
+  variety: between(() => [0, 1]),
+  detail: {
+    expected: (card) => (detailed(card) ? "yes or no" : "no: this model has no details to sample"),
+    read: (text, card) =>
+      text === "no" ? false : text === "yes" && detailed(card) ? true : undefined,
+    write: (value) => (value ? "yes" : "no"),
+  },
   target: {
     expected: () => "x,y,z in metres",
     read: point,

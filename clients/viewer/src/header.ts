@@ -20,7 +20,11 @@ const KEYS = [
   ["R", "reset all controls"],
   ["L", "loop"],
   ["G", "ghost of the nearest example"],
-  ["F", "feet and skate"],
+  ["N", "next take"],
+  ["P", "back to the prediction"],
+  ["V", "fan of other takes"],
+  ["S", "feet stand, or are as predicted"],
+  ["F", "contacts and skate of the feet"],
   ["B", "mannequin or sticks"],
   ["T", "light or dark"],
 ] as const;

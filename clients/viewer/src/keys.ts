@@ -1,12 +1,15 @@
 /** Shortcuts, where nobody is typing. */
 
+import { served } from "./page.ts";
 import type { Session } from "./session.ts";
+import { next, other, unplaceable } from "./takes.ts";
 import * as theme from "./theme.ts";
 import { move, togglePlay } from "./transport.ts";
 
 export function mount(session: Session): void {
-  const { card, player, signal, store } = session;
-  const flip = (key: "loop" | "ghost" | "feet") => () => store.set({ [key]: !store.state[key] });
+  const { card, player, signal, source, store } = session;
+  const flip = (key: "loop" | "ghost" | "feet" | "fan") => () =>
+    store.set({ [key]: !store.state[key] });
   const acts: Readonly<Record<string, (event: KeyboardEvent) => void>> = {
     " ": () => togglePlay(session),
     arrowleft: ({ shiftKey }) => move(session, shiftKey ? -10 : -1),
@@ -17,6 +20,12 @@ export function mount(session: Session): void {
     l: flip("loop"),
     g: flip("ghost"),
     f: flip("feet"),
+    ...(served(source) && {
+      n: () => store.set({ take: next(store.state.take) }),
+      p: () => store.set({ take: 0 }),
+      v: flip("fan"),
+      ...(!unplaceable(card) && { s: () => store.set({ footing: other(store.state.footing) }) }),
+    }),
     b: () => store.set({ body: store.state.body === "stick" ? "mannequin" : "stick" }),
     t: theme.toggle,
   };

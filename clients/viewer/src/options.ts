@@ -2,6 +2,7 @@
 
 import { choice, toggle } from "./dom.ts";
 import { type Mount, served } from "./page.ts";
+import { unplaceable } from "./takes.ts";
 
 export const mount: Mount = (host, { card, signal, source, store }) => {
   const body = choice(
@@ -13,21 +14,30 @@ export const mount: Mount = (host, { card, signal, source, store }) => {
     (value) => store.set({ body: value }),
   );
   const ghost = toggle("Ghost", "Ghost of the nearest example", (on) => store.set({ ghost: on }));
-  const feet = toggle("Feet", "Feet: contacts and skate", (on) => store.set({ feet: on }));
+  const fan = toggle("Fan", "Fan of other takes (V)", (on) => store.set({ fan: on }));
+  const feet = toggle("Contacts", "Contacts and skate of the feet (F)", (on) =>
+    store.set({ feet: on }),
+  );
+  const stand = toggle("Feet stand", "Feet stand, or are as predicted (S)", (on) =>
+    store.set({ footing: on ? "stand" : "as_predicted" }),
+  );
   const root = toggle("Root motion", "Root motion: the body travels", (on) =>
     store.set({ root: on ? "travelling" : "in_place" }),
   );
-  ghost.hidden = !served(source);
+  ghost.hidden = fan.hidden = !served(source);
+  stand.hidden = !served(source) || unplaceable(card) !== null;
   root.hidden = card.root === "in_place";
   const show = () => {
     const { state } = store;
     body.set(state.body);
     ghost.set(state.ghost);
+    fan.set(state.fan);
     feet.set(state.feet);
+    stand.set(state.footing === "stand");
     root.set(state.root === "travelling");
     host.hidden = state.view !== "one";
   };
-  host.append(body, ghost, feet, root);
+  host.append(body, ghost, fan, feet, stand, root);
   show();
   signal.addEventListener("abort", store.listen(show));
 };

@@ -6,6 +6,7 @@ import * as copy from "./copy-note.ts";
 import * as crowd from "./crowd.ts";
 import * as curves from "./curves.ts";
 import * as detail from "./detail-panel.ts";
+import * as fan from "./fan.ts";
 import * as feet from "./feet.ts";
 import * as files from "./files.ts";
 import * as ghost from "./ghost.ts";
@@ -15,6 +16,7 @@ import * as levels from "./levels.ts";
 import * as map from "./map.ts";
 import * as options from "./options.ts";
 import type { Session } from "./session.ts";
+import * as takes from "./takes-panel.ts";
 import * as target from "./target.ts";
 import * as transport from "./transport.ts";
 import * as trust from "./trust.ts";
@@ -27,6 +29,7 @@ const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<st
   stage: {
     options: options.mount,
     ghost: ghost.mount,
+    fan: fan.mount,
     levels: levels.mount,
     crowd: crowd.mount,
   },
@@ -35,6 +38,7 @@ const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<st
     welcome: welcome.mount,
     copy: copy.mount,
     controls: controls.mount,
+    takes: takes.mount,
     trust: trust.mount,
     curves: curves.mount,
     target: target.mount,

@@ -18,6 +18,7 @@ import {
 } from "./playback.ts";
 import type { State } from "./state.ts";
 import { Stopwatch } from "./stopwatch.ts";
+import { MANNER } from "./takes.ts";
 
 /** Milliseconds without a change until the whole clip is worth asking for. */
 const IDLE = 140;
@@ -130,14 +131,15 @@ export class Player {
 
   #changed(state: State, changed: ReadonlySet<keyof State>): void {
     if (ASKED_ANEW.some((key) => changed.has(key))) this.ask();
-    else if (changed.has("loop") || changed.has("root")) this.#replaced();
+    else if (REPLACED.some((key) => changed.has(key))) this.#replaced(changed);
     else if (changed.has("time") && !state.playing) this.#show(state.time);
     if (changed.has("playing") || changed.has("view")) this.#page.scene.redraw();
   }
 
-  /** The same motion as another clip: what is shown goes on meanwhile. */
-  #replaced(): void {
-    this.home();
+  /** The same question's motion as another clip: what is shown goes on meanwhile. */
+  #replaced(changed: ReadonlySet<keyof State>): void {
+    // Another take goes on where the last one was.
+    if (changed.has("loop") || changed.has("root")) this.home();
     this.#next();
     this.#soon(0);
   }
@@ -225,6 +227,7 @@ export class Player {
 }
 
 const ASKED_ANEW = ["controls", "performer", "labels", "level"] as const;
+const REPLACED = ["loop", "root", ...MANNER] as const;
 
 /** No joint turned, and as high as the legs are long. */
 function atRest(card: ModelCard): Pose {

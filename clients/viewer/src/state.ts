@@ -19,7 +19,17 @@ export interface State {
   readonly root: "travelling" | "in_place";
   readonly body: "stick" | "mannequin";
   readonly ghost: boolean;
+  /** Takes beside the motion that is shown. */
+  readonly fan: boolean;
+  /** Contacts and skate. */
   readonly feet: boolean;
+  readonly footing: "stand" | "as_predicted";
+  /** Seed of another take; 0 is the prediction. */
+  readonly take: number;
+  /** Size of a take's deviations, from 0 to 1. */
+  readonly variety: number;
+  /** Details that no control predicts, sampled by the seed. */
+  readonly detail: boolean;
   /** Where the event's joint shall be, m; null while no target is wanted. */
   readonly target: readonly [number, number, number] | null;
   readonly view: View;

@@ -5,6 +5,7 @@ import type { ModelCard, Reasons, Trust } from "@posefield/client";
 
 import { named, SCALE, worded } from "./bands.ts";
 import { el } from "./dom.ts";
+import { says as feetSay } from "./feet-words.ts";
 import { Latest } from "./latest.ts";
 import { items, marks } from "./marks.ts";
 import { served } from "./page.ts";
@@ -28,6 +29,7 @@ export function mount(host: HTMLElement, session: Session): void {
   const warnings = el("ul", { class: "warnings" });
   const list = el("ol", { class: "nearest" });
   const others = el("p", { class: "about" });
+  const feet = el("p", { class: "about", "data-feet": "" });
   const aloud = el("p", { class: "unseen", "aria-live": "polite" });
   const meter = el("meter", { min: 0, max: 1, "aria-hidden": "true" });
   host.append(
@@ -41,6 +43,7 @@ export function mount(host: HTMLElement, session: Session): void {
     known,
     sentence,
     warnings,
+    feet,
     aloud,
   );
   if (served(source)) host.append(el("h3", {}, "Made of these captured clips"), list, others);
@@ -54,6 +57,10 @@ export function mount(host: HTMLElement, session: Session): void {
   });
   let timer: ReturnType<typeof setTimeout> | undefined;
   signal.addEventListener("abort", () => clearTimeout(timer));
+  // A single pose says nothing of feet: they are placed over a whole clip.
+  player.onClip(({ trust }) => {
+    feet.textContent = feetSay(card, store.state.footing, trust.feet, served(source));
+  });
   player.onTrust((trust) => {
     sigma.textContent = written.centimetres(trust.sigma);
     // Services older than 3.1.0, and single poses in place, say no band.

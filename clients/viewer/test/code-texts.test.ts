@@ -42,6 +42,20 @@ describe("texts that ask for a clip", () => {
     assert.equal(new URL(link(labelled)).searchParams.get("label"), "style=it's calm");
   });
 
+  it("a take and its feet are said to all, beside controls of the same names", () => {
+    const controls = { take: 1.5, feet: 2 };
+    const question = { controls, take: 7, variety: 0.3, detail: true, feet: "stand" } as const;
+    const wanted: Wanted = { ...WANTED, question };
+    assert.deepEqual(called(python(wanted)), question);
+    const own = new URL(link({ ...wanted, question: { ...question, controls: {} } })).searchParams;
+    assert.deepEqual(Object.fromEntries(own), {
+      take: "7",
+      variety: "0.3",
+      detail: "true",
+      feet: "stand",
+    });
+  });
+
   it("a file's name holds nothing that a path could mean", () => {
     assert.equal(fileName({ ...WANTED, model: "../it's" }), "___it_s.usdc");
   });

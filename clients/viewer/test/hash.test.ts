@@ -5,8 +5,14 @@ import { test } from "node:test";
 
 import { address, initial, restored, written } from "../src/hash.ts";
 import type { State } from "../src/state.ts";
-import { CARD } from "./card.ts";
+import { CARD as PLAIN } from "./card.ts";
 
+/** With feet that may stand, and details to sample. */
+const CARD = {
+  ...PLAIN,
+  feet: [2],
+  diagnostics: { detail: { directions: 3 } },
+} as unknown as typeof PLAIN;
 const START = initial("hop", CARD);
 const OTHER: State = {
   model: "hop@0123",
@@ -21,7 +27,12 @@ const OTHER: State = {
   root: "in_place",
   body: "stick",
   ghost: true,
+  fan: true,
   feet: true,
+  footing: "stand",
+  take: 7,
+  variety: 0.35,
+  detail: true,
   target: [0.25, 1.5, -0.125],
   view: "crowd",
   across: "time",
@@ -76,6 +87,10 @@ const WRONG: readonly (readonly [string, RegExp])[] = [
   ["~labels=calm", /style:calm or/],
   ["~across=height", /speed, time/],
   ["~ghost=1", /yes or no/],
+  ["~take=1.5", /expected 0 to 999999999/],
+  ["~take=-1", /expected 0 to 999999999/],
+  ["~variety=1.1", /expected 0 to 1/],
+  ["~footing=yes", /stand or as_predicted/],
   ["~model=x", /unknown/],
   ["~__proto__=x", /unknown/],
   ["__proto__=1", /no such control/],
@@ -90,6 +105,21 @@ for (const [entry, words] of WRONG)
     assert.match(faults[0]!, words);
     assert.deepEqual(state, { ...START, feet: true });
   });
+
+test("what a model cannot do is refused with the reason, and feet stand where contacts are known", () => {
+  for (const [entry, words] of [
+    ["~footing=stand", /as_predicted: this model names no feet/],
+    ["~detail=yes", /no: this model has no details/],
+  ] as const) {
+    const { state, faults } = restored(address(`#hop?${entry}`), "hop", PLAIN);
+    assert.match(faults.join(), words);
+    assert.deepEqual(state, initial("hop", PLAIN));
+  }
+  const contacts = [{ joint: 2 }] as unknown as NonNullable<typeof CARD.contacts>;
+  assert.equal(initial("hop", CARD).footing, "as_predicted");
+  assert.equal(initial("hop", { ...CARD, contacts }).footing, "stand");
+  assert.equal(initial("hop", { ...CARD, contacts, root: "in_place" }).footing, "as_predicted");
+});
 
 test("a hash without anything names no model", () => {
   for (const text of ["", "#", "#?"]) assert.equal(address(text).model, null);

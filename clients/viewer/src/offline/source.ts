@@ -67,6 +67,7 @@ export class Offline implements Source {
   }
 
   async pose(_: string, question: PoseQuestion): Promise<Poses> {
+    predicted(question);
     const clip = this.#motion(this.#asked(question), "travelling");
     for (const time of question.times) door.within("times", time, 0, clip.trust.duration);
     const found = question.times.map((time) => at(clip, time));
@@ -85,6 +86,7 @@ export class Offline implements Source {
     if (question.loop && !this.#card.cyclic) {
       throw new door.Refused("loop: this model's last pose does not lead into its first");
     }
+    predicted(question);
     if (question.unit || question.up || (question.names ?? "own") !== "own") {
       throw new door.NeedsService("another unit, up axis or naming");
     }
@@ -189,6 +191,12 @@ export class Offline implements Source {
       band: band![0],
     } as Trust;
   }
+}
+
+/** Refuses what differs from the prediction. */
+function predicted({ take, detail, feet }: Pick<ClipQuestion, "take" | "detail" | "feet">): void {
+  if (take || detail) throw new door.NeedsService("another take");
+  if (feet === "stand") throw new door.NeedsService("feet that stand");
 }
 
 function at(clip: Motion, time: number) {

@@ -1,0 +1,73 @@
+/** Takes of a motion and how its feet are, as the state has them: what is asked of a service. */
+
+import type { ClipQuestion, ModelCard, PoseQuestion } from "@posefield/client";
+
+import { type Source, served } from "./page.ts";
+import type { State } from "./state.ts";
+
+/** Size of deviations where none is given, as the service has it. */
+export const VARIETY = 0.7;
+/** The greatest seed. */
+export const LAST = 999_999_999;
+
+export type Footing = State["footing"];
+
+/** What of the state is asked by manner(). */
+export const MANNER = ["take", "variety", "detail", "footing"] as const;
+
+/** The seed after this one; after the last, the first again. */
+export function next(take: number): number {
+  return (take % LAST) + 1;
+}
+
+/** Seeds of takes to be shown beside this one: from 1 on, without it. */
+export function beside(take: number, count: number): readonly number[] {
+  const some = Array.from({ length: count + 1 }, (_, i) => i + 1);
+  return some.filter((seed) => seed !== take).slice(0, count);
+}
+
+/** Whether the model has details to sample, which no control predicts. */
+export function detailed({ diagnostics }: Pick<ModelCard, "diagnostics">): boolean {
+  return Boolean((diagnostics as Readonly<Record<string, unknown>> | undefined)?.["detail"]);
+}
+
+/** In words, why a service cannot make these feet stand; null where it can. */
+export function unplaceable({ feet, root }: Pick<ModelCard, "feet" | "root">): string | null {
+  if (!feet.length) return "this model names no feet";
+  if (root === "in_place") return "this model's root stays in place";
+  return null;
+}
+
+/** How the service places the feet of a model's clips unless it is told otherwise. */
+export function usual(card: ModelCard): Footing {
+  return !unplaceable(card) && card.contacts?.length ? "stand" : "as_predicted";
+}
+
+export function other(footing: Footing): Footing {
+  return footing === "stand" ? "as_predicted" : "stand";
+}
+
+/** What of the take differs from the prediction; nothing where no service answers. */
+export function taken(
+  source: Source,
+  card: ModelCard,
+  { take, variety, detail }: Pick<State, "take" | "variety" | "detail">,
+): Pick<PoseQuestion, "take" | "variety" | "detail"> {
+  const details = detail && detailed(card);
+  if (!served(source) || !(take || details)) return {};
+  return {
+    ...(take && { take }),
+    ...(variety !== VARIETY && { variety }),
+    ...(details && { detail: true }),
+  };
+}
+
+/** The same and the feet, of clips. */
+export function manner(
+  source: Source,
+  card: ModelCard,
+  state: Pick<State, "take" | "variety" | "detail" | "footing">,
+): Pick<ClipQuestion, "take" | "variety" | "detail" | "feet"> {
+  const told = served(source) && state.footing !== usual(card);
+  return { ...taken(source, card, state), ...(told && { feet: state.footing }) };
+}

@@ -1,0 +1,87 @@
+/** Takes and feet: what is asked of a service, and what is said of its answer. */
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { says } from "../src/feet-words.ts";
+import { initial } from "../src/hash.ts";
+import type { Source } from "../src/page.ts";
+import { beside, LAST, manner, next, taken } from "../src/takes.ts";
+import { CARD as PLAIN } from "./card.ts";
+
+const CARD = {
+  ...PLAIN,
+  feet: [2],
+  contacts: [{ joint: 2 }],
+  diagnostics: { detail: { directions: 3 } },
+} as unknown as typeof PLAIN;
+const SERVICE = { file: () => undefined } as unknown as Source;
+const COPY = {} as Source;
+const START = initial("hop", CARD);
+
+test("the prediction asks for nothing new, so that its answer is that of before", () => {
+  assert.deepEqual(manner(SERVICE, CARD, START), {});
+  assert.deepEqual(manner(SERVICE, CARD, { ...START, variety: 0.2 }), {});
+});
+
+test("a take asks for its seed, and for what is not usual", () => {
+  assert.deepEqual(manner(SERVICE, CARD, { ...START, take: 7 }), { take: 7 });
+  const all = { ...START, take: 7, variety: 0, detail: true, footing: "as_predicted" } as const;
+  const said = { take: 7, variety: 0, detail: true };
+  assert.deepEqual(taken(SERVICE, CARD, all), said);
+  assert.deepEqual(manner(SERVICE, CARD, all), { ...said, feet: "as_predicted" });
+  assert.deepEqual(taken(SERVICE, CARD, { ...START, detail: true }), { detail: true });
+});
+
+test("a model without details is asked for none, and a copy of the page for nothing", () => {
+  assert.deepEqual(taken(SERVICE, PLAIN, { ...START, detail: true }), {});
+  const all = { ...START, take: 7, detail: true, footing: "as_predicted" } as const;
+  assert.deepEqual(manner(COPY, CARD, all), {});
+});
+
+test("seeds go on, around the last, and a fan leaves out the one that is shown", () => {
+  assert.deepEqual([0, 1, LAST].map(next), [1, 2, 1]);
+  assert.deepEqual(beside(0, 5), [1, 2, 3, 4, 5]);
+  assert.deepEqual(beside(3, 5), [1, 2, 4, 5, 6]);
+  assert.deepEqual(beside(70, 2), [1, 2]);
+});
+
+const STANCE = { joint: "Foot", begin: 0, end: 0.5, position: [0, 0, 0] };
+const DONE = {
+  stances: [STANCE, STANCE],
+  swings: 1,
+  skate_before: 0.1191,
+  skate: 0.0012,
+  drift: 0.0001,
+  lowered: 0.0213,
+  grounded: 0.0094,
+  left: [],
+};
+
+test("what was done to feet is said with its figures", () => {
+  assert.equal(
+    says(CARD, "stand", DONE),
+    "Feet stand: 2 stances, 1 swing; skate 11.9 cm/s before, 0.1 cm/s now; " +
+      "pelvis lowered by up to 2.1 cm; body lowered to the floor by 0.9 cm.",
+  );
+  const other = { ...DONE, drift: 0.004, lowered: 0, grounded: -0.02, left: ["Foot: too far"] };
+  const said = says(CARD, "stand", other);
+  for (const words of [
+    "off its place by up to 0.4 cm",
+    "pelvis not lowered",
+    "raised to the floor",
+  ])
+    assert.ok(said.includes(words), said);
+  assert.match(said, / Foot: too far\.$/);
+});
+
+test("why nothing was done is said", () => {
+  const none = { ...DONE, stances: [], left: ["Foot: never stands."] };
+  assert.match(says(CARD, "stand", none), /none could be placed\. Foot: never stands\.$/);
+  assert.equal(says(CARD, "as_predicted", undefined), "Feet as predicted.");
+  assert.match(says(PLAIN, "as_predicted", undefined), /names no feet/);
+  const stays = { ...CARD, root: "in_place" } as const;
+  assert.match(says(stays, "as_predicted", undefined), /root stays in place/);
+  assert.match(says(CARD, "stand", undefined, false), /only a service/);
+  assert.match(says(CARD, "stand", undefined), /did not say/);
+});
