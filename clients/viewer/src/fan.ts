@@ -14,6 +14,8 @@ import { beside } from "./takes.ts";
 import * as theme from "./theme.ts";
 
 const COUNT = 5;
+/** Opacity of each: together they leave the body to be seen. */
+const PALE = 0.2;
 
 export function mount(host: HTMLElement, session: Session): void {
   // Only a service has takes.
@@ -69,7 +71,7 @@ class Fan {
   #make(): void {
     const { card, character, scene } = this.#session;
     this.#members = Array.from({ length: COUNT }, () => ({
-      figure: new Figure(card, character, true),
+      figure: new Figure(card, character, true, PALE),
       pose: pose(card.skeleton.names.length),
       clip: null,
     }));

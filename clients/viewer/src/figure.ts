@@ -27,11 +27,12 @@ export class Figure {
   #kind: Body | null = null;
   #shown: Shown | null = null;
 
-  constructor(card: ModelCard, character: Character, ghost: boolean) {
+  /** opacity: of a ghost. */
+  constructor(card: ModelCard, character: Character, ghost: boolean, opacity = 0.32) {
     this.#card = card;
     this.#character = character;
     this.#colours = ghost ? GHOST : SOLID;
-    const made = () => (ghost ? pale() : new MeshLambertMaterial());
+    const made = () => (ghost ? pale(opacity) : new MeshLambertMaterial());
     this.#materials = { skin: made(), stick: made(), joint: made() };
     this.#before = ghost ? [hollow()] : [];
     this.tint();
@@ -79,8 +80,8 @@ export class Figure {
 /** Where it coincides with the body, that is what one sees. */
 const BEHIND = { polygonOffset: true, polygonOffsetFactor: 6, polygonOffsetUnits: 6 };
 
-function pale(): MeshLambertMaterial {
-  return new MeshLambertMaterial({ transparent: true, opacity: 0.32, ...BEHIND });
+function pale(opacity: number): MeshLambertMaterial {
+  return new MeshLambertMaterial({ transparent: true, opacity, ...BEHIND });
 }
 
 /** Fills the depth alone, so that what is pale shows its outside once and not its inside. */

@@ -24,12 +24,17 @@ import * as welcome from "./welcome.ts";
 
 type Part = (host: HTMLElement, session: Session) => void;
 
+/** Their labels, one over the other. */
+function ghosts(host: HTMLElement, session: Session): void {
+  ghost.mount(host, session);
+  fan.mount(host, session);
+}
+
 /** Each gets a section of its own, in this order, named for styles and tests. */
 const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<string, Part>>>> = {
   stage: {
     options: options.mount,
-    ghost: ghost.mount,
-    fan: fan.mount,
+    ghost: ghosts,
     levels: levels.mount,
     crowd: crowd.mount,
   },

@@ -34,7 +34,8 @@ export function mount(host: HTMLElement, session: Session): void {
   host.append(
     el("div", { class: "title" }, el("h2", {}, "Takes"), el("span", {}, taken)),
     el("p", { class: "about" }, ABOUT),
-    el("div", { class: "takes-row" }, more, back, seed.element),
+    el("div", { class: "takes-row" }, more, back),
+    seed.element,
     variety.element,
     details,
   );
@@ -65,7 +66,9 @@ function seedField(store: Store) {
   const show = (take: number) => {
     if (Number(field.value) !== take || field.value === "") field.value = String(take);
   };
-  return { element: labelled("Seed", field), show };
+  const element = labelled("Seed", field);
+  element.classList.add("takes-field");
+  return { element, show };
 }
 
 function varietyField(store: Store) {
@@ -73,7 +76,7 @@ function varietyField(store: Store) {
   range.addEventListener("input", () => store.set({ variety: Number(range.value) }));
   const said = el("span", { class: "takes-value" });
   const element = labelled("Variety", range);
-  element.classList.add("takes-variety");
+  element.classList.add("takes-field");
   element.append(said);
   const show = (variety: number) => {
     range.value = String(variety);

@@ -125,10 +125,29 @@ for (const model of ["reaching", "cmu_walk"]) {
       const question = { controls, root: "in_place" as const };
       const own = await ask<Asked>("clip", question);
       const fps = (own.times.length - 1) / own.trust.duration;
-      const found = await service.clip(model, { ...question, fps, exact: "none" });
+      const feet = "as_predicted" as const;
+      const found = await service.clip(model, { ...question, fps, exact: "none", feet });
       assert.ok(Math.abs(found.frames - own.times.length) <= 1);
       assert.ok(gap(card, own, found) < near);
       assert.ok(gap(card, await ask<Asked>("clip", { controls }), own) > near);
+    });
+
+    it("has no takes and no feet that stand, says so, and has no dead button", async () => {
+      const state = "~take=7&~variety=0.4&~fan=yes&~footing=as_predicted";
+      await page.evaluate((hash) => {
+        location.hash = hash;
+      }, `#${model}?${state}`);
+      await page.getByText("Other takes of the motion need a service").waitFor();
+      const why = card.feet.length ? /only a service makes them stand/ : /names no feet/;
+      await page.locator("[data-feet]", { hasText: why }).waitFor();
+      for (const name of ["Next take", "Prediction", "Fan of other takes", "Feet stand"])
+        assert.equal(await page.getByRole("button", { name }).count(), 0, name);
+      for (const key of ["n", "v", "s"]) await page.keyboard.press(key);
+      assert.equal(await page.locator("[data-fan]").count(), 0);
+      assert.ok((await page.locator("#notice p").allInnerTexts()).every((text) => !text));
+      const [controls] = ends(card) as [Controls];
+      for (const more of [{ take: 7 }, { feet: "stand" }])
+        await assert.rejects(ask("clip", { controls, ...more }), /needs a service/);
     });
 
     it("poses a crowd as its clips", async () => {

@@ -298,10 +298,14 @@ test("performers are chosen by name", () =>
     await until(async () => page.url().includes("~performer=cmu_35"), "the address follows");
   }));
 
-test("sticks, ghost, feet and level change the picture", () =>
+test("sticks, ghost, contacts and level change the picture", () =>
   on(WALK, async (page) => {
     const seen = [await picture(page)];
-    for (const name of ["Sticks", "Ghost of the nearest example", "Feet: contacts and skate"]) {
+    for (const name of [
+      "Sticks",
+      "Ghost of the nearest example",
+      "Contacts and skate of the feet",
+    ]) {
       await page.getByRole("button", { name }).click();
       seen.push(await picture(page));
     }
