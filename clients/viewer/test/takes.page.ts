@@ -86,8 +86,8 @@ test("take, variety and detail are in the address and in what is downloaded, and
       assert.deepEqual([...(await link(other))], [...said]);
     });
     await page.keyboard.press("p");
-    await until(async () => /~variety=0\.4&~detail=yes/.test(page.url()), "no take");
-    assert.ok(!page.url().includes("~take"));
+    await until(async () => !page.url().includes("~take"), "the address has no take");
+    assert.match(page.url(), /~variety=0\.4&~detail=yes/);
   }));
 
 test("a seed that is none is not taken", () =>
