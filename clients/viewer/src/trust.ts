@@ -61,6 +61,12 @@ export function mount(host: HTMLElement, session: Session): void {
   player.onClip(({ trust }) => {
     feet.textContent = feetSay(card, store.state.footing, trust.feet, served(source));
   });
+  const crowded = () => {
+    // Nor are they placed in crowds.
+    feet.hidden = store.state.view === "crowd";
+  };
+  crowded();
+  signal.addEventListener("abort", store.listen(crowded));
   player.onTrust((trust) => {
     sigma.textContent = written.centimetres(trust.sigma);
     // Services older than 3.1.0, and single poses in place, say no band.

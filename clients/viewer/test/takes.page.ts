@@ -7,7 +7,7 @@ import { Client, type ClipQuestion } from "@posefield/client";
 import type { Browser, Page } from "playwright-core";
 
 import { browser, opened, SERVICE } from "./harness.ts";
-import { picture, settled, until } from "./look.ts";
+import { picture, settled, slider, until } from "./look.ts";
 
 const WALK = "/#cmu_walk?speed=1.2&turn=0&stride_length=1.3&~playing=no&~time=0.3";
 const REACH = "/#reaching?~playing=no&~time=0.5";
@@ -90,6 +90,23 @@ test("take, variety and detail are in the address and in what is downloaded, and
     assert.match(page.url(), /~variety=0\.4&~detail=yes/);
   }));
 
+test("a take stays while a control is on the move, and other levels have it too", () =>
+  on(`${WALK}&~take=7`, async (page, asked) => {
+    await taken(page, "take 7");
+    const pose = page.waitForRequest(/\/pose(\.|$)/);
+    await slider(page, "speed").fill("900");
+    assert.equal((await pose).postDataJSON().take, 7);
+    await taken(page, "take 7");
+    await page.locator("#stage[data-clip]").waitFor();
+    asked.length = 0;
+    await page.getByRole("button", { name: "Compare all" }).click();
+    await page.locator(".levels-now", { hasText: "px" }).first().waitFor();
+    assert.deepEqual(
+      asked.map(({ level, take }) => [level, take]),
+      [0, 1, 2, 3].map((level) => [level, 7]),
+    );
+  }));
+
 test("a seed that is none is not taken", () =>
   on(REACH, async (page) => {
     for (const wrong of ["-1", "1.5", "1000000000"]) {
@@ -142,6 +159,8 @@ test("feet stand or are as predicted, and trust says what was done", () =>
     await page.keyboard.press("s");
     await feet(page, /^Feet stand: /);
     assert.ok(standing.equals(await picture(page)));
+    await page.getByRole("button", { name: "Crowd" }).click();
+    await page.locator("[data-feet]").waitFor({ state: "hidden" });
   }));
 
 test("where feet cannot stand there is no switch, and the reason is said", () =>
