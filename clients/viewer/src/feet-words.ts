@@ -2,7 +2,7 @@
 
 import type { ModelCard, Trust } from "@posefield/client";
 
-import { type Footing, unplaceable } from "./takes.ts";
+import { unplaceable } from "./takes.ts";
 import * as written from "./written.ts";
 
 /** Distances below are not worth words, m. */
@@ -11,7 +11,7 @@ const SLIGHT = 0.0005;
 /** asks: whether a service answers, which alone places feet. */
 export function says(
   card: Pick<ModelCard, "feet" | "root">,
-  footing: Footing,
+  stands: boolean,
   found: Trust["feet"],
   asks = true,
 ): string {
@@ -20,7 +20,7 @@ export function says(
   if (why) return `Feet as predicted: ${why}.`;
   if (!asks) return "Feet as predicted: only a service makes them stand.";
   // Services older than 4.0.0 place no feet and say nothing of them.
-  if (footing === "stand") return "Feet as predicted: the service did not say that they stand.";
+  if (stands) return "Feet as predicted: the service did not say that they stand.";
   return "Feet as predicted.";
 }
 

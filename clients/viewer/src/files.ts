@@ -297,11 +297,11 @@ class Files {
   /** As the stage has it. */
   #standing(): HTMLElement {
     const { store } = this.#page;
-    const row = check("Feet stand where they contact the ground", (stand) =>
-      store.set({ footing: stand ? "stand" : "as_predicted" }),
+    const row = check("Feet stand where they contact the ground", (stands) =>
+      store.set({ stands }),
     );
     this.#shows.push(() => {
-      row.querySelector("input")!.checked = store.state.footing === "stand";
+      row.querySelector("input")!.checked = store.state.stands;
     });
     return row;
   }

@@ -41,7 +41,7 @@ class Ghost {
     player.onTrust(() => this.#soon());
     const leave = store.listen((_, changed) => {
       if (["ghost", "view", "body"].some((key) => changed.has(key as "ghost"))) this.#appear();
-      if (["root", "loop", "footing"].some((key) => changed.has(key as "root"))) this.#of = "";
+      if (["root", "loop", "stands"].some((key) => changed.has(key as "root"))) this.#of = "";
     });
     signal.addEventListener("abort", () => {
       clearTimeout(this.#timer);
@@ -84,8 +84,8 @@ class Ghost {
       const [first] = nearest;
       if (!first || signal.aborted) return;
       this.label.textContent = says(first);
-      const { footing, level, loop, root } = store.state;
-      const of = `${first.source} ${level} ${root} ${loop} ${footing}`;
+      const { level, loop, root, stands } = store.state;
+      const of = `${first.source} ${level} ${root} ${loop} ${stands}`;
       if (of === this.#of) return;
       const own = { performer: first.performer, labels: first.labels ?? {} };
       const predicted = { ...own, take: 0, detail: false };

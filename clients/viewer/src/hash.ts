@@ -65,7 +65,7 @@ export function initial(model: string, card: ModelCard): State {
     ghost: false,
     fan: false,
     feet: false,
-    footing: usual(card),
+    stands: usual(card),
     take: 0,
     variety: VARIETY,
     detail: false,
@@ -161,21 +161,10 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   ghost: yes(),
   fan: yes(),
   feet: yes(),
-  footing: {
-    expected: (card) =>
-      unplaceable(card) ? `as_predicted: ${unplaceable(card)}` : "stand or as_predicted",
-    read: (text, card) =>
-      text === "as_predicted" || (text === "stand" && !unplaceable(card)) ? text : undefined,
-    write: (value) => value,
-  },
+  stands: possible(unplaceable),
   take: between(() => [0, LAST], Number.isInteger),
   variety: between(() => [0, 1]),
-  detail: {
-    expected: (card) => (detailed(card) ? "yes or no" : "no: this model has no details to sample"),
-    read: (text, card) =>
-      text === "no" ? false : text === "yes" && detailed(card) ? true : undefined,
-    write: (value) => (value ? "yes" : "no"),
-  },
+  detail: possible((card) => (detailed(card) ? null : "this model has no details to sample")),
   target: {
     expected: () => "x,y,z in metres",
     read: point,
@@ -227,6 +216,16 @@ function yes(): Field<boolean> {
     expected: () => "yes or no",
     read: (text) => ({ yes: true, no: false })[text],
     write: (value) => (value ? "yes" : "no"),
+  };
+}
+
+/** lacks: in words, why a model cannot do it; null where it can. */
+function possible(lacks: (card: ModelCard) => string | null): Field<boolean> {
+  const { expected, read, write } = yes();
+  return {
+    expected: (card) => (lacks(card) ? `no: ${lacks(card)}` : expected(card)),
+    read: (text, card) => (text === "yes" && lacks(card) ? undefined : read(text, card)),
+    write,
   };
 }
 

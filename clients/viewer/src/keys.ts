@@ -2,13 +2,13 @@
 
 import { served } from "./page.ts";
 import type { Session } from "./session.ts";
-import { next, other, unplaceable } from "./takes.ts";
+import { next, unplaceable } from "./takes.ts";
 import * as theme from "./theme.ts";
 import { move, togglePlay } from "./transport.ts";
 
 export function mount(session: Session): void {
   const { card, player, signal, source, store } = session;
-  const flip = (key: "loop" | "ghost" | "feet" | "fan") => () =>
+  const flip = (key: "loop" | "ghost" | "feet" | "fan" | "stands") => () =>
     store.set({ [key]: !store.state[key] });
   const acts: Readonly<Record<string, (event: KeyboardEvent) => void>> = {
     " ": () => togglePlay(session),
@@ -24,7 +24,7 @@ export function mount(session: Session): void {
       n: () => store.set({ take: next(store.state.take) }),
       p: () => store.set({ take: 0 }),
       v: flip("fan"),
-      ...(!unplaceable(card) && { s: () => store.set({ footing: other(store.state.footing) }) }),
+      ...(!unplaceable(card) && { s: flip("stands") }),
     }),
     b: () => store.set({ body: store.state.body === "stick" ? "mannequin" : "stick" }),
     t: theme.toggle,

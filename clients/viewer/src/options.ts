@@ -19,7 +19,7 @@ export const mount: Mount = (host, { card, signal, source, store }) => {
     store.set({ feet: on }),
   );
   const stand = toggle("Feet stand", "Feet stand, or are as predicted (S)", (on) =>
-    store.set({ footing: on ? "stand" : "as_predicted" }),
+    store.set({ stands: on }),
   );
   const root = toggle("Root motion", "Root motion: the body travels", (on) =>
     store.set({ root: on ? "travelling" : "in_place" }),
@@ -33,7 +33,7 @@ export const mount: Mount = (host, { card, signal, source, store }) => {
     ghost.set(state.ghost);
     fan.set(state.fan);
     feet.set(state.feet);
-    stand.set(state.footing === "stand");
+    stand.set(state.stands);
     root.set(state.root === "travelling");
     host.hidden = state.view !== "one";
   };

@@ -23,7 +23,8 @@ export interface State {
   readonly fan: boolean;
   /** Contacts and skate. */
   readonly feet: boolean;
-  readonly footing: "stand" | "as_predicted";
+  /** Whether the feet of clips are made to stand; else they are as predicted. */
+  readonly stands: boolean;
   /** Seed of another take; 0 is the prediction. */
   readonly take: number;
   /** Size of a take's deviations, from 0 to 1. */

@@ -10,10 +10,8 @@ export const VARIETY = 0.7;
 /** The greatest seed. */
 export const LAST = 999_999_999;
 
-export type Footing = State["footing"];
-
 /** What of the state is asked by manner(). */
-export const MANNER = ["take", "variety", "detail", "footing"] as const;
+export const MANNER = ["take", "variety", "detail", "stands"] as const;
 
 /** The seed after this one; after the last, the first again. */
 export function next(take: number): number {
@@ -38,13 +36,9 @@ export function unplaceable({ feet, root }: Pick<ModelCard, "feet" | "root">): s
   return null;
 }
 
-/** How the service places the feet of a model's clips unless it is told otherwise. */
-export function usual(card: ModelCard): Footing {
-  return !unplaceable(card) && card.contacts?.length ? "stand" : "as_predicted";
-}
-
-export function other(footing: Footing): Footing {
-  return footing === "stand" ? "as_predicted" : "stand";
+/** Whether the service makes the feet of a model's clips stand unless it is told otherwise. */
+export function usual(card: ModelCard): boolean {
+  return !unplaceable(card) && Boolean(card.contacts?.length);
 }
 
 /** What of the take differs from the prediction; nothing where no service answers. */
@@ -66,8 +60,11 @@ export function taken(
 export function manner(
   source: Source,
   card: ModelCard,
-  state: Pick<State, "take" | "variety" | "detail" | "footing">,
+  state: Pick<State, "take" | "variety" | "detail" | "stands">,
 ): Pick<ClipQuestion, "take" | "variety" | "detail" | "feet"> {
-  const told = served(source) && state.footing !== usual(card);
-  return { ...taken(source, card, state), ...(told && { feet: state.footing }) };
+  const told = served(source) && state.stands !== usual(card);
+  return {
+    ...taken(source, card, state),
+    ...(told && { feet: state.stands ? "stand" : "as_predicted" }),
+  };
 }

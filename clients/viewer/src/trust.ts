@@ -59,7 +59,7 @@ export function mount(host: HTMLElement, session: Session): void {
   signal.addEventListener("abort", () => clearTimeout(timer));
   // A single pose says nothing of feet: they are placed over a whole clip.
   player.onClip(({ trust }) => {
-    feet.textContent = feetSay(card, store.state.footing, trust.feet, served(source));
+    feet.textContent = feetSay(card, store.state.stands, trust.feet, served(source));
   });
   const crowded = () => {
     // Nor are they placed in crowds.

@@ -29,7 +29,7 @@ const OTHER: State = {
   ghost: true,
   fan: true,
   feet: true,
-  footing: "stand",
+  stands: true,
   take: 7,
   variety: 0.35,
   detail: true,
@@ -90,7 +90,7 @@ const WRONG: readonly (readonly [string, RegExp])[] = [
   ["~take=1.5", /expected 0 to 999999999/],
   ["~take=-1", /expected 0 to 999999999/],
   ["~variety=1.1", /expected 0 to 1/],
-  ["~footing=yes", /stand or as_predicted/],
+  ["~stands=1", /yes or no/],
   ["~model=x", /unknown/],
   ["~__proto__=x", /unknown/],
   ["__proto__=1", /no such control/],
@@ -108,7 +108,7 @@ for (const [entry, words] of WRONG)
 
 test("what a model cannot do is refused with the reason, and feet stand where contacts are known", () => {
   for (const [entry, words] of [
-    ["~footing=stand", /as_predicted: this model names no feet/],
+    ["~stands=yes", /no: this model names no feet/],
     ["~detail=yes", /no: this model has no details/],
   ] as const) {
     const { state, faults } = restored(address(`#hop?${entry}`), "hop", PLAIN);
@@ -116,9 +116,9 @@ test("what a model cannot do is refused with the reason, and feet stand where co
     assert.deepEqual(state, initial("hop", PLAIN));
   }
   const contacts = [{ joint: 2 }] as unknown as NonNullable<typeof CARD.contacts>;
-  assert.equal(initial("hop", CARD).footing, "as_predicted");
-  assert.equal(initial("hop", { ...CARD, contacts }).footing, "stand");
-  assert.equal(initial("hop", { ...CARD, contacts, root: "in_place" }).footing, "as_predicted");
+  assert.equal(initial("hop", CARD).stands, false);
+  assert.equal(initial("hop", { ...CARD, contacts }).stands, true);
+  assert.equal(initial("hop", { ...CARD, contacts, root: "in_place" }).stands, false);
 });
 
 test("a hash without anything names no model", () => {

@@ -133,7 +133,7 @@ for (const model of ["reaching", "cmu_walk"]) {
     });
 
     it("has no takes and no feet that stand, says so, and has no dead button", async () => {
-      const state = "~take=7&~variety=0.4&~fan=yes&~footing=as_predicted";
+      const state = "~take=7&~variety=0.4&~fan=yes&~stands=no";
       await page.evaluate((hash) => {
         location.hash = hash;
       }, `#${model}?${state}`);

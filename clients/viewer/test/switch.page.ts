@@ -76,7 +76,7 @@ test("who drags while the model is replaced may look around afterwards", async (
 });
 
 test("feet slide as fast as the service reckons, and what is not known yet is not said", async () => {
-  const { page } = await opened(chromium, "/#cmu_walk?~feet=yes&~footing=as_predicted&~playing=no");
+  const { page } = await opened(chromium, "/#cmu_walk?~feet=yes&~stands=no&~playing=no");
   await settled(page);
   const skate = page.locator("[data-skate]");
   const known = async () => /cm\/s/.test((await skate.textContent())!);

@@ -154,7 +154,7 @@ test("feet stand or are as predicted, and trust says what was done", () =>
     await feet(page, /^Feet as predicted\.$/);
     assert.equal(asked.at(-1)!.feet, "as_predicted");
     assert.equal((await link(page)).get("feet"), "as_predicted");
-    await until(async () => page.url().includes("~footing=as_predicted"), "the address says so");
+    await until(async () => page.url().includes("~stands=no"), "the address says so");
     assert.ok(!standing.equals(await picture(page)));
     await page.keyboard.press("s");
     await feet(page, /^Feet stand: /);
@@ -169,5 +169,5 @@ test("where feet cannot stand there is no switch, and the reason is said", () =>
     assert.ok(await page.getByRole("button", { name: "Feet stand" }).isHidden());
     await page.keyboard.press("s");
     await page.waitForTimeout(500);
-    assert.ok(!page.url().includes("~footing"));
+    assert.ok(!page.url().includes("~stands"));
   }));

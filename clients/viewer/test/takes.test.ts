@@ -26,7 +26,7 @@ test("the prediction asks for nothing new, so that its answer is that of before"
 
 test("a take asks for its seed, and for what is not usual", () => {
   assert.deepEqual(manner(SERVICE, CARD, { ...START, take: 7 }), { take: 7 });
-  const all = { ...START, take: 7, variety: 0, detail: true, footing: "as_predicted" } as const;
+  const all = { ...START, take: 7, variety: 0, detail: true, stands: false } as const;
   const said = { take: 7, variety: 0, detail: true };
   assert.deepEqual(taken(SERVICE, CARD, all), said);
   assert.deepEqual(manner(SERVICE, CARD, all), { ...said, feet: "as_predicted" });
@@ -35,7 +35,7 @@ test("a take asks for its seed, and for what is not usual", () => {
 
 test("a model without details is asked for none, and a copy of the page for nothing", () => {
   assert.deepEqual(taken(SERVICE, PLAIN, { ...START, detail: true }), {});
-  const all = { ...START, take: 7, detail: true, footing: "as_predicted" } as const;
+  const all = { ...START, take: 7, detail: true, stands: false } as const;
   assert.deepEqual(manner(COPY, CARD, all), {});
 });
 
@@ -60,12 +60,12 @@ const DONE = {
 
 test("what was done to feet is said with its figures", () => {
   assert.equal(
-    says(CARD, "stand", DONE),
+    says(CARD, true, DONE),
     "Feet stand: 2 stances, 1 swing; skate 11.9 cm/s before, 0.1 cm/s now; " +
       "pelvis lowered by up to 2.1 cm; body lowered to the floor by 0.9 cm.",
   );
   const other = { ...DONE, drift: 0.004, lowered: 0, grounded: -0.02, left: ["Foot: too far"] };
-  const said = says(CARD, "stand", other);
+  const said = says(CARD, true, other);
   for (const words of [
     "off its place by up to 0.4 cm",
     "pelvis not lowered",
@@ -77,11 +77,11 @@ test("what was done to feet is said with its figures", () => {
 
 test("why nothing was done is said", () => {
   const none = { ...DONE, stances: [], left: ["Foot: never stands."] };
-  assert.match(says(CARD, "stand", none), /none could be placed\. Foot: never stands\.$/);
-  assert.equal(says(CARD, "as_predicted", undefined), "Feet as predicted.");
-  assert.match(says(PLAIN, "as_predicted", undefined), /names no feet/);
+  assert.match(says(CARD, true, none), /none could be placed\. Foot: never stands\.$/);
+  assert.equal(says(CARD, false, undefined), "Feet as predicted.");
+  assert.match(says(PLAIN, false, undefined), /names no feet/);
   const stays = { ...CARD, root: "in_place" } as const;
-  assert.match(says(stays, "as_predicted", undefined), /root stays in place/);
-  assert.match(says(CARD, "stand", undefined, false), /only a service/);
-  assert.match(says(CARD, "stand", undefined), /did not say/);
+  assert.match(says(stays, false, undefined), /root stays in place/);
+  assert.match(says(CARD, true, undefined, false), /only a service/);
+  assert.match(says(CARD, true, undefined), /did not say/);
 });
