@@ -7,9 +7,13 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, RootPath, Rotations
+from posefield.common.array_shapes import Bones
 from posefield.common.units import Floats
 from posefield.motion import skeleton
+
+Points = Annotated[Floats, "*characters frames 3"]
+Turns = Annotated[Floats, "*characters frames 4"]
+Values = Annotated[Floats, "*characters frames"]
 
 
 @dataclass(frozen=True)
@@ -28,37 +32,38 @@ class Limb:
 
 @dataclass(frozen=True)
 class LimbPoses:
-    """Some limbs of one character in F poses.
+    """Some limbs of one character in F poses, or of N characters (N, F).
 
     parents: of the compact skeleton. joints: of the whole skeleton, by compact joint. bones:
-    offsets (C, 3), m. positions: (F, C, 3), m. orientations: (F, C, 4).
+    offsets (..., C, 3), m. positions: (..., F, C, 3), m. orientations: (..., F, C, 4).
     """
 
     joints: tuple[int, ...]
     parents: tuple[int, ...]
-    bones: Annotated[Floats, "chain 3"]
-    positions: Annotated[Floats, "frames chain 3"]
-    orientations: Annotated[Floats, "frames chain 4"]
+    bones: Annotated[Floats, "*characters chain 3"]
+    positions: Annotated[Floats, "*characters frames chain 3"]
+    orientations: Annotated[Floats, "*characters frames chain 4"]
 
     @cached_property
     def _places(self) -> dict[int, int]:
         return {joint: place for place, joint in enumerate(self.joints)}
 
-    def position(self, joint: int) -> RootPath:
-        """Return the positions (F, 3), m, of a joint of the whole skeleton."""
-        return self.positions[:, self._places[joint]]
+    def position(self, joint: int) -> Points:
+        """Return the positions (..., F, 3), m, of a joint of the whole skeleton."""
+        return self.positions[..., self._places[joint], :]
 
-    def orientation(self, joint: int) -> Annotated[Floats, "frames 4"]:
-        """Return the orientations (F, 4) of a joint of the whole skeleton."""
-        return self.orientations[:, self._places[joint]]
+    def orientation(self, joint: int) -> Turns:
+        """Return the orientations (..., F, 4) of a joint of the whole skeleton."""
+        return self.orientations[..., self._places[joint], :]
 
-    def parent_orientation(self, joint: int) -> Annotated[Floats, "frames 4"]:
-        """Return the orientations (F, 4) of a joint's parent."""
-        return self.orientations[:, self.parents[self._places[joint]]]
+    def parent_orientation(self, joint: int) -> Turns:
+        """Return the orientations (..., F, 4) of a joint's parent."""
+        return self.orientations[..., self.parents[self._places[joint]], :]
 
-    def length(self, joint: int) -> float:
-        """Return the length of the bone that ends at a joint, m."""
-        return float(np.linalg.norm(self.bones[self._places[joint]]))
+    def length(self, joint: int) -> Annotated[Floats, "*characters 1"]:
+        """Return the length (..., 1) of the bone that ends at a joint, m."""
+        found: Floats = np.linalg.norm(self.bones[..., self._places[joint], :], axis=-1)
+        return found[..., None]
 
 
 def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
@@ -93,14 +98,14 @@ def find_kept_limb(parents: Sequence[int], bones: Bones, joint: int) -> Limb | N
 
 def evaluate_poses(
     parents: Sequence[int],
-    bones: Bones,
+    bones: Annotated[Floats, "*characters joints 3"],
     limbs: Sequence[Limb],
-    rotations: Rotations,
-    roots: RootPath,
+    rotations: Annotated[Floats, "*characters frames joints 4"],
+    roots: Points,
 ) -> LimbPoses:
     """Return the poses of the limbs and of the joints above them.
 
-    bones: (J, 3), m. rotations: (F, J, 4). roots: (F, 3), m.
+    bones: (..., J, 3), m. rotations: (..., F, J, 4). roots: (..., F, 3), m.
     """
     needed = {0}
     for limb in limbs:
@@ -108,9 +113,9 @@ def evaluate_poses(
     joints = tuple(sorted(needed))
     places = {joint: place for place, joint in enumerate(joints)}
     own = tuple(places.get(parents[joint], -1) for joint in joints)
-    arms = bones[list(joints)]
+    arms = bones[..., list(joints), :]
     moved = skeleton.translations(arms, roots)
-    found = skeleton.forward_kinematics(own, rotations[:, list(joints)], moved)
+    found = skeleton.forward_kinematics(own, rotations[..., list(joints), :], moved)
     return LimbPoses(joints, own, arms, *found)
 
 

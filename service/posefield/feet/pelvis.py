@@ -5,10 +5,10 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath
+from posefield.common.array_shapes import Frames
 from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import two_bone
-from posefield.feet.limbs import Limb, LimbPoses
+from posefield.feet.limbs import Limb, LimbPoses, Points, Values
 
 # The pelvis is lowered this long before and after it is needed, s, and its way is smoothed with a
 # Gaussian that is half as wide.
@@ -17,12 +17,14 @@ SPREAD, SMOOTHING = 0.06, 0.03
 MOST = 0.05
 
 
-def need(poses: LimbPoses, leg: Limb, target: RootPath, sunk: float) -> Frames:
-    """Return how much lower a leg needs the pelvis to be (F,), m; infinite out of reach.
+def need(
+    poses: LimbPoses, leg: Limb, target: Points, sunk: float | Annotated[Floats, "*characters 1"]
+) -> Values:
+    """Return how much lower a leg needs the pelvis to be (..., F), m; infinite out of reach.
 
-    target: of the leg's end (F, 3), m. sunk: by how much the pelvis is lowered already, m.
+    target: of the leg's end (..., F, 3), m. sunk: by how much the pelvis is lowered already, m.
     """
-    apart = poses.position(leg.upper) - sunk * UP - target
+    apart = poses.position(leg.upper) - np.asarray(sunk)[..., None] * UP - target
     level = np.sum(np.square(apart * (1.0 - UP)), axis=-1)
     room = np.square(two_bone.firm_reach(poses, leg)) - level
     highest = np.sqrt(np.maximum(room, 0.0))
@@ -44,16 +46,16 @@ def room(poses: LimbPoses, limbs: Sequence[Limb]) -> tuple[Frames, Frames]:
     return np.maximum(up, 0.0), np.maximum(down, 0.0)
 
 
-def lower(needs: Sequence[Frames], most: Frames, rate: float, cyclic: bool) -> Frames:
-    """Return how much the pelvis is lowered (F,), m: smoothly, and at most by `most` (F,)."""
-    wanted = np.minimum(np.max([np.zeros(len(most)), *needs], axis=0), most)
+def lower(needs: Sequence[Values], most: Values, rate: float, cyclic: bool) -> Values:
+    """Return how much the pelvis is lowered (..., F), m: smoothly, by `most` (..., F) at most."""
+    wanted = np.minimum(np.max([np.zeros(most.shape), *needs], axis=0), most)
     smooth = cover(wanted, rate, cyclic)
     excess = cover(np.maximum(smooth - most, 0.0), rate, cyclic)
     return np.maximum(smooth - excess, 0.0)
 
 
-def cover(needed: Frames, rate: float, cyclic: bool) -> Frames:
-    """Return a smooth path (F,) that is nowhere below the needed one, which is not negative.
+def cover(needed: Values, rate: float, cyclic: bool) -> Values:
+    """Return a smooth path (..., F) that is nowhere below the needed one, which is not negative.
 
     The largest value of the neighbourhood, smoothed with a kernel that is no wider than that.
     """
@@ -61,17 +63,22 @@ def cover(needed: Frames, rate: float, cyclic: bool) -> Frames:
     if not needed.any():
         return needed
     kernel = np.exp(-0.5 * np.square(np.arange(-half, half + 1) / (SMOOTHING * rate)))
-    windows = np.lib.stride_tricks.sliding_window_view
-    wide = windows(_padded(needed, half, cyclic), 2 * half + 1).max(axis=-1)
-    found: Frames = windows(_padded(wide, half, cyclic), 2 * half + 1) @ (kernel / kernel.sum())
+    wide = np.max(_neighbours(needed, half, cyclic), axis=0)
+    found = np.zeros(needed.shape)
+    # Not a matrix product, whose sums could go in another order for more characters.
+    for share, moved in zip(kernel / kernel.sum(), _neighbours(wide, half, cyclic), strict=True):
+        found += share * moved
     return found
 
 
-def beyond(needed: Frames, most: Frames) -> Booleans:
-    """Return whether a leg needs more than the pelvis can be lowered (F,)."""
+def beyond(needed: Values, most: Values) -> Booleans:
+    """Return whether a leg needs more than the pelvis can be lowered (..., F)."""
     found: Booleans = needed > most + 1e-9
     return found
 
 
-def _padded(values: Frames, half: int, cyclic: bool) -> Annotated[Floats, "padded"]:
-    return np.pad(values, half, mode="wrap" if cyclic else "edge")
+def _neighbours(values: Values, half: int, cyclic: bool) -> list[Values]:
+    """Return the values (..., F) moved by -half to half frames."""
+    around = [(0, 0)] * (values.ndim - 1) + [(half, half)]
+    wide = np.pad(values, around, mode="wrap" if cyclic else "edge")
+    return [wide[..., first : first + values.shape[-1]] for first in range(2 * half + 1)]

@@ -10,9 +10,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath
 from posefield.common.units import Floats
-from posefield.feet.limbs import Limb, LimbPoses
+from posefield.feet.limbs import Limb, LimbPoses, Points, Turns, Values
 from posefield.motion import quat
 
 # A limb is not stretched beyond this share of its length; from 5 mm before it on it resists.
@@ -23,61 +22,63 @@ LEAST_BEND = 0.01
 
 @dataclass(frozen=True)
 class LimbTurns:
-    """Local rotations (F, 4) of the three joints of a limb."""
+    """Local rotations (..., F, 4) of the three joints of a limb."""
 
-    upper: Annotated[Floats, "frames 4"]
-    middle: Annotated[Floats, "frames 4"]
-    lower: Annotated[Floats, "frames 4"]
+    upper: Turns
+    middle: Turns
+    lower: Turns
 
 
-def firm_reach(poses: LimbPoses, limb: Limb) -> Frames:
-    """Return the distance (F,), m, up to which the end of a limb follows its target exactly."""
+def firm_reach(poses: LimbPoses, limb: Limb) -> Values:
+    """Return the distance (..., F), m, up to which the end of a limb follows its target exactly."""
     length = poses.length(limb.middle) + poses.length(limb.lower)
     source = np.linalg.norm(poses.position(limb.lower) - poses.position(limb.upper), axis=-1)
-    found: Frames = np.maximum(source, REACH * length - SOFTNESS)
+    found: Values = np.maximum(source, REACH * length - SOFTNESS)
     return found
 
 
-def soften(distance: Frames, firm: Frames, length: float) -> Frames:
-    """Return distances (F,), m, that exceed the firm reach (F,) softly, and never the length.
+def soften(
+    distance: Values, firm: Values, length: float | Annotated[Floats, "*characters 1"]
+) -> Values:
+    """Return distances (..., F), m, that exceed the firm reach softly, and never the length.
 
     Beyond a they are a + s (1 - exp(-(d - a) / s)), where s is at most 5 mm.
     """
     soft = np.maximum(np.maximum(REACH * length, firm) - firm, 1e-9)
     beyond = np.maximum(distance - firm, 0.0)
-    found: Frames = np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
+    found: Values = np.minimum(distance, firm + soft * -np.expm1(-beyond / soft))
     return found
 
 
-def reach(poses: LimbPoses, limb: Limb, shift: RootPath, target: RootPath) -> RootPath:
-    """Return the vectors (F, 3), m, from the upper joint of a limb to where its end comes.
+def reach(poses: LimbPoses, limb: Limb, shift: Points, target: Points) -> Points:
+    """Return the vectors (..., F, 3), m, from the upper joint of a limb to where its end comes.
 
-    shift: movement (F, 3), m, of the upper joint from its place in the poses. target: (F, 3), m; it
-    is approached along its direction if it is out of reach.
+    shift: movement (..., F, 3), m, of the upper joint from its place in the poses. target: (..., F,
+    3), m; it is approached along its direction if it is out of reach.
     """
     above, below = poses.length(limb.middle), poses.length(limb.lower)
     apart = target - poses.position(limb.upper) - shift
     distance = np.linalg.norm(apart, axis=-1)
     soft = soften(distance, firm_reach(poses, limb), above + below)
-    within = np.clip(soft, 1.001 * abs(above - below) + 1e-6, above + below)
-    found: RootPath = apart * (within / np.maximum(distance, 1e-9))[:, None]
+    within = np.clip(soft, 1.001 * np.abs(above - below) + 1e-6, above + below)
+    found: Points = apart * (within / np.maximum(distance, 1e-9))[..., None]
     return found
 
 
-def solve(poses: LimbPoses, limb: Limb, end: Annotated[Floats, "frames 3"]) -> LimbTurns:
-    """Return the rotations with which the end of a limb is `end` (F, 3), m, from its upper joint.
+def solve(poses: LimbPoses, limb: Limb, end: Points) -> LimbTurns:
+    """Return the rotations with which the end of a limb comes where it is wanted.
 
-    The end's orientation is kept.
+    end: vectors (..., F, 3), m, from the limb's upper joint. The end's orientation is kept.
     """
     above, below = poses.length(limb.middle), poses.length(limb.lower)
     upper, middle = poses.position(limb.upper), poses.position(limb.middle)
     lower = poses.position(limb.lower)
     distance = np.linalg.norm(end, axis=-1)
-    towards = end / distance[:, None]
+    towards = end / distance[..., None]
     side = _bend_direction(poses, limb, towards)
     along = (np.square(above) + np.square(distance) - np.square(below)) / (2.0 * distance)
     across = np.sqrt(np.maximum(np.square(above) - np.square(along), 0.0))
-    knee = along[:, None] * towards + across[:, None] * side
+    knee = along[..., None] * towards + across[..., None] * side
     thigh = quat.mul(shortest_turn(middle - upper, knee), poses.orientation(limb.upper))
     shin = quat.mul(shortest_turn(lower - middle, end - knee), poses.orientation(limb.middle))
     return LimbTurns(
@@ -96,8 +97,8 @@ def shortest_turn(
     return quat.normalize(np.concatenate([real[..., None], quat.cross(before, after)], axis=-1))
 
 
-def _bend_direction(poses: LimbPoses, limb: Limb, towards: RootPath) -> RootPath:
-    """Return the unit vectors (F, 3), orthogonal to the limb, towards which its middle bends.
+def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
+    """Return the unit vectors (..., F, 3), orthogonal to the limb, towards which its middle bends.
 
     Where a limb is nearly straight its plane is that of the mean bend in its parent's axes.
     """
@@ -107,14 +108,14 @@ def _bend_direction(poses: LimbPoses, limb: Limb, towards: RootPath) -> RootPath
     bone = middle - upper
     bend = bone - np.sum(bone * old, axis=-1, keepdims=True) * old
     frame = poses.parent_orientation(limb.upper)
-    mean = np.mean(quat.rotate(quat.conj(frame), bend), axis=0)
-    size = np.linalg.norm(mean)
-    least = LEAST_BEND * poses.length(limb.middle)
-    usual = quat.rotate(frame, np.broadcast_to(mean / max(size, 1e-9), bend.shape))
+    mean = np.mean(quat.rotate(quat.conj(frame), bend), axis=-2, keepdims=True)
+    size = np.linalg.norm(mean, axis=-1, keepdims=True)
+    least = LEAST_BEND * poses.length(limb.middle)[..., None]
+    usual = quat.rotate(frame, np.broadcast_to(mean / np.maximum(size, 1e-9), bend.shape))
     usual = usual - np.sum(usual * old, axis=-1, keepdims=True) * old
     bent = np.linalg.norm(bend, axis=-1, keepdims=True)
     mixed = bend + np.maximum(least - bent, 0.0) * usual
     side = quat.rotate(shortest_turn(old, towards), mixed)
     side = side - np.sum(side * towards, axis=-1, keepdims=True) * towards
-    found: RootPath = side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-12)
+    found: Points = side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-12)
     return found
