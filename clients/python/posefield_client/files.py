@@ -197,6 +197,7 @@ def walk(
     fov: float | None = None,
     height: float | None = None,
     pixels: float | None = None,
+    feet: Feet | None = None,
     instancing: Instancing | None = None,
     body: Body | None = None,
 ) -> Files:
@@ -207,7 +208,7 @@ def walk(
     words = {
         **asking.said(count=count, motions=motions, seconds=seconds, fps=fps, seed=seed),
         **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),
-        **asking.said(instancing=instancing, body=body),
+        **asking.said(feet=feet, instancing=instancing, body=body),
         **asking.label_words(labels or {}),
     }
     said = "".join(f", {name}={value!r}" for name, value in words.items())

@@ -2259,6 +2259,8 @@ export interface components {
         height: number;
         /** @description Maximum number of pixels that a level's error may cover. Default: 1. Requires `camera`. */
         pixels: number;
+        /** @description Whether feet stand where they contact the ground, planned over each character's whole walk. Default: `stand` for models that know the contacts of their feet, for 20 frames a second or more. Poses of crowds at single times have feet as predicted. Since 4.0.0. */
+        walkFeet: "stand" | "as_predicted";
         /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
         instancing: "references" | "scenegraph" | "flatten";
         /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
@@ -3185,6 +3187,8 @@ export interface operations {
                 height?: components["parameters"]["height"];
                 /** @description Maximum number of pixels that a level's error may cover. Default: 1. Requires `camera`. */
                 pixels?: components["parameters"]["pixels"];
+                /** @description Whether feet stand where they contact the ground, planned over each character's whole walk. Default: `stand` for models that know the contacts of their feet, for 20 frames a second or more. Poses of crowds at single times have feet as predicted. Since 4.0.0. */
+                feet?: components["parameters"]["walkFeet"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
                 /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
@@ -3289,6 +3293,8 @@ export interface operations {
                 height?: components["parameters"]["height"];
                 /** @description Maximum number of pixels that a level's error may cover. Default: 1. Requires `camera`. */
                 pixels?: components["parameters"]["pixels"];
+                /** @description Whether feet stand where they contact the ground, planned over each character's whole walk. Default: `stand` for models that know the contacts of their feet, for 20 frames a second or more. Poses of crowds at single times have feet as predicted. Since 4.0.0. */
+                feet?: components["parameters"]["walkFeet"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
                 /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
@@ -4194,6 +4200,7 @@ export const KEYS = {
     "fov",
     "height",
     "pixels",
+    "feet",
     "instancing",
     "body"
   ],

@@ -14,18 +14,15 @@ from posefield.console.progress import ProgressBar
 from posefield.encode import usd_crowd
 from posefield.encode.tables import crowd_tables
 from posefield.encode.usd_crowd import crowd_writer
-from posefield.locomotion import (
-    crowd_order,
-    gait,
-    walking_crowd,
-)
+from posefield.locomotion import gait, walking_crowd
 from posefield.locomotion import routes as given
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.routes import Route
-from posefield.motion.crowd_clip import CrowdClip, Motions
+from posefield.motion.crowd_clip import CrowdClip, Motions, StandingFeet
 from posefield.question.body_kind import DEFAULT_BODY
 from posefield.question.walk_question import WalkQuestion
+from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
 EXTENSIONS = (*usd_crowd.FILES, "npz")
@@ -47,7 +44,7 @@ def write_crowd(
             "body", f"{question.body!r}, expected none given: npz files carry no body"
         )
     opened = gait.fit_gait(model.session)
-    made = crowd_order.build_crowd(model, opened, asked)
+    made = walking_feet.build_crowd(model, opened, asked)
     feet = _FootSkateMeter(opened, asked.fps)
     watched = _with_progress(made, asked.motions or len(made.motion), feet)
     if ending == "npz":
@@ -64,6 +61,7 @@ def write_crowd(
         "seed": asked.seed,
         "level_shares": made.facts["level_shares"],
         "outside_share": made.facts["outside_share"],
+        "feet": made.facts["feet"],
         **feet.facts(),
     }
 
@@ -92,11 +90,14 @@ class _FootSkateMeter:
     gait: Gait
     rate: float
     samples: list[Floats] = field(default_factory=list)
+    standing: list[StandingFeet] = field(default_factory=list)
 
     def measure(self, motions: Motions) -> None:
         card = self.gait.session.card
         if card.feet:
             self.samples.append(walking_crowd.measure_foot_skate(card, motions, self.rate).ravel())
+        if motions.feet:
+            self.standing.append(motions.feet)
 
     def facts(self) -> dict[str, float]:
         if not self.samples:
@@ -106,6 +107,21 @@ class _FootSkateMeter:
             "skate_strides_cm_per_s": round(
                 100.0 * walking_crowd.mean_foot_skate(self.gait, self.rate), 2
             ),
+            **self._standing_facts(),
+        }
+
+    def _standing_facts(self) -> dict[str, float]:
+        """Return the facts about feet that were made to stand; none for feet as predicted."""
+        if not self.standing:
+            return {}
+        before, drift, lowered = (
+            100.0 * np.concatenate([getattr(own, name) for own in self.standing])
+            for name in ("skate_before", "drift", "lowered")
+        )
+        return {
+            "skate_before_cm_per_s": round(float(before.mean()), 2),
+            "drift_cm": round(float(drift.max()), 2),
+            "lowered_cm": round(float(lowered.max()), 2),
         }
 
 
@@ -134,6 +150,12 @@ def report_text(facts: dict[str, Any]) -> str:
         lines.append(
             f"feet on the ground slide at {facts['skate_cm_per_s']:.1f} cm/s, those of the model's "
             f"own strides at the captured controls at {facts['skate_strides_cm_per_s']:.1f} cm/s"
+        )
+    if "skate_before_cm_per_s" in facts:
+        lines.append(
+            f"feet stand: as predicted they would slide at {facts['skate_before_cm_per_s']:.1f} "
+            f"cm/s; a standing foot moves {facts['drift_cm']:.1f} cm at most, and a pelvis is "
+            f"lowered {facts['lowered_cm']:.1f} cm at most"
         )
     if facts["outside_share"]:
         lines.append(

@@ -118,7 +118,9 @@ def _response(length: int, rate: float, led: bool, trailed: bool) -> Annotated[F
     inside, outside = bends[:, 2:-2], bends[:, [0, 1, -2, -1]]
     stiffness = (SPREAD * rate) ** 4
     matrix = np.eye(length) + stiffness * inside.T @ inside
-    return np.linalg.solve(matrix, -stiffness * inside.T @ outside)
+    found = np.empty((length, 4))
+    found[:] = np.linalg.solve(matrix, -stiffness * inside.T @ outside)
+    return found
 
 
 def _held(stances: Runs, feet: FootRows, frames: int) -> Runs:

@@ -6,9 +6,10 @@ the plan, so no path is interpolated. Walkers do not depend on each other.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from posefield.common import cancellation
 from posefield.common.units import UP, Booleans, Floats
@@ -20,8 +21,8 @@ from posefield.feet.stance_rows import FootRows, Rows
 from posefield.feet.step_rows import StepRows
 from posefield.motion.foot_contacts import FootContact
 
+Scalar = TypeVar("Scalar", np.float64, np.bool_)
 PerWalker = Annotated[Floats, "walkers"]
-Rotations = Annotated[Floats, "walkers frames joints 4"]
 FeetPaths = Annotated[Floats, "walkers frames feet 3"]
 
 
@@ -42,14 +43,15 @@ class Walkers:
 
 @dataclass(frozen=True)
 class WalkersFeet:
-    """Motions with standing feet, and how the feet are.
+    """What changes in the motions so that feet stand, and how the feet are.
 
-    rotations: (M, F, J, 4). roots: (M, F, 3), m. before, after: paths of the K feet (M, F, K, 3),
-    m. down: when they stand (M, F, K). drift: largest distance of a standing foot from its place
-    (M,), m. lowered: largest distance by which the pelvis was lowered so that legs reach (M,), m.
+    turns: rotations (M, F, 4) of the joints of the legs. roots: (M, F, 3), m. before, after: paths
+    of the K feet (M, F, K, 3), m. down: when they stand (M, F, K). drift: largest distance of a
+    standing foot from its place (M,), m. lowered: largest distance by which the pelvis was lowered
+    so that legs reach (M,), m.
     """
 
-    rotations: Annotated[Floats, "walkers frames joints 4"]
+    turns: dict[int, Annotated[Floats, "walkers frames 4"]]
     roots: Annotated[Floats, "walkers frames 3"]
     before: Annotated[Floats, "walkers frames feet 3"]
     after: Annotated[Floats, "walkers frames feet 3"]
@@ -64,7 +66,7 @@ def stand(
     contacts: Sequence[FootContact],
     likely: Annotated[Floats, "walkers frames feet"],
 ) -> WalkersFeet:
-    """Return motions whose feet stand where their contacts are likely.
+    """Return what makes feet stand where their contacts are likely.
 
     legs: of the K feet that are placed. contacts: their statistics. likely: probabilities (M, F, K)
     of their contacts.
@@ -78,20 +80,24 @@ def stand(
     steps, lowered = _reachable_steps(poses, legs, feet, stance_rows.discipline(down, feet), sunk)
     shift = -(sunk[:, None] + lowered)[..., None] * UP
     targets = _walkers(steps.positions, len(legs))
-    rotations, after = _placed_legs(walkers.rotations, poses, legs, shift, targets)
+    turns, after = _placed_legs(poses, legs, shift, targets)
     standing = _walkers(steps.down, len(legs))
     away = np.linalg.norm((after - targets) * (1.0 - UP), axis=-1) * standing
     drift, most = away.max(axis=(1, 2)), lowered.max(axis=1)
-    return WalkersFeet(rotations, walkers.roots + shift, before, after, standing, drift, most)
+    return WalkersFeet(turns, walkers.roots + shift, before, after, standing, drift, most)
 
 
-def _rows(values: Annotated[Floats, "walkers frames feet ..."]) -> Annotated[Floats, "rows ..."]:
+def _rows(
+    values: Annotated[npt.NDArray[Scalar], "walkers frames feet ..."],
+) -> Annotated[npt.NDArray[Scalar], "rows ..."]:
     """Return values of feet (M, F, K, ...) by row (M K, F, ...)."""
     turned = np.swapaxes(values, 1, 2)
     return turned.reshape(-1, *turned.shape[2:])
 
 
-def _walkers(rows: Annotated[Floats, "rows ..."], feet: int) -> Annotated[Floats, "walkers ..."]:
+def _walkers(
+    rows: Annotated[npt.NDArray[Scalar], "rows ..."], feet: int
+) -> Annotated[npt.NDArray[Scalar], "walkers ..."]:
     """Return values of rows (M K, F, ...) by walker (M, F, K, ...)."""
     return np.swapaxes(rows.reshape(-1, feet, *rows.shape[1:]), 1, 2)
 
@@ -134,7 +140,7 @@ def _reachable_steps(
     for _ in range(ROUNDS):
         cancellation.check()
         needs = _needs(poses, legs, feet, steps, sunk)
-        beyond = pelvis.beyond(needs, np.array(pelvis.MOST))
+        beyond = pelvis.beyond(needs, np.full(needs.shape, pelvis.MOST))
         shorter = stance_rows.shortened(steps.down, beyond, feet.rate)
         changed = np.flatnonzero((shorter != steps.down).any(axis=1))
         if not len(changed):
@@ -161,20 +167,19 @@ def _needs(
 
 
 def _placed_legs(
-    rotations: Rotations,
     poses: LimbPoses,
     legs: Sequence[Limb],
     shift: Annotated[Floats, "walkers frames 3"],
     targets: FeetPaths,
-) -> tuple[Rotations, FeetPaths]:
-    """Return rotations with which the feet are at their targets, and where the feet come."""
-    turned, after = rotations.copy(), np.empty(targets.shape)
+) -> tuple[dict[int, Annotated[Floats, "walkers frames 4"]], FeetPaths]:
+    """Return rotations of legs that bring feet to their targets, and where the feet come."""
+    turns: dict[int, Annotated[Floats, "walkers frames 4"]] = {}
+    after = np.empty(targets.shape)
     for foot, leg in enumerate(legs):
         cancellation.check()
         arm = poses.position(leg.tip) - poses.position(leg.lower)
         end = two_bone.reach(poses, leg, shift, targets[:, :, foot] - arm)
         found = two_bone.solve(poses, leg, end)
-        for joint in ("upper", "middle", "lower"):
-            turned[:, :, getattr(leg, joint)] = getattr(found, joint)
+        turns |= {leg.upper: found.upper, leg.middle: found.middle, leg.lower: found.lower}
         after[:, :, foot] = poses.position(leg.upper) + shift + end + arm
-    return turned, after
+    return turns, after

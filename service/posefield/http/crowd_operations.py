@@ -18,12 +18,12 @@ from posefield.http import responses
 from posefield.http.concurrency import worker_threads
 from posefield.http.decoding import crowd_query, request_body
 from posefield.http.steps import Context, Steps, from_url
-from posefield.locomotion import crowd_order, gait
+from posefield.locomotion import gait
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
 from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 from posefield.question.walk_question import WalkQuestion
-from posefield.synthesis import crowd_synthesis
+from posefield.synthesis import crowd_synthesis, walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
 Crowds = Context[TableEncoder[CrowdPoses]]
@@ -107,7 +107,7 @@ async def plan_walk(context: Walks, task: WalkTask) -> CrowdClip:
 
 
 def _planned(model: Synthesizer, task: WalkTask) -> CrowdClip:
-    return crowd_order.build_crowd(model, gait.fit_gait(model.session), task.order)
+    return walking_feet.build_crowd(model, gait.fit_gait(model.session), task.order)
 
 
 async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iterator[bytes]:

@@ -13,8 +13,9 @@ from posefield.locomotion.gait import Gait
 from posefield.locomotion.level_transitions import LevelSchedule
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.routes import Route
+from posefield.locomotion.walking_crowd import MotionMaker
 from posefield.motion.crowd_clip import CrowdClip
-from posefield.question.motion_question import LabelValue
+from posefield.question.motion_question import FeetMode, LabelValue
 from posefield.question.walk_question import DEFAULT_FOV, DEFAULT_HEIGHT, WalkQuestion
 
 MAX_CHARACTERS = 1_000_000
@@ -30,7 +31,8 @@ class CrowdOrder:
     motions: number of distinct motions that the characters share, None for one each. seconds:
     duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
     if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
-    labels: name or weights of all characters by label set.
+    labels: name or weights of all characters by label set. feet: "stand", "as_predicted", or None
+    for what the model allows.
     """
 
     count: int
@@ -43,6 +45,7 @@ class CrowdOrder:
     camera: Camera | None = None
     pixels: float = DEFAULT_PIXELS
     labels: Mapping[str, LabelValue] = field(default_factory=dict)
+    feet: FeetMode | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MAX_CHARACTERS:
@@ -79,27 +82,25 @@ def from_question(asked: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrd
         camera=camera,
         pixels=DEFAULT_PIXELS if asked.pixels is None else asked.pixels,
         labels=asked.labels,
+        feet=asked.feet,
     )
 
 
-def build_crowd(model: NamedModel, gait: Gait, order: CrowdOrder) -> CrowdClip:
+def build_crowd(
+    model: NamedModel, gait: Gait, order: CrowdOrder, make: MotionMaker | None = None
+) -> CrowdClip:
     """Return the crowd of an order, whose motions are computed on demand.
 
-    Raises InvalidField for parameters that the model or the limits do not permit.
+    make: computes the motions, which are as predicted by default. Raises InvalidField for
+    parameters that the model or the limits do not permit.
     """
     gait = gait.with_labels(order.labels)
     plan = _build_plan(gait, order)
-    return _build_motions(gait, plan, _build_schedule(model, plan, order), order)
-
-
-def _build_motions(
-    gait: Gait, plan: LocomotionPlan, shown: LevelSchedule, order: CrowdOrder
-) -> CrowdClip:
+    shown = _build_schedule(model, plan, order)
     if order.motions is None:
-        return walking_crowd.build_crowd(gait.session, plan, shown)
-    return walking_crowd.share_motions(
-        gait.session, plan, shown, random_paths.initial_placement(order.count, order.seed)
-    )
+        return walking_crowd.build_crowd(gait.session, plan, shown, make)
+    stands = random_paths.initial_placement(order.count, order.seed)
+    return walking_crowd.share_motions(gait.session, plan, shown, stands, make)
 
 
 def _build_plan(gait: Gait, order: CrowdOrder) -> LocomotionPlan:

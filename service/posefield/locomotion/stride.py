@@ -136,6 +136,26 @@ def synthesize_poses(
     return replace(posed, curves=curves[0][:, 0]) if curves else posed
 
 
+def contact_probabilities(
+    session: Session,
+    controls: PointControls,
+    labels: PointLabels,
+    phases: PerPoint,
+    level: int = 0,
+) -> Annotated[Floats, "points contacts"]:
+    """Return the probabilities (K, C) of the contacts on the card, at phases (K,) of the cycle."""
+    found = np.empty((len(controls), len(session.card.contacts)))
+    for rows in _batches(len(controls)):
+        cancellation.check()
+        own, names = controls[rows], labels[rows]
+        times = phases[rows] * session.durations(own, labels=names, level=level)
+        (likely,) = session.run(
+            own, times[:, None], graph_ports.CONTACTS, labels=names, level=level
+        )
+        found[rows] = likely[:, 0]
+    return found
+
+
 def relative_poses(
     own: Strides,
     phases: Annotated[Floats, "poses"],

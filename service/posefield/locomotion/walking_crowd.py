@@ -1,7 +1,7 @@
 """Crowds of walking characters: validation, plans, and motions computed on demand."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Annotated, Any
 
@@ -41,6 +41,8 @@ SEED_LIMIT = 2**63
 Pairs = tuple[Indices, Indices]
 """Indices of characters (K,) and frames (K,)."""
 FPS_RANGE = (1.0, 1000.0)
+MotionMaker = Callable[[Session, LocomotionPlan, Indices, LevelSchedule], Motions]
+"""Computes the motions of characters (M,) of a plan, as `motions` does."""
 
 
 def plan_random(gait: Gait, count: int, seconds: float, rate: float, seed: int) -> LocomotionPlan:
@@ -98,8 +100,13 @@ def poses(count: int, seconds: float, rate: float) -> float:
     return count * (seconds * max(rate, 1.0 / MAX_PLAN_STEP) + 1.0)
 
 
-def build_crowd(session: Session, plan: LocomotionPlan, shown: LevelSchedule) -> CrowdClip:
-    """Return the crowd of a plan, each character with its own motion in the frame of its start."""
+def build_crowd(
+    session: Session, plan: LocomotionPlan, shown: LevelSchedule, make: MotionMaker | None = None
+) -> CrowdClip:
+    """Return the crowd of a plan, each character with its own motion in the frame of its start.
+
+    make: computes the motions; `motions` by default.
+    """
     characters, frames = plan.phases.shape
     return CrowdClip(
         session.card.skeleton,
@@ -107,17 +114,21 @@ def build_crowd(session: Session, plan: LocomotionPlan, shown: LevelSchedule) ->
         frames,
         Placement(plan.roots[:, 0], plan.headings[:, 0]),
         np.arange(characters),
-        _batches(session, plan.relative_to_start(), shown),
+        _batches(session, plan.relative_to_start(), shown, make or motions),
         {**_facts(session, plan), "level_shares": _level_shares(session, shown)},
         tuple(curve.name for curve in session.card.curves),
     )
 
 
 def share_motions(
-    session: Session, plan: LocomotionPlan, shown: LevelSchedule, stands: Placement
+    session: Session,
+    plan: LocomotionPlan,
+    shown: LevelSchedule,
+    stands: Placement,
+    make: MotionMaker | None = None,
 ) -> CrowdClip:
     """Return a crowd at given placements, whose characters reuse the plan's motions in turn."""
-    one_each = build_crowd(session, plan, shown)
+    one_each = build_crowd(session, plan, shown, make)
     return replace(one_each, placement=stands, motion=np.arange(len(stands)) % len(plan.who))
 
 
@@ -142,12 +153,14 @@ def _outside_share(card: ModelCard, plan: LocomotionPlan) -> float:
     return float(np.mean(np.any((plan.controls < low) | (plan.controls > high), axis=-1)))
 
 
-def _batches(session: Session, plan: LocomotionPlan, shown: LevelSchedule) -> Iterator[Motions]:
+def _batches(
+    session: Session, plan: LocomotionPlan, shown: LevelSchedule, make: MotionMaker
+) -> Iterator[Motions]:
     count, frames = plan.phases.shape
     together = max(1, POSES_PER_BATCH // frames)
     for first in range(0, count, together):
         who = np.arange(first, min(first + together, count))
-        yield motions(session, plan, who, shown.select(who))
+        yield make(session, plan, who, shown.select(who))
 
 
 def motions(
@@ -218,15 +231,22 @@ def measure_foot_skate(
     The ground is at the lowest height of each stride, as for captured clips. A remainder at the end
     is ignored, unless the motion is shorter than a stride. Needs a card with feet.
     """
-    frames = motions.rotations.shape[1]
-    length = min(round(float(np.mean(card.durations)) * rate) + 1, frames)
     bones, roots, rotations = (
         part.astype(np.float64)
         for part in (motions.bone_offsets, motions.root_position, motions.rotations)
     )
     local = skeleton.translations(bones, roots)
     joints = skeleton.positions(card.skeleton.parents, rotations, local)
-    feet = joints[:, : frames // length * length, list(card.feet)]
+    return measure_skate_of_feet(card, joints[:, :, list(card.feet)], rate)
+
+
+def measure_skate_of_feet(
+    card: ModelCard, feet: Annotated[Floats, "motions frames feet 3"], rate: float
+) -> Annotated[Floats, "motions strides"]:
+    """Return the foot skate of `measure_foot_skate` for paths of feet (M, F, K, 3), m."""
+    frames = feet.shape[1]
+    length = min(round(float(np.mean(card.durations)) * rate) + 1, frames)
+    feet = feet[:, : frames // length * length]
     return foot_skate.mean_skate_speed(feet.reshape(len(feet), -1, length, *feet.shape[2:]), rate)
 
 

@@ -37,12 +37,27 @@ class Placement:
 
 
 @dataclass(frozen=True)
+class StandingFeet:
+    """How the feet of M motions were made to stand, a number (M,) for each motion.
+
+    skate_before, skate: mean foot skate of the prediction and of the motion, m/s. drift: largest
+    distance of a standing foot from its place, m. lowered: largest distance by which the pelvis was
+    lowered so that the legs reach, m.
+    """
+
+    skate_before: Annotated[Floats, "motions"]
+    skate: Annotated[Floats, "motions"]
+    drift: Annotated[Floats, "motions"]
+    lowered: Annotated[Floats, "motions"]
+
+
+@dataclass(frozen=True)
 class Motions:
     """Motions of equal length, each in its character's own frame.
 
     rotations: (M, F, J, 4). root_position: (M, F, 3), m. bone_offsets: (M, J, 3), m. levels (M, F):
     level of detail at which each pose was computed. curves: values (M, F, C) of the crowd's curves;
-    None without them.
+    None without them. feet: None where they are as predicted.
     """
 
     rotations: Annotated[Singles, "motions frames joints 4"]
@@ -50,6 +65,7 @@ class Motions:
     bone_offsets: Annotated[Singles, "motions joints 3"]
     levels: Annotated[Indices, "motions frames"]
     curves: Annotated[Singles, "motions frames curves"] | None = None
+    feet: StandingFeet | None = None
 
     def __len__(self) -> int:
         return len(self.rotations)

@@ -7,7 +7,7 @@ from msgspec import Meta, Struct
 
 from posefield.common.errors import InvalidField
 from posefield.question.body_kind import Body
-from posefield.question.motion_question import LabelValue
+from posefield.question.motion_question import FeetMode, LabelValue
 
 Instancing = Literal["references", "scenegraph", "flatten"]
 DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
@@ -59,6 +59,13 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     pixels: Annotated[
         float | None,
         Meta(description="limit of a level's error, pixels; default: 1; requires a camera"),
+    ] = None
+    feet: Annotated[
+        FeetMode | None,
+        Meta(
+            description="whether feet stand where they contact the ground; default: stand, for "
+            "models that know the contacts of their feet and for 20 or more frames a second"
+        ),
     ] = None
     instancing: Annotated[
         Instancing, Meta(description="sharing of data between characters in USD")

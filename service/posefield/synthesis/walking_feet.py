@@ -1,0 +1,113 @@
+"""Feet of walking crowds that stand: which crowds, and their motions."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from posefield.common.errors import InvalidField
+from posefield.common.units import Indices
+from posefield.feet import limb_choice, walkers_feet
+from posefield.feet.limb_choice import LimbChoice
+from posefield.feet.walkers_feet import Walkers, WalkersFeet
+from posefield.inference.named_model import NamedModel
+from posefield.inference.session import Session
+from posefield.locomotion import crowd_order, walker_contacts, walking_crowd
+from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.locomotion.gait import Gait
+from posefield.locomotion.level_transitions import LevelSchedule
+from posefield.locomotion.locomotion_plan import LocomotionPlan
+from posefield.model_file.model_card import ModelCard
+from posefield.motion.crowd_clip import CrowdClip, Motions, StandingFeet
+from posefield.motion.foot_contacts import FootContact
+
+MIN_RATE = 20.0
+"""Smallest number of frames a second of a crowd whose feet stand: a contact lasts 0.1 s or more,
+and a stance of one frame cannot be told from a touch."""
+
+
+def build_crowd(model: NamedModel, gait: Gait, order: CrowdOrder) -> CrowdClip:
+    """Return the crowd of an order, whose feet stand or are as predicted.
+
+    Raises InvalidField as `crowd_order.build_crowd` does, and for feet that cannot stand.
+    """
+    standing = wants_standing_feet(gait.session.card, order)
+    make = standing_motions if standing else None
+    crowd = crowd_order.build_crowd(model, gait, order, make)
+    feet = "stand" if standing else "as_predicted"
+    return replace(crowd, facts={**crowd.facts, "feet": feet})
+
+
+def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
+    """Return whether the feet of a crowd are placed.
+
+    Raises InvalidField if they are asked to stand, but the model does not know their contacts, no
+    leg leads to them, or the crowd has too few frames a second.
+    """
+    if order.feet == "as_predicted":
+        return False
+    known, slow = bool(card.feet and foot_contacts(card)), order.fps < MIN_RATE
+    legs = known and bool(choose_legs(card).feet)
+    if order.feet is None:
+        return legs and not slow
+    if not known:
+        raise InvalidField("feet", "'stand', but this model knows no contacts of feet")
+    if not legs:
+        raise InvalidField("feet", "'stand', but no two bones lead to a foot of this model")
+    if slow:
+        raise InvalidField(
+            "feet", f"'stand' at {order.fps:g} frames a second, expected {MIN_RATE:g} or more"
+        )
+    return True
+
+
+def foot_contacts(card: ModelCard) -> tuple[FootContact, ...]:
+    """Return the contacts of feet; a hand's contacts with things are none."""
+    return tuple(own for own in card.contacts if own.joint in card.feet)
+
+
+def choose_legs(card: ModelCard) -> LimbChoice:
+    """Return the legs of the feet whose contacts are known; those of the skeleton at rest."""
+    skeleton = card.skeleton
+    feet = [own.joint for own in foot_contacts(card)]
+    return limb_choice.choose_limbs(skeleton.parents, skeleton.offsets, feet, ())
+
+
+def standing_motions(
+    session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule
+) -> Motions:
+    """Return the motions of characters (M,) of the plan with standing feet.
+
+    Arguments as for `walking_crowd.motions`. Stances are planned over each whole motion.
+    """
+    made = walking_crowd.motions(session, plan, who, shown)
+    placed = _placed_feet(session, plan, who, shown, made)
+    rotations = made.rotations
+    for joint, turns in placed.turns.items():
+        rotations[:, :, joint] = turns
+    roots = placed.roots.astype(np.float32)
+    feet = _describe(session.card, placed, plan.rate)
+    return replace(made, rotations=rotations, root_position=roots, feet=feet)
+
+
+def _placed_feet(
+    session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule, made: Motions
+) -> WalkersFeet:
+    """Return where the feet of predicted motions are placed."""
+    card = session.card
+    choice = choose_legs(card)
+    contacts = [foot_contacts(card)[place] for place in choice.feet]
+    places = [card.contacts.index(own) for own in contacts]
+    likely = walker_contacts.contact_probabilities(session, plan, who, shown)[..., places]
+    doubles = (made.bone_offsets, made.rotations, made.root_position)
+    bones, rotations, roots = (part.astype(np.float64) for part in doubles)
+    walkers = Walkers(card.skeleton.parents, bones, rotations, roots, plan.rate)
+    return walkers_feet.stand(walkers, choice.character.legs, contacts, likely)
+
+
+def _describe(card: ModelCard, placed: WalkersFeet, rate: float) -> StandingFeet:
+    """Return the facts about the placed feet of motions."""
+    before, after = (
+        walking_crowd.measure_skate_of_feet(card, paths, rate).mean(axis=1)
+        for paths in (placed.before, placed.after)
+    )
+    return StandingFeet(before, after, placed.drift, placed.lowered)
