@@ -1,0 +1,206 @@
+"""Tests of walking crowds whose feet stand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.inference.level_selection import Camera
+from posefield.locomotion import (
+    crowd_order,
+    gait,
+    level_transitions,
+    routes,
+    walker_contacts,
+    walking_crowd,
+)
+from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.motion import skeleton
+from posefield.synthesis import walking_feet
+from posefield.synthesis.synthesizer import Synthesizer
+
+RATE = 30.0
+PARTS = ("rotations", "root_position", "bone_offsets", "levels")
+TURNS = [[0, 0], [0, 5], [2, 10], [0, 15], [-2, 20]]
+
+
+@pytest.fixture(scope="module")
+def model(walk_path):
+    return Synthesizer("stroll", session.load(walk_path))
+
+
+@pytest.fixture(scope="module")
+def own(model):
+    return gait.fit_gait(model.session)
+
+
+def built(model, own, **asked):
+    """A crowd, its facts, and its motions in one."""
+    order = CrowdOrder(**{"count": 12, "seconds": 6.0, **asked})
+    made = walking_feet.build_crowd(model, own, order)
+    batches = list(made.batches)
+    return (
+        made.facts,
+        {name: np.concatenate([getattr(one, name) for one in batches]) for name in PARTS},
+        [one.feet for one in batches],
+    )
+
+
+def joints(card, made):
+    """Joints (M, F, J, 3), m."""
+    bones, roots, rotations = (
+        made[name].astype(float) for name in ("bone_offsets", "root_position", "rotations")
+    )
+    local = skeleton.translations(bones, roots)
+    return skeleton.positions(card.skeleton.parents, rotations, local)
+
+
+def skate(card, made, rate=RATE):
+    feet = joints(card, made)[:, :, list(card.feet)]
+    return walking_crowd.measure_skate_of_feet(card, feet, rate).mean()
+
+
+def test_feet_of_walkers_stand(model, own):
+    card = model.session.card
+    facts, stood, feet = built(model, own)
+    _, free, none = built(model, own, feet="as_predicted")
+    assert facts["feet"] == "stand" and none == [None]
+    before, after = skate(card, free), skate(card, stood)
+    # Negative control: the prediction slides.
+    assert after < 0.2 * before and before > 0.005
+    (told,) = feet
+    assert told.skate_before.mean() == pytest.approx(before, rel=1e-4)
+    assert told.skate.mean() == pytest.approx(after, abs=1e-4)
+    assert told.drift.max() < 1e-6 and 0.0 <= told.lowered.max() <= 0.05
+
+
+def test_a_standing_foot_stays_in_one_place_on_the_floor(model, own):
+    card = model.session.card
+    _, stood, _ = built(model, own, count=3)
+    _, free, _ = built(model, own, count=3, feet="as_predicted")
+    heights = np.array([contact.height for contact in card.contacts])
+    placed = joints(card, stood)[:, :, list(card.feet)]
+    assert (placed[..., 1] - heights).min() > -0.01
+    still = np.linalg.norm(np.diff(placed, axis=1), axis=-1) < 2e-6
+    slow = np.linalg.norm(np.diff(joints(card, free)[:, :, list(card.feet)], axis=1), axis=-1)
+    # Half of all frames or so, where the prediction has none.
+    assert 0.3 < still.mean() < 0.8 and (slow < 2e-6).mean() < 0.02
+
+
+def test_only_legs_turn_and_only_the_height_of_the_root_changes(model, own):
+    card = model.session.card
+    _, stood, _ = built(model, own)
+    _, free, _ = built(model, own, feet="as_predicted")
+    legs = walking_feet.choose_legs(card).character.legs
+    moved = {joint for leg in legs for joint in (leg.upper, leg.middle, leg.lower)}
+    for joint in range(len(card.skeleton)):
+        same = np.array_equal(stood["rotations"][:, :, joint], free["rotations"][:, :, joint])
+        assert same != (joint in moved)
+    level = [0, 2]
+    gap = stood["root_position"] - free["root_position"]
+    assert np.abs(gap[..., level]).max() < 1e-6 and np.abs(gap).max() < 0.1
+    assert np.array_equal(stood["bone_offsets"], free["bone_offsets"])
+
+
+def test_as_predicted_is_the_crowd_of_before(model, own):
+    order = CrowdOrder(count=5, seconds=2.0, feet="as_predicted")
+    plain = crowd_order.build_crowd(model, own, order)
+    made = walking_feet.build_crowd(model, own, order)
+    assert made.facts == {**plain.facts, "feet": "as_predicted"}
+    for one, other in zip(made.batches, plain.batches, strict=True):
+        assert all(np.array_equal(getattr(one, name), getattr(other, name)) for name in PARTS)
+
+
+def test_feet_stand_on_routes_with_turns(model, own):
+    ways = routes.parse_routes(
+        [
+            {"waypoints": TURNS, "speed": 1.0},
+            {"waypoints": [[3, 0], [3, 30]], "speed": 1.2},
+        ]
+    )
+    asked = {"count": 2, "routes": ways, "seconds": 12.0}
+    _, stood, feet = built(model, own, **asked)
+    _, free, _ = built(model, own, feet="as_predicted", **asked)
+    card = model.session.card
+    assert skate(card, stood) < 0.2 * skate(card, free)
+    assert feet[0].drift.max() < 1e-6
+
+
+def test_feet_stand_while_levels_change(model, own):
+    camera = Camera(np.array([-4.0, 1.7, 0.0]), 1.0472, 1080.0)
+    asked = {"count": 20, "camera": camera, "pixels": 1.0}
+    _, stood, feet = built(model, own, **asked)
+    assert (np.diff(stood["levels"], axis=1) != 0).any()
+    assert skate(model.session.card, stood) < 0.05
+    assert max(own.drift.max() for own in feet) < 1e-6
+
+
+def test_contacts_are_those_of_the_level(model, own):
+    plan = walking_crowd.plan_random(own, 4, 2.0, RATE, 0)
+    who, shape = np.arange(4), plan.phases.shape
+
+    def likely(shown):
+        return walker_contacts.contact_probabilities(own.session, plan, who, shown)
+
+    fine, coarse = (
+        likely(level_transitions.constant_schedule(level, shape))
+        for level in (0, len(model.session.card.levels) - 1)
+    )
+    levels = np.full(shape, len(model.session.card.levels) - 1)
+    half = likely(
+        level_transitions.LevelSchedule(levels, np.zeros_like(levels), np.full(shape, 0.5))
+    )
+    assert half == pytest.approx(0.5 * (fine + coarse), abs=1e-6)
+    assert np.abs(fine - coarse).max() > 1e-3
+    assert fine.min() >= 0.0 and fine.max() <= 1.0
+
+
+def test_fewer_walkers_step_as_the_first_of_more(model, own):
+    _, few, _ = built(model, own, count=3)
+    _, many, _ = built(model, own, count=12)
+    for name in PARTS:
+        # The runtime's sums may go in another order in a batch of another size.
+        assert np.abs(few[name] - many[name][:3]).max() < 1e-5
+
+
+def test_the_same_crowd_has_the_same_bytes(model, own):
+    _, once, _ = built(model, own)
+    _, again, _ = built(model, own)
+    assert all(once[name].tobytes() == again[name].tobytes() for name in PARTS)
+
+
+def test_walkers_that_share_motions_stand(model, own):
+    made = walking_feet.build_crowd(model, own, CrowdOrder(count=9, motions=2, seconds=2.0))
+    (motions,) = made.batches
+    assert made.shared and len(motions) == 2 and motions.feet is not None
+
+
+@pytest.mark.parametrize("fps", [20.0, 120.0])
+def test_feet_stand_at_other_rates(model, own, fps):
+    _, stood, feet = built(model, own, count=4, seconds=3.0, fps=fps)
+    assert skate(model.session.card, stood, fps) < 0.03
+    assert feet[0].drift.max() < 1e-6
+
+
+def with_card(model, **changed):
+    card = replace(model.session.card, **changed)
+    return Synthesizer(model.name, replace(model.session, card=card))
+
+
+def test_crowds_with_few_frames_are_as_predicted_and_refuse_to_stand(model, own):
+    facts, _, feet = built(model, own, count=2, fps=10.0)
+    assert facts["feet"] == "as_predicted" and feet == [None]
+    with pytest.raises(InvalidField, match="feet: 'stand' at 10 frames a second, expected 20"):
+        built(model, own, count=2, fps=10.0, feet="stand")
+
+
+def test_models_without_contacts_of_feet_are_as_predicted_and_refuse_to_stand(model):
+    for changed in ({"contacts": ()}, {"feet": ()}):
+        odd = with_card(model, **changed)
+        walk = gait.fit_gait(odd.session)
+        facts, _, feet = built(odd, walk, count=2)
+        assert facts["feet"] == "as_predicted" and feet == [None]
+        with pytest.raises(InvalidField, match="feet: 'stand', but this model knows no contacts"):
+            built(odd, walk, count=2, feet="stand")
