@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import crowd_bounds
+import crowd_feet
 import crowd_models
 import crowd_poses
 import crowd_rivals
@@ -18,12 +19,13 @@ from rows import Row, table
 
 def rows(made: Family) -> list[Row]:
     """Poses of the procedural family, rivals of the same crowd, and crowds that walk."""
-    model = crowd_models.reaching(made)
+    model, walks = crowd_models.reaching(made), crowd_models.walks()
     return [
         *crowd_poses.rows(model),
         *crowd_bounds.rows(made, model),
         *crowd_rivals.rows(made, model),
-        *crowd_walk.rows(crowd_models.walks()),
+        *crowd_walk.rows(walks),
+        *crowd_feet.rows(walks),
     ]
 
 

@@ -35,6 +35,26 @@ def test_a_crowd_is_written_and_its_feet_are_told_of(walk_path, tmp_path):
         assert apart.min() > 0.8
 
 
+def test_feet_stand_unless_asked_to_be_as_predicted(walk_path, tmp_path):
+    told, written = {}, {}
+    for words in ((), ("--feet", "stand"), ("--feet", "as_predicted")):
+        path = tmp_path / f"{len(told)}.npz"
+        done = run(walk_path, "--count", 4, "--seconds", 3, "-o", path, "--json", *words)
+        told[words], written[words] = json.loads(done.stdout), path.read_bytes()
+    usual, stood, free = told.values()
+    assert usual["feet_stand"] and stood["feet_stand"] and not free["feet_stand"]
+    assert stood["skate_cm_per_s"] < 0.2 * free["skate_cm_per_s"]
+    assert stood["skate_before_cm_per_s"] == pytest.approx(free["skate_cm_per_s"], abs=0.011)
+    assert stood["drift_cm"] == 0.0 and 0.0 <= stood["lowered_cm"] <= 5.0
+    assert not {"skate_before_cm_per_s", "drift_cm", "lowered_cm"} & free.keys()
+    usual, stood, free = written.values()
+    assert usual == stood != free
+    done = run(walk_path, "--count", 4, "--seconds", 3, "-o", path)
+    assert "feet stand: as predicted they would slide at" in done.stdout
+    done = run(walk_path, "--fps", 10, "--feet", "stand", "-o", path)
+    assert isinstance(done.exception, InvalidField)
+
+
 def test_the_same_seed_writes_the_same_bytes(walk_path, tmp_path):
     paths = [tmp_path / name for name in ("a.npz", "b.npz", "c.npz")]
     for path, seed in zip(paths, (1, 1, 2), strict=True):

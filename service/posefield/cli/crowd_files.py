@@ -61,7 +61,7 @@ def write_crowd(
         "seed": asked.seed,
         "level_shares": made.facts["level_shares"],
         "outside_share": made.facts["outside_share"],
-        "feet": made.facts["feet"],
+        "feet_stand": made.facts["feet_stand"],
         **feet.facts(),
     }
 

@@ -1,7 +1,7 @@
 """Stances and swings of the feet of many walkers at once, by the rules of `stances`.
 
-Each row is one foot of one walker, whose motion does not repeat. Each row's stances depend on it
-alone, so that walkers step alike whoever is computed with them.
+Each row is one foot of one walker, whose motion does not repeat. Stances of a row depend on no
+other row.
 """
 
 from dataclasses import dataclass

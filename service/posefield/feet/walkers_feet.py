@@ -43,7 +43,7 @@ class Walkers:
 
 @dataclass(frozen=True)
 class WalkersFeet:
-    """What changes in the motions so that feet stand, and how the feet are.
+    """Changes of motions that make feet stand, and facts about the feet.
 
     turns: rotations (M, F, 4) of the joints of the legs. roots: (M, F, 3), m. before, after: paths
     of the K feet (M, F, K, 3), m. down: when they stand (M, F, K). drift: largest distance of a

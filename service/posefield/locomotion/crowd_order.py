@@ -31,8 +31,8 @@ class CrowdOrder:
     motions: number of distinct motions that the characters share, None for one each. seconds:
     duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
     if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
-    labels: name or weights of all characters by label set. feet: "stand", "as_predicted", or None
-    for what the model allows.
+    labels: name or weights of all characters by label set. feet: whether they stand; None where the
+    model decides.
     """
 
     count: int

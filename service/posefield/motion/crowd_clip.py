@@ -38,7 +38,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class StandingFeet:
-    """How the feet of M motions were made to stand, a number (M,) for each motion.
+    """Facts about the feet of M motions that were made to stand: a number (M,) for each motion.
 
     skate_before, skate: mean foot skate of the prediction and of the motion, m/s. drift: largest
     distance of a standing foot from its place, m. lowered: largest distance by which the pelvis was

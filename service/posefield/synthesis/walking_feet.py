@@ -1,21 +1,23 @@
 """Feet of walking crowds that stand: which crowds, and their motions."""
 
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import Indices
+from posefield.common.units import Floats, Indices
 from posefield.feet import limb_choice, walkers_feet
 from posefield.feet.limb_choice import LimbChoice
 from posefield.feet.walkers_feet import Walkers, WalkersFeet
 from posefield.inference.named_model import NamedModel
 from posefield.inference.session import Session
-from posefield.locomotion import crowd_order, walker_contacts, walking_crowd
+from posefield.locomotion import crowd_order, stride, walking_crowd
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.level_transitions import LevelSchedule
 from posefield.locomotion.locomotion_plan import LocomotionPlan
+from posefield.locomotion.walking_crowd import POSES_PER_CALL, Pairs
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.crowd_clip import CrowdClip, Motions, StandingFeet
 from posefield.motion.foot_contacts import FootContact
@@ -33,8 +35,7 @@ def build_crowd(model: NamedModel, gait: Gait, order: CrowdOrder) -> CrowdClip:
     standing = wants_standing_feet(gait.session.card, order)
     make = standing_motions if standing else None
     crowd = crowd_order.build_crowd(model, gait, order, make)
-    feet = "stand" if standing else "as_predicted"
-    return replace(crowd, facts={**crowd.facts, "feet": feet})
+    return replace(crowd, facts={**crowd.facts, "feet_stand": standing})
 
 
 def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
@@ -43,7 +44,7 @@ def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
     Raises InvalidField if they are asked to stand, but the model does not know their contacts, no
     leg leads to them, or the crowd has too few frames a second.
     """
-    if order.feet == "as_predicted":
+    if order.feet not in (None, "stand"):
         return False
     known, slow = bool(card.feet and foot_contacts(card)), order.fps < MIN_RATE
     legs = known and bool(choose_legs(card).feet)
@@ -97,11 +98,55 @@ def _placed_feet(
     choice = choose_legs(card)
     contacts = [foot_contacts(card)[place] for place in choice.feet]
     places = [card.contacts.index(own) for own in contacts]
-    likely = walker_contacts.contact_probabilities(session, plan, who, shown)[..., places]
+    likely = contact_probabilities(session, plan, who, shown)[..., places]
     doubles = (made.bone_offsets, made.rotations, made.root_position)
     bones, rotations, roots = (part.astype(np.float64) for part in doubles)
     walkers = Walkers(card.skeleton.parents, bones, rotations, roots, plan.rate)
     return walkers_feet.stand(walkers, choice.character.legs, contacts, likely)
+
+
+def contact_probabilities(
+    session: Session, plan: LocomotionPlan, who: Annotated[Indices, "motions"], shown: LevelSchedule
+) -> Annotated[Floats, "motions frames contacts"]:
+    """Return the probabilities (M, F, C) of the contacts of characters (M,) of the plan.
+
+    shown: levels (M, F); where they change, probabilities are blended as the poses are.
+    """
+    shape = (len(who), plan.phases.shape[1])
+    count = shape[0] * shape[1]
+    found = np.empty((count, len(session.card.contacts)))
+    for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
+        character, frame = np.divmod(np.arange(count)[rows], shape[1])
+        found[rows] = _blended_contacts(session, plan, (who[character], frame), shown.rows(rows))
+    return found.reshape(*shape, -1)
+
+
+def _blended_contacts(
+    session: Session, plan: LocomotionPlan, pairs: Pairs, shown: LevelSchedule
+) -> Annotated[Floats, "pairs contacts"]:
+    """Return the probabilities of K pairs of a character and a frame."""
+    found, shares = _contacts_at_levels(session, plan, pairs, shown.levels), shown.shares
+    between = np.flatnonzero(shares < 1.0)
+    if len(between):
+        some = pairs[0][between], pairs[1][between]
+        before = _contacts_at_levels(session, plan, some, shown.previous[between])
+        found[between] = before + shares[between, None] * (found[between] - before)
+    return found
+
+
+def _contacts_at_levels(
+    session: Session, plan: LocomotionPlan, pairs: Pairs, levels: Indices
+) -> Annotated[Floats, "pairs contacts"]:
+    """Return the probabilities of K pairs, each at its level (K,)."""
+    found = np.empty((len(levels), len(session.card.contacts)))
+    for level in np.unique(levels).tolist():
+        rows = np.flatnonzero(levels == level)
+        pair = pairs[0][rows], pairs[1][rows]
+        labels = plan.labels.weights[plan.who[pair[0]]]
+        found[rows] = stride.contact_probabilities(
+            session, plan.controls[pair], labels, plan.phases[pair], level
+        )
+    return found
 
 
 def _describe(card: ModelCard, placed: WalkersFeet, rate: float) -> StandingFeet:

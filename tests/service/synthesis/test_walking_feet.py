@@ -13,7 +13,6 @@ from posefield.locomotion import (
     gait,
     level_transitions,
     routes,
-    walker_contacts,
     walking_crowd,
 )
 from posefield.locomotion.crowd_order import CrowdOrder
@@ -66,7 +65,7 @@ def test_feet_of_walkers_stand(model, own):
     card = model.session.card
     facts, stood, feet = built(model, own)
     _, free, none = built(model, own, feet="as_predicted")
-    assert facts["feet"] == "stand" and none == [None]
+    assert facts["feet_stand"] and none == [None]
     before, after = skate(card, free), skate(card, stood)
     # Negative control: the prediction slides.
     assert after < 0.2 * before and before > 0.005
@@ -108,7 +107,7 @@ def test_as_predicted_is_the_crowd_of_before(model, own):
     order = CrowdOrder(count=5, seconds=2.0, feet="as_predicted")
     plain = crowd_order.build_crowd(model, own, order)
     made = walking_feet.build_crowd(model, own, order)
-    assert made.facts == {**plain.facts, "feet": "as_predicted"}
+    assert made.facts == {**plain.facts, "feet_stand": False}
     for one, other in zip(made.batches, plain.batches, strict=True):
         assert all(np.array_equal(getattr(one, name), getattr(other, name)) for name in PARTS)
 
@@ -142,7 +141,7 @@ def test_contacts_are_those_of_the_level(model, own):
     who, shape = np.arange(4), plan.phases.shape
 
     def likely(shown):
-        return walker_contacts.contact_probabilities(own.session, plan, who, shown)
+        return walking_feet.contact_probabilities(own.session, plan, who, shown)
 
     fine, coarse = (
         likely(level_transitions.constant_schedule(level, shape))
@@ -191,7 +190,7 @@ def with_card(model, **changed):
 
 def test_crowds_with_few_frames_are_as_predicted_and_refuse_to_stand(model, own):
     facts, _, feet = built(model, own, count=2, fps=10.0)
-    assert facts["feet"] == "as_predicted" and feet == [None]
+    assert not facts["feet_stand"] and feet == [None]
     with pytest.raises(InvalidField, match="feet: 'stand' at 10 frames a second, expected 20"):
         built(model, own, count=2, fps=10.0, feet="stand")
 
@@ -201,6 +200,6 @@ def test_models_without_contacts_of_feet_are_as_predicted_and_refuse_to_stand(mo
         odd = with_card(model, **changed)
         walk = gait.fit_gait(odd.session)
         facts, _, feet = built(odd, walk, count=2)
-        assert facts["feet"] == "as_predicted" and feet == [None]
+        assert not facts["feet_stand"] and feet == [None]
         with pytest.raises(InvalidField, match="feet: 'stand', but this model knows no contacts"):
             built(odd, walk, count=2, feet="stand")
