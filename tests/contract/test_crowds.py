@@ -209,6 +209,14 @@ def test_a_walk_has_the_labels_that_are_asked_for(ask):
     assert alone.split(b"def ", 1)[1] == ann.split(b"def ", 1)[1] != ben.split(b"def ", 1)[1]
 
 
+def test_feet_of_a_walk_stand_unless_asked_to_be_as_predicted(ask):
+    path = f"{WALK}.usda?count=3&seconds=1"
+    usual, stood, free = (
+        ask("GET", path + more).content for more in ("", "&feet=stand", "&feet=as_predicted")
+    )
+    assert usual == stood != free
+
+
 def test_shared_motions_are_sent_once(ask):
     own, shared = (
         len(ask("GET", f"{WALK}.usdz?count=20&seconds=1{more}").content)
@@ -240,6 +248,8 @@ def test_shared_motions_are_sent_once(ask):
         ("camera=90,2,0&pixels=-1", 422, "pixels"),
         ("pixels=2", 422, "pixels"),
         ("instancing=clones", 400, "instancing"),
+        ("feet=still", 400, "feet"),
+        ("feet=stand&fps=10", 422, "feet"),
     ],
 )
 def test_a_walk_that_cannot_be_is_refused_before_it_begins(ask, query, status, parameter):

@@ -47,6 +47,8 @@ def test_labels_are_a_parameter_each_and_weights_a_list():
     assert parse_qsl(urlsplit(target(questions.suggest("m", labels=labels))).query) == [style, who]
     walk = files.walk("m", count=3, labels=labels).request("usdc").target
     assert parse_qsl(urlsplit(walk).query) == [("count", "3"), style, who]
+    stood = files.walk("m", feet="stand").request("usdc").target
+    assert parse_qsl(urlsplit(stood).query) == [("feet", "stand")]
     asked = questions.why("m", labels=labels, nearest=3)
     assert [*parse_qsl(urlsplit(target(asked)).query)][-2:] == [style, who]
     body = msgspec.json.decode(files.crowd("m", 0, labels=labels).request("npz").body)
