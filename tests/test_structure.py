@@ -205,7 +205,11 @@ def test_a_boolean_of_a_question_stands_in_few_files():
     kinds = {".py", ".ts", ".yaml", ".json"}
     files = (path for folder in folders for path in folder.rglob("*") if path.suffix in kinds)
     made = {"generated.py", "schema.ts", "schema.d.ts", "request.json"}
-    own = [path for path in files if path.name not in made and not {"node_modules", "test"} & {*path.parts}]
+    own = [
+        path
+        for path in files
+        if path.name not in made and not {"node_modules", "test"} & {*path.parts}
+    ]
     found = {
         path.relative_to(ROOT).as_posix()
         for path in own
