@@ -18,7 +18,7 @@ from posefield.question import json_decoding as bodies
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion
 from posefield.question.motion_question import ClipQuestion, FileQuestion
 from posefield.registry import model_registry
-from posefield.synthesis import clips, crowd_synthesis
+from posefield.synthesis import clips, crowd_synthesis, walking_feet
 from posefield.synthesis.capture_suggestions import suggest
 from posefield.synthesis.sigma_grid import grid
 
@@ -110,13 +110,19 @@ def walked(model, walk):
     return list(crowd_writer.stream(made, "usdc"))
 
 
+def stood(model, walk):
+    """Motions of a crowd whose feet stand."""
+    asked = CrowdOrder(count=300, seconds=1.0, feet="stand")
+    return list(walking_feet.build_crowd(walk, gait.fit_gait(walk.session), asked).batches)
+
+
 def several(model, walk):
     """Several clips, written together."""
     answers = [clips.synthesize_clip(model, ClipQuestion(controls=controls(model)))] * 8
     return CLIP_ENCODERS["usda"].write(answers, CLIP_ENCODERS["usda"].usual)
 
 
-WORK = [solved, solved_open, mapped, suggested, archived, crowded, planned, walked, several]
+WORK = [solved, solved_open, mapped, suggested, archived, crowded, planned, walked, stood, several]
 
 
 @pytest.mark.parametrize("work", WORK, ids=lambda work: work.__name__)
