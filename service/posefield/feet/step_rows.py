@@ -113,13 +113,47 @@ def _response(length: int, rate: float, led: bool, trailed: bool) -> Annotated[F
 
     led, trailed: whether there are frames before it and after it; zeros where not.
     """
-    bends = np.diff(np.eye(length + 4), n=2, axis=0)
-    bends = bends[0 if led else 2 : None if trailed else length]
-    inside, outside = bends[:, 2:-2], bends[:, [0, 1, -2, -1]]
-    stiffness = (SPREAD * rate) ** 4
-    matrix = np.eye(length) + stiffness * inside.T @ inside
-    found = np.empty((length, 4))
-    found[:] = np.linalg.solve(matrix, -stiffness * inside.T @ outside)
+    # Second differences of three frames each, from the first frame of each on.
+    firsts = np.arange(0 if led else 2, length + 2 if trailed else length)
+    bands, factors = np.zeros((3, length + 4)), (1.0, -2.0, 1.0)
+    for row, one in enumerate(factors):
+        for column, other in enumerate(factors[: row + 1]):
+            bands[row - column, firsts + column] += one * other * (SPREAD * rate) ** 4
+    goal = np.zeros((length, 4))
+    goal[0, :2] = -bands[2, 0], -bands[1, 1]
+    goal[-1, 2:] = -bands[1, length + 1], -bands[2, length + 1]
+    if length > 1:
+        goal[1, 1], goal[-2, 2] = -bands[2, 1], -bands[2, length]
+    bands[0] += 1.0
+    return _solve_banded(bands[:, 2:-2], goal)
+
+
+def _solve_banded(
+    bands: Annotated[Floats, "3 length"], goal: Annotated[Floats, "length 4"]
+) -> Annotated[Floats, "length 4"]:
+    """Return the solution of a symmetric system of five diagonals, by its factors L D L'.
+
+    bands: the diagonal, and the two below it, by column.
+    """
+    middle, first, second = (band.tolist() for band in bands)
+    found = goal.copy()
+    for row in range(len(found)):
+        if row > 0:
+            found[row] -= first[row - 1] * found[row - 1]
+        if row > 1:
+            found[row] -= second[row - 2] * found[row - 2]
+        near, far = first[row], second[row]
+        first[row], second[row] = near / middle[row], far / middle[row]
+        if row + 1 < len(found):
+            middle[row + 1] -= near * first[row]
+            first[row + 1] -= far * first[row]
+        if row + 2 < len(found):
+            middle[row + 2] -= far * second[row]
+    found /= np.array(middle)[:, None]
+    for row in range(len(found) - 2, -1, -1):
+        found[row] -= first[row] * found[row + 1]
+        if row + 2 < len(found):
+            found[row] -= second[row] * found[row + 2]
     return found
 
 
