@@ -51,9 +51,8 @@ def answered(model, index, **asked):
     names = dict(card.clip_names(index))
     who = names.pop("performer", None)
     controls = {c.name: v for c, v in zip(card.controls, card.examples[index], strict=True)}
-    question = ClipQuestion(
-        controls=controls, performer=who, labels=names, fps=RATE, exact="none", **asked
-    )
+    own = {"exact": "none", "feet": "as_predicted"} | asked
+    question = ClipQuestion(controls=controls, performer=who, labels=names, fps=RATE, **own)
     return clips.synthesize_clip(model, question).clip.positions()
 
 

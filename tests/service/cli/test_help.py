@@ -103,7 +103,7 @@ def test_an_unknown_command_suggests_one(posefield):
 
 @pytest.mark.system
 @pytest.mark.parametrize(
-    ("line", "word"), [("posefield cl", "clip"), ("posefield clip --pi", "--pin-feet")]
+    ("line", "word"), [("posefield cl", "clip"), ("posefield clip --fe", "--feet")]
 )
 def test_shells_complete_commands_and_options(line, word):
     asked = {"_POSEFIELD_COMPLETE": "complete_bash", "COMP_WORDS": line}
