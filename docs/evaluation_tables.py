@@ -191,3 +191,42 @@ def support() -> Rows:
             controls = f"{found['clips']} clips, {len(found['support']['beyond'])} controls"
             false_alarms = f"{100 * found['support']['false_alarms']:.1f} %"
             yield [f"{name} ({controls})", false_alarms, f"{100 * beyond:.0f} %", ""]
+
+
+def feet_families() -> list[str]:
+    """Return the families whose evaluation has clips with standing feet."""
+    return [family for family in FAMILIES if protocols(family).get(CLIPS, {}).get("feet")]
+
+
+def feet() -> Rows:
+    """Yield the feet of clips held out, as predicted and standing, and what standing costs."""
+    found = [protocols(family)[CLIPS]["feet"] for family in feet_families()]
+    for name, text, goal in FEET_ROWS:
+        yield [name, *(text(own) for own in found), goal]
+
+
+def _change(key: str) -> Callable[[Found], str]:
+    return lambda own: f"{own[key]['predicted']:.2f} → {own[key]['standing']:.2f}"
+
+
+FEET_ROWS: tuple[tuple[str, Callable[[Found], str], str], ...] = (
+    ("speed of planted feet over captured", _change("skate"), "1.2, 1.0"),
+    (
+        "weighted speed of low feet over captured (Zhang et al. 2018)",
+        _change("weighted_skate"),
+        "1.0, 0.8",
+    ),
+    (
+        "relative distance, cm",
+        lambda own: f"{own['predicted_error_cm']:.2f} → {own['standing_error_cm']:.2f}",
+        "+0.15, +0.05",
+    ),
+    ("acceleration over captured", _change("acceleration"), "× 1.15, × 1.05"),
+    ("99th percentile of the knees' acceleration over captured", _change("knee_peak"), "3, 1.5"),
+    (
+        "pelvis lowered, worst clip, cm",
+        lambda own: f"{own['lowered_worst_cm']:.1f}",
+        "8, 3",
+    ),
+)
+"""Rows of the table of feet: name, text of a family's figures, required and desired value."""

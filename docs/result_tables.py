@@ -34,6 +34,10 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
         ["clips given to `posefield adapt`", *tables.adapted_families()],
         tables.adapted(),
     ),
+    "feet": lambda: (
+        ["measure", *(tables.ALL_FAMILIES[own] for own in tables.feet_families()), tables.GOALS],
+        tables.feet(),
+    ),
     "exact": lambda: (
         [*tables.headings("target at the event", known_performer), tables.GOALS],
         tables.exact(),
