@@ -16,10 +16,17 @@ from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelC
 from posefield_train.adapt import adaptation, canonical_clips, contact_extension, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
-from posefield_train.graph import level_errors, onnx_export, training_notes, truncation_cost
+from posefield_train.graph import (
+    level_errors,
+    onnx_export,
+    trained_card,
+    training_notes,
+    truncation_cost,
+)
 from posefield_train.graph.level_errors import LevelTest
 from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, ModelLevels
-from posefield_train.graph.onnx_export import MAX_LISTED_VALUES, ExportedModel
+from posefield_train.graph.onnx_export import ExportedModel
+from posefield_train.graph.trained_card import MAX_LISTED_VALUES
 from posefield_train.kriging import sample_points, thinning
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
@@ -174,7 +181,7 @@ def _card(
     left_out = (*old.left_out, *map(_rounded, np.sqrt(adapted.left_out_errors)))
     fields = bank.others.items()
     made = {
-        n: onnx_export.kriging_settings(f.hyper)
+        n: trained_card.kriging_settings(f.hyper)
         for n, f in fields
         if isinstance(f, UniversalKriging)
     }
@@ -188,7 +195,7 @@ def _card(
         labels=_labels(adapted),
         sources=(*old.sources, *(clip.row.source for clip in clips)),
         left_out=left_out,
-        kriging=onnx_export.plain_parameters(bank.pose.hyper),
+        kriging=trained_card.plain_parameters(bank.pose.hyper),
         # The statistics of takes are in the parent's bases, which the new clips change.
         making=replace(
             reopened.making, fields=made, takes=_takes(old, clips), take_root=(), detail=b""
@@ -203,7 +210,7 @@ def _labels(adapted: AdaptedModel) -> tuple[LabelSet, ...]:
     bank = adapted.model.bank
     counts, every = tuple(map(len, bank.labels.values())), np.arange(len(bank.pose.samples))
     samples = SamplePoints(bank.pose.samples, len(bank.low), every, counts)
-    return onnx_export.card_labels(bank.labels, samples)
+    return trained_card.card_labels(bank.labels, samples)
 
 
 def _takes(old: ModelCard, clips: Sequence[Example]) -> tuple[int, ...]:
@@ -217,7 +224,7 @@ def _takes(old: ModelCard, clips: Sequence[Example]) -> tuple[int, ...]:
 
 def _controls(old: Sequence[Control], values: Floats) -> tuple[Control, ...]:
     """Return the controls with ranges, defaults and values from samples (N, d)."""
-    typical = onnx_export.typical_controls(values)
+    typical = trained_card.typical_controls(values)
     return tuple(
         replace(
             control,
@@ -287,7 +294,7 @@ def _provenance(reopened: ReconstructedModel, newcomer: NewPerformer) -> Mapping
         "parent_sha256": reopened.digest,
         "performer": newcomer.performer,
         "clips": len(newcomer.examples),
-        "data_sha256": onnx_export.data_digest(
+        "data_sha256": trained_card.data_digest(
             {f"{i} {e.row.place.name}": e for i, e in enumerate(newcomer.examples)}
         ),
         "licence": newcomer.licence,

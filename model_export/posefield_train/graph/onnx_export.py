@@ -1,54 +1,22 @@
-"""Export of a trained model to one file, after a parity check.
+"""Export of a trained model to one file, after a parity check."""
 
-The parity check runs the file in the service's own session and compares joints in metres with the
-float64 reference.
-"""
-
-import hashlib
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from importlib.metadata import version
-from typing import Any
-
-import numpy as np
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from posefield import __version__
-from posefield.common.errors import ExportRefused
-from posefield.common.units import Floats
-from posefield.inference import graph_ports, session
-from posefield.inference.session import Session
-from posefield.kriging import typical_clip
-from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
 from posefield.model_file import model_card
-from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import (
-    Control,
-    LabelSet,
-    ModelCard,
-    Preset,
-    TrainingParameters,
+from posefield.model_file.model_card import ModelCard
+from posefield_train.graph import (
+    levels,
+    parity_check,
+    take_statistics,
+    trained_card,
+    training_notes,
 )
-from posefield_train.contacts.contact_model import FittedContacts
-from posefield_train.graph import levels, take_statistics, training_notes, truncation_cost
-from posefield_train.graph.float_model import FloatModel, ModelOutputs
+from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import sample_points, thinning
-from posefield_train.kriging.kriging_bank import EVENT
-from posefield_train.kriging.sample_points import LabelNames, SamplePoints
-from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
-from posefield_train.source import measured_controls
-from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import truncation_error
-
-POINTS, BATCH = 10_000, 1_000
-# Largest distance of a joint of the graph from the reference's, m.
-PARITY_LIMIT = 1e-4
-# Largest difference of the probability of a contact.
-CONTACT_LIMIT = 2e-3
-# A control with more distinct values than this is continuous, and they are not listed.
-MAX_LISTED_VALUES = 10
 
 
 @dataclass(frozen=True)
@@ -75,22 +43,24 @@ def export_model(recipe: Recipe, trained: TrainedModel, notes: list[str]) -> Exp
     notes = training_notes.training_notes(recipe, trained, notes)
     laddered = levels.build_levels(recipe, trained)
     takes = take_statistics.estimate(trained)
-    return check_and_export(
-        laddered.model,
-        lambda parity: takes.on_card(_card(recipe, trained, laddered.levels, notes, parity)),
-    )
+    found = laddered.levels
+
+    def own_card(parity: float) -> ModelCard:
+        return takes.on_card(trained_card.build_card(recipe, trained, found, notes, parity))
+
+    return check_and_export(laddered.model, own_card)
 
 
 def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) -> ExportedModel:
     """Check a model of all its levels and return it with its file.
 
-    own_card: makes the model card from the parity error, m. Raises ExportRefused as `check_parity`
-    does.
+    own_card: makes the model card from the parity error, m. Raises ExportRefused as
+    `parity_check.check_parity` does.
     """
     about = _producer()
     # The card contains the parity error, so the weights are checked with a draft of the card.
     draft = own_card(0.0)
-    parity = check_parity(model, model.onnx(model_card.dump(draft), about), draft)
+    parity = parity_check.check_parity(model, model.onnx(model_card.dump(draft), about), draft)
     written = own_card(parity)
     return ExportedModel(model, model.onnx(model_card.dump(written), about), written, parity)
 
@@ -102,304 +72,9 @@ def export_finest(recipe: Recipe, trained: TrainedModel) -> bytes:
     # Held-out clips narrow the sampled ranges, which presets have to lie in.
     alone = recipe.model_copy(update={"size": size, "presets": {}})
     laddered = levels.build_levels(alone, trained)
-    own_card = _card(alone, trained, laddered.levels, [], parity=0.0)
+    own_card = trained_card.build_card(alone, trained, laddered.levels, [], parity=0.0)
     return laddered.model.onnx(model_card.dump(own_card), _producer())
 
 
 def _producer() -> dict[str, str]:
     return {"producer_name": "posefield", "producer_version": __version__}
-
-
-def check_parity(model: FloatModel, content: bytes, own_card: ModelCard) -> float:
-    """Return the largest joint distance, m, between file and reference at random inputs.
-
-    Every level is checked. Raises ExportRefused, naming the joint and the input, if the distance
-    exceeds ALLOWED.
-    """
-    opened = session.open_bytes(content, f"{own_card.name}.onnx")
-    rng = np.random.Generator(np.random.PCG64(10_000))
-    worst = 0.0
-    for question in range(POINTS // BATCH):
-        asked = _draw_inputs(rng, model, own_card, question % len(own_card.levels))
-        gaps = _joint_distances(model, opened, asked)
-        _check_contacts(model, opened, asked)
-        at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
-        worst = max(worst, float(gaps[at]))
-        if worst > PARITY_LIMIT:
-            named = [*own_card.skeleton.names, *(curve.name for curve in own_card.curves)]
-            raise ExportRefused(
-                f"the graph puts {named[at[2]]} {100 * worst:.4f} cm from where "
-                f"the reference does, expected at most {100 * PARITY_LIMIT:g} cm; at "
-                f"{asked.said(own_card, int(at[0]))}. Fewer controls, or a larger nugget, "
-                "condition it better"
-            )
-    return worst
-
-
-@dataclass(frozen=True)
-class _ParityInputs:
-    """Inputs of the parity check.
-
-    points: controls (B, d) in their own units. times: (B, 1), s. labels: (B, p). level: of detail.
-    All are float32 values, the only ones that the graph can receive.
-    """
-
-    points: Floats
-    times: Floats
-    labels: Floats
-    level: int
-
-    def said(self, own_card: ModelCard, row: int) -> str:
-        """Describe one of the inputs in words."""
-        controls = (control.name for control in own_card.controls)
-        point = dict(zip(controls, self.points[row].tolist(), strict=True))
-        names = [name for own in own_card.labels for name in own.names]
-        who = "".join(f"{names[i]}, " for i in np.flatnonzero(self.labels[row]))
-        return f"{who}{point}, {self.times[row, 0]:.3f} s, level {self.level}"
-
-
-def _draw_inputs(
-    rng: np.random.Generator, model: FloatModel, own_card: ModelCard, level: int
-) -> _ParityInputs:
-    """Draw random controls, labels and times of their clips.
-
-    In each label set no name is as likely as each of the names.
-    """
-    low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
-    points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
-    drawn = thinning.random_labels(rng, model.bank.labels, BATCH)
-    labels = np.hstack([np.zeros((BATCH, 0)), *drawn])
-    durations = model.durations(points, labels)
-    times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
-    return _ParityInputs(points, times.astype(np.float32).astype(np.float64), labels, level)
-
-
-def _joint_distances(model: FloatModel, opened: Session, asked: _ParityInputs) -> Floats:
-    """Return distances (B, 1, J + C), m, between joints and curves of graph and reference."""
-    question, card = (asked.points, asked.times), opened.card
-    parents, names = card.skeleton.parents, graph_ports.outputs(card)
-    expected = model.evaluate(*question, asked.labels, asked.level).points(parents, card.curves)
-    answers = opened.run(*question, *names, labels=asked.labels, level=asked.level)
-    found = ModelOutputs(*answers).points(parents, card.curves)
-    return np.asarray(np.linalg.norm(found - expected, axis=-1))
-
-
-def _check_contacts(model: FloatModel, opened: Session, asked: _ParityInputs) -> None:
-    """Raise ExportRefused where the graph's contacts differ from the reference's."""
-    question, level = (asked.points, asked.times), asked.level
-    expected = model.evaluate(*question, asked.labels, level).contacts
-    if expected is None:
-        return
-    (found,) = opened.run(*question, graph_ports.CONTACTS, labels=asked.labels, level=level)
-    gaps = np.abs(found - expected)
-    if gaps.max() > CONTACT_LIMIT:
-        row = int(np.unravel_index(int(np.argmax(gaps)), gaps.shape)[0])
-        raise ExportRefused(
-            f"the graph's probability of a contact is {gaps.max():.5f} off the reference's, "
-            f"expected at most {CONTACT_LIMIT:g}; at {asked.said(opened.card, row)}"
-        )
-
-
-def _card(
-    recipe: Recipe,
-    trained: TrainedModel,
-    ladder: tuple[Level, ...],
-    notes: list[str],
-    parity: float,
-) -> ModelCard:
-    examples, durations = trained.examples, trained.aligned.durations
-    return ModelCard(
-        name=recipe.name,
-        description=recipe.description,
-        controls=_controls(recipe, trained),
-        skeleton=trained.skeleton,
-        cyclic=recipe.motion.cyclic,
-        root=recipe.motion.root,
-        rate=float(np.median([example.clip.rate for example in examples])),
-        frames=recipe.motion.frames,
-        samples=len(examples),
-        levels=ladder,
-        durations=(float(durations.min()), float(durations.max())),
-        examples=tuple(tuple(map(float, example.controls)) for example in examples),
-        labels=card_labels(trained.model.bank.labels, trained.samples),
-        feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
-        diagnostics=_diagnostics(trained, notes, parity),
-        provenance=_provenance(recipe, examples),
-        sources=tuple(example.row.source for example in examples),
-        kriging=plain_parameters(trained.pose.hyper),
-        roles={str(role): joint for role, joint in recipe.roles.items()},
-        left_out=tuple(map(_rounded, np.sqrt(trained.left_out_errors))),
-        event=truncation_error.event(recipe, examples),
-        beside=_covariance_root(trained),
-        joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
-        making=_making(recipe, trained),
-        presets=tuple(
-            Preset(name, preset.values, preset.labels) for name, preset in recipe.presets.items()
-        ),
-        curves=trained.tensor.curves,
-        contacts=trained.contacts.statistics if trained.contacts else (),
-    )
-
-
-def _covariance_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
-    """Return the root of the covariance of log duration and travel residuals.
-
-    The residuals are scaled to a sigma of one metre.
-    """
-    if "travel" not in trained.residuals:
-        return ()
-    strays = np.hstack([trained.residuals["duration"], trained.residuals["travel"]])
-    sigmas = np.sqrt(trained.model.bank.sill * trained.pose.variances)
-    standard = strays / sigmas[:, None]
-    covariance = standard.T @ standard / len(standard)
-    # The covariance is singular for clips of one duration or without turns.
-    root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(covariance)))
-    return tuple(tuple(map(_rounded, row)) for row in root)
-
-
-def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
-    marks = [example.landmarks for example in trained.examples]
-    times = np.array(marks).reshape(len(marks), -1).mean(axis=0)
-    bank = trained.model.bank
-    fields = {**bank.others, EVENT: bank.event}.items()
-    return TrainingParameters(
-        {
-            name: kriging_settings(field.hyper)
-            for name, field in fields
-            if isinstance(field, UniversalKriging)
-        },
-        dict(zip(recipe.landmark_names, map(float, times), strict=True)),
-        {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
-        recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
-        _takes(trained.examples),
-        trained.examples[0].facing,
-    )
-
-
-def card_labels(known: LabelNames, samples: SamplePoints) -> tuple[LabelSet, ...]:
-    """Return the label sets of a card from their names and the samples."""
-    pairs = zip(known.items(), samples.label_indices, strict=True)
-    return tuple(LabelSet(name, names, tuple(own.tolist())) for (name, names), own in pairs)
-
-
-def _takes(examples: Sequence[Example]) -> tuple[int, ...]:
-    """Return the number (N,) of each example's take; empty where each file is a take."""
-    takes = sample_points.take_numbers(examples)
-    files = np.unique([example.row.place.name for example in examples], return_inverse=True)[1]
-    pairs = len({*zip(takes.tolist(), files.tolist(), strict=True)})
-    one_each = pairs == len(np.unique(takes)) == len(np.unique(files))
-    return () if one_each else tuple(takes.tolist())
-
-
-def kriging_settings(hyper: Hyper) -> tuple[float, ...]:
-    """Return nugget, trend and offsets with six digits, as adaptation reads them."""
-    offsets = (own.offset for own in hyper.labels)
-    return tuple(float(f"{x:.6g}") for x in (hyper.nugget, hyper.trend, *offsets))
-
-
-def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
-    values = np.stack([example.controls for example in trained.examples])
-    landmarks = np.array([example.landmarks for example in trained.examples])
-    controls = []
-    typical = typical_controls(values)
-    for asked, own, default in zip(recipe.controls, values.T, typical, strict=True):
-        distinct = np.unique(own)
-        controls.append(
-            Control(
-                asked.name,
-                asked.unit,
-                asked.description,
-                float(distinct[0]),
-                float(distinct[-1]),
-                float(default),
-                tuple(map(float, distinct)) if len(distinct) <= MAX_LISTED_VALUES else (),
-                measured_controls.card_measure(recipe, asked, trained.skeleton, landmarks),
-            )
-        )
-    return tuple(controls)
-
-
-def typical_controls(values: Floats) -> Floats:
-    """Return the controls (d,) of the medoid of captured clips with controls (N, d)."""
-    places = half_ranges(values, values.min(axis=0), values.max(axis=0))
-    return values[typical_clip.medoid(places)]
-
-
-def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict[str, Any]:
-    """Return training statistics, in metres and shares, rounded."""
-    cut = {
-        f"truncation_{k}_m": v
-        for k, v in asdict(trained.truncation_errors).items()
-        if v is not None
-    }
-    kept, controls = trained.model.decoder.reduced.core.shape, len(trained.model.bank.low)
-    compression = asdict(truncation_cost.tensor_compression(trained.tensor, kept, controls))
-    hyper = trained.pose.hyper
-    return {
-        **{name: _rounded(distance) for name, distance in cut.items()},
-        "compression": {name: _rounded(ratio) for name, ratio in compression.items()},
-        "leave_one_out_rms_m": _rounded(np.sqrt(trained.left_out_errors.mean())),
-        "explained": {name: _rounded(share) for name, share in trained.explained.items()},
-        "covariance": hyper.covariance,
-        "drift": list(hyper.drifts),
-        "scales": [_rounded(scale) for scale in hyper.scales],
-        "nugget": _rounded(hyper.nugget),
-        "trend": _rounded(hyper.trend),
-        "labels": {
-            name: {"correlation": _rounded(own.correlation), "offset": _rounded(own.offset)}
-            for name, own in zip(trained.model.bank.labels, hyper.labels, strict=True)
-        },
-        "tensor": list(trained.tensor.values.shape),
-        "parity_m": float(f"{parity:.1e}"),
-        "notes": list(notes),
-        **_contact_accuracy(trained.contacts),
-    }
-
-
-def _contact_accuracy(found: FittedContacts | None) -> dict[str, Any]:
-    if found is None:
-        return {}
-    return {"contacts": {name: _rounded(own) for name, own in asdict(found.accuracy).items()}}
-
-
-def plain_parameters(hyper: Hyper) -> Hyper:
-    """Return the parameters with Python floats, which a model card can hold."""
-    return replace(
-        hyper,
-        nugget=float(hyper.nugget),
-        trend=float(hyper.trend),
-        labels=tuple(
-            LabelKernel(own.count, float(own.correlation), float(own.offset))
-            for own in hyper.labels
-        ),
-    )
-
-
-def _rounded(value: Any) -> float:
-    return float(f"{float(value):.4g}")
-
-
-def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:
-    return {
-        "licence": recipe.licence,
-        "recipe_sha256": hashlib.sha256(recipe.model_dump_json().encode()).hexdigest(),
-        "data_sha256": data_digest({str(e.row.place.name): e for e in examples}),
-        "clips": len(examples),
-        "versions": {name: version(name) for name in ("posefield", "numpy", "scipy", "onnx")},
-    }
-
-
-def data_digest(files: Mapping[str, Example]) -> str:
-    """Return one SHA-256 digest over the names and contents of files, sorted by name.
-
-    files: clips by the names of their motion files. Files of curves count as well.
-    """
-    total = hashlib.sha256()
-    places = {name: example.row.place for name, example in files.items()}
-    curves = (example.row.curve_place for example in files.values())
-    places |= {place.name: place for place in curves if place is not None}
-    for name in sorted(places):
-        with places[name].open("rb") as file:
-            own = hashlib.file_digest(file, "sha256").digest()
-        total.update(name.encode() + b"\0" + own)
-    return total.hexdigest()
