@@ -128,7 +128,11 @@ def _submit(
 ) -> "Future[ChunkResult | None]":
     # A submission may start a worker, which inherits this environment.
     with _worker_environment():
-        return pool.submit(_run_task, work, task)
+        try:
+            return pool.submit(_run_task, work, task)
+        except OSError as fault:
+            # Another worker died while this one was started: the pool's pipes are closed already.
+            raise BrokenProcessPool(f"a worker could not be started: {fault}") from fault
 
 
 @contextmanager

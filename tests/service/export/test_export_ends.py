@@ -146,7 +146,7 @@ def test_a_worker_that_dies_ends_it_clearly(place, after, command, undisturbed, 
         time.sleep(0.001)
     os.kill(workers_of(process)[place], signal.SIGKILL)
     out, err = process.communicate(timeout=30)
-    assert (process.returncode, out) == (5, "")
+    assert (process.returncode, out) == (5, ""), err
     last = err.strip().splitlines()[-1]
     assert last.startswith("posefield: a worker process has died; finished chunks are kept")
     assert "Traceback" not in err
