@@ -6,12 +6,12 @@ import numpy as np
 import onnx
 import pytest
 
-from posefield.common.errors import ModelError
+from posefield.common.errors import ExportRefused, ModelError
 from posefield.inference import graph_ports, session
 from posefield.inference.graph_ports import CONTACTS
 from posefield.model_file import model_card, subgraph
 from posefield_train.contacts import contact_labels, contact_model, contact_table
-from posefield_train.graph import onnx_export, parity_check
+from posefield_train.graph import parity_check
 from posefield_train.kriging import universal_kriging
 from posefield_train.report.provenance import Provenance
 from posefield_train.sample import sample_walk
@@ -218,7 +218,7 @@ def test_the_parity_check_refuses_wrong_contacts(walk_exported):
     model, card = walk_exported.model, walk_exported.card
     content = model.onnx(model_card.dump(card), {})
     wrong = replace(model.contacts, values=1.01 * model.contacts.values)
-    with pytest.raises(onnx_export.ExportRefused, match="probability of a contact"):
+    with pytest.raises(ExportRefused, match="probability of a contact"):
         parity_check.check_parity(replace(model, contacts=wrong), content, card)
 
 
