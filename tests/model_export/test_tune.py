@@ -318,7 +318,10 @@ def test_quantities_beside_share_scales_and_correlation(samples, people, rng):
     problem = TuningProblem(labelled(samples, people), own_ways(samples, people, rng, 0.5))
     found = kriging_tuning.tune_beside(problem, LABELLED).hyper
     own = {name[0]: value_of(found, name) for name in BESIDE}
-    assert found == vary(LABELLED, **own)
+    expected = vary(LABELLED, **own)
+    assert np.array_equal(found.scales, expected.scales)
+    # The fields but the scales: Python 3.13 compares arrays of two data classes by their values.
+    assert replace(found, scales=()) == replace(expected, scales=())
     assert all(own[name[0]] != value_of(LABELLED, name) for name in BESIDE)
     without = kriging_tuning.tune_beside(problem, replace(LABELLED, drifts=(1,), trend=0.0)).hyper
     assert without.trend == 0.0 and without.drifts == (1,)
