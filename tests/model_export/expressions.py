@@ -11,7 +11,7 @@ from posefield_train.source.recipe import Recipe
 
 RATE = 60.0
 RAISED = {"a": 0.0, "b": 0.1, "d": 0.2, "cy": 0.25}
-"""How far each performer's brows are raised and funnel is open, beyond those of `face_motion`."""
+"""What each performer adds to the curves OWN of `face_motion`."""
 OWN = ("mouthFunnel", "browInnerUp")
 HEADING = "file,curves,smile,openness,who"
 POINTS = [(0.1 + 0.8 * i / 14, 0.1 + 0.8 * ((4 * i) % 15) / 14) for i in range(15)]

@@ -43,7 +43,7 @@ def labelled(own, examples):
 
 
 def stance(shares, landing):
-    """Whether a foot of the strides stands, away from both ends of its stance; None near them."""
+    """Return which shares are far from both ends of a stance, and in which the foot stands."""
     since = (shares - landing) % 1.0
     sure = (np.abs(since - sample_walk.STANCE) > 0.12) & (since > 0.05) & (since < 0.92)
     return sure, since < sample_walk.STANCE

@@ -12,7 +12,7 @@ from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.inference import residual_covariance
 from posefield.model_file.level_of_detail import Level
-from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard
+from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard, rounded
 from posefield_train.adapt import adaptation, canonical_clips, contact_extension, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
@@ -123,7 +123,7 @@ def _add_parent_errors(found: Level, finest: Level) -> Level:
     """Add the errors of the parent's finest level in quadrature; the two are independent."""
 
     def both(name: str) -> float:
-        return _rounded(np.hypot(getattr(found, name), getattr(finest, name)))
+        return rounded(np.hypot(getattr(found, name), getattr(finest, name)))
 
     return replace(
         found,
@@ -178,7 +178,7 @@ def _card(
     old, bank, clips = reopened.card, adapted.model.bank, adapted.new_clips.examples
     own = tuple(tuple(map(float, clip.controls)) for clip in clips)
     seconds = (*old.durations, *adapted.new_clips.aligned.durations.tolist())
-    left_out = (*old.left_out, *map(_rounded, np.sqrt(adapted.left_out_errors)))
+    left_out = (*old.left_out, *map(rounded, np.sqrt(adapted.left_out_errors)))
     fields = bank.others.items()
     made = {
         n: trained_card.kriging_settings(f.hyper)
@@ -262,9 +262,9 @@ def _diagnostics(
     kept_facts = {name: fact for name, fact in old.items() if name != "detail"}
     return {
         **kept_facts,
-        "compression": {name: _rounded(ratio) for name, ratio in compression.items()},
-        "leave_one_out_rms_m": _rounded(np.sqrt(np.mean(np.square(left_out)))),
-        "scales": [_rounded(scale) for scale in model.bank.pose.hyper.scales],
+        "compression": {name: rounded(ratio) for name, ratio in compression.items()},
+        "leave_one_out_rms_m": rounded(np.sqrt(np.mean(np.square(left_out)))),
+        "scales": [rounded(scale) for scale in model.bank.pose.hyper.scales],
         "tensor": list(shape),
         "parity_m": float(f"{parity:.1e}"),
         "notes": [*old["notes"], *_notes(reopened, adapted, newcomer)],
@@ -306,7 +306,3 @@ def _provenance(reopened: ReconstructedModel, newcomer: NewPerformer) -> Mapping
         "adapted": [*old.get("adapted", []), step],
         "versions": {name: version(name) for name in old["versions"]},
     }
-
-
-def _rounded(value: Any) -> float:
-    return float(f"{float(value):.4g}")

@@ -36,6 +36,18 @@ class ContactAccuracy:
     brier: float
     climatology: float
 
+    @classmethod
+    def measure(cls, predicted: Floats, labels: Floats, from_mean: Floats) -> "ContactAccuracy":
+        """Return the errors of probabilities (...) against labels (...), 0 or 1.
+
+        from_mean: labels less their mean over the other takes (...).
+        """
+        return cls(
+            float(np.mean((predicted > 0.5) == (labels > 0.5))),
+            float(np.mean(np.square(predicted - labels))),
+            float(np.mean(np.square(from_mean))),
+        )
+
 
 @dataclass(frozen=True)
 class FittedContacts:
@@ -90,11 +102,7 @@ def left_out_accuracy(
     rows, known = labels.reshape(len(labels), -1), reduced.reshape(len(labels), -1)
     left_out = universal_kriging.leave_out(pose, samples.points, samples.groups)
     predicted = np.clip(known - left_out @ known, 0.0, 1.0)
-    return ContactAccuracy(
-        agreement=float(np.mean((predicted > 0.5) == (rows > 0.5))),
-        brier=float(np.mean(np.square(predicted - rows))),
-        climatology=float(np.mean(np.square(samples.from_mean(rows)))),
-    )
+    return ContactAccuracy.measure(predicted, rows, samples.from_mean(rows))
 
 
 def _notes(

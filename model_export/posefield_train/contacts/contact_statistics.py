@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
+from posefield.model_file.model_card import rounded
 from posefield.motion.contacts import contact_detection
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.foot_contacts import CLEARANCE, LONG_SWING, FootContact
 from posefield_train.contacts.contact_labels import ClipContacts
 
-LONG_SWING, LIFT = 90.0, 75.0
-"""Percentiles of a swing's duration and of its clearance."""
 USUAL_SWING, USUAL_CLEARANCE = 0.4, 0.05
 """Seconds and metres of a swing where no joint makes a whole one in any clip."""
 
@@ -62,10 +61,10 @@ def without_swings(clips: Sequence[ClipContacts], place: int, cyclic: bool) -> b
 def _contact(joint: int, height: float, durations: Floats, lifts: Floats) -> FootContact:
     return FootContact(
         joint,
-        _rounded(height),
-        _rounded(np.median(durations)),
-        _rounded(np.percentile(durations, LONG_SWING)),
-        _rounded(np.percentile(lifts, LIFT)),
+        rounded(height),
+        rounded(np.median(durations)),
+        rounded(np.percentile(durations, LONG_SWING)),
+        rounded(np.percentile(lifts, CLEARANCE)),
     )
 
 
@@ -86,7 +85,3 @@ def _swings(clips: Sequence[ClipContacts], place: int, cyclic: bool) -> _Swings:
                 lifts.append(max(float(height[run].max()) - standing, 0.0))
     own = float(np.median(heights)) if heights else None
     return _Swings(np.array(durations), np.array(lifts), own)
-
-
-def _rounded(value: float) -> float:
-    return float(f"{float(value):.4g}")

@@ -41,14 +41,7 @@ def held_out_accuracies(
         return []
     mean = _labels(recipe, clips.rest, joints).mean(axis=0)
     pairs = zip(_labels(recipe, clips.held, joints), predict(SHARES), strict=True)
-    return [
-        ContactAccuracy(
-            agreement=float(np.mean((predicted > 0.5) == (own > 0.5))),
-            brier=float(np.mean(np.square(predicted - own))),
-            climatology=float(np.mean(np.square(mean - own))),
-        )
-        for own, predicted in pairs
-    ]
+    return [ContactAccuracy.measure(predicted, own, own - mean) for own, predicted in pairs]
 
 
 def mean_facts(found: Sequence[ContactAccuracy]) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.model_file.level_of_detail import Level
+from posefield.model_file.model_card import rounded
 from posefield_train.graph import level_errors, ranks, truncation_cost
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.level_errors import LevelTest
@@ -97,11 +98,11 @@ class LevelBuilder:
             numbers,
             4 * numbers,
             truncation_cost.count_operations(model, level),
-            rms=_rounded(found.rms),
-            p99=_rounded(found.p99),
-            max=_rounded(found.max),
-            pose=_rounded(found.pose),
-            effector=None if effector is None else _rounded(effector),
+            rms=rounded(found.rms),
+            p99=rounded(found.p99),
+            max=rounded(found.max),
+            pose=rounded(found.pose),
+            effector=None if effector is None else rounded(effector),
             event=0 if level else model.bank.event_columns,
         )
 
@@ -167,10 +168,6 @@ def level_builder(recipe: Recipe, trained: TrainedModel) -> LevelBuilder:
         level_errors.level_test(recipe, trained, FINALS),
         thinning.thinning_data(bank),
     )
-
-
-def _rounded(length: float) -> float:
-    return float(f"{length:.4g}")
 
 
 def _moving_joints(trained: TrainedModel, finer: LevelSize, detail: Detail) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from posefield.common.units import Floats
 from posefield.inference import motion_detail
 from posefield.inference.motion_detail import Deviations
 from posefield.kriging import leave_one_out
-from posefield.model_file.model_card import ModelCard
+from posefield.model_file.model_card import ModelCard, rounded
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
@@ -39,7 +39,7 @@ class DetailFit:
         """Return the facts of the model card."""
         harmonics, directions = self.deviations.shape
         sizes = {"harmonics": harmonics, "directions": directions}
-        return sizes | {"acceleration": _rounded(self.without), "sampled": _rounded(self.sampled)}
+        return sizes | {"acceleration": rounded(self.without), "sampled": rounded(self.sampled)}
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def take_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
     sizes = np.sqrt(np.diagonal(covariance)) + JITTER
     root = np.linalg.cholesky(covariance / np.outer(sizes, sizes) + JITTER * np.eye(len(sizes)))
     rows = (sizes[:, None] * root)[-beside.shape[1] :]
-    return tuple(tuple(map(_rounded, row)) for row in rows)
+    return tuple(tuple(map(rounded, row)) for row in rows)
 
 
 def fit_detail(trained: TrainedModel) -> DetailFit | None:
@@ -157,7 +157,3 @@ def _accelerations(trained: TrainedModel, values: Floats) -> PerClip:
     second = np.diff(joints - joints[:, :, :1], 2, axis=1)
     rates = (values.shape[1] - 1) / trained.aligned.durations
     return np.asarray(np.mean(np.linalg.norm(second, axis=-1), axis=(1, 2)) * rates**2)
-
-
-def _rounded(value: float) -> float:
-    return float(f"{float(value):.4g}")

@@ -18,6 +18,7 @@ from posefield.model_file.model_card import (
     ModelCard,
     Preset,
     TrainingParameters,
+    rounded,
 )
 from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph import truncation_cost
@@ -64,7 +65,7 @@ def build_card(
         sources=tuple(example.row.source for example in examples),
         kriging=plain_parameters(trained.pose.hyper),
         roles={str(role): joint for role, joint in recipe.roles.items()},
-        left_out=tuple(map(_rounded, np.sqrt(trained.left_out_errors))),
+        left_out=tuple(map(rounded, np.sqrt(trained.left_out_errors))),
         event=truncation_error.event(recipe, examples),
         beside=_covariance_root(trained),
         joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
@@ -90,7 +91,7 @@ def _covariance_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
     covariance = standard.T @ standard / len(standard)
     # The covariance is singular for clips of one duration or without turns.
     root = np.linalg.cholesky(covariance + 1e-9 * np.eye(len(covariance)))
-    return tuple(tuple(map(_rounded, row)) for row in root)
+    return tuple(tuple(map(rounded, row)) for row in root)
 
 
 def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
@@ -172,17 +173,17 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
     compression = asdict(truncation_cost.tensor_compression(trained.tensor, kept, controls))
     hyper = trained.pose.hyper
     return {
-        **{name: _rounded(distance) for name, distance in cut.items()},
-        "compression": {name: _rounded(ratio) for name, ratio in compression.items()},
-        "leave_one_out_rms_m": _rounded(np.sqrt(trained.left_out_errors.mean())),
-        "explained": {name: _rounded(share) for name, share in trained.explained.items()},
+        **{name: rounded(distance) for name, distance in cut.items()},
+        "compression": {name: rounded(ratio) for name, ratio in compression.items()},
+        "leave_one_out_rms_m": rounded(np.sqrt(trained.left_out_errors.mean())),
+        "explained": {name: rounded(share) for name, share in trained.explained.items()},
         "covariance": hyper.covariance,
         "drift": list(hyper.drifts),
-        "scales": [_rounded(scale) for scale in hyper.scales],
-        "nugget": _rounded(hyper.nugget),
-        "trend": _rounded(hyper.trend),
+        "scales": [rounded(scale) for scale in hyper.scales],
+        "nugget": rounded(hyper.nugget),
+        "trend": rounded(hyper.trend),
         "labels": {
-            name: {"correlation": _rounded(own.correlation), "offset": _rounded(own.offset)}
+            name: {"correlation": rounded(own.correlation), "offset": rounded(own.offset)}
             for name, own in zip(trained.model.bank.labels, hyper.labels, strict=True)
         },
         "tensor": list(trained.tensor.values.shape),
@@ -195,7 +196,7 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
 def _contact_accuracy(found: FittedContacts | None) -> dict[str, Any]:
     if found is None:
         return {}
-    return {"contacts": {name: _rounded(own) for name, own in asdict(found.accuracy).items()}}
+    return {"contacts": {name: rounded(own) for name, own in asdict(found.accuracy).items()}}
 
 
 def plain_parameters(hyper: Hyper) -> Hyper:
@@ -209,10 +210,6 @@ def plain_parameters(hyper: Hyper) -> Hyper:
             for own in hyper.labels
         ),
     )
-
-
-def _rounded(value: Any) -> float:
-    return float(f"{float(value):.4g}")
 
 
 def _provenance(recipe: Recipe, examples: Sequence[Example]) -> dict[str, Any]:

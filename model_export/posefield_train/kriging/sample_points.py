@@ -91,10 +91,8 @@ def make_samples(recipe: Recipe, examples: Sequence[Example]) -> tuple[SamplePoi
     known = {label_set: names for label_set, names in every.items() if len(names) > 1}
     both = np.hstack([points, label_weights(given, known)])
     counts = tuple(map(len, known.values()))
-    groups, several = (
-        _groups(recipe, examples, points),
-        len({e.row.performer for e in examples}) > 1,
-    )
+    groups = _groups(recipe, examples, points)
+    several = len({example.row.performer for example in examples}) > 1
     unnamed = several and PERFORMER not in known
     return SamplePoints(both, points.shape[1], groups, counts, unnamed), known
 

@@ -10,15 +10,13 @@ from posefield.feet import stances
 from posefield.feet.stances import FootPath, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.contacts import contact_detection
-from posefield.motion.foot_contacts import FootContact
+from posefield.motion.foot_contacts import CLEARANCE, LONG_SWING, FootContact
 
 # A foot stands where its contact is more likely than not. Probabilities are rounded, so that two
 # machines whose last digits differ plan the same steps.
 STANDING, DECIMALS = 0.5, 6
 # Swings of a motion in which no foot swings: median and longest duration, s.
 DEFAULT_SWING, DEFAULT_LONGEST = 0.3, 0.5
-# Percentiles of the durations and of the lifts of swings, as in training.
-LONGEST_PERCENTILE, CLEARANCE_PERCENTILE = 90.0, 75.0
 
 
 def from_probabilities(
@@ -34,7 +32,7 @@ def from_probabilities(
 
 def from_motion(paths: Sequence[FootPath]) -> list[list[Interval]]:
     """Return the contacts of each foot, detected by its speed and height."""
-    return [stances.tidy(detect(path), path.rate, path.cycle is not None) for path in paths]
+    return [stances.runs(detect(path), path.cycle is not None) for path in paths]
 
 
 def detect(path: FootPath) -> Annotated[Booleans, "frames"]:
@@ -64,6 +62,6 @@ def statistics(joint: int, path: FootPath, found: Sequence[Interval]) -> FootCon
         joint,
         height,
         float(np.median(seconds)),
-        float(np.percentile(seconds, LONGEST_PERCENTILE)),
-        max(0.0, float(np.percentile(lifts, CLEARANCE_PERCENTILE))),
+        float(np.percentile(seconds, LONG_SWING)),
+        max(0.0, float(np.percentile(lifts, CLEARANCE))),
     )

@@ -14,16 +14,18 @@ from posefield.common.array_shapes import Frames, RootPath
 from posefield.common.units import UP, Booleans
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
+from posefield.motion.contacts import contact_detection
 from posefield.motion.foot_contacts import FootContact
 
 # Contacts that are shorter are dropped, and gaps that are shorter are closed, s.
-SHORTEST_CONTACT, SHORTEST_GAP = 0.1, 0.08
+SHORTEST_CONTACT = contact_detection.DEFAULT.shortest
+SHORTEST_GAP = contact_detection.DEFAULT.shortest_gap
 # Distances are compared to the micrometre, so that two machines plan the same steps.
 MICROMETRES = 6
 # A swing that goes less is none, m.
 SHORTEST_STEP = 0.03
 # A foot that is higher above the place where it stands is in the air whatever the plan says, m.
-LIFTED = 0.0525
+LIFTED = contact_detection.DEFAULT.grown_height
 
 
 @dataclass(frozen=True)
@@ -153,9 +155,6 @@ def _swing_frames(
 
 def runs(down: Annotated[Booleans, "frames"], cyclic: bool) -> list[Interval]:
     """Return the intervals of true frames, in order; one of a cycle may go over its end."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], down, [False]]).astype(np.int8)))
-    runs = [Interval(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-    wraps = cyclic and len(runs) > 1 and runs[0].begin == 0 and runs[-1].end == len(down)
-    if not wraps:
-        return runs
-    return [*runs[1:-1], Interval(runs[-1].begin, len(down) + runs[0].end)]
+    found = contact_detection.runs(down, cyclic)
+    intervals = [Interval(int(own[0]), int(own[0]) + len(own)) for own in found]
+    return sorted(intervals, key=lambda own: own.begin)

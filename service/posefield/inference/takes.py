@@ -49,11 +49,6 @@ class TakeSampler:
         self._field_cached = lru_cache(FIELD_CACHE)(self._field)
         self._deviations_cached = lru_cache(DEVIATION_CACHE)(self._deviations)
 
-    @property
-    def is_available(self) -> bool:
-        """Return whether the model's covariance can be simulated."""
-        return random_field.has_features(self._session.card.kriging)
-
     def deviations(
         self, controls: PointControls, labels: PointLabels, seeds: Annotated[Indices, "points"]
     ) -> PointValues:

@@ -7,7 +7,7 @@ older reader would misread a file. `card_reader` reads what `dump` writes.
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, SupportsFloat
 
 import msgspec
 import numpy as np
@@ -211,6 +211,11 @@ class ModelCard:
     def control(self, name: str) -> Control | None:
         """Return the control of that name; None for an unknown name."""
         return next((c for c in self.controls if c.name == name), None)
+
+
+def rounded(value: SupportsFloat) -> float:
+    """Return a measured number as cards store it, with four significant digits."""
+    return float(f"{float(value):.4g}")
 
 
 def dump(card: ModelCard) -> dict[str, str]:

@@ -4,6 +4,10 @@ from dataclasses import dataclass
 
 from posefield.common.bounded_types import Index, NonNegative, Number, Positive
 
+LONG_SWING, CLEARANCE = 90.0, 75.0
+"""Percentiles of a swing's duration and of its lift that count as its longest, and as its
+clearance."""
+
 
 @dataclass(frozen=True)
 class FootContact:

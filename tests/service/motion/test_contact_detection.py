@@ -73,7 +73,7 @@ def test_no_contact_and_no_gap_between_contacts_is_short(cyclic, seed):
 
 @pytest.mark.parametrize("shift", [0, 17, 60, 119, 200])
 def test_a_cycle_has_the_contacts_of_its_shifted_self(shift):
-    """Where a cycle is cut does not matter: the last frame leads into the first."""
+    """A cycle that begins elsewhere has the same contacts."""
     path = stepping([(0.5, 0.9)])
     length = len(path) - 1
     gone = path[-1] - path[0]

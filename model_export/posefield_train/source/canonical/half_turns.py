@@ -81,13 +81,11 @@ def move_twists(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
         twists = quat.twist(steps, axis)
         swings = quat.mul(steps, quat.from_axis_angle(axis, -twists))
         swung = np.linalg.norm(quat.log(swings), axis=-1)
-        jumps = np.flatnonzero((angles > JUMP_ANGLE) & (swung < MOST_SWING))
-        if not len(jumps):
+        jumps = (angles > JUMP_ANGLE) & (swung < MOST_SWING)
+        if not jumps.any():
             continue
-        moved = np.concatenate(
-            [[0.0], np.cumsum(np.where(np.isin(np.arange(len(steps)), jumps), twists, 0.0))]
-        )
-        parts = np.split(np.arange(len(moved)), jumps + 1)
+        moved = np.concatenate([[0.0], np.cumsum(np.where(jumps, twists, 0.0))])
+        parts = np.split(np.arange(len(moved)), np.flatnonzero(jumps) + 1)
         moved -= moved[max(parts, key=len)[0]]
         own = quat.from_axis_angle(axis, moved)
         rotations[:, joint] = quat.mul(rotations[:, joint], quat.conj(own))
