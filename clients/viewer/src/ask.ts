@@ -13,7 +13,7 @@ import { curvesAt } from "./curves.ts";
 import type { Source } from "./page.ts";
 import { pose as posture, sample } from "./playback.ts";
 import type { State } from "./state.ts";
-import { manner, taken } from "./takes.ts";
+import { takeAndFeet, takeFields } from "./takes.ts";
 
 /** Frames a second that a clip is fetched at; poses between them are interpolated. */
 const RATE = 60;
@@ -26,7 +26,7 @@ export function clip(
 ): Promise<Motion> {
   const { controls, performer, labels, level, loop, model, root } = state;
   const whole = { root, fps: RATE, loop: card.cyclic && loop };
-  const how = manner(source, card, state);
+  const how = takeAndFeet(source, card, state);
   const question = { controls, performer, labels, level, ...whole, ...how };
   return source.clip(model, question, signal);
 }
@@ -48,7 +48,7 @@ export async function pose(
 ): Promise<Poses> {
   const whole = async () => at(await clip(source, card, state, signal), time);
   // Crowds of takes last as long as the prediction does, and have no details.
-  const other = Object.keys(taken(source, card, state)).length > 0;
+  const other = Object.keys(takeFields(source, card, state)).length > 0;
   if (other && state.root !== card.root) return whole();
   // A refusal would be mended too, but browsers write each into their console.
   if (time > LATE * Math.min(duration, card.durations[0]!)) return whole();
@@ -76,7 +76,7 @@ function travelling(
 ) {
   const { controls, performer, labels, level, model } = state;
   const question = { controls, performer, labels, level, times: [time] };
-  return source.pose(model, { ...question, ...taken(source, card, state) }, signal);
+  return source.pose(model, { ...question, ...takeFields(source, card, state) }, signal);
 }
 
 /** A crowd of one: crowds alone may be asked for poses that stay where they are. */

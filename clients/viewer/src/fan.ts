@@ -10,7 +10,7 @@ import { served } from "./page.ts";
 import { type Pose, pose, sample } from "./playback.ts";
 import type { Session } from "./session.ts";
 import type { State } from "./state.ts";
-import { beside } from "./takes.ts";
+import { otherTakes } from "./takes.ts";
 import * as theme from "./theme.ts";
 
 const COUNT = 5;
@@ -82,7 +82,7 @@ class Fan {
   async #find(): Promise<void> {
     const { card, notice, signal, source, store } = this.#session;
     const { state } = store;
-    const seeds = beside(state.take, COUNT);
+    const seeds = otherTakes(state.take, COUNT);
     try {
       const clips = await Promise.all(
         seeds.map((take) => ask.clip(source, card, { ...state, take }, signal)),

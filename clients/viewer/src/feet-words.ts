@@ -2,7 +2,7 @@
 
 import type { ModelCard, Trust } from "@posefield/client";
 
-import { unplaceable } from "./takes.ts";
+import { whyFeetCannotStand } from "./takes.ts";
 import * as written from "./written.ts";
 
 /** Distances below are not worth words, m. */
@@ -16,7 +16,7 @@ export function says(
   asks = true,
 ): string {
   if (found) return done(found);
-  const why = unplaceable(card);
+  const why = whyFeetCannotStand(card);
   if (why) return `Feet as predicted: ${why}.`;
   if (!asks) return "Feet as predicted: only a service makes them stand.";
   // Services older than 4.0.0 place no feet and say nothing of them.

@@ -10,7 +10,7 @@ import { saveFile } from "./save-file.ts";
 import type { Session } from "./session.ts";
 import { title } from "./slider.ts";
 import type { State } from "./state.ts";
-import { MANNER, manner, unplaceable } from "./takes.ts";
+import { TAKE_AND_FEET, takeAndFeet, whyFeetCannotStand } from "./takes.ts";
 import { videoButton } from "./video-button.ts";
 import { figure } from "./written.ts";
 
@@ -165,7 +165,7 @@ class Files {
       ...(root === "in_place" && { root }),
       ...(loop && { loop }),
       ...(targets && { targets }),
-      ...manner(source, card, store.state),
+      ...takeAndFeet(source, card, store.state),
       ...(exact !== "auto" && { exact }),
       ...(names !== "own" && { names }),
       ...measured,
@@ -183,7 +183,7 @@ class Files {
   }
 
   #changed(changed: ReadonlySet<keyof State>): void {
-    const drawn = ["root", "level", "target", ...MANNER] as const;
+    const drawn = ["root", "level", "target", ...TAKE_AND_FEET] as const;
     if (drawn.some((key) => changed.has(key))) this.#draw();
     else if (["controls", "performer", "labels"].some((key) => changed.has(key as "labels")))
       this.#tell();
@@ -310,7 +310,7 @@ class Files {
   #holds(): HTMLElement[] {
     const { card, store } = this.#page;
     const rows: HTMLElement[] = card.cyclic ? [this.#cycle()] : [];
-    if (!unplaceable(card)) rows.push(this.#standing());
+    if (!whyFeetCannotStand(card)) rows.push(this.#standing());
     const measured = card.controls.filter(({ measure }) => measure).map(({ name }) => title(name));
     if (measured.length) {
       const words = `Match exactly: ${measured.join(", ")}`;

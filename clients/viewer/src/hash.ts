@@ -8,7 +8,7 @@ import type { ModelCard } from "@posefield/client";
 
 import { otherSets } from "./examples.ts";
 import type { State } from "./state.ts";
-import { detailed, LAST, unplaceable, usual, VARIETY } from "./takes.ts";
+import { hasDetail, LARGEST_SEED, standsByDefault, VARIETY, whyFeetCannotStand } from "./takes.ts";
 import { read as number } from "./written.ts";
 
 export interface Address {
@@ -65,7 +65,7 @@ export function initial(model: string, card: ModelCard): State {
     ghost: false,
     fan: false,
     feet: false,
-    stands: usual(card),
+    stands: standsByDefault(card),
     take: 0,
     variety: VARIETY,
     detail: false,
@@ -161,10 +161,10 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   ghost: yes(),
   fan: yes(),
   feet: yes(),
-  stands: possible(unplaceable),
-  take: between(() => [0, LAST], Number.isInteger),
+  stands: possible(whyFeetCannotStand),
+  take: between(() => [0, LARGEST_SEED], Number.isInteger),
   variety: between(() => [0, 1]),
-  detail: possible((card) => (detailed(card) ? null : "this model has no details to sample")),
+  detail: possible((card) => (hasDetail(card) ? null : "this model has no details to sample")),
   target: {
     expected: () => "x,y,z in metres",
     read: point,

@@ -2,7 +2,7 @@
 
 import { served } from "./page.ts";
 import type { Session } from "./session.ts";
-import { next, unplaceable } from "./takes.ts";
+import { nextSeed, whyFeetCannotStand } from "./takes.ts";
 import * as theme from "./theme.ts";
 import { move, togglePlay } from "./transport.ts";
 
@@ -21,10 +21,10 @@ export function mount(session: Session): void {
     g: flip("ghost"),
     f: flip("feet"),
     ...(served(source) && {
-      n: () => store.set({ take: next(store.state.take) }),
+      n: () => store.set({ take: nextSeed(store.state.take) }),
       p: () => store.set({ take: 0 }),
       v: flip("fan"),
-      ...(!unplaceable(card) && { s: flip("stands") }),
+      ...(!whyFeetCannotStand(card) && { s: flip("stands") }),
     }),
     b: () => store.set({ body: store.state.body === "stick" ? "mannequin" : "stick" }),
     t: theme.toggle,

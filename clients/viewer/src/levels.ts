@@ -14,7 +14,7 @@ import type { Mount, Page } from "./page.ts";
 import { type Placed, place, placed } from "./skeleton.ts";
 import { SkinnedBody } from "./skinned-body.ts";
 import type { State } from "./state.ts";
-import { MANNER, manner } from "./takes.ts";
+import { TAKE_AND_FEET, takeAndFeet } from "./takes.ts";
 import * as theme from "./theme.ts";
 
 /** Frames a second of the clips: what a screen shows. */
@@ -103,7 +103,7 @@ class Levels {
   }
 
   #changed(state: State, changed: ReadonlySet<keyof State>): void {
-    const asked = ["controls", "performer", "labels", "root", "view", ...MANNER] as const;
+    const asked = ["controls", "performer", "labels", "root", "view", ...TAKE_AND_FEET] as const;
     if (asked.some((key) => changed.has(key))) this.#show(state);
     if (changed.has("time") && this.#group.visible) this.#page.scene.redraw();
   }
@@ -118,7 +118,7 @@ class Levels {
     // Who walks away would not stay side by side.
     const root = card.cyclic ? "in_place" : state.root;
     const { controls, labels, performer } = state;
-    const how = manner(this.#page.source, card, state);
+    const how = takeAndFeet(this.#page.source, card, state);
     this.#asking.ask({ controls, performer, labels, root, fps: RATE, ...how });
   }
 

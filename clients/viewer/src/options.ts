@@ -2,7 +2,7 @@
 
 import { choice, toggle } from "./dom.ts";
 import { type Mount, served } from "./page.ts";
-import { unplaceable } from "./takes.ts";
+import { whyFeetCannotStand } from "./takes.ts";
 
 export const mount: Mount = (host, { card, signal, source, store }) => {
   const body = choice(
@@ -25,7 +25,7 @@ export const mount: Mount = (host, { card, signal, source, store }) => {
     store.set({ root: on ? "travelling" : "in_place" }),
   );
   ghost.hidden = fan.hidden = !served(source);
-  stand.hidden = !served(source) || unplaceable(card) !== null;
+  stand.hidden = !served(source) || whyFeetCannotStand(card) !== null;
   root.hidden = card.root === "in_place";
   const show = () => {
     const { state } = store;

@@ -18,7 +18,7 @@ import {
 } from "./playback.ts";
 import type { State } from "./state.ts";
 import { Stopwatch } from "./stopwatch.ts";
-import { MANNER } from "./takes.ts";
+import { TAKE_AND_FEET } from "./takes.ts";
 
 /** Milliseconds without a change until the whole clip is worth asking for. */
 const IDLE = 140;
@@ -227,7 +227,7 @@ export class Player {
 }
 
 const ASKED_ANEW = ["controls", "performer", "labels", "level"] as const;
-const REPLACED = ["loop", "root", ...MANNER] as const;
+const REPLACED = ["loop", "root", ...TAKE_AND_FEET] as const;
 
 /** No joint turned, and as high as the legs are long. */
 function atRest(card: ModelCard): Pose {

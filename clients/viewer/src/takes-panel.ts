@@ -4,7 +4,7 @@ import "./takes.css";
 import { button, el, labelled } from "./dom.ts";
 import { served } from "./page.ts";
 import type { Session } from "./session.ts";
-import { detailed, LAST, next } from "./takes.ts";
+import { hasDetail, LARGEST_SEED, nextSeed } from "./takes.ts";
 
 export function mount(host: HTMLElement, session: Session): void {
   const { card, player, signal, source, store } = session;
@@ -14,7 +14,7 @@ export function mount(host: HTMLElement, session: Session): void {
   }
   const taken = el("strong", { "data-taken": "", role: "status" });
   const more = button("Next take", "Next take (N)", () =>
-    store.set({ take: next(store.state.take) }),
+    store.set({ take: nextSeed(store.state.take) }),
   );
   const back = button("Prediction", "Prediction, no take (P)", () => store.set({ take: 0 }));
   const seed = seedField(store);
@@ -22,7 +22,7 @@ export function mount(host: HTMLElement, session: Session): void {
   const detail = el("input", { type: "checkbox" });
   detail.addEventListener("change", () => store.set({ detail: detail.checked }));
   const details = el("label", { class: "takes-check" }, detail, el("span", {}, DETAIL));
-  details.hidden = !detailed(card);
+  details.hidden = !hasDetail(card);
   const show = () => {
     const { state } = store;
     host.hidden = state.view === "crowd";
@@ -56,10 +56,17 @@ const DETAIL = "Detail: sampled by the seed, not predicted";
 type Store = Session["store"];
 
 function seedField(store: Store) {
-  const field = el("input", { type: "number", min: 0, max: LAST, step: 1, class: "takes-seed" });
+  const field = el("input", {
+    type: "number",
+    min: 0,
+    max: LARGEST_SEED,
+    step: 1,
+    class: "takes-seed",
+  });
   field.addEventListener("change", () => {
     const value = Number(field.value);
-    const fits = field.value !== "" && Number.isInteger(value) && value >= 0 && value <= LAST;
+    const fits =
+      field.value !== "" && Number.isInteger(value) && value >= 0 && value <= LARGEST_SEED;
     if (fits) store.set({ take: value });
     else field.value = String(store.state.take);
   });

@@ -8,46 +8,49 @@ import type { State } from "./state.ts";
 /** Size of deviations where none is given, as the service has it. */
 export const VARIETY = 0.7;
 /** The greatest seed. */
-export const LAST = 999_999_999;
+export const LARGEST_SEED = 999_999_999;
 
-/** What of the state is asked by manner(). */
-export const MANNER = ["take", "variety", "detail", "stands"] as const;
+/** Parts of the state that takeAndFeet() asks for. */
+export const TAKE_AND_FEET = ["take", "variety", "detail", "stands"] as const;
 
 /** The seed after this one; after the last, the first again. */
-export function next(take: number): number {
-  return (take % LAST) + 1;
+export function nextSeed(take: number): number {
+  return (take % LARGEST_SEED) + 1;
 }
 
 /** Seeds of takes to be shown beside this one: from 1 on, without it. */
-export function beside(take: number, count: number): readonly number[] {
+export function otherTakes(take: number, count: number): readonly number[] {
   const some = Array.from({ length: count + 1 }, (_, i) => i + 1);
   return some.filter((seed) => seed !== take).slice(0, count);
 }
 
 /** Whether the model has details to sample, which no control predicts. */
-export function detailed({ diagnostics }: Pick<ModelCard, "diagnostics">): boolean {
+export function hasDetail({ diagnostics }: Pick<ModelCard, "diagnostics">): boolean {
   return Boolean((diagnostics as Readonly<Record<string, unknown>> | undefined)?.["detail"]);
 }
 
 /** In words, why a service cannot make these feet stand; null where it can. */
-export function unplaceable({ feet, root }: Pick<ModelCard, "feet" | "root">): string | null {
+export function whyFeetCannotStand({
+  feet,
+  root,
+}: Pick<ModelCard, "feet" | "root">): string | null {
   if (!feet.length) return "this model names no feet";
   if (root === "in_place") return "this model's root stays in place";
   return null;
 }
 
 /** Whether the service makes the feet of a model's clips stand unless it is told otherwise. */
-export function usual(card: ModelCard): boolean {
-  return !unplaceable(card) && Boolean(card.contacts?.length);
+export function standsByDefault(card: ModelCard): boolean {
+  return !whyFeetCannotStand(card) && Boolean(card.contacts?.length);
 }
 
-/** What of the take differs from the prediction; nothing where no service answers. */
-export function taken(
+/** Fields of a question that ask for another take; none where no service answers. */
+export function takeFields(
   source: Source,
   card: ModelCard,
   { take, variety, detail }: Pick<State, "take" | "variety" | "detail">,
 ): Pick<PoseQuestion, "take" | "variety" | "detail"> {
-  const details = detail && detailed(card);
+  const details = detail && hasDetail(card);
   if (!served(source) || !(take || details)) return {};
   return {
     ...(take && { take }),
@@ -56,15 +59,15 @@ export function taken(
   };
 }
 
-/** The same and the feet, of clips. */
-export function manner(
+/** Fields of a question for a clip: of its take, and of its feet. */
+export function takeAndFeet(
   source: Source,
   card: ModelCard,
   state: Pick<State, "take" | "variety" | "detail" | "stands">,
 ): Pick<ClipQuestion, "take" | "variety" | "detail" | "feet"> {
-  const told = served(source) && state.stands !== usual(card);
+  const told = served(source) && state.stands !== standsByDefault(card);
   return {
-    ...taken(source, card, state),
+    ...takeFields(source, card, state),
     ...(told && { feet: state.stands ? "stand" : "as_predicted" }),
   };
 }

@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { says } from "../src/feet-words.ts";
 import { initial } from "../src/hash.ts";
 import type { Source } from "../src/page.ts";
-import { beside, LAST, manner, next, taken } from "../src/takes.ts";
+import { LARGEST_SEED, nextSeed, otherTakes, takeAndFeet, takeFields } from "../src/takes.ts";
 import { CARD as PLAIN } from "./card.ts";
 
 const CARD = {
@@ -20,30 +20,30 @@ const COPY = {} as Source;
 const START = initial("hop", CARD);
 
 test("the prediction asks for nothing new, so that its answer is that of before", () => {
-  assert.deepEqual(manner(SERVICE, CARD, START), {});
-  assert.deepEqual(manner(SERVICE, CARD, { ...START, variety: 0.2 }), {});
+  assert.deepEqual(takeAndFeet(SERVICE, CARD, START), {});
+  assert.deepEqual(takeAndFeet(SERVICE, CARD, { ...START, variety: 0.2 }), {});
 });
 
 test("a take asks for its seed, and for what is not usual", () => {
-  assert.deepEqual(manner(SERVICE, CARD, { ...START, take: 7 }), { take: 7 });
+  assert.deepEqual(takeAndFeet(SERVICE, CARD, { ...START, take: 7 }), { take: 7 });
   const all = { ...START, take: 7, variety: 0, detail: true, stands: false } as const;
   const said = { take: 7, variety: 0, detail: true };
-  assert.deepEqual(taken(SERVICE, CARD, all), said);
-  assert.deepEqual(manner(SERVICE, CARD, all), { ...said, feet: "as_predicted" });
-  assert.deepEqual(taken(SERVICE, CARD, { ...START, detail: true }), { detail: true });
+  assert.deepEqual(takeFields(SERVICE, CARD, all), said);
+  assert.deepEqual(takeAndFeet(SERVICE, CARD, all), { ...said, feet: "as_predicted" });
+  assert.deepEqual(takeFields(SERVICE, CARD, { ...START, detail: true }), { detail: true });
 });
 
 test("a model without details is asked for none, and a copy of the page for nothing", () => {
-  assert.deepEqual(taken(SERVICE, PLAIN, { ...START, detail: true }), {});
+  assert.deepEqual(takeFields(SERVICE, PLAIN, { ...START, detail: true }), {});
   const all = { ...START, take: 7, detail: true, stands: false } as const;
-  assert.deepEqual(manner(COPY, CARD, all), {});
+  assert.deepEqual(takeAndFeet(COPY, CARD, all), {});
 });
 
 test("seeds go on, around the last, and a fan leaves out the one that is shown", () => {
-  assert.deepEqual([0, 1, LAST].map(next), [1, 2, 1]);
-  assert.deepEqual(beside(0, 5), [1, 2, 3, 4, 5]);
-  assert.deepEqual(beside(3, 5), [1, 2, 4, 5, 6]);
-  assert.deepEqual(beside(70, 2), [1, 2]);
+  assert.deepEqual([0, 1, LARGEST_SEED].map(nextSeed), [1, 2, 1]);
+  assert.deepEqual(otherTakes(0, 5), [1, 2, 3, 4, 5]);
+  assert.deepEqual(otherTakes(3, 5), [1, 2, 4, 5, 6]);
+  assert.deepEqual(otherTakes(70, 2), [1, 2]);
 });
 
 const STANCE = { joint: "Foot", begin: 0, end: 0.5, position: [0, 0, 0] };
