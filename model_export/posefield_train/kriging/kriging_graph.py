@@ -219,7 +219,8 @@ def _sigma(
     # Two columns: see `GraphBuilder.row_sums`.
     pairs = net("Expand", _sill(bank, net), ends["pairs"])
     terms = net("Mul", net("MatMul", own, form), own)
-    variance = net("Relu", net("Gemm", terms, pairs, net("Exp", logarithm)))
+    # Not Relu, which onnxruntime-web 1.23 fuses with Gemm into an operator that it lacks.
+    variance = net("Max", net("Gemm", terms, pairs, net("Exp", logarithm)), net.number(0.0))
     return net("Gather", net("Sqrt", variance), net.weights("first", np.array(0)), axis=1)
 
 
