@@ -39,6 +39,15 @@ def test_standing_feet_slide_less_and_cost_little(found):
         assert 0.0 <= own.lowered <= 0.08
 
 
+def test_feet_that_are_locked_without_swing_rules_slide_more(found):
+    """Negative control: rules of swings, and not the contacts alone, make feet stand."""
+    locked, standing = (
+        np.mean([getattr(own, name).weighted_skate for own in found])
+        for name in ("locked", "standing")
+    )
+    assert locked > standing
+
+
 def test_facts_are_ratios_of_means_and_centimetres(found):
     told = feet_summary.facts(found)
     captured = sum(own.captured.acceleration for own in found)

@@ -240,6 +240,7 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
     from posefield_train.evaluate import corrections, protocol
     from posefield_train.evaluate.footing import feet_summary
     from posefield_train.evaluate.summary import evaluation_summary, performer_summary
+    from posefield_train.evaluate.variation import take_summary
 
     names = wanted.protocols or protocol.protocols(own.recipe, own.examples)
     counts = [protocol.count_jobs(own.examples, name) for name in names]
@@ -260,6 +261,8 @@ def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]
                 wanted.print(f"{corrections.table(results[-1])}\n")
             if results[-1].feet:
                 wanted.print(f"{feet_summary.table(results[-1].feet)}\n")
+            if told := take_summary.table(results[-1].variation):
+                wanted.print(f"{told}\n")
     for text in performer_summary.performer_text(results):
         wanted.print(text)
     return results

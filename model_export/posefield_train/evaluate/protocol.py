@@ -32,6 +32,9 @@ from posefield_train.evaluate.footing.standing_answers import FeetAnswer
 from posefield_train.evaluate.methods import EXACT, OURS, Queries
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.support_flags import SupportFlags
+from posefield_train.evaluate.variation import take_answers, take_summary
+from posefield_train.evaluate.variation.take_answers import TakeResults
+from posefield_train.evaluate.variation.take_summary import Takes
 from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
@@ -62,8 +65,9 @@ class EvaluationResult:
     flag; None against the truth, which has no held-out clips. bodies: at the event, of captured
     clips and of posefield's predictions. parents: of the joints. contacts: accuracy of posefield's
     (C,); empty without contacts, and against the truth. feet: of the service's answers (C,); empty
-    without feet, in place, and against the truth. curves: names. has_positions: False for
-    clips of curves without a skeleton, of which measures of positions say nothing.
+    without feet, in place, and against the truth. variation: takes of the clips.
+    curves: names. has_positions: False for clips of curves without a skeleton, of which measures of
+    positions say nothing.
     """
 
     family: str
@@ -80,6 +84,7 @@ class EvaluationResult:
     parents: tuple[int, ...] = ()
     contacts: tuple[ContactAccuracy, ...] = ()
     feet: tuple[FeetAnswer, ...] = ()
+    variation: Takes = field(default_factory=Takes)
     curves: tuple[str, ...] = ()
     has_positions: bool = True
 
@@ -105,6 +110,7 @@ class PartialResult:
     parents: tuple[int, ...]
     contacts: Sequence[ContactAccuracy] = ()
     feet: Sequence[FeetAnswer] = ()
+    takes: TakeResults | None = None
 
     def of(self, name: str) -> Sequence[MotionErrors | None]:
         """Return the errors of a method, None for each clip if it predicted none."""
@@ -212,7 +218,10 @@ def run_fold(
     contacts = _contact_accuracies(made, HeldOutClips(rest, held), asked)
     by_clip = held if protocol == "clip" else []
     feet = standing_answers.feet_answers(recipe.name, made.file, by_clip, _relative_distance)
-    return replace(found, contacts=contacts, feet=feet)
+    takes = None
+    if protocol == "clip":
+        takes = take_answers.take_results(recipe.name, made.file, held, fold.held)
+    return replace(found, contacts=contacts, feet=feet, takes=takes)
 
 
 def _relative_distance(made: Clip, captured: Clip) -> float:
@@ -342,5 +351,6 @@ def _merge_parts(
         # A fold without a clip in contact has no contacts.
         contacts=tuple(contacts[i] for i in order) if len(contacts) == len(order) else (),
         feet=tuple(feet[i] for i in order) if len(feet) == len(order) else (),
+        variation=take_summary.merge([part.takes for part in listed], order.tolist()),
         has_positions=recipe.curves is None or not recipe.curves.alone,
     )

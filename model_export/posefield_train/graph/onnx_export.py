@@ -73,6 +73,7 @@ def export_finest(recipe: Recipe, trained: TrainedModel) -> bytes:
     alone = recipe.model_copy(update={"size": size, "presets": {}})
     laddered = levels.build_levels(alone, trained)
     own_card = trained_card.build_card(alone, trained, laddered.levels, [], parity=0.0)
+    own_card = take_statistics.estimate(trained).on_card(own_card)
     return laddered.model.onnx(model_card.dump(own_card), _producer())
 
 

@@ -24,10 +24,14 @@ DETAIL_CACHE = 512
 
 
 class TakeVariation:
-    """Variation of the motions of one model."""
+    """Variation of the motions of one model.
 
-    def __init__(self, session: Session) -> None:
+    eventful_times: number of time functions, the first ones, that vary in a motion without cycle.
+    """
+
+    def __init__(self, session: Session, eventful_times: int = EVENTFUL_TIMES) -> None:
         self._session = session
+        self._eventful_times = eventful_times
         self._sampler = TakeSampler(session)
         self._detail_cached = lru_cache(DETAIL_CACHE)(self._detail)
 
@@ -67,7 +71,7 @@ class TakeVariation:
         count = min(modes, bench.spread.residuals.shape[1])
         motions = by[:, :count] @ bench.spread.residuals.T
         if not card.cyclic:
-            motions.reshape(-1, times, freedoms)[:, EVENTFUL_TIMES:] = 0.0
+            motions.reshape(-1, times, freedoms)[:, self._eventful_times :] = 0.0
             return motions
         # Files of earlier versions have no joint root; their cycles last and travel as predicted.
         root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, by.shape[1])))

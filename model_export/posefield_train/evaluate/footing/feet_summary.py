@@ -9,7 +9,9 @@ from posefield_train.evaluate.footing.foot_quality import FootQuality
 from posefield_train.evaluate.footing.standing_answers import FeetAnswer
 from posefield_train.report.drawing import markdown_table, significant_digits
 
-HEADER = ("feet", "captured", "as predicted", "standing")
+HEADER = ("feet", "captured", "as predicted", "standing", "without swing rules")
+NAMES = ("predicted", "standing", "locked")
+"""Answers that are compared with captured clips, in the order of the columns."""
 RATIOS: dict[str, tuple[str, Callable[[FootQuality], float]]] = {
     "skate": ("planted feet, speed over captured", lambda own: own.skate),
     "weighted_skate": ("low feet, weighted speed over captured", lambda own: own.weighted_skate),
@@ -39,13 +41,12 @@ def facts(found: Sequence[FeetAnswer]) -> dict[str, Any]:
             name: significant_digits.round_number(
                 100.0 * min(getattr(own, name).lowest for own in found)
             )
-            for name in ("captured", "predicted", "standing")
+            for name in ("captured", *NAMES)
         },
     }
     for key, (_, value) in RATIOS.items():
         told[key] = {
-            name: significant_digits.round_number(_ratio(found, name, value))
-            for name in ("predicted", "standing")
+            name: significant_digits.round_number(_ratio(found, name, value)) for name in NAMES
         }
     return told
 
@@ -56,15 +57,15 @@ def rows(found: Sequence[FeetAnswer]) -> tuple[tuple[str, ...], ...]:
         return ()
     own = facts(found)
     ratios = [
-        (words, "1", *(f"{own[key][name]:.2f}" for name in ("predicted", "standing")))
+        (words, "1", *(f"{own[key][name]:.2f}" for name in NAMES))
         for key, (words, _) in RATIOS.items()
     ]
     errors = [f"{own[key]:.2f}" for key in ("predicted_error_cm", "standing_error_cm")]
     return (
         *ratios,
-        ("relative distance (cm)", "", *errors),
+        ("relative distance (cm)", "", *errors, ""),
         ("lowest foot (cm)", *(f"{value:.1f}" for value in own["lowest_cm"].values())),
-        ("pelvis lowered, worst clip (cm)", "", "", f"{own['lowered_worst_cm']:.1f}"),
+        ("pelvis lowered, worst clip (cm)", "", "", f"{own['lowered_worst_cm']:.1f}", ""),
     )
 
 

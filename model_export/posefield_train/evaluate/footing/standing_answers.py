@@ -1,10 +1,11 @@
 """Answers of the service with feet as predicted and with standing feet, for held-out clips."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from posefield.feet import limb_choice
 from posefield.inference import session
+from posefield.model_file.model_card import ModelCard
 from posefield.motion.clip import Clip
 from posefield.question.motion_question import ClipQuestion, FeetMode, LabelValue
 from posefield.synthesis import clips
@@ -13,6 +14,8 @@ from posefield_train.evaluate.footing import foot_quality
 from posefield_train.evaluate.footing.foot_quality import FootQuality
 from posefield_train.source.ingest import Example
 
+NO_LIMIT = 1e6
+"""Duration of a swing, s, that none exceeds."""
 Distance = Callable[[Clip, Clip], float]
 """Distance of a made clip from a captured one, m."""
 
@@ -21,6 +24,8 @@ Distance = Callable[[Clip, Clip], float]
 class FeetAnswer:
     """Measures of one held-out clip: as captured, as predicted, and with standing feet.
 
+    locked: with feet that keep their places in contacts, whose swings are as predicted, neither
+    shortened nor lifted as captured ones; a negative control of the rules of swings.
     predicted_error, standing_error: mean relative distance from the captured clip after time
     warping, m. lowered: largest distance by which the pelvis was lowered, m.
     """
@@ -28,6 +33,7 @@ class FeetAnswer:
     captured: FootQuality
     predicted: FootQuality
     standing: FootQuality
+    locked: FootQuality
     predicted_error: float
     standing_error: float
     lowered: float
@@ -41,38 +47,81 @@ def feet_answers(
     Empty for a model whose feet do not stand: in place, without feet, or without legs.
     """
     model = Synthesizer(name, session.open_bytes(file, name))
-    card = model.session.card
+    joints = measured_joints(model.session.card)
+    if joints is None:
+        return []
+    models = _Models(model, _without_swing_rules(model))
+    return [_feet_answer(models, example, joints, distance) for example in held]
+
+
+@dataclass(frozen=True)
+class MeasuredJoints:
+    """Indices of the joints that `foot_quality` measures: feet and knees, one for each leg."""
+
+    feet: tuple[int, ...]
+    knees: tuple[int, ...]
+
+    def measure(self, clip: Clip, rate: float) -> FootQuality:
+        """Return the measures of a clip at a frame rate."""
+        return foot_quality.measure(clip, rate, self.feet, self.knees)
+
+
+def measured_joints(card: ModelCard) -> MeasuredJoints | None:
+    """Return the feet and knees of a character whose feet can stand, else None.
+
+    Feet stand in motions that travel, at the ends of legs.
+    """
     own = card.skeleton
     legs = limb_choice.choose_limbs(own.parents, own.offsets, card.feet, ()).character.legs
     if not legs or card.root != "travelling":
-        return []
-    feet, knees = tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs)
-    return [_feet_answer(model, example, (feet, knees), distance) for example in held]
+        return None
+    return MeasuredJoints(tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs))
+
+
+@dataclass(frozen=True)
+class _Models:
+    """A model, and the same without the rules of swings."""
+
+    own: Synthesizer
+    locked: Synthesizer
 
 
 def _feet_answer(
-    model: Synthesizer,
+    models: _Models,
     example: Example,
-    joints: tuple[tuple[int, ...], tuple[int, ...]],
+    joints: MeasuredJoints,
     distance: Distance,
 ) -> FeetAnswer:
-    """Return the measures of one clip. joints: of the feet and of the knees."""
+    """Return the measures of one clip."""
     clip = example.captured or example.clip
     rate = min(foot_quality.HIGHEST_RATE, clip.rate)
-    predicted = clips.synthesize_clip(model, _question(model, example, rate, "as_predicted"))
-    standing = clips.synthesize_clip(model, _question(model, example, rate, "stand"))
+    standing_question = question(models.own, example, rate, "stand")
+    predicted = clips.synthesize_clip(
+        models.own, question(models.own, example, rate, "as_predicted")
+    )
+    standing = clips.synthesize_clip(models.own, standing_question)
+    locked = clips.synthesize_clip(models.locked, standing_question)
     report = standing.trust.feet
     return FeetAnswer(
-        foot_quality.measure(clip, rate, *joints),
-        foot_quality.measure(predicted.clip, rate, *joints),
-        foot_quality.measure(standing.clip, rate, *joints),
+        joints.measure(clip, rate),
+        joints.measure(predicted.clip, rate),
+        joints.measure(standing.clip, rate),
+        joints.measure(locked.clip, rate),
         distance(predicted.clip, clip),
         distance(standing.clip, clip),
         report.lowered if report else 0.0,
     )
 
 
-def _question(model: Synthesizer, example: Example, rate: float, feet: FeetMode) -> ClipQuestion:
+def _without_swing_rules(model: Synthesizer) -> Synthesizer:
+    """Return the model without the captured swings' durations and clearance."""
+    card = model.session.card
+    free = tuple(replace(own, longest_swing=NO_LIMIT, clearance=0.0) for own in card.contacts)
+    return Synthesizer(model.name, replace(model.session, card=replace(card, contacts=free)))
+
+
+def question(model: Synthesizer, example: Example, rate: float, feet: FeetMode) -> ClipQuestion:
+    """Return the question for a held-out clip, at a frame rate and without targets."""
     card = model.session.card
     known = {own.name: set(own.names) for own in card.labels}
     labels: dict[str, LabelValue] = {

@@ -12,6 +12,7 @@ from posefield_train.evaluate.pages import evaluation_charts
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.evaluate.summary import evaluation_summary, method_summary
 from posefield_train.evaluate.summary.method_summary import NOT_APPLICABLE, MethodSummary
+from posefield_train.evaluate.variation import take_summary
 from posefield_train.report.drawing.html_page import Page, Section, Table
 
 TITLES = {
@@ -77,6 +78,7 @@ def _section(result: EvaluationResult) -> Section:
             *_curves(result, found),
             *_corrections(result),
             *_feet(result),
+            *_takes(result),
         ),
         (
             evaluation_charts.method_bars(found),
@@ -108,6 +110,12 @@ def _feet(result: EvaluationResult) -> list[Table]:
     rows = feet_summary.rows(result.feet)
     caption = "Feet of the service's clips: as predicted, and standing"
     return [Table(caption, feet_summary.HEADER, rows)] if rows else []
+
+
+def _takes(result: EvaluationResult) -> list[Table]:
+    rows = take_summary.rows(result.variation)
+    caption = "Takes: random fields against the model's, and motions against captured ones"
+    return [Table(caption, take_summary.HEADER, rows)] if rows else []
 
 
 def _other_methods(found: Sequence[MethodSummary]) -> list[MethodSummary]:

@@ -14,6 +14,7 @@ from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.evaluate.summary import method_summary
 from posefield_train.evaluate.summary.method_summary import NOT_APPLICABLE, MethodSummary
+from posefield_train.evaluate.variation import take_summary
 from posefield_train.report.drawing import markdown_table, significant_digits
 
 
@@ -78,6 +79,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
     """Return the figures of a result as JSON values."""
     held = {} if result.flags is None else {"support": result.flags.facts()}
     contacts = held_out_contacts.mean_facts(result.contacts) if result.contacts else None
+    takes = take_summary.facts(result.variation)
     by_joint = joint_sigma_ratios(result)
     methods = {summary.name: summary.facts() for summary in summarize(result)}
     if EXACT in methods:
@@ -93,6 +95,7 @@ def facts(result: EvaluationResult) -> dict[str, Any]:
         **held,
         **({"contacts": contacts} if contacts else {}),
         **({"feet": feet_summary.facts(result.feet)} if result.feet else {}),
+        **({"takes": takes} if takes else {}),
         "equal_information": equal_information.facts(result),
         "methods": methods,
     }

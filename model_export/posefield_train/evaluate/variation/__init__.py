@@ -1,0 +1,1 @@
+"""Measures of takes and of sampled detail, for held-out clips."""

@@ -1,0 +1,135 @@
+"""Takes of the service for held-out clips, compared with the captured motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from msgspec import structs
+
+from posefield.constraints.take_variation import TakeVariation
+from posefield.inference import session
+from posefield.inference.takes import TakeSettings
+from posefield.motion.clip import Clip, assemble
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train.evaluate.footing import standing_answers
+from posefield_train.evaluate.footing.foot_quality import FootQuality
+from posefield_train.evaluate.footing.standing_answers import MeasuredJoints
+from posefield_train.evaluate.variation import field_statistics
+from posefield_train.evaluate.variation.field_statistics import FieldStatistics
+from posefield_train.source.ingest import Example
+
+RATE = 30.0
+"""Frames a second: a clip's default. Motions are stored at about 30 to 55 frames a second, so that
+acceleration at higher rates is that of the interpolation.
+"""
+FIRST_SEED = 1
+"""Seed of the first held-out clip; each has its own, since clips of one seed vary alike."""
+
+
+@dataclass(frozen=True)
+class TakeAnswer:
+    """Measures of a held-out clip: as captured, predicted, and as a take.
+
+    predicted: with feet as predicted. take, sliding: with standing feet, and with feet as
+    predicted. unlimited: `sliding` with all time functions varied, a negative control; None for
+    cycles, of which all are. detailed, lively: the prediction and the take with detail, the latter
+    with standing feet; None for models without.
+    """
+
+    captured: FootQuality
+    predicted: FootQuality
+    take: FootQuality
+    sliding: FootQuality
+    unlimited: FootQuality | None
+    detailed: FootQuality | None
+    lively: FootQuality | None
+
+
+@dataclass(frozen=True)
+class TakeResults:
+    """Takes of the held-out clips of a fold, and the random fields that its model draws them of.
+
+    fields: None for a covariance that no takes can be drawn of; clips is empty then, and without
+    feet that can stand.
+    """
+
+    clips: Sequence[TakeAnswer]
+    fields: FieldStatistics | None
+
+
+def take_results(
+    name: str, file: bytes, held: Sequence[Example], places: Sequence[int]
+) -> TakeResults:
+    """Return the takes of a model file for held-out clips, whose indices are `places`."""
+    model = Synthesizer(name, session.open_bytes(file, name))
+    card = model.session.card
+    seeds = [FIRST_SEED + place for place in places]
+    fields = field_statistics.measure(model.session.kriging_weights, seeds[0])
+    joints = standing_answers.measured_joints(card)
+    if fields is None or joints is None:
+        return TakeResults((), fields)
+    found = [
+        _take_answer(_Asked(model, example, seed), joints)
+        for example, seed in zip(held, seeds, strict=True)
+    ]
+    return TakeResults(found, fields)
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A model, a held-out clip, and the seed of its take."""
+
+    model: Synthesizer
+    example: Example
+    seed: int
+
+    @property
+    def plain(self) -> ClipQuestion:
+        """Return the question for the prediction, with feet as predicted."""
+        return standing_answers.question(self.model, self.example, RATE, "as_predicted")
+
+    @property
+    def taken(self) -> ClipQuestion:
+        """Return the question for the take, with feet as predicted."""
+        return structs.replace(self.plain, take=self.seed)
+
+
+def _take_answer(asked: _Asked, joints: MeasuredJoints) -> TakeAnswer:
+    model, taken = asked.model, asked.taken
+    standing = structs.replace(taken, feet="stand")
+    has_detail = bool(model.session.card.making.detail)
+
+    def measured(question: ClipQuestion) -> FootQuality:
+        return joints.measure(clips.synthesize_clip(model, question).clip, RATE)
+
+    def detailed(question: ClipQuestion) -> FootQuality | None:
+        return measured(structs.replace(question, detail=True)) if has_detail else None
+
+    cyclic = model.session.card.cyclic
+    return TakeAnswer(
+        joints.measure(asked.example.captured or asked.example.clip, RATE),
+        measured(asked.plain),
+        measured(standing),
+        measured(taken),
+        None if cyclic else joints.measure(_unlimited(model, taken), RATE),
+        detailed(asked.plain),
+        detailed(standing),
+    )
+
+
+def _unlimited(model: Synthesizer, asked: ClipQuestion) -> Clip:
+    """Return a take that varies all time functions of a motion without cycle."""
+    question, solver = model.question(asked), model.solver
+    bench, card = solver.corrector(question.level), model.session.card
+    state = model.session.state(question.point, np.zeros(1), question.labels, question.level)
+    variation = TakeVariation(model.session, len(bench.reduced.core))
+    settings = TakeSettings(asked.take, asked.variety, detail=False)
+    held = variation.vary(bench, bench.predict(state), question, settings)
+    times = np.arange(0.0, held.duration, 1.0 / asked.fps)
+    trust = replace(model.constrained_trust(asked, question, held), targets=())
+    found = solver.poses(question, held, times, trust)
+    return assemble(
+        card.skeleton, found.rotations, found.root_position, found.bone_offsets, asked.fps
+    )
