@@ -6,6 +6,7 @@ OPENBLAS_NUM_THREADS=1 .venv/bin/python benchmarks/crowd.py
 import tempfile
 from pathlib import Path
 
+import clip_feet
 import crowd_bounds
 import crowd_feet
 import crowd_models
@@ -18,7 +19,7 @@ from rows import Row, table
 
 
 def rows(made: Family) -> list[Row]:
-    """Poses of the procedural family, rivals of the same crowd, and crowds that walk."""
+    """Poses of the procedural family, rivals of the same crowd, and walking crowds and clips."""
     model, walks = crowd_models.reaching(made), crowd_models.walks()
     return [
         *crowd_poses.rows(model),
@@ -26,6 +27,7 @@ def rows(made: Family) -> list[Row]:
         *crowd_rivals.rows(made, model),
         *crowd_walk.rows(walks),
         *crowd_feet.rows(walks),
+        *clip_feet.rows(walks),
     ]
 
 

@@ -209,6 +209,11 @@ def _change(key: str) -> Callable[[Found], str]:
     return lambda own: f"{own[key]['predicted']:.2f} → {own[key]['standing']:.2f}"
 
 
+def _locked(key: str) -> Callable[[Found], str]:
+    """Return the text of feet that are locked without swing rules; empty where not measured."""
+    return lambda own: f"{own[key]['locked']:.2f}" if "locked" in own[key] else ""
+
+
 FEET_ROWS: tuple[tuple[str, Callable[[Found], str], str], ...] = (
     ("speed of planted feet over captured", _change("skate"), "1.2, 1.0"),
     (
@@ -216,6 +221,8 @@ FEET_ROWS: tuple[tuple[str, Callable[[Found], str], str], ...] = (
         _change("weighted_skate"),
         "1.0, 0.8",
     ),
+    ("speed of planted feet, locked without rules of swings", _locked("skate"), ""),
+    ("weighted speed of low feet, locked without rules of swings", _locked("weighted_skate"), ""),
     (
         "relative distance, cm",
         lambda own: f"{own['predicted_error_cm']:.2f} → {own['standing_error_cm']:.2f}",

@@ -6,6 +6,7 @@ from itertools import chain
 import equal_tables
 import evaluation_tables as tables
 import measured_tables
+import take_tables
 from evaluation_tables import Rows, known_performer, new_performer
 
 SPEED = tuple(f"speed/{name}" for name in ("training", "requests", "viewer", "crowds", "files"))
@@ -37,6 +38,14 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "feet": lambda: (
         ["measure", *(tables.ALL_FAMILIES[own] for own in tables.feet_families()), tables.GOALS],
         tables.feet(),
+    ),
+    "takes": lambda: (
+        [
+            "measure",
+            *(tables.ALL_FAMILIES[own] for own in take_tables.take_families()),
+            tables.GOALS,
+        ],
+        take_tables.takes(),
     ),
     "exact": lambda: (
         [*tables.headings("target at the event", known_performer), tables.GOALS],

@@ -107,9 +107,20 @@ def evaluate_poses(
 
     bones: (..., J, 3), m. rotations: (..., F, J, 4). roots: (..., F, 3), m.
     """
+    return evaluate_joints(parents, bones, [limb.tip for limb in limbs], rotations, roots)
+
+
+def evaluate_joints(
+    parents: Sequence[int],
+    bones: Annotated[Floats, "*characters joints 3"],
+    wanted: Sequence[int],
+    rotations: Annotated[Floats, "*characters frames joints 4"],
+    roots: Points,
+) -> LimbPoses:
+    """Return the poses of joints and of those above them; arguments as for `evaluate_poses`."""
     needed = {0}
-    for limb in limbs:
-        needed.update(skeleton.joint_chain(tuple(parents), limb.tip))
+    for joint in wanted:
+        needed.update(skeleton.joint_chain(tuple(parents), joint))
     joints = tuple(sorted(needed))
     places = {joint: place for place, joint in enumerate(joints)}
     own = tuple(places.get(parents[joint], -1) for joint in joints)

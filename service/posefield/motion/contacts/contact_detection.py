@@ -90,7 +90,8 @@ def runs(mask: Annotated[Booleans, "frames"], cyclic: bool) -> list[Annotated[In
         return [np.arange(count)]
     # Begin a cycle behind a frame of False, so that no run passes its end.
     start = int(np.argmin(mask)) if cyclic else 0
-    turned = np.concatenate([[False], np.roll(mask, -start), [False]])
+    # `np.roll` takes twice the time of all the rest.
+    turned = np.concatenate([[False], mask[start:], mask[:start], [False]])
     edges = np.flatnonzero(turned[1:] != turned[:-1]).reshape(-1, 2)
     return [(np.arange(first, end) + start) % count for first, end in edges]
 

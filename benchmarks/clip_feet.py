@@ -1,0 +1,68 @@
+"""Cost of a clip's standing feet and of a take, as processor time in one thread."""
+
+import time
+from collections.abc import Callable, Mapping
+from statistics import median
+
+from msgspec import structs
+from rows import Row
+from threadpoolctl import threadpool_limits
+
+from posefield.locomotion.gait import Gait
+from posefield.question.motion_question import ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+
+FRAMES, ROUNDS, QUESTIONS = 60, 15, 8
+FEET_GOAL, TAKE_GOAL = 5.0, 1.0
+"""Milliseconds."""
+
+
+def rows(walks: dict[str, Gait]) -> list[Row]:
+    """Processor milliseconds of standing feet and of a take, beside those of the prediction."""
+    models = {name: Synthesizer("walk", gait.session) for name, gait in walks.items()}
+    return [row for name, model in models.items() for row in model_rows(name, model)]
+
+
+def model_rows(name: str, model: Synthesizer) -> list[Row]:
+    """Return the rows of one model."""
+    plain = _question(model)
+    seeds = iter(range(1, 1_000_000))
+    # Standing feet are planned over the whole motion, whatever the frames that are asked for.
+    runs = {
+        "plain": lambda: clips.synthesize_clip(model, plain),
+        "stand": lambda: clips.synthesize_clip(model, structs.replace(plain, feet="stand")),
+        "take": lambda: clips.synthesize_clip(model, structs.replace(plain, take=next(seeds))),
+    }
+    taken = processor_seconds(runs)
+    feet, take = (1e3 * (taken[name] - taken["plain"]) for name in ("stand", "take"))
+    title = f"a clip of {FRAMES} frames, {name}, one thread"
+    words = f"processor time above that of the prediction, {1e3 * taken['plain']:.2g} ms"
+    return [
+        Row(f"standing feet of {title}", feet, "ms", words, None, FEET_GOAL),
+        Row(f"a take with a new seed, {title}", take, "ms", words, None, TAKE_GOAL),
+    ]
+
+
+def _question(model: Synthesizer) -> ClipQuestion:
+    """Return the question for the default motion in that many frames."""
+    card = model.session.card
+    asked = ClipQuestion(
+        controls={own.name: own.default for own in card.controls}, feet="as_predicted", exact="none"
+    )
+    duration = clips.synthesize_clip(model, asked).trust.duration
+    return structs.replace(asked, fps=(FRAMES - 1) / duration)
+
+
+def processor_seconds(runs: Mapping[str, Callable[[], object]]) -> dict[str, float]:
+    """Return the median processor seconds per call of each function, measured alternately."""
+    taken: dict[str, list[float]] = {name: [] for name in runs}
+    with threadpool_limits(limits=1):
+        for _ in range(ROUNDS + 1):
+            for name, run in runs.items():
+                begun = time.process_time()
+                for _ in range(QUESTIONS):
+                    run()
+                taken[name].append((time.process_time() - begun) / QUESTIONS)
+    # The first round fills caches.
+    return {name: median(times[1:]) for name, times in taken.items()}
