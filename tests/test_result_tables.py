@@ -15,6 +15,7 @@ import evaluation_tables  # noqa: E402
 import measure_models  # noqa: E402
 import measured_tables  # noqa: E402
 import result_tables  # noqa: E402
+import take_tables  # noqa: E402
 from rows import Row, record  # noqa: E402
 
 
@@ -200,3 +201,29 @@ def test_the_table_of_feet_is_that_of_the_files(folder):
     cells = [row[1] for row in evaluation_tables.feet()]
     changes = ["2.00 → 0.25", "2.00 → 0.25", "5.00 → 5.10", "1.00 → 1.10", "1.00 → 1.10", "4.0"]
     assert cells == changes
+
+
+def test_takes_stand_beside_their_negative_controls(folder):
+    assert take_tables.take_families() == [] and len(list(take_tables.takes())) == 9
+    fields = {
+        "variogram": [0.98, 1.02],
+        "variance": 1.01,
+        "mean_in_standard_errors": 1.0,
+        "controls": {
+            "variogram_of_half_scales": [0.5, 0.9],
+            "variance_without_conditioning": 6.0,
+            "mean_in_standard_errors_of_equal_errors": 4.0,
+        },
+    }
+    answers = {"predicted": 0.9, "take": 1.0, "sliding": 1.5, "unlimited": 2.0}
+    moving = dict.fromkeys(("acceleration", "skate", "weighted_skate"), answers)
+    for name, takes in {"one": fields, "two": fields | {"clips": 9} | moving}.items():
+        (folder / f"{name}.json").write_text(json.dumps(family(2.0) | {"takes": takes}))
+    evaluation_tables.protocols.cache_clear()
+    # Of the other family only the fields were measured: its clips have no feet.
+    assert take_tables.take_families() == ["two"]
+    rows = {cells[0]: cells[1] for cells in take_tables.takes()}
+    assert rows["variance over kriging variance (without conditioning)"] == "1.01 (6.0)"
+    taken = "acceleration of a take over captured (all time functions varied)"
+    assert rows[taken] == "1.00 (2.00)"
+    assert rows["acceleration with detail over captured (without)"] == ""

@@ -1,6 +1,6 @@
 """Frames of a motion with the feet placed where the plan says."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -13,6 +13,7 @@ from posefield.feet.ball_path import Footsteps
 from posefield.feet.footsteps import FeetPlan
 from posefield.feet.stances import Cycle
 from posefield.locomotion import floor_plane
+from posefield.motion import skeleton
 
 
 @dataclass(frozen=True)
@@ -32,23 +33,36 @@ class FootPaths:
 
 
 def place_feet(
-    plan: FeetPlan, times: Frames, rotations: Rotations, roots: RootPath
+    plan: FeetPlan,
+    times: Frames,
+    rotations: Rotations,
+    roots: RootPath,
+    joints: Collection[int] | None = None,
 ) -> PlacedFrames:
     """Return the frames at times (S,), s, with the feet where the plan says.
 
     rotations (S, J, 4) and roots (S, 3), m: predicted poses at these times, of the motion that was
-    planned.
+    planned. joints: those whose positions are needed; limbs without any of them are not turned.
+    None for all.
     """
     body, at = plan.character, times * plan.rate
     poses = limbs.evaluate_poses(body.parents, body.bones, body.limbs, rotations, roots)
     shift = _shift(plan, at)
     turned = rotations.copy()
+    above = None if joints is None else _joints_above(body.parents, joints)
     for limb, target in _targets(plan, poses, at):
+        if above is not None and limb.upper not in above:
+            continue
         found = two_bone.solve(poses, limb, two_bone.reach(poses, limb, shift, target))
         turned[:, limb.upper] = found.upper
         turned[:, limb.middle] = found.middle
         turned[:, limb.lower] = found.lower
     return PlacedFrames(turned, roots + shift)
+
+
+def _joints_above(parents: tuple[int, ...], joints: Collection[int]) -> set[int]:
+    """Return the joints whose rotations move some joints."""
+    return {above for joint in joints for above in skeleton.joint_chain(parents, joint)[:-1]}
 
 
 def foot_paths(plan: FeetPlan) -> FootPaths:

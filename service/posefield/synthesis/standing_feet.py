@@ -182,9 +182,9 @@ def _measured(
         return found
     bones, parents = answer.bone_offsets, card.skeleton.parents
     times = np.arange(len(plan.lowered)) / plan.rate
-    after = foot_placement.place_feet(plan, times, before.rotations, before.root_position)
-    # The joints that are measured alone: the whole skeleton takes a fifth of the feet's time.
     joints = sorted({0, *(joint for _, measure in moving for joint in measure.joints)})
+    after = foot_placement.place_feet(plan, times, before.rotations, before.root_position, joints)
+    # The joints that are measured alone: the whole skeleton takes a fifth of the feet's time.
     both = [
         _joint_positions(limbs.evaluate_joints(parents, bones, joints, rotations, roots), joints)
         for rotations, roots in (
