@@ -192,14 +192,24 @@ def test_the_figures_of_models_are_those_of_the_shipped_files():
 def test_the_table_of_feet_is_that_of_the_files(folder):
     folder_file = evaluation_tables.FOLDER / "one.json"
     found = json.loads(folder_file.read_text())
-    ratios = {key: {"predicted": 2.0, "standing": 0.25} for key in ("skate", "weighted_skate")}
+    skate = {"predicted": 2.0, "standing": 0.25, "locked": 1.5}
+    ratios = dict.fromkeys(("skate", "weighted_skate"), skate)
     ratios |= {key: {"predicted": 1.0, "standing": 1.1} for key in ("acceleration", "knee_peak")}
     costs = {"predicted_error_cm": 5.0, "standing_error_cm": 5.1, "lowered_worst_cm": 4.0}
     folder_file.write_text(json.dumps(found | {"feet": ratios | costs}))
     evaluation_tables.protocols.cache_clear()
     assert evaluation_tables.feet_families() == ["one"], "the other family has none"
     cells = [row[1] for row in evaluation_tables.feet()]
-    changes = ["2.00 → 0.25", "2.00 → 0.25", "5.00 → 5.10", "1.00 → 1.10", "1.00 → 1.10", "4.0"]
+    changes = [
+        "2.00 → 0.25",
+        "2.00 → 0.25",
+        "1.50",
+        "1.50",
+        "5.00 → 5.10",
+        "1.00 → 1.10",
+        "1.00 → 1.10",
+        "4.0",
+    ]
     assert cells == changes
 
 

@@ -96,9 +96,7 @@ def _feet_answer(
     clip = example.captured or example.clip
     rate = min(foot_quality.HIGHEST_RATE, clip.rate)
     standing_question = question(models.own, example, rate, "stand")
-    predicted = clips.synthesize_clip(
-        models.own, question(models.own, example, rate, "as_predicted")
-    )
+    predicted = clips.synthesize_clip(models.own, question(models.own, example, rate))
     standing = clips.synthesize_clip(models.own, standing_question)
     locked = clips.synthesize_clip(models.locked, standing_question)
     report = standing.trust.feet
@@ -120,7 +118,9 @@ def _without_swing_rules(model: Synthesizer) -> Synthesizer:
     return Synthesizer(model.name, replace(model.session, card=replace(card, contacts=free)))
 
 
-def question(model: Synthesizer, example: Example, rate: float, feet: FeetMode) -> ClipQuestion:
+def question(
+    model: Synthesizer, example: Example, rate: float, feet: FeetMode = "as_predicted"
+) -> ClipQuestion:
     """Return the question for a held-out clip, at a frame rate and without targets."""
     card = model.session.card
     known = {own.name: set(own.names) for own in card.labels}

@@ -88,7 +88,7 @@ class _Asked:
     @property
     def plain(self) -> ClipQuestion:
         """Return the question for the prediction, with feet as predicted."""
-        return standing_answers.question(self.model, self.example, RATE, "as_predicted")
+        return standing_answers.question(self.model, self.example, RATE)
 
     @property
     def taken(self) -> ClipQuestion:
