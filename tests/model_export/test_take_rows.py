@@ -58,6 +58,15 @@ def test_a_covariance_without_fields_has_no_takes(weights):
     assert take_summary.facts(Takes()) == {} and take_summary.table(Takes()) == ""
 
 
+def test_few_samples_have_takes_without_statistics_of_fields(weights, found):
+    few = KrigingWeights(weights.hyper, weights.samples[:5])
+    assert field_statistics.measure(few, 1) is None
+    assert field_statistics.measure(KrigingWeights(weights.hyper, weights.samples[:6]), 1)
+    alone = Takes(found.clips)
+    assert "variance" not in take_summary.facts(alone)
+    assert len(take_summary.rows(alone)) == 3
+
+
 def test_takes_of_held_out_clips_are_measured_at_the_default_rate(found):
     assert ClipQuestion(controls={}).fps == take_answers.RATE
     assert len(found.clips) == len(HELD)

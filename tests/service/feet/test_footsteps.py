@@ -80,6 +80,20 @@ def test_four_feet_stand_and_step():
     assert np.abs(told.before - feet_of(motion)).max() < 1e-9
 
 
+def test_only_limbs_above_the_wanted_joints_are_turned():
+    motion, times = sliding(), np.arange(FRAMES) / RATE
+    plan = footsteps.plan_feet(body(), motion, [contact(motion, foot) for foot in FEET])
+    whole = placed(motion, plan)
+    wanted = {FEET[1], len(PARENTS) - 1}
+    found = foot_placement.place_feet(plan, times, motion.rotations, motion.roots, wanted)
+    assert np.array_equal(found.roots, whole.roots)
+    own = feet_of(SampledMotion(found.rotations, found.roots, RATE))
+    assert np.array_equal(own[:, 1], feet_of(whole)[:, 1])
+    # The other legs are as predicted.
+    assert np.array_equal(found.rotations[:, :4], motion.rotations[:, :4])
+    assert not np.array_equal(whole.rotations[:, :4], motion.rotations[:, :4])
+
+
 def test_a_join_of_two_motions_is_planned_as_one():
     """Contacts of one motion until the join, of the other from then on."""
     before, after = sliding(speed=0.3), sliding(speed=-0.2)

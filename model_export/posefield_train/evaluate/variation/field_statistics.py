@@ -15,6 +15,8 @@ SEEDS, FIELDS, PLACES, BINS = 24, 12, 48, 6
 """Seeds of a fold and independent fields of each; points at most; bins of distance."""
 WRONG_SCALE = 0.5
 """Factor of the scales in the negative control of the variogram."""
+FEWEST_PLACES = 5
+"""Fewest points: fewer have too few pairs for the bins."""
 
 Drawn = Annotated[Floats, "seeds fields points"]
 
@@ -41,10 +43,10 @@ class FieldStatistics:
 def measure(weights: KrigingWeights, first_seed: int) -> FieldStatistics | None:
     """Return the statistics over seeds from `first_seed` on, other ones for each fold.
 
-    None for a covariance without random fields.
+    None for a covariance without random fields, and for fewer than six samples.
     """
     hyper, places = weights.hyper, _places(weights)
-    if not random_field.has_features(hyper):
+    if not random_field.has_features(hyper) or len(places) < FEWEST_PLACES:
         return None
     seeds = [first_seed * SEEDS + step for step in range(SEEDS)]
     fields = [random_field.simulate(weights, seed, FIELDS) for seed in seeds]

@@ -9,6 +9,7 @@ from msgspec import structs
 from posefield.constraints.take_variation import TakeVariation
 from posefield.inference import session
 from posefield.inference.takes import TakeSettings
+from posefield.kriging import random_field
 from posefield.motion.clip import Clip, assemble
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
@@ -51,8 +52,8 @@ class TakeAnswer:
 class TakeResults:
     """Takes of the held-out clips of a fold, and the random fields that its model draws them of.
 
-    fields: None for a covariance that no takes can be drawn of; clips is empty then, and without
-    feet that can stand.
+    fields: None for a covariance that no takes can be drawn of, and for few samples. clips is empty
+    for such a covariance, and without feet that can stand.
     """
 
     clips: Sequence[TakeAnswer]
@@ -68,7 +69,7 @@ def take_results(
     seeds = [FIRST_SEED + place for place in places]
     fields = field_statistics.measure(model.session.kriging_weights, seeds[0])
     joints = standing_answers.measured_joints(card)
-    if fields is None or joints is None:
+    if joints is None or not random_field.has_features(card.kriging):
         return TakeResults((), fields)
     found = [
         _take_answer(_Asked(model, example, seed), joints)

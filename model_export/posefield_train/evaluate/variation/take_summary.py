@@ -26,7 +26,8 @@ ANSWERS = ("predicted", "take", "sliding", "unlimited", "detailed", "lively")
 class Takes:
     """Takes of all folds: of the clips (C,), in their order, and the fields of each fold's model.
 
-    Both are empty against the truth, and for a covariance that no takes can be drawn of.
+    Both are empty against the truth, and for a covariance that no takes can be drawn of; clips
+    without feet that can stand, and fields for models of few samples.
     """
 
     clips: Sequence[TakeAnswer] = ()
@@ -42,14 +43,13 @@ def merge(parts: Sequence[TakeResults | None], order: Sequence[int]) -> Takes:
 
 
 def facts(found: Takes) -> dict[str, Any]:
-    """Return the figures by name, ratios all of them; empty without fields.
+    """Return the figures by name, ratios all of them; empty without takes.
 
     Ranges are the least and the greatest of the bins of distance, each the mean over folds. In
     `controls` are the negative controls of the fields.
     """
-    if not found.fields:
-        return {}
-    return {**_field_facts(found.fields), **(_clip_facts(found.clips) if found.clips else {})}
+    fields = _field_facts(found.fields) if found.fields else {}
+    return fields | (_clip_facts(found.clips) if found.clips else {})
 
 
 def _field_facts(fields: Sequence[FieldStatistics]) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def _clip_facts(clips: Sequence[TakeAnswer]) -> dict[str, Any]:
         key: {
             name: _ratio(clips, name, value)
             for name in ANSWERS
-            if getattr(clips[0], name) is not None
+            if any(getattr(own, name) is not None for own in clips)
         }
         for key, value in MEASURES.items()
     }
@@ -98,12 +98,18 @@ def _rounded(value: Any) -> float:
 
 
 def rows(found: Takes) -> tuple[tuple[str, ...], ...]:
-    """Return the rows of the table under HEADER; empty without fields."""
+    """Return the rows of the table under HEADER; empty without takes."""
     told = facts(found)
-    if not told:
-        return ()
+    return (
+        *(_field_rows(told) if found.fields else ()),
+        *(_clip_rows(told) if found.clips else ()),
+    )
+
+
+def _field_rows(told: dict[str, Any]) -> list[tuple[str, str, str]]:
+    """Return the rows of the random fields."""
     other = told["controls"]
-    own = [
+    return [
         (
             "variogram over the model's, 6 distances",
             _range(told["variogram"]),
@@ -120,7 +126,6 @@ def rows(found: Takes) -> tuple[tuple[str, ...], ...]:
             f"{other['mean_in_standard_errors_of_equal_errors']:.2f} with equal errors at samples",
         ),
     ]
-    return (*own, *(_clip_rows(told) if found.clips else ()))
 
 
 def _clip_rows(told: dict[str, Any]) -> list[tuple[str, str, str]]:
@@ -145,6 +150,6 @@ def _range(values: Sequence[float]) -> str:
 
 
 def table(found: Takes) -> str:
-    """Return the table in Markdown; empty without fields."""
+    """Return the table in Markdown; empty without takes."""
     listed = rows(found)
     return markdown_table.markdown_table(HEADER, listed) if listed else ""
