@@ -77,6 +77,27 @@ class TakeVariation:
         root = np.array(card.making.take_root or np.zeros((CYCLE_VARIABLES, by.shape[1])))
         return np.hstack([motions, by @ root.T])
 
+    def along_paths(
+        self,
+        controls: Annotated[Floats, "paths points controls"],
+        labels: Annotated[Floats, "paths labels"],
+        seeds: Annotated[Indices, "paths"],
+    ) -> Annotated[Floats, "paths points modes"]:
+        """Return deviations (N, B, r3) of a cycle's coefficients along paths of controls (N, B, d).
+
+        They are uncorrelated, each with the variance of sigma: `change_coefficients` correlates
+        them. labels (N, p) and seeds (N,): one of each path; zero for seeds of zero.
+        """
+        modes = self._session.card.levels[0].ranks[2]
+        return self._sampler.along(controls, labels, seeds)[..., :modes]
+
+    def details(
+        self, seeds: Annotated[Indices, "paths"]
+    ) -> Annotated[Floats, "paths frames freedoms"]:
+        """Return the details (N, T, r1) of seeds (N,), at the finest level."""
+        card = self._session.card
+        return motion_detail.sample(motion_detail.deviations(card), card.frames, seeds)
+
     def detail(self, bench: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
         """Return the detail (T, r1) of a seed."""
         return self._detail_cached(seed)[:, : len(bench.reduced.directions)]
@@ -84,6 +105,15 @@ class TakeVariation:
     def _detail(self, seed: int) -> Annotated[Floats, "frames freedoms"]:
         card = self._session.card
         return motion_detail.sample(motion_detail.deviations(card), card.frames, seed)
+
+
+def change_coefficients(
+    bench: LevelCorrector, by: Annotated[Floats, "points values"]
+) -> Annotated[Floats, "points modes"]:
+    """Return the changes (B, r3) of a level's coefficients by deviations (B, m) of the finest."""
+    root = bench.spread.coefficients
+    # A coarser level has the leading coefficients, and these have the leading part of the root.
+    return np.asarray(by[:, : len(root)] @ root.T)
 
 
 def check(card: ModelCard, asked: MotionQuestion) -> None:

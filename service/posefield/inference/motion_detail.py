@@ -9,6 +9,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.kriging import philox
+from posefield.kriging.philox import Seeds
 from posefield.model_file.model_card import ModelCard
 
 STREAM = 3
@@ -34,8 +35,10 @@ def waves(frames: int, harmonics: int) -> Annotated[Floats, "frames waves"]:
     return np.hstack([np.cos(angles), np.sin(angles)])
 
 
-def sample(found: Deviations, frames: int, seed: int) -> Annotated[Floats, "frames freedoms"]:
-    """Return the detail (T, r1) of a seed: equal for all controls and labels."""
+def sample(
+    found: Deviations, frames: int, seed: Seeds
+) -> Annotated[Floats, "*seeds frames freedoms"]:
+    """Return the detail (..., T, r1) of each seed: equal for all controls and labels."""
     harmonics, freedoms = found.shape
     drawn = philox.normals(seed, STREAM, 2 * harmonics, freedoms)
-    return waves(frames, harmonics) @ (drawn * np.vstack([found, found]))
+    return np.asarray(waves(frames, harmonics) @ (drawn * np.vstack([found, found])))

@@ -63,6 +63,18 @@ class ReducedTensor:
         """Return the coefficients (S, r1) of the directions in a reduced motion (r2, r1)."""
         return self.with_detail(self.rows(places) @ motion, places)
 
+    def moves_of_coefficients(
+        self, coefficients: Annotated[Floats, "poses modes"], places: Annotated[Floats, "poses"]
+    ) -> Annotated[Floats, "poses freedoms"]:
+        """Return the coefficients (S, r1) of the directions of poses of motions of their own.
+
+        coefficients: sample coefficients (S, r3) of each motion. places: canonical frames (S,).
+        """
+        r2, r1, r3 = self.core.shape
+        motions = coefficients @ self.core.reshape(r2 * r1, r3).T
+        found = self.rows(places)[:, None] @ motions.reshape(-1, r2, r1)
+        return np.asarray(found[:, 0])
+
     def with_detail(
         self, moves: Annotated[Floats, "frames freedoms"], places: Frames
     ) -> Annotated[Floats, "frames freedoms"]:
@@ -73,9 +85,23 @@ class ReducedTensor:
         self, motion: Annotated[Floats, "times freedoms"], places: Frames
     ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
-        numbers = self.mean + self.moves(motion, places) @ self.directions
-        vectors = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(places), -1, 3)
-        return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
+        return self.poses_of_moves(self.moves(motion, places))[:2]
+
+    def poses_of_moves(
+        self, moves: Annotated[Floats, "poses freedoms"]
+    ) -> tuple[
+        Annotated[Floats, "poses joints 4"],
+        Annotated[Floats, "poses 3"],
+        Annotated[Floats, "poses curves"],
+    ]:
+        """Return rotations (S, J, 4), root positions (S, 3), m, and values (S, C) of the curves.
+
+        moves: coefficients (S, r1) of the directions.
+        """
+        numbers, end = self.mean + moves @ self.directions, 3 + 3 * len(self.rotations)
+        vectors = numbers[:, 3:end].reshape(len(moves), -1, 3)
+        turned = quat.mul(self.rotations, quat.exp(vectors))
+        return turned, numbers[:, :3], curves.clamp(self.curves, numbers[:, end:])
 
     def curve_values(
         self, motion: Annotated[Floats, "times freedoms"], places: Frames

@@ -27,6 +27,7 @@ class ResidualCovariance:
     """Covariance of a reduced motion (r2, r1) and of the variables beside it.
 
     All for a sigma of one metre. residuals: (r2 r1, r3), a root of the covariance of residuals.
+    coefficients: (r3, r3), the same for the sample coefficients, lower triangular.
     time: (r2, r2) and freedoms: (r1, r1), its marginals, their product scaled to its trace. beside:
     (b, b), covariance of the logarithm of the duration and of a cycle's travel; empty for motions
     without cycles. captured: (n, r2 r1), reduced motions of the captured clips. predicted: (n, r2
@@ -35,6 +36,7 @@ class ResidualCovariance:
     """
 
     residuals: Annotated[Floats, "reduced modes"]
+    coefficients: Annotated[Floats, "modes modes"]
     time: Annotated[Floats, "times times"]
     freedoms: Annotated[Floats, "freedoms freedoms"]
     beside: Annotated[Floats, "beside beside"]
@@ -81,7 +83,8 @@ def estimate(
     marginals = time / np.trace(time), freedoms
     flat = core.reshape(-1, r3).T
     motions = held @ flat, (held - missed) @ flat
-    return ResidualCovariance(spread.reshape(-1, r3), *marginals, own @ own.T, *motions, sigmas)
+    roots = spread.reshape(-1, r3), root
+    return ResidualCovariance(*roots, *marginals, own @ own.T, *motions, sigmas)
 
 
 def sample_coefficients(

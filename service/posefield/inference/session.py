@@ -24,6 +24,8 @@ from posefield.model_file.model_card import ModelCard
 # Estimate of memory: a model of 114 kB with four levels in use takes 3.1 MB, for twelve sessions
 # with weights.
 BASE_MEMORY, COPIES = 2 << 20, 12
+PATH_OUTPUTS = {"duration", "root_position", "travel"}
+"""Outputs without rotations: they take a third of the time of whole poses."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,8 @@ class Session:
     each level of detail. clocks: sessions that compute only the duration. gauges: the session that
     computes only sigma, at the finest level. states: sessions that compute a State. size: of the
     file, bytes. contact_sessions: sessions that compute only the contacts, none without them.
-    content: the file. golden: the answer at the default controls.
+    path_sessions: sessions that compute only the outputs in `PATH_OUTPUTS`. content: the file.
+    golden: the answer at the default controls.
     """
 
     card: ModelCard
@@ -63,6 +66,7 @@ class Session:
     size: int
     state_sessions: Sequence[Any] = ()
     contact_sessions: Sequence[Any] = ()
+    path_sessions: Sequence[Any] = ()
     content: bytes = field_of(default=b"", repr=False)
     golden: bytes = b""
 
@@ -168,7 +172,10 @@ class Session:
         feed = self._feed(controls, labels)
         feed["time"] = time.astype(np.float32, copy=False)
         poses = [name for name in outputs if name != CONTACTS]
-        answers: list[Any] = self.runtimes[level].run(poses, feed) if poses else []
+        # A walking crowd asks three times as often for strides as for poses.
+        alone = self.path_sessions and set(poses) <= PATH_OUTPUTS
+        runtimes = self.path_sessions if alone else self.runtimes
+        answers: list[Any] = runtimes[level].run(poses, feed) if poses else []
         if CONTACTS in outputs:
             (contacts,) = self.contact_sessions[level].run([CONTACTS], feed)
             answers.insert(outputs.index(CONTACTS), contacts)
@@ -300,6 +307,7 @@ def open_checked(content: bytes, card: ModelCard, source: str) -> Session:
         size=len(content),
         state_sessions=LazySessions(telling(*state_outputs(card)), count),
         contact_sessions=LazySessions(telling(CONTACTS), count) if card.contacts else (),
+        path_sessions=LazySessions(telling(*sorted(PATH_OUTPUTS)), count),
         content=content,
     )
     # The trial runs the finest level and its clock, which opens them.

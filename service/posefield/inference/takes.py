@@ -12,7 +12,7 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.array_shapes import PointControls, PointLabels, PointValues, Values
-from posefield.common.units import Indices
+from posefield.common.units import Floats, Indices
 from posefield.inference.session import Session
 from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import ConditionalField
@@ -22,6 +22,8 @@ FIELD_CACHE, DEVIATION_CACHE = 64, 4096
 """Numbers of cached fields, of about 200 kB each, and of deviations at one point, of 300 bytes. A
 crowd asks for the same points in every frame.
 """
+FIELDS_TOGETHER = 8
+"""Number of fields that are drawn at once: more of them outgrow a core's cache."""
 EVENTFUL_TIMES = 3
 """Time functions of a motion without cycle that a take varies, the first ones. Residuals of further
 ones are differences in footing and timing, which are no independent Gaussian numbers.
@@ -66,6 +68,29 @@ class TakeSampler:
             if seeds[place]:
                 cancellation.check()
                 found[place] = self._deviations_cached(tuple(rows[place]), int(seeds[place]))
+        return found
+
+    def along(
+        self,
+        controls: Annotated[Floats, "paths points controls"],
+        labels: Annotated[Floats, "paths labels"],
+        seeds: Annotated[Indices, "paths"],
+    ) -> Annotated[Floats, "paths points values"]:
+        """Return the deviations (N, B, m) of takes along paths of controls (N, B, d).
+
+        labels (N, p) and seeds (N,): one of each path. As `deviations`, for many points of a seed.
+        """
+        limited = np.asarray(self._session.bounds.limit(controls), np.float64)
+        points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
+        names = np.broadcast_to(labels[:, None], (*points.shape[:2], labels.shape[1]))
+        points = np.concatenate([points, names], axis=-1)
+        found = np.zeros((*points.shape[:2], self._count))
+        varied = np.flatnonzero(seeds)
+        for first in range(0, len(varied), FIELDS_TOGETHER):
+            cancellation.check()
+            some = varied[first : first + FIELDS_TOGETHER]
+            own = random_field.simulate(self._session.kriging_weights, seeds[some], self._count)
+            found[some] = self._root_of_sill * own.evaluate(points[some])
         return found
 
     def _deviations(self, point: tuple[float, ...], seed: int) -> Values:

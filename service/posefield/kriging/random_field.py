@@ -10,11 +10,11 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Points, PointValues, SampleValues, Values
 from posefield.common.units import Floats
 from posefield.kriging import kriging_model, philox
 from posefield.kriging.covariance import RATE32, RATE52
 from posefield.kriging.kriging_model import Hyper, KrigingWeights
+from posefield.kriging.philox import Seeds
 
 FREQUENCIES = 64
 """Random frequencies of a field. Each has a cosine and a sine, so that the variance at a point does
@@ -22,6 +22,9 @@ not depend on chance, as it would with 128 cosines of random phases.
 """
 VALUE_DECIMALS = 9
 """Decimals of a conditional field: cosines and sums differ between machines in the last digits."""
+
+SeedPoints = Annotated[Floats, "*seeds points coordinates"]
+SeedValues = Annotated[Floats, "*seeds points values"]
 
 SMOOTHNESS = {"exponential": (3.0, 1), "matern32": (RATE32, 3), "matern52": (RATE52, 5)}
 """Rate at unit range, and degrees of freedom of Student's distribution, of the frequencies."""
@@ -44,28 +47,29 @@ class RandomField:
     frequencies (d, K): per half-range of the controls. signs (p + sets, K), offsets (p + sets, m):
     of the names of all label sets, with one more row for each set, of a name without samples.
     common (sets, K): signs that the names of a set share. amplitudes (2 K, m): of cosines and
-    sines. slopes (d, m): along the controls.
+    sines. slopes (d, m): along the controls. Fields of many seeds have axes of the seeds before.
     """
 
     hyper: Hyper
-    frequencies: Annotated[Floats, "controls frequencies"]
-    signs: Annotated[Floats, "names frequencies"]
-    common: Annotated[Floats, "sets frequencies"]
-    amplitudes: Annotated[Floats, "features values"]
-    offsets: Annotated[Floats, "names values"]
-    slopes: Annotated[Floats, "controls values"]
+    frequencies: Annotated[Floats, "*seeds controls frequencies"]
+    signs: Annotated[Floats, "*seeds names frequencies"]
+    common: Annotated[Floats, "*seeds sets frequencies"]
+    amplitudes: Annotated[Floats, "*seeds features values"]
+    offsets: Annotated[Floats, "*seeds names values"]
+    slopes: Annotated[Floats, "*seeds controls values"]
 
-    def evaluate(self, points: Points) -> PointValues:
-        """Return the values (B, m) at points (B, d + p), the controls in half-ranges."""
+    def evaluate(self, points: SeedPoints) -> SeedValues:
+        """Return the values (..., B, m) at points (..., B, d + p), the controls in half-ranges."""
         d = len(self.hyper.scales)
-        controls, names = points[:, :d], _with_unsampled(self.hyper, points)
+        controls, names = points[..., :d], _with_unsampled(self.hyper, points)
         angles = controls @ self.frequencies
         scale = np.full_like(angles, FREQUENCIES**-0.5)
         sets = kriging_model.label_columns(0, _row_counts(self.hyper))
-        for own, common, rows in zip(self.hyper.labels, self.common, sets, strict=True):
-            kept = np.sqrt(own.correlation) * common
-            scale *= kept + np.sqrt(1.0 - own.correlation) * (names[:, rows] @ self.signs[rows])
-        features = np.hstack([scale * np.cos(angles), scale * np.sin(angles)])
+        for place, (own, rows) in enumerate(zip(self.hyper.labels, sets, strict=True)):
+            kept = np.sqrt(own.correlation) * self.common[..., place, None, :]
+            varied = names[..., rows] @ self.signs[..., rows, :]
+            scale *= kept + np.sqrt(1.0 - own.correlation) * varied
+        features = np.concatenate([scale * np.cos(angles), scale * np.sin(angles)], axis=-1)
         linear = names @ self.offsets + controls @ self.slopes
         return np.asarray(features @ self.amplitudes + linear)
 
@@ -76,22 +80,26 @@ class ConditionalField:
 
     Their mean over seeds is zero and their variance is the kriging variance, in sills. errors (n,
     m): values of the field at the samples with their nuggets. own (m,): nugget of the new
-    observation, equal at all points.
+    observation, equal at all points. Fields of many seeds have axes of the seeds before.
     """
 
     field: RandomField
     weights: KrigingWeights
-    errors: SampleValues
-    own: Values
+    errors: Annotated[Floats, "*seeds samples values"]
+    own: Annotated[Floats, "*seeds values"]
 
-    def evaluate(self, points: Points) -> PointValues:
-        """Return the deviations (B, m) at points (B, d + p)."""
-        kriged = self.weights.weights(points) @ self.errors
-        return np.round(self.field.evaluate(points) - kriged + self.own, VALUE_DECIMALS)
+    def evaluate(self, points: SeedPoints) -> SeedValues:
+        """Return the deviations (..., B, m) at points (..., B, d + p)."""
+        weights = self.weights.weights(points.reshape(-1, points.shape[-1]))
+        kriged = weights.reshape(*points.shape[:-1], -1) @ self.errors
+        found = self.field.evaluate(points) - kriged + self.own[..., None, :]
+        return np.asarray(np.round(found, VALUE_DECIMALS))
 
 
-def draw_field(hyper: Hyper, seed: int, count: int) -> RandomField:
+def draw_field(hyper: Hyper, seed: Seeds, count: int) -> RandomField:
     """Return independent fields (count) of a seed; ValueError without distribution of frequencies.
+
+    Of many seeds (...), the fields of each are those that it has alone.
 
     A product of independent features has the product of their covariances, so that each label set
     multiplies them by signs: common ones and those of the name.
@@ -102,32 +110,36 @@ def draw_field(hyper: Hyper, seed: int, count: int) -> RandomField:
     _, freedoms = SMOOTHNESS.get(hyper.covariance, (0.0, 0))
     shapes = [(d + freedoms, FREQUENCIES), *((n, count) for n in (2 * FREQUENCIES, names, d))]
     # One call for all numbers: the overhead of a call is a tenth of a field's time.
-    drawn = philox.normals(seed, FIELD, 1, sum(rows * columns for rows, columns in shapes))[0]
-    ends = np.cumsum([rows * columns for rows, columns in shapes])
-    parts = zip(np.split(drawn, ends[:-1]), shapes, strict=True)
-    spectrum, amplitudes, offsets, slopes = (part.reshape(shape) for part, shape in parts)
+    sizes = [rows * columns for rows, columns in shapes]
+    drawn = philox.normals(seed, FIELD, 1, sum(sizes))[..., 0, :]
+    parts = zip(np.split(drawn, np.cumsum(sizes)[:-1], axis=-1), shapes, strict=True)
+    spectrum, amplitudes, offsets, slopes = (
+        part.reshape(*np.shape(seed), *shape) for part, shape in parts
+    )
     signs = philox.signs(seed, SIGNS, sets + names, FREQUENCIES)
     scales = np.repeat([own.offset for own in hyper.labels], _row_counts(hyper))
     return RandomField(
         hyper,
         _frequencies(hyper, spectrum),
-        signs[sets:],
-        signs[:sets],
+        signs[..., sets:, :],
+        signs[..., :sets, :],
         amplitudes,
         np.sqrt(scales)[:, None] * offsets,
         np.sqrt(hyper.trend) * slopes,
     )
 
 
-def simulate(weights: KrigingWeights, seed: int, count: int) -> ConditionalField:
+def simulate(weights: KrigingWeights, seed: Seeds, count: int) -> ConditionalField:
     """Return independent deviations (count) of a seed from a kriging prediction.
 
-    Raises ValueError as `draw_field` does.
+    Of many seeds (...), those of each are those that it has alone. Raises ValueError as
+    `draw_field` does.
     """
     field, samples = draw_field(weights.hyper, seed, count), weights.samples
     nuggets = philox.normals(seed, NUGGETS, len(samples) + 1, count)
     nuggets *= np.sqrt(weights.hyper.nugget)
-    return ConditionalField(field, weights, field.evaluate(samples) + nuggets[1:], nuggets[0])
+    errors = field.evaluate(samples) + nuggets[..., 1:, :]
+    return ConditionalField(field, weights, errors, nuggets[..., 0, :])
 
 
 def _row_counts(hyper: Hyper) -> list[int]:
@@ -136,27 +148,29 @@ def _row_counts(hyper: Hyper) -> list[int]:
 
 
 def _frequencies(
-    hyper: Hyper, normals: Annotated[Floats, "rows frequencies"]
-) -> Annotated[Floats, "controls frequencies"]:
-    """Return frequencies (d, K) of the covariance's spectrum, per half-range of the controls.
+    hyper: Hyper, normals: Annotated[Floats, "*seeds rows frequencies"]
+) -> Annotated[Floats, "*seeds controls frequencies"]:
+    """Return frequencies (..., d, K) of the covariance's spectrum, per half-range of the controls.
 
-    normals: (d, K), and for Student's distribution as many more rows as it has degrees of freedom.
+    normals: (..., d, K), and for Student's distribution as many more rows as it has degrees of
+    freedom.
     """
-    directions, lengths = np.split(normals, [len(hyper.scales)])
+    directions, lengths = np.split(normals, [len(hyper.scales)], axis=-2)
     rate = np.full(FREQUENCIES, GAUSSIAN_RATE)
-    if len(lengths):
-        rate = SMOOTHNESS[hyper.covariance][0] / np.sqrt(np.sum(np.square(lengths), axis=0))
+    if lengths.size:
+        squares = np.sum(np.square(lengths), axis=-2, keepdims=True)
+        rate = SMOOTHNESS[hyper.covariance][0] / np.sqrt(squares)
     return hyper.scales[:, None] * directions * rate
 
 
-def _with_unsampled(hyper: Hyper, points: Points) -> Annotated[Floats, "points names"]:
+def _with_unsampled(hyper: Hyper, points: SeedPoints) -> Annotated[Floats, "*seeds points names"]:
     """Return the weights of names with what is left of unit length, for each label set.
 
     It counts as a name without samples, as in `kriging_model.prior_variances`.
     """
-    parts = [np.zeros((len(points), 0))]
+    parts = [np.zeros((*points.shape[:-1], 0))]
     for columns in kriging_model.label_columns(len(hyper.scales), hyper.label_counts):
-        own = points[:, columns]
-        left = np.sqrt(np.maximum(1.0 - np.sum(np.square(own), axis=1), 0.0))
-        parts += [own, left[:, None]]
-    return np.hstack(parts)
+        own = points[..., columns]
+        left = np.sqrt(np.maximum(1.0 - np.sum(np.square(own), axis=-1), 0.0))
+        parts += [own, left[..., None]]
+    return np.concatenate(parts, axis=-1)

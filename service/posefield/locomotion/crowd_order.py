@@ -15,8 +15,13 @@ from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.locomotion.routes import Route
 from posefield.locomotion.walking_crowd import MotionMaker
 from posefield.motion.crowd_clip import CrowdClip
-from posefield.question.motion_question import FeetMode, LabelValue
-from posefield.question.walk_question import DEFAULT_FOV, DEFAULT_HEIGHT, WalkQuestion
+from posefield.question.motion_question import DEFAULT_VARIETY, FeetMode, LabelValue
+from posefield.question.walk_question import (
+    DEFAULT_FOV,
+    DEFAULT_HEIGHT,
+    WalkerTake,
+    WalkQuestion,
+)
 
 MAX_CHARACTERS = 1_000_000
 """Largest number of characters of one crowd, which may share motions."""
@@ -32,7 +37,9 @@ class CrowdOrder:
     duration. fps: frames a second. seed: of all random numbers. level: level of detail, the finest
     if None and no camera is given. camera: chooses levels with errors of at most `pixels` pixels.
     labels: name or weights of all characters by label set. feet: whether they stand; None where the
-    model decides.
+    model decides. take: seed of all characters, 0 for the prediction, or "index" for a seed of its
+    own for each distinct motion. variety: size of the takes' deviations. detail: whether details
+    that no control predicts are added.
     """
 
     count: int
@@ -46,6 +53,9 @@ class CrowdOrder:
     pixels: float = DEFAULT_PIXELS
     labels: Mapping[str, LabelValue] = field(default_factory=dict)
     feet: FeetMode | None = None
+    take: WalkerTake = 0
+    variety: float = DEFAULT_VARIETY
+    detail: bool = False
 
     def __post_init__(self) -> None:
         if not 1 <= self.count <= MAX_CHARACTERS:
@@ -83,6 +93,9 @@ def from_question(asked: WalkQuestion, routes: Sequence[Route] = ()) -> CrowdOrd
         pixels=DEFAULT_PIXELS if asked.pixels is None else asked.pixels,
         labels=asked.labels,
         feet=asked.feet,
+        take=asked.take,
+        variety=asked.variety,
+        detail=asked.detail,
     )
 
 

@@ -113,6 +113,18 @@ def synthesize_poses(
     labels = plan.labels.weights[plan.who[who]]
     pair = who, frames
     own = stride.synthesize_poses(session, plan.controls[pair], labels, plan.phases[pair], level)
+    return place_poses(plan, pair, own)
+
+
+def place_poses(
+    plan: LocomotionPlan,
+    pair: tuple[Annotated[Indices, "poses"], Annotated[Indices, "poses"]],
+    own: RelativePoses,
+) -> RelativePoses:
+    """Return poses where the plan has K pairs of a character (K,) and a frame (K,).
+
+    own: K poses in frames that travel with the characters.
+    """
     headings = plan.headings[pair]
     places = plan.places[pair] + own.places * floor_plane.unit_vectors(headings)
     rotations = floor_plane.turn_roots(own.rotations, headings)

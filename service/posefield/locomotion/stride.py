@@ -145,7 +145,7 @@ def contact_probabilities(
 ) -> Annotated[Floats, "points contacts"]:
     """Return the probabilities (K, C) of the contacts on the card, at phases (K,) of the cycle."""
     found = np.empty((len(controls), len(session.card.contacts)))
-    for rows in _batches(len(controls)):
+    for rows in batches(len(controls)):
         cancellation.check()
         own, names = controls[rows], labels[rows]
         times = phases[rows] * session.durations(own, labels=names, level=level)
@@ -231,7 +231,7 @@ def _run_batches(
 ) -> list[Annotated[Floats, "points ..."]]:
     """Return the graph's outputs for any number of rows, computed in batches."""
     found: list[Floats] = []
-    for rows in _batches(len(controls)):
+    for rows in batches(len(controls)):
         cancellation.check()
         own = controls[rows], times[rows]
         parts = session.run(*own, *outputs, labels=labels[rows], level=level)
@@ -244,7 +244,8 @@ def _run_batches(
     return found
 
 
-def _batches(rows: int) -> Iterator[slice]:
+def batches(rows: int) -> Iterator[slice]:
+    """Yield the rows of each call of the graph."""
     first = 0
     while first < rows:
         # A matrix product with one row sums in another order, so no batch of several has one row.

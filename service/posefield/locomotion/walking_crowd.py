@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -43,6 +44,9 @@ Pairs = tuple[Indices, Indices]
 FPS_RANGE = (1.0, 1000.0)
 MotionMaker = Callable[[Session, LocomotionPlan, Indices, LevelSchedule], Motions]
 """Computes the motions of characters (M,) of a plan, as `motions` does."""
+PoseMaker = Callable[[Session, LocomotionPlan, Indices, Indices, int], RelativePoses]
+"""Computes poses of a plan, as `locomotion_plan.synthesize_poses` does."""
+_PoseMaker = Callable[[Indices, Indices, int], RelativePoses]
 
 
 def plan_random(gait: Gait, count: int, seconds: float, rate: float, seed: int) -> LocomotionPlan:
@@ -164,9 +168,16 @@ def _batches(
 
 
 def motions(
-    session: Session, plan: LocomotionPlan, who: Annotated[Indices, "motions"], shown: LevelSchedule
+    session: Session,
+    plan: LocomotionPlan,
+    who: Annotated[Indices, "motions"],
+    shown: LevelSchedule,
+    pose: PoseMaker = locomotion_plan.synthesize_poses,
 ) -> Motions:
-    """Return the motions of characters (M,) of the plan, at their levels of detail."""
+    """Return the motions of characters (M,) of the plan, at their levels of detail.
+
+    pose: computes the poses, which are those of the prediction by default.
+    """
     shape = (len(who), plan.phases.shape[1])
     count, joints = shape[0] * shape[1], len(session.card.skeleton)
     rotations = np.empty((count, joints, 4), np.float32)
@@ -174,7 +185,8 @@ def motions(
     values = np.empty((count, len(session.card.curves)), np.float32)
     for rows in (slice(first, first + POSES_PER_CALL) for first in range(0, count, POSES_PER_CALL)):
         character, frame = np.divmod(np.arange(count)[rows], shape[1])
-        posed = _blended_poses(session, plan, (who[character], frame), shown.rows(rows))
+        own_pose = partial(pose, session, plan)
+        posed = _blended_poses(session.card, own_pose, (who[character], frame), shown.rows(rows))
         rotations[rows] = posed.rotations
         roots[rows] = floor_plane.at_height(posed.places, posed.heights)
         if posed.curves is not None:
@@ -188,27 +200,25 @@ def motions(
 
 
 def _blended_poses(
-    session: Session, plan: LocomotionPlan, pairs: Pairs, shown: LevelSchedule
+    card: ModelCard, pose: _PoseMaker, pairs: Pairs, shown: LevelSchedule
 ) -> RelativePoses:
     """Return the poses of K pairs of a character and a frame, blended where levels change.
 
     shown: levels of the pairs, in arrays (K,).
     """
-    after, shares = _at_levels(session, plan, pairs, shown.levels), shown.shares
+    after, shares = _at_levels(card, pose, pairs, shown.levels), shown.shares
     between = np.flatnonzero(shares < 1.0)
     if len(between):
         some = pairs[0][between], pairs[1][between]
-        before = _at_levels(session, plan, some, shown.previous[between])
+        before = _at_levels(card, pose, some, shown.previous[between])
         for name, whole in after.arrays.items():
             mix = blend.nlerp if name == "rotations" else blend.lerp
             whole[between] = mix(getattr(before, name), whole[between], shares[between])
     return after
 
 
-def _at_levels(
-    session: Session, plan: LocomotionPlan, pairs: Pairs, levels: Indices
-) -> RelativePoses:
-    joints, channels, count = len(session.card.skeleton), len(session.card.curves), len(levels)
+def _at_levels(card: ModelCard, pose: _PoseMaker, pairs: Pairs, levels: Indices) -> RelativePoses:
+    joints, channels, count = len(card.skeleton), len(card.curves), len(levels)
     poses = RelativePoses(
         np.empty((count, joints, 4)),
         np.empty(count),
@@ -217,7 +227,7 @@ def _at_levels(
     )
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
-        own = locomotion_plan.synthesize_poses(session, plan, pairs[0][rows], pairs[1][rows], level)
+        own = pose(pairs[0][rows], pairs[1][rows], level)
         for name, whole in poses.arrays.items():
             whole[rows] = getattr(own, name)
     return poses

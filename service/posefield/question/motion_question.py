@@ -12,6 +12,8 @@ from posefield.question.body_kind import Body
 
 MAX_TAKE = 999_999_999
 """Largest seed of a take: whole numbers in text have at most nine digits."""
+DEFAULT_VARIETY = 0.7
+"""Size of a take's deviations, as a share of those of captured clips."""
 ExtrapolationPolicy = Literal["ok", "warn", "refuse"]
 RootMode = Literal["travelling", "in_place"]
 FeetMode = Literal["stand", "as_predicted"]
@@ -111,7 +113,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     ] = 0
     variety: Annotated[
         float, Meta(description="size of a take's deviations; 1 is that of captured clips")
-    ] = 0.7
+    ] = DEFAULT_VARIETY
     detail: Annotated[
         bool, Meta(description="add details that no control predicts, sampled by the take's seed")
     ] = False

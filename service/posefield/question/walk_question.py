@@ -7,9 +7,11 @@ from msgspec import Meta, Struct
 
 from posefield.common.errors import InvalidField
 from posefield.question.body_kind import Body
-from posefield.question.motion_question import FeetMode, LabelValue
+from posefield.question.motion_question import DEFAULT_VARIETY, FeetMode, LabelValue
 
 Instancing = Literal["references", "scenegraph", "flatten"]
+WalkerTake = Literal["index"] | int
+"""Seed of all characters, or "index" for a seed of its own for each."""
 DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
 
 
@@ -67,6 +69,20 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             "models that know the contacts of their feet and for 20 or more frames a second"
         ),
     ] = None
+    take: Annotated[
+        WalkerTake,
+        Meta(
+            description="seed of another take of all characters' motions, or index: a seed of its "
+            "own for each motion, so that no two are alike; 0 is the mean",
+            extra={"metavar": "SEED|index"},
+        ),
+    ] = 0
+    variety: Annotated[
+        float, Meta(description="size of the takes' deviations; 1 is that of captured clips")
+    ] = DEFAULT_VARIETY
+    detail: Annotated[
+        bool, Meta(description="add details that no control predicts, sampled by the takes' seeds")
+    ] = False
     instancing: Annotated[
         Instancing, Meta(description="sharing of data between characters in USD")
     ] = "references"

@@ -10,32 +10,50 @@ from posefield.common.units import Floats, Indices
 from posefield.feet import limb_choice, walkers_feet
 from posefield.feet.limb_choice import LimbChoice
 from posefield.feet.walkers_feet import Walkers, WalkersFeet
-from posefield.inference.named_model import NamedModel
 from posefield.inference.session import Session
-from posefield.locomotion import crowd_order, stride, walking_crowd
+from posefield.locomotion import crowd_order, locomotion_plan, stride, walking_crowd
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.level_transitions import LevelSchedule
 from posefield.locomotion.locomotion_plan import LocomotionPlan
-from posefield.locomotion.walking_crowd import POSES_PER_CALL, Pairs
+from posefield.locomotion.walking_crowd import POSES_PER_CALL, MotionMaker, Pairs, PoseMaker
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.crowd_clip import CrowdClip, Motions, StandingFeet
 from posefield.motion.foot_contacts import FootContact
+from posefield.synthesis import walking_takes
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.walking_takes import WalkerTakes
 
 MIN_RATE = 20.0
 """Smallest number of frames a second of a crowd whose feet stand: a contact lasts 0.1 s or more,
 and a stance of one frame cannot be told from a touch."""
 
 
-def build_crowd(model: NamedModel, gait: Gait, order: CrowdOrder) -> CrowdClip:
+def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
     """Return the crowd of an order, whose feet stand or are as predicted.
 
-    Raises InvalidField as `crowd_order.build_crowd` does, and for feet that cannot stand.
+    Raises InvalidField as `crowd_order.build_crowd` and `walking_takes.of_order` do, and for feet
+    that cannot stand.
     """
+    takes = walking_takes.of_order(model.session.card, order)
     standing = wants_standing_feet(gait.session.card, order)
-    make = standing_motions if standing else None
+    make = _motion_maker(model, takes, standing)
     crowd = crowd_order.build_crowd(model, gait, order, make)
-    return replace(crowd, facts={**crowd.facts, "feet_stand": standing})
+    said = {"feet_stand": standing, "take": {} if takes is None else takes.facts()}
+    return replace(crowd, facts={**crowd.facts, **said})
+
+
+def _motion_maker(model: Synthesizer, takes: WalkerTakes | None, standing: bool) -> MotionMaker:
+    """Return what computes motions whose feet stand or are as predicted."""
+    make = standing_motions if standing else walking_crowd.motions
+    if takes is None:
+        return make
+
+    def vary(session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule) -> Motions:
+        pose = walking_takes.pose_maker(model, takes, plan, who)
+        return make(session, plan, who, shown, pose)
+
+    return vary
 
 
 def wants_standing_feet(card: ModelCard, order: CrowdOrder) -> bool:
@@ -74,13 +92,17 @@ def choose_legs(card: ModelCard) -> LimbChoice:
 
 
 def standing_motions(
-    session: Session, plan: LocomotionPlan, who: Indices, shown: LevelSchedule
+    session: Session,
+    plan: LocomotionPlan,
+    who: Indices,
+    shown: LevelSchedule,
+    pose: PoseMaker = locomotion_plan.synthesize_poses,
 ) -> Motions:
     """Return the motions of characters (M,) of the plan with standing feet.
 
     Arguments as for `walking_crowd.motions`. Stances are planned over each whole motion.
     """
-    made = walking_crowd.motions(session, plan, who, shown)
+    made = walking_crowd.motions(session, plan, who, shown, pose)
     placed = _placed_feet(session, plan, who, shown, made)
     rotations = made.rotations
     for joint, turns in placed.turns.items():
