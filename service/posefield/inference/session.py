@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
-from posefield.common.units import Floats, Singles
+from posefield.common.units import Floats, Indices, Singles
 from posefield.inference import graph_ports, onnx_runtime
 from posefield.inference.graph_ports import CONTACTS, LABELS
 from posefield.inference.onnx_runtime import LazySessions
@@ -89,18 +89,16 @@ class Session:
             raise ValueError(f"model {self.card.name} has no contacts")
         if self.bounds.is_inside(controls):
             return self._run(controls, time, outputs, labels, level)
-        raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
+        rows, raw, bounded = self._outside_durations(controls, labels, level)
         # The graph places a time by the duration that it computes itself.
-        stretched = time * (raw / bounded)[:, None]
+        stretched = time * _stretch(len(controls), rows, raw / bounded)
         answers = self._run(self.bounds.limit(controls), stretched, outputs, labels, level)
-        replaced = {"duration": (raw != bounded, bounded)}
+        if "duration" in outputs:
+            apart = raw != bounded
+            answers[outputs.index("duration")][rows[apart]] = bounded[apart]
         if "sigma" in outputs:
             sigma = self._run(controls, time, ("sigma",), labels, level)[0]
-            replaced["sigma"] = (self.bounds.outside(controls), sigma)
-        for at in set(outputs) & set(replaced):
-            rows, values = replaced[at]
-            place = outputs.index(at)
-            answers[place] = np.where(rows, values, answers[place])
+            answers[outputs.index("sigma")][rows] = sigma[rows]
         return answers
 
     def durations(
@@ -112,7 +110,10 @@ class Session:
         """Return the durations (B,), s, of `run`, in a quarter of its time."""
         if self.bounds.is_inside(controls):
             return self._durations(controls, labels, level)
-        return self._raw_and_bounded_durations(controls, labels, level)[1]
+        found = self._durations(self.bounds.limit(controls), labels, level)
+        rows, _, bounded = self._outside_durations(controls, labels, level, found)
+        found[rows] = bounded
+        return found
 
     def state(
         self,
@@ -127,7 +128,7 @@ class Session:
         """
         if self.bounds.is_inside(controls):
             return self._state(controls, time, labels, level)
-        raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
+        _, raw, bounded = self._outside_durations(controls, labels, level)
         asked = float(self._run(controls, np.zeros((1, 1)), ("sigma",), labels, level)[0][0])
         stretch = float(raw[0]) / float(bounded[0])
         found = self._state(self.bounds.limit(controls), time * stretch, labels, level)
@@ -146,8 +147,9 @@ class Session:
         """
         limited: Floats | Singles = controls
         if not self.bounds.is_inside(controls):
-            raw, bounded = self._raw_and_bounded_durations(controls, labels, level)
-            limited, times = self.bounds.limit(controls), times * (raw / bounded)[:, None]
+            rows, raw, bounded = self._outside_durations(controls, labels, level)
+            times = times * _stretch(len(controls), rows, raw / bounded)
+            limited = self.bounds.limit(controls)
         feed = self._feed(limited, labels)
         feed["time"] = times.astype(np.float32, copy=False)
         names = [name for name in ("coefficients", "frame", "way") if name in self._state_outputs]
@@ -189,13 +191,29 @@ class Session:
         )
         return answers[0]
 
-    def _raw_and_bounded_durations(
-        self, controls: Floats | Singles, labels: Floats | Singles | None, level: int
-    ) -> tuple[Singles, Singles]:
-        """Return the durations (B,) of the graph at limited controls, and the bounded ones."""
-        raw = self._durations(self.bounds.limit(controls), labels, level)
-        nearest = self._durations(self.bounds.nearest_sampled(controls), labels, level)
-        return raw, self.bounds.limit_durations(raw, nearest)
+    def _outside_durations(
+        self,
+        controls: Floats | Singles,
+        labels: Floats | Singles | None,
+        level: int,
+        raw: Singles | None = None,
+    ) -> tuple[Indices, Singles, Singles]:
+        """Return the rows (K,) outside the sampled ranges, their raw and their bounded durations.
+
+        raw: durations (B,) of the graph at limited controls, if they are known.
+        """
+        rows = np.flatnonzero(self.bounds.outside(controls))
+        # A matrix product with one row sums in another order, so no batch of several has one row.
+        if len(rows) == 1 < len(controls):
+            rows = np.repeat(rows, 2)
+        some = controls[rows]
+        own = labels if labels is None or len(labels) == 1 else labels[rows]
+        if raw is None:
+            found = self._durations(self.bounds.limit(some), own, level)
+        else:
+            found = raw[rows]
+        nearest = self._durations(self.bounds.nearest_sampled(some), own, level)
+        return rows, found, self.bounds.limit_durations(found, nearest)
 
     def _state(
         self, controls: Floats | Singles, time: Floats, labels: Floats | None, level: int
@@ -252,6 +270,13 @@ class Session:
         if labels is not None and self.card.labels:
             feed[LABELS] = labels.astype(np.float32, copy=False)
         return feed
+
+
+def _stretch(count: int, rows: Indices, ratios: Singles) -> Annotated[Singles, "points 1"]:
+    """Return factors (B, 1) of times: ratios (K,) in these rows (K,), one in all others."""
+    found = np.ones((count, 1), ratios.dtype)
+    found[rows, 0] = ratios
+    return found
 
 
 def state_outputs(card: ModelCard) -> tuple[str, ...]:
