@@ -198,17 +198,24 @@ def walk(
     height: float | None = None,
     pixels: float | None = None,
     feet: Feet | None = None,
+    take: int | Literal["index"] | None = None,
+    variety: float | None = None,
+    detail: bool | None = None,
     instancing: Instancing | None = None,
     body: Body | None = None,
 ) -> Files:
-    """Return a walking crowd. camera: position x, y, z, m. labels: of all characters."""
+    """Return a walking crowd. camera: position x, y, z, m. labels: of all characters.
+
+    take: "index" gives each motion a take of its own.
+    """
     place = (
         None if camera is None else ",".join(map(asking.digits, asking.numbers("camera", camera)))
     )
     words = {
         **asking.said(count=count, motions=motions, seconds=seconds, fps=fps, seed=seed),
         **asking.said(level=level, camera=place, fov=fov, height=height, pixels=pixels),
-        **asking.said(feet=feet, instancing=instancing, body=body),
+        **asking.said(feet=feet, take=take, variety=variety, detail=detail),
+        **asking.said(instancing=instancing, body=body),
         **asking.label_words(labels or {}),
     }
     said = "".join(f", {name}={value!r}" for name, value in words.items())

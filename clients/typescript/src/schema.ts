@@ -2261,6 +2261,12 @@ export interface components {
         pixels: number;
         /** @description Whether feet stand where they contact the ground, planned over each character's whole walk. Default: `stand` for models that know the contacts of their feet, for 20 frames a second or more. Poses of crowds at single times have feet as predicted. Since 4.0.0. */
         walkFeet: "stand" | "as_predicted";
+        /** @description Seed of another take of all characters' motions, or `index` for seeds from 1 on in the order of the distinct motions, so that no two characters walk alike. Durations and travel stay those of the prediction, so that characters stay on their paths. Since 4.0.0. */
+        walkTake: components["schemas"]["Take"] | "index";
+        /** @description Size of the takes' deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. Since 4.0.0. */
+        walkVariety: components["schemas"]["Variety"];
+        /** @description Whether to add details that no control predicts, sampled by the takes' seeds. A warning reports a model that has none. Since 4.0.0. */
+        walkDetail: components["schemas"]["Detail"];
         /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
         instancing: "references" | "scenegraph" | "flatten";
         /** @description Level of detail, an index into `levels` on the model's card; 0 is the finest. */
@@ -3189,6 +3195,12 @@ export interface operations {
                 pixels?: components["parameters"]["pixels"];
                 /** @description Whether feet stand where they contact the ground, planned over each character's whole walk. Default: `stand` for models that know the contacts of their feet, for 20 frames a second or more. Poses of crowds at single times have feet as predicted. Since 4.0.0. */
                 feet?: components["parameters"]["walkFeet"];
+                /** @description Seed of another take of all characters' motions, or `index` for seeds from 1 on in the order of the distinct motions, so that no two characters walk alike. Durations and travel stay those of the prediction, so that characters stay on their paths. Since 4.0.0. */
+                take?: components["parameters"]["walkTake"];
+                /** @description Size of the takes' deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. Since 4.0.0. */
+                variety?: components["parameters"]["walkVariety"];
+                /** @description Whether to add details that no control predicts, sampled by the takes' seeds. A warning reports a model that has none. Since 4.0.0. */
+                detail?: components["parameters"]["walkDetail"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
                 /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
@@ -3295,6 +3307,12 @@ export interface operations {
                 pixels?: components["parameters"]["pixels"];
                 /** @description Whether feet stand where they contact the ground, planned over each character's whole walk. Default: `stand` for models that know the contacts of their feet, for 20 frames a second or more. Poses of crowds at single times have feet as predicted. Since 4.0.0. */
                 feet?: components["parameters"]["walkFeet"];
+                /** @description Seed of another take of all characters' motions, or `index` for seeds from 1 on in the order of the distinct motions, so that no two characters walk alike. Durations and travel stay those of the prediction, so that characters stay on their paths. Since 4.0.0. */
+                take?: components["parameters"]["walkTake"];
+                /** @description Size of the takes' deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. Since 4.0.0. */
+                variety?: components["parameters"]["walkVariety"];
+                /** @description Whether to add details that no control predicts, sampled by the takes' seeds. A warning reports a model that has none. Since 4.0.0. */
+                detail?: components["parameters"]["walkDetail"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
                 /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
@@ -4201,6 +4219,9 @@ export const KEYS = {
     "height",
     "pixels",
     "feet",
+    "take",
+    "variety",
+    "detail",
     "instancing",
     "body"
   ],

@@ -62,6 +62,8 @@ def write_crowd(
         "level_shares": made.facts["level_shares"],
         "outside_share": made.facts["outside_share"],
         "feet_stand": made.facts["feet_stand"],
+        "take": made.facts["take"],
+        "warnings": made.facts["warnings"],
         **feet.facts(),
     }
 
@@ -157,9 +159,20 @@ def report_text(facts: dict[str, Any]) -> str:
             f"cm/s; a standing foot moves {facts['drift_cm']:.1f} cm at most, and a pelvis is "
             f"lowered {facts['lowered_cm']:.1f} cm at most"
         )
+    if facts["take"]:
+        lines.append(_take_text(facts["take"], facts["motions"]))
     if facts["outside_share"]:
         lines.append(
             f"{100 * facts['outside_share']:.1f} % of the poses have some control outside what was "
             "sampled"
         )
-    return "\n".join(lines)
+    return "\n".join([*lines, *facts["warnings"]])
+
+
+def _take_text(take: dict[str, Any], motions: int) -> str:
+    """Return the sentence about the takes of a crowd's motions."""
+    which = f"take {take['seed']}" if take["seed"] else "no take"
+    if take["seed"] == "index":
+        which = f"takes 1 to {motions}, one for each motion"
+    detail = ", with details sampled" if take["detail"] else ""
+    return f"{which}, variety {take['variety']:g}{detail}"

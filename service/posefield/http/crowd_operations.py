@@ -117,10 +117,12 @@ async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iter
 
 def send_walk(context: Walks, answer: CrowdClip, content: Iterator[bytes]) -> Response:
     """Return the response that streams the crowd."""
-    share = float(answer.facts["outside_share"])
-    said = f"{100 * share:.1f} % of the poses have some control outside what was sampled"
+    share, said = float(answer.facts["outside_share"]), list(answer.facts["warnings"])
+    if share:
+        outside = f"{100 * share:.1f} % of the poses have some control outside what was sampled"
+        said.insert(0, outside)
     sent = responses.sent(content, worker_threads.CROWD_LIMITER)
-    return responses.stream(sent, context.form, context.model, [said] if share else [])
+    return responses.stream(sent, context.form, context.model, said)
 
 
 # The default of Accept is binary USD.

@@ -27,6 +27,7 @@ from msgspec import NODEFAULT, Meta, Struct, structs
 from posefield.common.errors import FormError
 from posefield.common.name_suggestion import did_you_mean
 from posefield.question.motion_question import ExactControls, LabelValue, Moment, Target
+from posefield.question.walk_question import WalkerTake
 
 Question = TypeVar("Question", bound=Struct)
 MOMENTS: tuple[Moment, ...] = get_args(Moment)
@@ -198,6 +199,19 @@ def parse_exact(text: str) -> ExactControls:
     return names
 
 
+def parse_walker_take(text: str) -> WalkerTake:
+    """Return a seed, or index.
+
+    Raises ValueError for any other text.
+    """
+    if text == "index":
+        return "index"
+    try:
+        return parse_integer(text)
+    except ValueError:
+        raise ValueError(f"{text!r}, expected a whole number or index") from None
+
+
 def parse_target(text: str) -> Target:
     """Return the target of a text.
 
@@ -254,6 +268,7 @@ PARSERS: Mapping[Any, Callable[[str], Any]] = {
     str: str,
     ExactControls: parse_exact,
     Target: parse_target,
+    WalkerTake: parse_walker_take,
     tuple[float, float, float]: parse_position,
 }
 """Function that reads a text, by type of field; literals have their choices instead."""

@@ -21,7 +21,7 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion.crowd_clip import CrowdClip, Motions, StandingFeet
 from posefield.motion.foot_contacts import FootContact
 from posefield.synthesis import walking_takes
-from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 from posefield.synthesis.walking_takes import WalkerTakes
 
 MIN_RATE = 20.0
@@ -39,7 +39,12 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
     standing = wants_standing_feet(gait.session.card, order)
     make = _motion_maker(model, takes, standing)
     crowd = crowd_order.build_crowd(model, gait, order, make)
-    said = {"feet_stand": standing, "take": {} if takes is None else takes.facts()}
+    missing = order.detail and not model.session.card.making.detail
+    said = {
+        "feet_stand": standing,
+        "take": {} if takes is None else takes.facts(),
+        "warnings": [NO_DETAIL] if missing else [],
+    }
     return replace(crowd, facts={**crowd.facts, **said})
 
 
