@@ -217,6 +217,26 @@ def test_feet_of_a_walk_stand_unless_asked_to_be_as_predicted(ask):
     assert usual == stood != free
 
 
+def test_takes_of_a_walk(ask):
+    path = f"{WALK}.usda?count=3&seconds=1"
+    usual, none, own, again, one = (
+        ask("GET", path + more).content
+        for more in ("", "&take=0&variety=0.2", "&take=index", "&take=index", "&take=7")
+    )
+    assert usual == none and own == again
+    assert len({usual, own, one}) == 3
+
+
+def test_a_walk_of_a_model_without_detail_has_a_warning(ask):
+    plain, asked = (
+        ask("GET", f"{WALK}.usdz?count=2&seconds=1{more}") for more in ("", "&detail=true")
+    )
+    said = asked.headers.get("Posefield-Warning", "")
+    assert "this model's file has none to sample" in said
+    assert "detail" not in plain.headers.get("Posefield-Warning", "")
+    assert plain.content == asked.content
+
+
 def test_shared_motions_are_sent_once(ask):
     own, shared = (
         len(ask("GET", f"{WALK}.usdz?count=20&seconds=1{more}").content)
@@ -250,6 +270,10 @@ def test_shared_motions_are_sent_once(ask):
         ("instancing=clones", 400, "instancing"),
         ("feet=still", 400, "feet"),
         ("feet=stand&fps=10", 422, "feet"),
+        ("take=own", 400, "take"),
+        ("take=-1", 400, "take"),
+        ("take=7&variety=1.5", 422, "variety"),
+        ("detail=yes", 400, "detail"),
     ],
 )
 def test_a_walk_that_cannot_be_is_refused_before_it_begins(ask, query, status, parameter):

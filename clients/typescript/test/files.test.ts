@@ -44,6 +44,17 @@ test("walkers have the labels that are asked for", async () => {
   await assert.rejects(client.crowdFile("walk", "usda", wrong), /'bob', expected one of ann, ben/);
 });
 
+test("walkers have the takes that are asked for", async () => {
+  const { client, sent } = observed();
+  const takes = { take: "index", variety: 0.5, detail: true } as const;
+  await client.crowdFile("walk", "usda", { count: 2, seconds: 0.2, ...takes });
+  const asked = new URL(sent[0]!.path, "http://any").searchParams;
+  assert.deepEqual(
+    ["take", "variety", "detail"].map((name) => asked.get(name)),
+    ["index", "0.5", "true"],
+  );
+});
+
 test("files are asked for as they are, documents and poses in any coding", async () => {
   const { client, sent } = observed();
   const controls = await defaults(client);

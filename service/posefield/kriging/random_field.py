@@ -23,7 +23,7 @@ not depend on chance, as it would with 128 cosines of random phases.
 VALUE_DECIMALS = 9
 """Decimals of a conditional field: cosines and sums differ between machines in the last digits."""
 
-SeedPoints = Annotated[Floats, "*seeds points coordinates"]
+SeedPoints = Annotated[Floats, "*some points coordinates"]
 SeedValues = Annotated[Floats, "*seeds points values"]
 
 SMOOTHNESS = {"exponential": (3.0, 1), "matern32": (RATE32, 3), "matern52": (RATE52, 5)}
@@ -163,7 +163,7 @@ def _frequencies(
     return hyper.scales[:, None] * directions * rate
 
 
-def _with_unsampled(hyper: Hyper, points: SeedPoints) -> Annotated[Floats, "*seeds points names"]:
+def _with_unsampled(hyper: Hyper, points: SeedPoints) -> Annotated[Floats, "*some points names"]:
     """Return the weights of names with what is left of unit length, for each label set.
 
     It counts as a name without samples, as in `kriging_model.prior_variances`.

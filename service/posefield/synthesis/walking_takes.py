@@ -111,23 +111,31 @@ def pose_maker(
 def _deviations(
     model: Synthesizer, takes: WalkerTakes, plan: LocomotionPlan, who: Indices
 ) -> _Deviations:
-    variation, seeds = model.solver.variation, takes.seeds[who]
-    frames = plan.controls.shape[1]
-    knots = _knots(frames, plan.rate)
-    labels = plan.labels.weights[plan.who[who]]
-    by = variation.along_paths(plan.controls[who][:, knots], labels, seeds)
-    places = np.interp(np.arange(frames), knots, np.arange(len(knots)))
-    before = np.minimum(places.astype(np.int64), max(len(knots) - 2, 0))
-    after, share = np.minimum(before + 1, len(knots) - 1), (places - before)[:, None]
-    by = (1.0 - share) * by[:, before] + share * by[:, after]
-    details = variation.details(seeds) if takes.detail else None
+    seeds = takes.seeds[who]
+    by = deviations_along(model, plan, who, seeds, KNOT_SECONDS)
+    details = model.solver.variation.details(seeds) if takes.detail else None
     return _Deviations(who, takes.variety * by, details)
 
 
-def _knots(frames: int, rate: float) -> Annotated[Indices, "knots"]:
-    """Return the frames at which deviations are computed: evenly apart, and the last one."""
-    apart = max(1, int(KNOT_SECONDS * rate))
-    return np.append(np.arange(0, frames - 1, apart), frames - 1)
+def deviations_along(
+    model: Synthesizer,
+    plan: LocomotionPlan,
+    who: Annotated[Indices, "motions"],
+    seeds: Annotated[Indices, "motions"],
+    apart: float,
+) -> Annotated[Floats, "motions frames modes"]:
+    """Return uncorrelated deviations (M, F, r3) of takes along the paths of characters (M,).
+
+    seeds: (M,). apart: interval of the points at which they are computed, s, with lines between.
+    """
+    frames = plan.controls.shape[1]
+    knots = np.append(np.arange(0, frames - 1, max(1, int(apart * plan.rate))), frames - 1)
+    labels = plan.labels.weights[plan.who[who]]
+    by = model.solver.variation.along_paths(plan.controls[who][:, knots], labels, seeds)
+    places = np.interp(np.arange(frames), knots, np.arange(len(knots)))
+    before = np.minimum(places.astype(np.int64), max(len(knots) - 2, 0))
+    after, share = np.minimum(before + 1, len(knots) - 1), (places - before)[:, None]
+    return np.asarray((1.0 - share) * by[:, before] + share * by[:, after])
 
 
 def _relative_poses(

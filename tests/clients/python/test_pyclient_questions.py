@@ -132,6 +132,16 @@ def test_takes_and_detail():
     }
 
 
+def test_takes_of_a_walking_crowd():
+    asked = files.walk("m", count=3, take="index", variety=0.5, detail=True)
+    assert parse_qsl(urlsplit(asked.request("usdz").target).query) == [
+        ("count", "3"),
+        ("take", "index"),
+        ("variety", "0.5"),
+        ("detail", "true"),
+    ]
+
+
 def test_targets_and_exact_controls_in_a_body():
     # More than a line takes.
     many = {f"control_{number:04}": number for number in range(400)}

@@ -52,6 +52,16 @@ def test_normal_numbers_are_standard_and_streams_independent():
     assert abs(first[:-1] @ first[1:]) / COUNT < 3.0 * error
 
 
+def test_numbers_of_many_seeds_are_those_of_each_alone():
+    seeds = np.array([[3, 8], [2**40 + 1, 0]])
+    found = philox.normals(seeds, 1, 5, 7)
+    assert found.shape == (2, 2, 5, 7)
+    for place in np.ndindex(2, 2):
+        assert np.array_equal(found[place], philox.normals(int(seeds[place]), 1, 5, 7))
+        assert not np.array_equal(found[place], philox.normals(int(seeds[place]) + 1, 1, 5, 7))
+    assert np.array_equal(philox.signs(seeds, 1, 3, 2)[1, 0], philox.signs(2**40 + 1, 1, 3, 2))
+
+
 def test_signs_are_even():
     found = philox.signs(5, 2, 100, 100)
     assert {*found.ravel().tolist()} == {1.0, -1.0}

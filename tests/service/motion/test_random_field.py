@@ -119,6 +119,17 @@ def test_equal_seeds_are_equal_fields(samples):
     assert not np.array_equal(random_field.simulate(weights, 8, FIELDS).evaluate(samples), again)
 
 
+def test_fields_of_many_seeds_are_those_of_each_alone(samples):
+    weights, seeds = KrigingWeights(HYPER, samples), np.array([4, 9, 5])
+    paths = np.stack([samples[:6], samples[2:8], samples[4:10]])
+    found = random_field.simulate(weights, seeds, FIELDS).evaluate(paths)
+    for seed, path, values in zip(seeds.tolist(), paths, found, strict=True):
+        alone = random_field.simulate(weights, seed, FIELDS).evaluate(path)
+        assert np.abs(values - alone).max() <= 1.1e-9
+        other = random_field.simulate(weights, seed + 10, FIELDS).evaluate(path)
+        assert np.abs(values - other).max() > 0.1
+
+
 def test_parameters_without_labels_have_fields(rng):
     hyper = replace(HYPER, labels=())
     samples = rng.uniform(-1.0, 1.0, (10, 2))

@@ -1,0 +1,255 @@
+"""Tests of takes of walking crowds: no two characters alike, on the paths of the prediction."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.inference.level_selection import Camera
+from posefield.kriging import kriging_model
+from posefield.locomotion import (
+    floor_plane,
+    gait,
+    level_transitions,
+    locomotion_plan,
+    walking_crowd,
+)
+from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.motion import skeleton
+from posefield.registry import shipped_models
+from posefield.synthesis import crowd_takes, walking_feet, walking_takes
+from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
+from posefield.synthesis.walking_takes import WalkerTakes
+from posefield.validation.crowd_question import CharacterTakes
+
+FRAMES, RATE = 40, 30.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    path = shipped_models.FOLDER / "cmu_walk.onnx"
+    return Synthesizer("cmu_walk", session.load(path))
+
+
+@pytest.fixture(scope="module")
+def walk(model):
+    return gait.fit_gait(model.session)
+
+
+@pytest.fixture(scope="module")
+def twins(model, walk):
+    """Plan of three characters with equal controls, labels and phases, on the same path."""
+    example = np.array(model.session.card.examples[5])
+    held = np.tile(example, (3, FRAMES, 1))
+    origin = floor_plane.project(np.zeros((3, 3)))
+    start, same = (origin, np.zeros(3)), np.zeros(3, dtype=np.int64)
+    return locomotion_plan.plan_from_controls(walk, held, same, np.zeros(3), start, RATE)
+
+
+def joints(card, made):
+    """Joints (M, F, J, 3), m."""
+    bones, roots, rotations = (
+        part.astype(float) for part in (made.bone_offsets, made.root_position, made.rotations)
+    )
+    local = skeleton.translations(bones, roots)
+    return skeleton.positions(card.skeleton.parents, rotations, local)
+
+
+def built(model, walk, **asked):
+    """A crowd's facts, and its motions in one batch."""
+    order = CrowdOrder(**{"count": 8, "seconds": 3.0, **asked})
+    made = walking_feet.build_crowd(model, walk, order)
+    (batch,) = made.batches
+    return made.facts, batch
+
+
+def taken(model, plan, seeds, variety=0.7, detail=False, who=None):
+    """Motions of takes of a plan's characters, feet as predicted."""
+    takes = WalkerTakes("index", np.array(seeds), variety, detail)
+    who = np.arange(len(seeds)) if who is None else who
+    shown = level_transitions.constant_schedule(0, plan.phases.shape).select(who)
+    pose = walking_takes.pose_maker(model, takes, plan, who)
+    return walking_feet.standing_motions(model.session, plan, who, shown, pose)
+
+
+def apart(one, other):
+    """Root mean square distance of joints, cm."""
+    return 100.0 * np.sqrt(np.mean(np.sum(np.square(one - other), axis=-1)))
+
+
+def test_no_two_walk_alike(model, twins):
+    card = model.session.card
+    a, b, c = joints(card, taken(model, twins, [1, 2, 2]))
+    # Negative control: characters with one seed, equal controls and equal labels move alike.
+    assert np.array_equal(b, c)
+    assert 1.0 < apart(a, b) < 10.0
+
+
+def test_no_take_is_the_prediction(model, twins):
+    card = model.session.card
+    none = joints(card, taken(model, twins, [1, 2, 3], variety=0.0))
+    who = np.arange(3)
+    shown = level_transitions.constant_schedule(0, twins.phases.shape)
+    plain = joints(card, walking_feet.standing_motions(model.session, twins, who, shown))
+    # Poses of takes are computed in double precision, those of the graph in single precision.
+    assert apart(none, plain) < 1e-3
+    assert apart(joints(card, taken(model, twins, [1, 2, 3])), plain) > 0.5
+
+
+def test_without_a_take_a_crowd_has_the_bytes_of_before(model, walk):
+    facts, made = built(model, walk)
+    _, zero = built(model, walk, take=0, variety=0.3)
+    assert facts["take"] == {} and np.array_equal(made.rotations, zero.rotations)
+    facts, other = built(model, walk, take="index")
+    assert facts["take"] == {"seed": "index", "variety": 0.7, "detail": False}
+    assert not np.array_equal(made.rotations, other.rotations)
+
+
+def test_a_walker_has_the_poses_of_its_take_in_a_crowd(model, twins):
+    """A seed is the same function of the controls for walkers and for poses of characters."""
+    seeds, rows = np.array([4, 5, 6]), np.arange(3)
+    frames = np.full(3, 11)
+    takes = WalkerTakes("index", seeds, 0.7, True)
+    pose = walking_takes.pose_maker(model, takes, twins, rows)
+    found = pose(model.session, twins, rows, frames, 0)
+    labels = twins.labels.weights[twins.who]
+    controls = twins.controls[:, 11]
+    durations = model.session.durations(controls, labels)
+    times = (twins.phases[:, 11] * durations)[:, None]
+    own = CharacterTakes(seeds, np.full(3, 0.7), np.full(3, True))
+    posed, path, _ = crowd_takes.pose_takes(model, own, controls, times, labels, 0)
+    assert np.abs(found.rotations[:, 1:] - posed[:, 1:]).max() < 1e-6
+    assert np.abs(found.heights - path[:, 1]).max() < 1e-6
+    other = replace(own, seeds=seeds + 1)
+    wrong, _, _ = crowd_takes.pose_takes(model, other, controls, times, labels, 0)
+    assert np.abs(found.rotations[:, 1:] - wrong[:, 1:]).max() > 1e-2
+
+
+def test_a_walker_depends_on_itself_alone(model, walk):
+    order = CrowdOrder(count=9, seconds=2.0, take="index", detail=True)
+    crowds = [walking_feet.build_crowd(model, walk, order) for _ in range(2)]
+    first, again = (next(iter(made.batches)) for made in crowds)
+    assert np.array_equal(first.rotations, again.rotations)
+    assert np.array_equal(first.root_position, again.root_position)
+
+
+def test_part_of_a_crowd_moves_as_in_the_whole(model, twins):
+    whole = taken(model, twins, [1, 2, 3], detail=True)
+    alone = taken(model, twins, [1, 2, 3], detail=True, who=np.array([1]))
+    assert np.abs(whole.rotations[1] - alone.rotations[0]).max() < 1e-6
+
+
+def test_walkers_stay_on_their_paths(model, walk):
+    card = model.session.card
+    _, mean = built(model, walk, feet="as_predicted")
+    _, varied = built(model, walk, take="index", variety=1.0, feet="as_predicted")
+    gap = (varied.root_position - mean.root_position)[..., [0, 2]]
+    assert 0.001 < np.linalg.norm(gap, axis=-1).mean() < 0.05
+    assert apart(joints(card, varied), joints(card, mean)) > 1.0
+
+
+def test_feet_of_takes_stand(model, walk):
+    _, made = built(model, walk, take="index", detail=True)
+    assert 100.0 * made.feet.skate.mean() < 3.0 < 100.0 * made.feet.skate_before.mean()
+    assert made.feet.drift.max() < 1e-6 and made.feet.lowered.max() <= 0.05
+
+
+def test_deviations_between_knots_are_those_of_the_field(model, walk):
+    order = CrowdOrder(count=6, seconds=6.0, take="index")
+    exact = _paths(model, walk, order, 0.0)
+    found = _paths(model, walk, order, walking_takes.KNOT_SECONDS)
+    coarse = _paths(model, walk, order, 3.0)
+    size = np.sqrt(np.mean(np.square(exact)))
+    assert np.sqrt(np.mean(np.square(found - exact))) < 0.005 * size
+    assert np.sqrt(np.mean(np.square(coarse - exact))) > 0.005 * size
+
+
+def _paths(model, walk, order, apart):
+    """Deviations along the paths of a crowd, computed at knots so many seconds apart."""
+    plan = walking_crowd.plan_random(walk, order.count, order.seconds, order.fps, order.seed)
+    return walking_takes.deviations_along(
+        model, plan, np.arange(order.count), 1 + np.arange(order.count), apart
+    )
+
+
+@pytest.mark.parametrize("level", range(4))
+def test_each_level_has_takes(model, walk, level):
+    card = model.session.card
+    _, mean = built(model, walk, level=level)
+    _, varied = built(model, walk, level=level, take="index")
+    assert apart(joints(card, varied), joints(card, mean)) > 0.1
+
+
+def test_takes_do_not_jump_while_levels_change(model, walk):
+    card = model.session.card
+    near = Camera(np.array([-8.0, 1.7, 0.0]), 1.0472, 1080.0)
+    asked = {"count": 30, "seconds": 8.0, "camera": near, "pixels": 3.0}
+    facts, varied = built(model, walk, take="index", **asked)
+    _, mean = built(model, walk, **asked)
+    assert sum(share > 0.0 for share in facts["level_shares"]) > 1
+    steps = [
+        np.linalg.norm(np.diff(joints(card, made), axis=1), axis=-1).max()
+        for made in (varied, mean)
+    ]
+    assert steps[0] < 1.5 * steps[1]
+
+
+def test_detail_adds_acceleration(model, walk):
+    card = model.session.card
+    sizes = []
+    for detail in (False, True):
+        _, made = built(model, walk, take="index", detail=detail)
+        jumps = np.diff(joints(card, made), 2, axis=1) * RATE**2
+        sizes.append(np.sqrt(np.mean(np.square(jumps))))
+    assert 1.03 * sizes[0] < sizes[1] < 1.3 * sizes[0]
+
+
+def test_shared_motions_have_a_seed_each(model, walk):
+    order = CrowdOrder(count=9, motions=3, seconds=1.0, take="index")
+    takes = walking_takes.of_order(model.session.card, order)
+    assert takes.seeds.tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("asked", "field"),
+    [
+        ({"take": -1}, "take"),
+        ({"take": 1_000_000_000}, "take"),
+        ({"take": 3, "variety": 1.5}, "variety"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(model, walk, asked, field):
+    with pytest.raises(InvalidField) as caught:
+        built(model, walk, **asked)
+    assert caught.value.field == field
+
+
+def test_a_model_without_takes_refuses_them(model):
+    card = model.session.card
+    spherical = replace(card, kriging=replace(card.kriging, covariance="spherical"))
+    with pytest.raises(InvalidField, match="spherical kriging"):
+        walking_takes.of_order(spherical, CrowdOrder(count=2, take="index"))
+    assert walking_takes.of_order(spherical, CrowdOrder(count=2)) is None
+
+
+def test_a_model_without_detail_says_so(walk_path):
+    own = Synthesizer("stroll", session.load(walk_path))
+    bare = replace(own.session.card, making=replace(own.session.card.making, detail=b""))
+    plain = Synthesizer("stroll", replace(own.session, card=bare))
+    facts, _ = built(plain, gait.fit_gait(plain.session), detail=True)
+    assert facts["warnings"] == [NO_DETAIL] and facts["take"] == {}
+
+
+def test_variances_of_deviations_are_those_of_kriging(model, twins):
+    """The field along a path has the kriging variance, in sills."""
+    seeds = 1 + np.arange(300)
+    controls = np.repeat(twins.controls[:1, :1], len(seeds), axis=0)
+    labels = np.repeat(twins.labels.weights[twins.who][:1], len(seeds), axis=0)
+    found = model.solver.variation.along_paths(controls, labels, seeds)[:, 0]
+    (sigma,) = model.session.sigmas(controls[:1, 0], labels[:1])
+    ranges = model.session.card.sampled_ranges
+    assert np.abs(kriging_model.half_ranges(controls[0, 0], *ranges)).max() <= 1.0
+    assert found.var() == pytest.approx(float(sigma) ** 2, rel=0.1)
+    assert found.var() != pytest.approx(1.5 * float(sigma) ** 2, rel=0.1)
