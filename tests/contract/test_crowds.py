@@ -234,7 +234,6 @@ def test_a_walk_of_a_model_without_detail_has_a_warning(ask):
     said = asked.headers.get("Posefield-Warning", "")
     assert "this model's file has none to sample" in said
     assert "detail" not in plain.headers.get("Posefield-Warning", "")
-    assert plain.content == asked.content
 
 
 def test_shared_motions_are_sent_once(ask):

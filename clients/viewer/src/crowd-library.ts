@@ -10,6 +10,8 @@ import { type Placed, place, placed } from "./skeleton.ts";
 
 /** Motions, and frames of each: what lies between two frames is mixed from them. */
 export const [MOTIONS, FRAMES] = [24, 24];
+/** Motions of a crowd of takes: a service gives at most 2,000 characters of a question a take. */
+export const TAKES = Math.floor(2000 / (FRAMES + 1));
 /** Captured clips that are tried, and the fastest turn, rad/s, of who walks a gentle way. */
 const [TRIED, SHARPEST] = [120, 0.2];
 
@@ -36,7 +38,7 @@ interface Row {
 /**
  * Ten questions for a model of four levels: what its clips do, and then their poses.
  *
- * progress: called with the share that is done.
+ * progress: called with the share that is done. takes: whether each motion is a take of its own.
  */
 export async function library(
   source: Source,
@@ -44,6 +46,7 @@ export async function library(
   card: ModelCard,
   signal: AbortSignal,
   progress: (share: number) => void,
+  takes = false,
 ): Promise<Library> {
   const questions = 2 + 2 * card.levels.length;
   let answered = 0;
@@ -60,7 +63,10 @@ export async function library(
   };
   const ways = await journeys(tried, ask);
   const gentle = tried.map((_, i) => i).filter((i) => Math.abs(ways.turning[i]!) <= SHARPEST);
-  const chosen = spread(walks && gentle.length >= 6 ? gentle : tried.map((_, i) => i), MOTIONS);
+  const fit = walks && gentle.length >= 6 ? gentle : tried.map((_, i) => i);
+  const some = spread(fit, MOTIONS);
+  // Takes last and travel as the prediction does, so that several may share a captured clip.
+  const chosen = takes ? Array.from({ length: TAKES }, (_, i) => some[i % some.length]!) : some;
   const rest = standing(card, Float32Array.from(card.skeleton.offsets.flat()));
   const size = chosen.length * (FRAMES + 1) * card.skeleton.names.length * SIZE;
   const all = new Float32Array(card.levels.length * size);
@@ -72,7 +78,9 @@ export async function library(
       const time = repeated.map(
         (_, i) => (duration[Math.floor(i / (FRAMES + 1))]! * (i % (FRAMES + 1))) / FRAMES,
       );
-      const poses = await ask(repeated, { time, level, root: walks ? "in_place" : "travelling" });
+      const root = walks ? "in_place" : "travelling";
+      const take = repeated.map((_, i) => 1 + Math.floor(i / (FRAMES + 1)));
+      const poses = await ask(repeated, { time, level, root, ...(takes && { take }) });
       lay(all.subarray(level * size, (level + 1) * size), rest, poses, walks);
     }),
   );

@@ -1,7 +1,8 @@
 /** What the crowd is asked to be, and what it costs: sliders, counts and times. */
 
-import { el, labelled } from "./dom.ts";
-import type { Page } from "./page.ts";
+import { TAKES } from "./crowd-library.ts";
+import { el, labelled, toggle } from "./dom.ts";
+import { type Page, served } from "./page.ts";
 import type { State } from "./state.ts";
 import { figure } from "./written.ts";
 
@@ -32,6 +33,7 @@ export class Panel {
       this.#said,
       this.#progress,
       people(page),
+      takes(page),
       limit(page),
       el("ul", {}, ...levels),
       this.#seen,
@@ -74,6 +76,17 @@ function people(page: Page): HTMLElement {
   const range = { min: FEWEST, max: MOST, step: 50 };
   const said = (value: number) => `${value} characters`;
   return slider(page, "crowd", range, said, Number, (count) => count);
+}
+
+/** Whether the motions are takes; only a service has them. */
+function takes({ signal, source, store }: Page): HTMLElement {
+  const label = `${TAKES} motions instead of a few, each a take of its own`;
+  const own = toggle("No two alike", label, (on) => store.set({ varied: on }));
+  own.hidden = !served(source);
+  const show = () => own.set(store.state.varied);
+  show();
+  signal.addEventListener("abort", store.listen(show));
+  return own;
 }
 
 function limit(page: Page): HTMLElement {

@@ -20,6 +20,7 @@ import { Panel } from "./crowd-panel.ts";
 import { Crowd, half, REACH } from "./crowd-walk.ts";
 import { type Ladder, ladder, lens, pixels } from "./detail.ts";
 import { understood } from "./faults.ts";
+import { served } from "./page.ts";
 import type { Session } from "./session.ts";
 import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
@@ -83,6 +84,7 @@ class CrowdView {
       else this.#leave();
     }
     if (changed.has("crowd") && this.#library) this.#people();
+    if (changed.has("varied")) this.#again();
     // The page says so when the service is back, and one may move a control to try again.
     if (changed.has("controls")) this.#want();
     if (changed.has("playing") && changed.has("time")) this.#goOn(state);
@@ -129,13 +131,21 @@ class CrowdView {
     orbit.update();
   }
 
+  /** Other motions; those that are there go on until then. */
+  #again(): void {
+    this.#library = null;
+    this.#want();
+  }
+
   async #load(): Promise<void> {
     const { source, store, card, signal, notice } = this.#page;
+    const { varied } = store.state;
     this.#loading = true;
     try {
       this.#panel.say("Computing the motions …");
       const done = (share: number) => this.#panel.progress(share);
-      this.#library = await library(source, store.state.model, card, signal, done);
+      const takes = varied && served(source);
+      this.#library = await library(source, store.state.model, card, signal, done, takes);
       this.#panel.say("");
       if (!signal.aborted) this.#people();
     } catch (fault) {
@@ -145,6 +155,7 @@ class CrowdView {
     } finally {
       this.#loading = false;
       this.#panel.progress(null);
+      if (!signal.aborted && varied !== store.state.varied) this.#again();
     }
   }
 

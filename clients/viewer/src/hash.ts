@@ -74,6 +74,7 @@ export function initial(model: string, card: ModelCard): State {
     across,
     along,
     crowd: 300,
+    varied: false,
     pixels: 4,
   };
 }
@@ -174,6 +175,7 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   across: control(),
   along: control(),
   crowd: between(() => [50, 1000], Number.isInteger),
+  varied: yes(),
   pixels: between(() => [0.25, 16]),
 };
 

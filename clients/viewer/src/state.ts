@@ -39,6 +39,8 @@ export interface State {
   readonly along: string;
   /** Characters of the crowd, and the pixels that their errors may cover. */
   readonly crowd: number;
+  /** Whether the crowd's motions are takes, so that hardly any two are alike. */
+  readonly varied: boolean;
   readonly pixels: number;
 }
 

@@ -28,6 +28,7 @@ const OTHER: State = {
   body: "stick",
   ghost: true,
   fan: true,
+  varied: true,
   feet: true,
   stands: true,
   take: 7,

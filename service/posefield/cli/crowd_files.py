@@ -62,8 +62,8 @@ def write_crowd(
         "level_shares": made.facts["level_shares"],
         "outside_share": made.facts["outside_share"],
         "feet_stand": made.facts["feet_stand"],
-        "take": made.facts["take"],
-        "warnings": made.facts["warnings"],
+        "take": made.facts.get("take", {}),
+        "warnings": made.facts.get("warnings", []),
         **feet.facts(),
     }
 

@@ -117,7 +117,7 @@ async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iter
 
 def send_walk(context: Walks, answer: CrowdClip, content: Iterator[bytes]) -> Response:
     """Return the response that streams the crowd."""
-    share, said = float(answer.facts["outside_share"]), list(answer.facts["warnings"])
+    share, said = float(answer.facts["outside_share"]), list(answer.facts.get("warnings", ()))
     if share:
         outside = f"{100 * share:.1f} % of the poses have some control outside what was sampled"
         said.insert(0, outside)

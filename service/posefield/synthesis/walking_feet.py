@@ -1,7 +1,7 @@
 """Feet of walking crowds that stand: which crowds, and their motions."""
 
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -39,12 +39,11 @@ def build_crowd(model: Synthesizer, gait: Gait, order: CrowdOrder) -> CrowdClip:
     standing = wants_standing_feet(gait.session.card, order)
     make = _motion_maker(model, takes, standing)
     crowd = crowd_order.build_crowd(model, gait, order, make)
-    missing = order.detail and not model.session.card.making.detail
-    said = {
-        "feet_stand": standing,
-        "take": {} if takes is None else takes.facts(),
-        "warnings": [NO_DETAIL] if missing else [],
-    }
+    said: dict[str, Any] = {"feet_stand": standing}
+    if takes is not None:
+        said["take"] = takes.facts()
+    if order.detail and not model.session.card.making.detail:
+        said["warnings"] = [NO_DETAIL]
     return replace(crowd, facts={**crowd.facts, **said})
 
 
