@@ -55,6 +55,24 @@ def test_feet_stand_unless_asked_to_be_as_predicted(walk_path, tmp_path):
     assert isinstance(done.exception, InvalidField)
 
 
+def test_takes_are_written_and_told_of(walk_path, tmp_path):
+    written = []
+    for words in ((), ("--take", "index"), ("--take", "index"), ("--take", 7, "--variety", 0.4)):
+        path = tmp_path / f"{len(written)}.usda"
+        done = run(walk_path, "--count", 3, "--seconds", 1, "-o", path, *words)
+        assert done.exit_code == 0, done.output
+        written.append(path.read_bytes())
+    assert "take 7, variety 0.4" in done.stdout
+    plain, own, again, one = written
+    assert own == again and len({plain, own, one}) == 3
+    data = Usd.Stage.Open(str(tmp_path / "1.usda")).GetRootLayer().customLayerData["posefield"]
+    assert data["take"] == {"seed": "index", "variety": pytest.approx(0.7), "detail": False}
+    bare = Usd.Stage.Open(str(tmp_path / "0.usda")).GetRootLayer().customLayerData["posefield"]
+    assert "take" not in bare
+    done = run(walk_path, "--take", "own", "-o", path)
+    assert isinstance(done.exception, FormError)
+
+
 def test_the_same_seed_writes_the_same_bytes(walk_path, tmp_path):
     paths = [tmp_path / name for name in ("a.npz", "b.npz", "c.npz")]
     for path, seed in zip(paths, (1, 1, 2), strict=True):

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
@@ -85,7 +86,9 @@ class ReducedTensor:
         self, motion: Annotated[Floats, "times freedoms"], places: Frames
     ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
-        return self.poses_of_moves(self.moves(motion, places))[:2]
+        numbers = self.mean + self.moves(motion, places) @ self.directions
+        vectors = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(places), -1, 3)
+        return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
 
     def poses_of_moves(
         self, moves: Annotated[Floats, "poses freedoms"]
@@ -96,12 +99,32 @@ class ReducedTensor:
     ]:
         """Return rotations (S, J, 4), root positions (S, 3), m, and values (S, C) of the curves.
 
-        moves: coefficients (S, r1) of the directions.
+        moves: coefficients (S, r1) of the directions. As `poses`, in half of its time, up to the
+        rounding of mean rotations.
         """
-        numbers, end = self.mean + moves @ self.directions, 3 + 3 * len(self.rotations)
-        vectors = numbers[:, 3:end].reshape(len(moves), -1, 3)
-        turned = quat.mul(self.rotations, quat.exp(vectors))
-        return turned, numbers[:, :3], curves.clamp(self.curves, numbers[:, end:])
+        others = np.r_[:3, 3 + 3 * len(self.rotations) : len(self.mean)]
+        numbers = self.mean[others] + moves @ self.directions[:, others]
+        mean, turns = self._half_turns
+        halves = (mean + moves @ turns).reshape(len(moves), -1, 4)
+        angles = np.sqrt(np.einsum("njk,njk->nj", halves, halves))
+        # np.sinc is sin(pi x) / (pi x), and exact at zero.
+        halves *= np.sinc(angles / np.pi)[..., None]
+        halves += np.cos(angles)[..., None] * self.rotations
+        return halves, numbers[:, :3], curves.clamp(self.curves, numbers[:, 3:])
+
+    @cached_property
+    def _half_turns(
+        self,
+    ) -> tuple[Annotated[Floats, "joints_4"], Annotated[Floats, "freedoms joints_4"]]:
+        """Mean rotations times half the rotation vectors (J 4): their mean, and by direction.
+
+        They are linear in the moves, and as long as half the angles.
+        """
+        end, joints = 3 + 3 * len(self.rotations), len(self.rotations)
+        rows = 0.5 * np.vstack([self.mean, self.directions])[:, 3:end].reshape(-1, joints, 3)
+        found = quat.mul(self.rotations, np.pad(rows, ((0, 0), (0, 0), (1, 0))))
+        flat = found.reshape(len(rows), -1)
+        return flat[0], flat[1:]
 
     def curve_values(
         self, motion: Annotated[Floats, "times freedoms"], places: Frames

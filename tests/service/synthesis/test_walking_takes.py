@@ -79,6 +79,19 @@ def apart(one, other):
     return 100.0 * np.sqrt(np.mean(np.sum(np.square(one - other), axis=-1)))
 
 
+def test_poses_of_moves_are_those_of_a_motion(model, rng):
+    reduced = model.solver.corrector(0).reduced
+    coefficients = 0.1 * rng.normal(size=reduced.core.shape[2])
+    places = np.linspace(0.0, reduced.frames - 1.0, 7)
+    motion = reduced.motion(coefficients)
+    moves = reduced.moves_of_coefficients(np.tile(coefficients, (7, 1)), places)
+    assert np.abs(moves - reduced.moves(motion, places)).max() < 1e-12
+    found, expected = reduced.poses_of_moves(moves), reduced.poses(motion, places)
+    assert np.abs(found[0] - expected[0]).max() < 1e-6
+    assert np.abs(found[1] - expected[1]).max() < 1e-12
+    assert np.abs(reduced.poses_of_moves(1.1 * moves)[0] - expected[0]).max() > 1e-4
+
+
 def test_no_two_walk_alike(model, twins):
     card = model.session.card
     a, b, c = joints(card, taken(model, twins, [1, 2, 2]))
