@@ -65,9 +65,9 @@ def test_takes_are_written_and_told_of(walk_path, tmp_path):
     assert "take 7, variety 0.4" in done.stdout
     plain, own, again, one = written
     assert own == again and len({plain, own, one}) == 3
-    data = Usd.Stage.Open(str(tmp_path / "1.usda")).GetRootLayer().customLayerData["posefield"]
+    stages = [Usd.Stage.Open(str(tmp_path / f"{place}.usda")) for place in (0, 1)]
+    bare, data = (stage.GetRootLayer().customLayerData["posefield"] for stage in stages)
     assert data["take"] == {"seed": "index", "variety": pytest.approx(0.7), "detail": False}
-    bare = Usd.Stage.Open(str(tmp_path / "0.usda")).GetRootLayer().customLayerData["posefield"]
     assert "take" not in bare
     done = run(walk_path, "--take", "own", "-o", path)
     assert isinstance(done.exception, FormError)

@@ -164,8 +164,8 @@ def _relative_poses(
         for whole, values in zip(posed, _poses(bench.reduced, moves, places, travel), strict=True):
             whole[part] = values
     rotations, roots, values = posed
-    found = stride.relative_poses(own, phases, rotations, roots)
-    return replace(found, curves=values) if values.shape[1] else found
+    relative = stride.relative_poses(own, phases, rotations, roots)
+    return replace(relative, curves=values) if values.shape[1] else relative
 
 
 def _shapes(card: ModelCard) -> list[tuple[int, ...]]:
