@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -183,3 +184,30 @@ def test_an_error_names_what_bytes_were_said_to_be():
     for opened in (session.open_bytes, session.load_bytes):
         with pytest.raises(ModelError, match=r"^upload\.onnx: does not end with its checksum"):
             opened(b"nothing", "upload.onnx")
+
+
+def test_paths_without_rotations_are_those_of_whole_poses(walk_path):
+    own = session.load(walk_path)
+    example = np.array(own.card.examples[:5])
+    times = np.linspace(0.0, 0.8, 5)[:, None]
+    names = ("duration", "root_position", "travel")
+    whole = replace(own, path_sessions=())
+    for found, expected in zip(
+        own.run(example, times, *names), whole.run(example, times, *names), strict=True
+    ):
+        assert np.array_equal(found, expected)
+
+
+def test_rows_outside_are_bounded_as_they_are_alone(walk_path):
+    own = session.load(walk_path)
+    low, high = own.bounds.low, own.bounds.high
+    inside = np.linspace(low, high, 4)
+    mixed = np.vstack([inside, high + 0.4 * (high - low), low - 0.4 * (high - low)])
+    found = own.durations(mixed)
+    assert np.array_equal(found[:4], own.durations(inside))
+    times = np.full((6, 1), 0.3)
+    (ran,) = own.run(mixed, times, "duration")
+    alone = np.concatenate([own.durations(mixed[[row]]) for row in range(6)])
+    assert np.abs(ran - alone).max() < 1e-6 and np.abs(found - alone).max() < 1e-6
+    least, most = own.bounds.duration_limits
+    assert ((found >= least) & (found <= most)).all()
