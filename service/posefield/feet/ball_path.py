@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import Floats, Indices
+from posefield.common.units import UP, Floats, Indices
 from posefield.feet import stances
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
+from posefield.motion.floor import LEVEL_FLOOR, Floor
 from posefield.motion.foot_contacts import FootContact
 
 # Time over which a change of the path is spread, s.
@@ -43,6 +44,14 @@ class Footsteps:
     positions: RootPath
     stances: tuple[Interval, ...]
     anchors: Annotated[Floats, "stances 3"]
+
+    def on_floor(self, floor: Floor) -> "Footsteps":
+        """Return the steps of a floor at height 0 on another floor."""
+        if floor == LEVEL_FLOOR:
+            return self
+        moved = self.positions + floor.heights(self.positions)[:, None] * UP
+        anchors = self.anchors + floor.heights(self.anchors)[:, None] * UP
+        return Footsteps(moved, self.stances, anchors)
 
 
 def plan_path(path: FootPath, found: Sequence[Interval], foot: FootContact) -> Footsteps:

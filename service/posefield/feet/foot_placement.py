@@ -13,7 +13,7 @@ from posefield.feet.ball_path import Footsteps
 from posefield.feet.footsteps import FeetPlan
 from posefield.feet.stances import Cycle
 from posefield.locomotion import floor_plane
-from posefield.motion import skeleton
+from posefield.motion import quat, skeleton
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,18 @@ def place_feet(
     shift = _shift(plan, at)
     turned = rotations.copy()
     above = None if joints is None else _joints_above(body.parents, joints)
-    for limb, target in _targets(plan, poses, at):
+    for index, (limb, target) in enumerate(_targets(plan, poses, at)):
         if above is not None and limb.upper not in above:
             continue
         found = two_bone.solve(poses, limb, two_bone.reach(poses, limb, shift, target))
         turned[:, limb.upper] = found.upper
         turned[:, limb.middle] = found.middle
         turned[:, limb.lower] = found.lower
+        if index < len(body.legs) and not plan.floor.is_level:
+            # The foot is tilted as the floor is, in the axes of the ankle.
+            own = poses.orientation(limb.lower)
+            tilt = quat.mul(quat.conj(own), quat.mul(plan.floor.tilt, own))
+            turned[:, limb.lower] = quat.mul(found.lower, tilt)
     return PlacedFrames(turned, roots + shift)
 
 
@@ -73,7 +78,7 @@ def foot_paths(plan: FeetPlan) -> FootPaths:
     before, after = np.empty((2, len(at), len(legs), 3))
     for foot, (leg, target) in enumerate(list(_targets(plan, poses, at))[: len(legs)]):
         upper = poses.position(leg.upper) + shift
-        arm = poses.position(leg.tip) - poses.position(leg.lower)
+        arm = _foot_arm(plan, poses, leg)
         before[:, foot] = poses.position(leg.tip)
         after[:, foot] = upper + two_bone.reach(poses, leg, shift, target) + arm
     return FootPaths(before, after)
@@ -92,10 +97,16 @@ def _targets(
     body = plan.character
     for leg, steps, change in zip(body.legs, plan.steps, plan.changes, strict=True):
         moved = _interpolate(_extended_path(change, plan.cycle), at)
-        tip = poses.position(leg.tip)
-        yield leg, _anchored(steps, plan, at, tip + moved) - (tip - poses.position(leg.lower))
+        path = poses.position(leg.tip) + moved
+        yield leg, _anchored(steps, plan, at, path) - _foot_arm(plan, poses, leg)
     for limb in body.kept:
         yield limb, poses.position(limb.lower)
+
+
+def _foot_arm(plan: FeetPlan, poses: limbs.LimbPoses, leg: limbs.Limb) -> RootPath:
+    """Return the vectors (S, 3), m, from the ankle to the joint that stands."""
+    arm = poses.position(leg.tip) - poses.position(leg.lower)
+    return arm if plan.floor.is_level else plan.floor.tilted(arm)
 
 
 def _anchored(steps: Footsteps, plan: FeetPlan, at: Frames, path: RootPath) -> RootPath:

@@ -16,12 +16,16 @@ from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stances
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.motion.floor import LEVEL_FLOOR, Floor
 from posefield.motion.foot_contacts import FootContact
 
 # Rounds in which stances are shortened whose leg does not reach.
 ROUNDS = 4
 # A foot may stand this much higher or lower than captured feet do, m: soles differ.
 UNEVEN = 0.01
+# On a slope the feet of a step differ in height: the pelvis is lowered by this length times the
+# slope more, m.
+STEP = 0.4
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,8 @@ class Character:
 
     parents: of the joints. bones: offsets (J, 3), m. legs: of the feet that are planted. kept:
     limbs whose ends keep their predicted paths, such as the arm of a hand with an exact target.
-    fixed: whether the root keeps its height.
+    fixed: whether the pelvis keeps its height above the floor. raised: whether a fixed one follows
+    the floor nevertheless.
     """
 
     parents: tuple[int, ...]
@@ -38,6 +43,7 @@ class Character:
     legs: tuple[Limb, ...]
     kept: tuple[Limb, ...] = ()
     fixed: bool = False
+    raised: bool = False
 
     @property
     def limbs(self) -> tuple[Limb, ...]:
@@ -64,8 +70,10 @@ class FeetPlan:
     """Plan of the feet over the frames of a grid.
 
     rate: of the grid, frames a second. cycle: as of the motion. steps: of each leg. changes: of the
-    path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m, with what brings
-    the character to the floor. grounded: the latter, m. poses: predicted, of the limbs.
+    path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m. followed: the part
+    of it that follows the floor (F,), m; the rest is the pelvis. grounded: how much a character that
+    floats was lowered to the level on which it was captured, m. poses: predicted, of the limbs.
+    floor: on which the feet stand. unreached: legs, by place, none of whose stances reaches it.
     """
 
     character: Character
@@ -74,8 +82,11 @@ class FeetPlan:
     steps: tuple[Footsteps, ...]
     changes: Annotated[Floats, "feet frames 3"]
     lowered: Frames
+    followed: Frames
     grounded: float
     poses: LimbPoses
+    floor: Floor = LEVEL_FLOOR
+    unreached: tuple[int, ...] = ()
 
 
 def plan_feet(
@@ -83,13 +94,14 @@ def plan_feet(
     motion: SampledMotion,
     contacts: Sequence[FootContact] = (),
     likely: Annotated[Floats, "frames feet"] | None = None,
-    floor: float = 0.0,
+    floor: Floor = LEVEL_FLOOR,
 ) -> FeetPlan:
     """Return where the feet of a motion stand, and how low its pelvis must be for that.
 
     Any motion may be planned, also one that is joined of several. contacts: statistics of each
     leg's foot, with the probabilities `likely` (F, K) of its contacts; both are estimated from the
-    motion if they are not given. floor: height of the floor, m.
+    motion if they are not given. floor: on which the feet stand. The steps are those of a floor at
+    height 0, moved to it. A cycle does not climb: its floor must be level.
     """
     poses = limbs.evaluate_poses(
         character.parents, character.bones, character.limbs, motion.rotations, motion.roots
@@ -103,26 +115,39 @@ def plan_feet(
         ]
     else:
         down, known = contact_estimates.from_probabilities(paths, likely), list(contacts)
-    above = _heights_above(paths, down, known, floor)
-    sunk = _sunk(above, poses, character)
+    above = _heights_above(paths, down, known)
+    grounded = _grounded(above, poses, character)
     # The ground first: the whole character stands as high as its feet do.
-    grounded = [
+    feet = [
         _GroundedFoot(
-            replace(path, positions=path.positions - sunk * UP),
-            replace(foot, height=floor + foot.height + float(np.clip(own - sunk, -UNEVEN, UNEVEN))),
+            replace(path, positions=path.positions - grounded * UP),
+            replace(foot, height=foot.height + float(np.clip(own - grounded, -UNEVEN, UNEVEN))),
         )
         for path, foot, own in zip(paths, known, above, strict=True)
     ]
     found = [
         stances.discipline(own, foot.path, foot.contact)
-        for own, foot in zip(down, grounded, strict=True)
+        for own, foot in zip(down, feet, strict=True)
     ]
-    steps, lowered = _reachable_steps(poses, character, grounded, found, sunk)
+    followed = _follow(floor, grounded, motion, poses, character)
+    body = _GroundedBody(poses, character, floor, grounded, followed)
+    steps, lowered = _reachable_steps(body, feet, found)
     changes = np.array(
         [own.positions - path.positions for own, path in zip(steps, paths, strict=True)]
     ).reshape(-1, *motion.roots.shape)
-    cycle, rate = motion.cycle, motion.rate
-    return FeetPlan(character, rate, cycle, tuple(steps), changes, sunk + lowered, sunk, poses)
+    return FeetPlan(
+        character,
+        motion.rate,
+        motion.cycle,
+        tuple(steps),
+        changes,
+        followed + lowered,
+        followed,
+        grounded,
+        poses,
+        floor,
+        _unreached(floor, found, steps),
+    )
 
 
 @dataclass(frozen=True)
@@ -133,21 +158,35 @@ class _GroundedFoot:
     contact: FootContact
 
 
+@dataclass(frozen=True)
+class _GroundedBody:
+    """Character on a floor.
+
+    grounded: how much it is lowered to the level on which it was captured, m. followed: the same,
+    and how its root follows the floor (F,), m.
+    """
+
+    poses: LimbPoses
+    character: Character
+    floor: Floor
+    grounded: float
+    followed: Frames
+
+
 def _reachable_steps(
-    poses: LimbPoses,
-    character: Character,
-    feet: Sequence[_GroundedFoot],
-    found: Sequence[list[Interval]],
-    sunk: float,
+    body: _GroundedBody, feet: Sequence[_GroundedFoot], found: Sequence[list[Interval]]
 ) -> tuple[list[Footsteps], Frames]:
     """Return the steps of the feet, and how much the pelvis is lowered for them (F,), m.
 
     Stances whose leg does not reach are shortened.
     """
-    count = len(poses.positions)
-    _, below = pelvis.room(poses, character.kept)
-    most = np.zeros(count) if character.fixed else np.clip(below - sunk, 0.0, pelvis.MOST)
-    steps, needs = _steps(poses, character, feet, found, sunk)
+    count = len(body.poses.positions)
+    _, below = pelvis.room(body.poses, body.character.kept)
+    deepest = pelvis.MOST + STEP * body.floor.slope
+    most = np.clip(below - body.followed, 0.0, deepest)
+    if body.character.fixed:
+        most = np.zeros(count)
+    steps, needs = _steps(body, feet, found)
     for _ in range(ROUNDS):
         shorter = [
             _shortened(own, pelvis.beyond(need, most), foot.path)
@@ -156,46 +195,52 @@ def _reachable_steps(
         if shorter == found:
             break
         found = shorter
-        steps, needs = _steps(poses, character, feet, found, sunk)
+        steps, needs = _steps(body, feet, found)
     rate = feet[0].path.rate if feet else 1.0
     return steps, pelvis.lower(needs, most, rate, bool(feet and feet[0].path.cycle))
 
 
 def _steps(
-    poses: LimbPoses,
-    character: Character,
-    feet: Sequence[_GroundedFoot],
-    found: Sequence[list[Interval]],
-    sunk: float,
+    body: _GroundedBody, feet: Sequence[_GroundedFoot], found: Sequence[list[Interval]]
 ) -> tuple[list[Footsteps], list[Frames]]:
     """Return the steps of each foot, and how much lower its leg needs the pelvis to be (F,), m."""
-    steps = [
-        ball_path.plan_path(foot.path, own, foot.contact)
-        for foot, own in zip(feet, found, strict=True)
-    ]
-    needs = []
-    for leg, foot, own in zip(character.legs, feet, steps, strict=True):
-        target = poses.position(leg.lower) - sunk * UP + own.positions - foot.path.positions
-        needs.append(pelvis.need(poses, leg, target, sunk))
+    poses, steps, needs = body.poses, [], []
+    for leg, foot, own in zip(body.character.legs, feet, found, strict=True):
+        step = ball_path.plan_path(foot.path, own, foot.contact).on_floor(body.floor)
+        ankle = poses.position(leg.lower) - body.grounded * UP
+        target = ankle + step.positions - foot.path.positions
+        if not body.floor.is_level:
+            arm = poses.position(leg.tip) - poses.position(leg.lower)
+            target = target + arm - body.floor.tilted(arm)
+        needs.append(pelvis.need(poses, leg, target, body.followed))
+        steps.append(step)
     return steps, needs
+
+
+def _unreached(
+    floor: Floor, found: Sequence[list[Interval]], steps: Sequence[Footsteps]
+) -> tuple[int, ...]:
+    """Return the legs, by place, that stood as predicted, but do not on a given floor."""
+    if floor == LEVEL_FLOOR:
+        return ()
+    return tuple(leg for leg, own in enumerate(steps) if found[leg] and not own.stances)
 
 
 def _heights_above(
     paths: Sequence[FootPath],
     down: Sequence[Sequence[Interval]],
     known: Sequence[FootContact],
-    floor: float,
 ) -> list[float]:
     """Return how much higher each foot stands than captured feet do, by its median, m."""
     found = []
     for path, own, foot in zip(paths, down, known, strict=True):
         standing = path.heights[stances.mask(own, len(path))]
-        found.append(float(np.median(standing)) - foot.height - floor if len(standing) else 0.0)
+        found.append(float(np.median(standing)) - foot.height if len(standing) else 0.0)
     return found
 
 
-def _sunk(above: Sequence[float], poses: LimbPoses, character: Character) -> float:
-    """Return how far a character is lowered to the floor, m: it floats, or sinks, by its feet.
+def _grounded(above: Sequence[float], poses: LimbPoses, character: Character) -> float:
+    """Return how far a character is lowered to the ground, m: it floats, or sinks, by its feet.
 
     Feet may be uneven, and limbs that keep their ends must reach them.
     """
@@ -205,6 +250,24 @@ def _sunk(above: Sequence[float], poses: LimbPoses, character: Character) -> flo
     up, down = pelvis.room(poses, character.kept)
     wanted = float(np.sign(mean) * max(abs(mean) - UNEVEN, 0.0))
     return float(np.clip(wanted, -up.min(), down.min()))
+
+
+def _follow(
+    floor: Floor, grounded: float, motion: SampledMotion, poses: LimbPoses, character: Character
+) -> Frames:
+    """Return how much the root is lowered so that it follows the floor (F,), m.
+
+    Limbs that keep their ends must reach them; the legs make up for the rest.
+    """
+    wanted = grounded - floor.heights(motion.roots)
+    if character.fixed and not character.raised:
+        return np.zeros(len(wanted))
+    up, down = pelvis.room(poses, character.kept)
+    cyclic = motion.cycle is not None
+    high = pelvis.cover(np.maximum(-wanted - up, 0.0), motion.rate, cyclic)
+    low = pelvis.cover(np.maximum(wanted - down, 0.0), motion.rate, cyclic)
+    found: Frames = wanted + high - low
+    return found
 
 
 def _shortened(

@@ -18,7 +18,7 @@ MOST = 0.05
 
 
 def need(
-    poses: LimbPoses, leg: Limb, target: Points, sunk: float | Annotated[Floats, "*characters 1"]
+    poses: LimbPoses, leg: Limb, target: Points, sunk: float | Annotated[Floats, "*characters _"]
 ) -> Values:
     """Return how much lower a leg needs the pelvis to be (..., F), m; infinite out of reach.
 

@@ -7,6 +7,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from posefield.common.units import LengthUnit, UpAxis
+from posefield.motion.floor import Floor
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import Body
 
@@ -17,6 +18,8 @@ DEFAULT_VARIETY = 0.7
 ExtrapolationPolicy = Literal["ok", "warn", "refuse"]
 RootMode = Literal["travelling", "in_place"]
 FeetMode = Literal["stand", "as_predicted"]
+FloorValue = float | Floor
+"""Floor as a height, m, or as a plane."""
 Moment = Literal["start", "end", "event", "highest", "lowest", "farthest"]
 """Moment of the motion; "farthest" is from the root."""
 TargetTime = float | Moment
@@ -124,7 +127,7 @@ class MotionQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return self.exact != "auto" or bool(self.targets) or bool(self.take) or self.detail
 
 
-CONSTRAINING = ("targets", "feet")
+CONSTRAINING = ("targets", "feet", "floor")
 """Fields that constrain an answer whatever their value, unless it is empty."""
 
 
@@ -150,7 +153,8 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
     round(duration * fps)) steps, without start and end. Its frame N equals the first one if it
     stays in place, else it is the first one moved by the cycle's travel and turn. It plays N / fps
     seconds, which is the rounded duration. feet: "stand" plans stances and swings over the whole
-    motion and places the legs; None is "stand" for models that travel and know contacts.
+    motion and places the legs; None is "stand" for models that travel and know contacts. floor:
+    plane in the frame of the clip; standing feet, swings and the pelvis follow it.
     """
 
     fps: Annotated[
@@ -180,6 +184,19 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
             "models that travel and know the contacts of their feet"
         ),
     ] = None
+    floor: Annotated[
+        FloorValue,
+        Meta(
+            description="floor on which feet stand: its height, m, or height at the origin and "
+            "rise for each metre along x and z; default: 0",
+            extra={"metavar": "HEIGHT|HEIGHT,SLOPE_X,SLOPE_Z"},
+        ),
+    ] = 0.0
+
+    @property
+    def ground(self) -> Floor:
+        """Return the floor as a plane."""
+        return self.floor if isinstance(self.floor, Floor) else Floor(self.floor)
 
 
 class FileQuestion(ClipQuestion, frozen=True, kw_only=True):

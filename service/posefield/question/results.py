@@ -1,15 +1,17 @@
 """Results of a query: poses or clips with provenance and uncertainty, sigma grids, reasons."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
+from msgspec import structs
 from numpy.typing import NDArray
 
 from posefield.common.units import Booleans, Floats, Singles
 from posefield.model_file.model_card import Control
 from posefield.motion.clip import Clip
+from posefield.motion.floor import Floor
 from posefield.question.motion_question import LabelValue
 
 Number = TypeVar("Number", bound=np.floating[Any])
@@ -114,7 +116,7 @@ class FeetResult:
     largest distance over the floor of a standing foot from its place, m. lowered: by how much the
     pelvis was lowered at most, so that the feet reach the floor, m. grounded: by how much the whole
     character was lowered to the floor, m; negative if it was raised. left: one sentence for each
-    foot that is as predicted.
+    foot that is as predicted. floor: on which they stand; None for a floor at height 0.
     """
 
     stances: tuple[StanceResult, ...] = ()
@@ -125,6 +127,15 @@ class FeetResult:
     lowered: float = 0.0
     grounded: float = 0.0
     left: tuple[str, ...] = ()
+    floor: Floor | None = None
+
+    def facts(self) -> dict[str, Any]:
+        """Return the fields as plain values, without the floor at height 0."""
+        found = {own.name: getattr(self, own.name) for own in fields(self)}
+        found["stances"] = tuple(asdict(stance) for stance in self.stances)
+        if self.floor is None:
+            return {name: fact for name, fact in found.items() if name != "floor"}
+        return found | {"floor": structs.asdict(self.floor)}
 
 
 @dataclass(frozen=True)
@@ -193,7 +204,7 @@ class Trust:
             "joint_sigma": list(self.joint_sigma),
             "deviations": [deviation.facts() for deviation in self.deviations],
             "labels": dict(self.labels),
-            "feet": {} if self.feet is None else asdict(self.feet),
+            "feet": {} if self.feet is None else self.feet.facts(),
             "take": dict(self.take),
         }
         return seen | {name: fact for name, fact in more.items() if fact}

@@ -26,7 +26,14 @@ from msgspec import NODEFAULT, Meta, Struct, structs
 
 from posefield.common.errors import FormError
 from posefield.common.name_suggestion import did_you_mean
-from posefield.question.motion_question import ExactControls, LabelValue, Moment, Target
+from posefield.motion.floor import Floor
+from posefield.question.motion_question import (
+    ExactControls,
+    FloorValue,
+    LabelValue,
+    Moment,
+    Target,
+)
 from posefield.question.walk_question import WalkerTake
 
 Question = TypeVar("Question", bound=Struct)
@@ -178,6 +185,20 @@ def parse_position(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def parse_floor(text: str) -> FloorValue:
+    """Return the height, or the plane, of HEIGHT or HEIGHT,SLOPE_X,SLOPE_Z.
+
+    Raises ValueError for any other text.
+    """
+    try:
+        numbers = [parse_number(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (1, 3):
+        raise ValueError(f"{text!r}, expected a height or height,slope_x,slope_z in metres")
+    return numbers[0] if len(numbers) == 1 else Floor(*numbers)
+
+
 def parse_flag(text: str) -> bool:
     """Return the boolean of "true" or "false".
 
@@ -267,6 +288,7 @@ PARSERS: Mapping[Any, Callable[[str], Any]] = {
     bool: parse_flag,
     str: str,
     ExactControls: parse_exact,
+    FloorValue: parse_floor,
     Target: parse_target,
     WalkerTake: parse_walker_take,
     tuple[float, float, float]: parse_position,

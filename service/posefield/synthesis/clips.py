@@ -122,7 +122,7 @@ def _unconstrained(
             answer.trust.duration,
             cycle=_cycle(model, way),
         )
-        answer = standing_feet.stand(model, question, NO_CONSTRAINTS, answer, motion)
+        answer = standing_feet.stand(model, question, NO_CONSTRAINTS, answer, motion, asked.ground)
     return _apply_root_options(model, answer, way, asked) if way and routed else answer
 
 
@@ -156,7 +156,7 @@ def _constrained(
             held.state.duration / held.duration,
             _cycle(model, way),
         )
-        answer = standing_feet.stand(model, question, goals, answer, motion)
+        answer = standing_feet.stand(model, question, goals, answer, motion, asked.ground)
     routed = asked.loop or asked.root == "in_place"
     return _apply_root_options(model, answer, way, asked) if routed else answer
 

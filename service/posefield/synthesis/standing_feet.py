@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import Floats
+from posefield.common.units import UP, Floats
 from posefield.constraints.targets import ConstraintSet
 from posefield.feet import foot_placement, footsteps, limb_choice, limbs, stances
 from posefield.feet.footsteps import FeetPlan, SampledMotion
@@ -17,16 +17,24 @@ from posefield.inference.graph_ports import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import foot_skate, measures
+from posefield.motion import foot_skate, measures, skeleton
+from posefield.motion.floor import LEVEL_FLOOR, Floor
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.measures import MeasuredMotion
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import FeetResult, PoseAnswer, StanceResult
+from posefield.question.value_validation import check_number, check_range
 from posefield.synthesis.synthesizer import MICROMETRES, Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 
 # Frames a second of the grid of a plan, and the smallest and largest number of its steps.
 RATE, FEWEST, MOST = 60.0, 8, 600
+# Limits of a floor: height, m, which keeps micrometres of single precision in files, and rise for
+# each metre, up to which legs reach the steps of a walk.
+HIGHEST, STEEPEST = 10.0, 0.3
+
+
+UNREACHED = "does not stand: its leg does not reach the floor"
 
 
 @dataclass(frozen=True)
@@ -53,8 +61,16 @@ class WholeMotion:
 def wants_standing_feet(card: ModelCard, asked: ClipQuestion) -> bool:
     """Return whether the feet of a clip are placed.
 
-    Raises InvalidField if they are asked to stand, but the model has no feet on the ground.
+    Raises InvalidField if they are asked to stand, but the model has no feet on the ground, and for
+    a floor on which they cannot stand.
     """
+    stands = _are_placed(card, asked)
+    if asked.ground != LEVEL_FLOOR:
+        _check_floor(asked, stands)
+    return stands
+
+
+def _are_placed(card: ModelCard, asked: ClipQuestion) -> bool:
     travels = card.root == "travelling"
     if asked.feet is None:
         return bool(travels and card.feet and card.contacts)
@@ -63,6 +79,32 @@ def wants_standing_feet(card: ModelCard, asked: ClipQuestion) -> bool:
     if asked.feet == "stand" and not travels:
         raise InvalidField("feet", "'stand', but the root of this model's motions stays in place")
     return asked.feet == "stand"
+
+
+def _check_floor(asked: ClipQuestion, stands: bool) -> None:
+    """Raise InvalidField for a floor beyond the limits, and for one without standing feet."""
+    floor = asked.ground
+    height = "floor/height" if isinstance(asked.floor, Floor) else "floor"
+    check_range(height, check_number(height, floor.height), -HIGHEST, HIGHEST, "m")
+    for name in ("slope_x", "slope_z"):
+        check_number(f"floor/{name}", getattr(floor, name))
+    if not floor.slope <= STEEPEST:
+        raise InvalidField(
+            "floor",
+            f"rises by {floor.slope:g} m for each metre, expected at most {STEEPEST:g}: legs reach "
+            "no further",
+        )
+    if not stands:
+        said = "as asked" if asked.feet else "as this model's are unless feet=stand is asked for"
+        raise InvalidField(
+            "floor", f"other than 0, but feet are as predicted, {said}; expected feet that stand"
+        )
+    if not floor.is_level and (asked.loop or asked.root == "in_place"):
+        field = "loop" if asked.loop else "root=in_place"
+        raise InvalidField(
+            "floor",
+            f"with a slope and {field}, expected a level floor: what climbs ends at another height",
+        )
 
 
 def cycle_of(way: Strides) -> Cycle:
@@ -79,11 +121,15 @@ def stand(
     goals: ConstraintSet,
     answer: PoseAnswer[np.float64],
     motion: WholeMotion,
+    floor: Floor = LEVEL_FLOOR,
 ) -> PoseAnswer[np.float64]:
     """Return the poses of an answer with standing feet, and with the facts about them in `trust`.
 
     goals: constraints that the motion meets, which stay met.
     """
+    if not floor.is_level:
+        # A cycle that climbs does not repeat.
+        motion = replace(motion, cycle=None)
     card, times = model.session.card, motion.times
     poses = motion.poses(times)
     known = [own for own in card.contacts if own.joint in card.feet]
@@ -93,13 +139,17 @@ def stand(
     )
     left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in choice.left)
     if not choice.feet:
-        return replace(answer, trust=replace(answer.trust, feet=FeetResult(left=left)))
+        return replace(
+            answer, trust=replace(answer.trust, feet=FeetResult(left=left, floor=_told(floor)))
+        )
     rate = (len(times) - (motion.cycle is None)) / motion.duration
     sampled = SampledMotion(poses.rotations, poses.root_position, rate, motion.cycle)
     own = [known[place] for place in choice.feet] if known else []
     likely = _probabilities(model, question, own, times * motion.stretch) if known else None
-    plan = footsteps.plan_feet(choice.character, sampled, own, likely)
-    told = replace(describe(plan, card.skeleton.names), left=left)
+    character = replace(choice.character, raised=_may_rise(goals))
+    plan = footsteps.plan_feet(character, sampled, own, likely, floor)
+    told = describe(plan, card.skeleton.names)
+    told = replace(told, left=left + told.left)
     measured = _measured(card, goals, answer, poses, plan)
     placed = foot_placement.place_feet(plan, answer.times, answer.rotations, answer.root_position)
     trust = replace(answer.trust, feet=told, measured=measured)
@@ -120,11 +170,12 @@ def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
             position = tuple(round(float(axis), MICROMETRES) for axis in anchor)
             begin, end = stance.begin / plan.rate, (stance.end - 1) / plan.rate
             found.append(StanceResult(names[leg.tip], _rounded(begin), _rounded(end), position))
+    # Feet on a slope are low where they are near it.
+    level = whole.after - plan.floor.heights(whole.after)[..., None] * UP
     before, after = (
-        float(foot_skate.mean_skate_speed(paths, plan.rate))
-        for paths in (whole.before, whole.after)
+        float(foot_skate.mean_skate_speed(paths, plan.rate)) for paths in (whole.before, level)
     )
-    lowered = float((plan.lowered - plan.grounded).max())
+    lowered = float((plan.lowered - plan.followed).max())
     return FeetResult(
         tuple(found),
         swings,
@@ -133,7 +184,14 @@ def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
         _rounded(drift),
         _rounded(lowered),
         _rounded(plan.grounded),
+        tuple(f"{names[plan.character.legs[leg].tip]} {UNREACHED}" for leg in plan.unreached),
+        _told(plan.floor),
     )
+
+
+def _told(floor: Floor) -> Floor | None:
+    """Return the floor of an answer; None for the level on which motions are captured."""
+    return None if floor == LEVEL_FLOOR else floor
 
 
 def _rounded(value: float) -> float:
@@ -144,6 +202,14 @@ def _held_joints(goals: ConstraintSet) -> set[int]:
     """Return the joints whose positions constrain a motion."""
     own = [measure for _, measure, _ in goals.controls] + [goal.moment for goal in goals.targets]
     return {joint for measure in own for joint in measure.joints}
+
+
+def _may_rise(goals: ConstraintSet) -> bool:
+    """Return whether no constraint is on a height, so that a trunk may follow the floor."""
+    return not goals.targets and not any(
+        measure.quantity == "height" or measure.at in ("highest", "lowest")
+        for _, measure, _ in goals.controls
+    )
 
 
 def _probabilities(

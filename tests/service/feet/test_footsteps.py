@@ -1,11 +1,14 @@
 """Plans of whole motions: four feet, joined motions, floors, and limits of the pelvis."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from posefield.feet import foot_placement, footsteps, limb_choice, limbs, pelvis
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
+from posefield.motion.floor import Floor
 from posefield.motion.foot_contacts import FootContact
 
 RATE, FRAMES = 60.0, 90
@@ -118,9 +121,67 @@ def test_a_character_that_floats_is_moved_to_the_floor(floats):
     assert plan.grounded == pytest.approx(floats - np.sign(floats) * footsteps.UNEVEN)
     heights = feet_of(placed(lifted, plan))[..., 1]
     assert np.abs(heights - known[0].height).max() <= footsteps.UNEVEN + 1e-9
-    # The height of the floor is a parameter.
-    raised = footsteps.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)), floor=floats)
-    assert raised.grounded == pytest.approx(0.0, abs=1e-12)
+
+
+FLOORS = [Floor(0.5), Floor(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2, -0.2)]
+
+
+@pytest.mark.parametrize("floor", FLOORS)
+def test_feet_stand_and_swing_on_a_given_floor(floor):
+    motion = sliding()
+    known, likely = [contact(motion, foot) for foot in FEET], alternating()
+    usual = footsteps.plan_feet(body(), motion, known, likely)
+    plan = footsteps.plan_feet(body(), motion, known, likely, floor)
+    feet, level = feet_of(placed(motion, plan)), feet_of(placed(motion, usual))
+    # Places over the floor, and heights above it, are those of a floor at height 0.
+    above = feet[..., 1] - floor.heights(feet)
+    assert np.abs(feet[..., [0, 2]] - level[..., [0, 2]]).max() < 1e-6
+    assert np.abs(above - level[..., 1]).max() < 1e-6
+    for foot, steps in enumerate(plan.steps):
+        assert steps.stances == usual.steps[foot].stances
+        for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
+            assert np.abs(feet[stance.begin : stance.end, foot] - anchor).max() < 1e-9
+    if floor.is_level:
+        assert plan.lowered - usual.lowered == pytest.approx(-floor.height)
+    else:
+        # The heights of another floor are not these.
+        assert np.ptp(feet[0, :, 1]) > 0.05
+
+
+def test_feet_are_tilted_as_the_floor_is():
+    """The ball lies ahead of the ankle: on a slope its foot is turned, and the ball stays."""
+    parents = (*PARENTS, *FEET)
+    bones = np.concatenate([BONES, np.tile([0.0, -0.05, 0.12], (4, 1))])
+    balls, motion, floor = (14, 15, 16, 17), sliding(), Floor(0.0, 0.0, 0.2)
+    rotations = np.zeros((FRAMES, 18, 4))
+    rotations[..., 0], rotations[:, :14] = 1.0, motion.rotations
+    whole = SampledMotion(rotations, motion.roots, RATE)
+    character = limb_choice.choose_limbs(parents, bones, balls, ()).character
+    assert [leg.lower for leg in character.legs] == list(FEET)
+    height = skeleton.positions(parents, rotations, skeleton.translations(bones, motion.roots))
+    known = [FootContact(ball, float(height[0, ball, 1]), 0.3, 0.5, 0.05) for ball in balls]
+    plan = footsteps.plan_feet(character, whole, known, alternating(), floor)
+    found = foot_placement.place_feet(plan, np.arange(FRAMES) / RATE, whole.rotations, whole.roots)
+    moved = skeleton.translations(bones, found.roots)
+    after = skeleton.positions(parents, found.rotations, moved)
+    for leg, ball in zip(FEET, balls, strict=True):
+        arm = after[:, ball] - after[:, leg]
+        assert arm == pytest.approx(
+            np.tile(floor.tilted(height[0, ball] - height[0, leg]), (FRAMES, 1)), abs=1e-9
+        )
+    told = foot_placement.foot_paths(plan)
+    assert np.abs(told.after - after[:, list(balls)]).max() < 1e-9
+
+
+def test_a_floor_out_of_reach_of_a_fixed_body_is_told():
+    motion = sliding()
+    known, likely = [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
+    plan = footsteps.plan_feet(body(held={0}), motion, known, likely, Floor(-0.3))
+    assert not plan.lowered.any() and plan.unreached == (0, 1, 2, 3)
+    assert footsteps.plan_feet(body(held={0}), motion, known, likely).unreached == ()
+    free = replace(body(held={0}), raised=True)
+    risen = footsteps.plan_feet(free, motion, known, likely, Floor(-0.3))
+    assert risen.lowered == pytest.approx(0.3) and risen.unreached == ()
 
 
 def test_the_pelvis_is_lowered_within_its_limit_and_stances_end_that_need_more():

@@ -11,7 +11,13 @@ from typing import Any, Protocol
 import msgspec
 
 from posefield.question import text_decoding
-from posefield.question.motion_question import LEGAL_NAME, ExactControls, LabelValue, Target
+from posefield.question.motion_question import (
+    LEGAL_NAME,
+    ExactControls,
+    FloorValue,
+    LabelValue,
+    Target,
+)
 
 
 class CellKind(Protocol):
@@ -160,6 +166,29 @@ def _parse_exact(cell: object) -> ExactControls | None:
     if cell is None or isinstance(cell, str):
         return text_decoding.parse_exact(cell) if cell else None
     raise ValueError
+
+
+@dataclass(frozen=True)
+class FloorCell:
+    """Floors: HEIGHT or HEIGHT,SLOPE_X,SLOPE_Z in text, else a number or an object.
+
+    The object has the keys height, slope_x and slope_z.
+    """
+
+    expected: str = "a height in m, or HEIGHT,SLOPE_X,SLOPE_Z"
+
+    def text(self, cells: Sequence[str]) -> list[FloorValue | None]:
+        return [text_decoding.parse_floor(cell) if cell else None for cell in cells]
+
+    def values(self, cells: Sequence[Any]) -> list[FloorValue | None]:
+        return [_parse_floor(cell) for cell in cells]
+
+
+def _parse_floor(cell: object) -> FloorValue | None:
+    if cell is None or isinstance(cell, str):
+        return text_decoding.parse_floor(cell) if cell else None
+    found: FloorValue = msgspec.convert(cell, FloorValue)
+    return found
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from posefield.batch.rows.cells import (
     CellKind,
     ChoiceCell,
     ExactCell,
+    FloorCell,
     IntegerCell,
     LabelCell,
     NameCell,
@@ -27,7 +28,13 @@ from posefield.common.name_suggestion import similar_name
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.model_file.model_card import PERFORMER, ModelCard
 from posefield.question import text_decoding
-from posefield.question.motion_question import ExactControls, Name, NamedClipQuestion, Target
+from posefield.question.motion_question import (
+    ExactControls,
+    FloorValue,
+    Name,
+    NamedClipQuestion,
+    Target,
+)
 from posefield.question.text_decoding import Parameter
 
 CONTROL_PREFIX, LABEL_PREFIX = "controls/", "labels/"
@@ -64,6 +71,7 @@ CELL_KINDS: Mapping[Any, CellKind] = {
     int: IntegerCell(),
     bool: BooleanCell(),
     ExactControls: ExactCell(),
+    FloorValue: FloorCell(),
     Target: TargetsCell(),
     Name: NameCell(),
 }

@@ -1,0 +1,52 @@
+"""Floor on which feet stand: a plane in the frame of a clip."""
+
+from typing import Annotated
+
+import numpy as np
+from msgspec import Struct
+
+from posefield.common.units import UP, Floats
+from posefield.motion import quat
+
+
+class Floor(Struct, frozen=True, forbid_unknown_fields=True):
+    """Plane over x and z in the frame of a clip.
+
+    height: at the origin, m. slope_x, slope_z: rise for each metre along the axes.
+    """
+
+    height: float = 0.0
+    slope_x: float = 0.0
+    slope_z: float = 0.0
+
+    @property
+    def is_level(self) -> bool:
+        """Return whether the floor has no slope."""
+        return self.slope == 0.0
+
+    @property
+    def slope(self) -> float:
+        """Return the rise for each metre in the steepest direction."""
+        return float(np.hypot(self.slope_x, self.slope_z))
+
+    @property
+    def tilt(self) -> Annotated[Floats, "4"]:
+        """Return the rotation by the smallest angle from the vertical to the floor's normal."""
+        normal = np.array([-self.slope_x, 1.0, -self.slope_z])
+        normal /= np.linalg.norm(normal)
+        turn = np.concatenate([[1.0 + normal @ UP], np.cross(UP, normal)])
+        found: Floats = turn / np.linalg.norm(turn)
+        return found
+
+    def heights(self, points: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch"]:
+        """Return the heights (...), m, of the floor below or above points (..., 3), m."""
+        found: Floats = self.height + self.slope_x * points[..., 0] + self.slope_z * points[..., 2]
+        return found
+
+    def tilted(self, vectors: Annotated[Floats, "*batch 3"]) -> Annotated[Floats, "*batch 3"]:
+        """Return vectors (..., 3) turned as the floor is tilted."""
+        return quat.rotate(np.broadcast_to(self.tilt, (*vectors.shape[:-1], 4)), vectors)
+
+
+LEVEL_FLOOR = Floor()
+"""Floor at height 0, on which motions are captured."""
