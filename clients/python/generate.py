@@ -34,6 +34,7 @@ QUESTIONS = (
     "WhyQuestion",
     "Camera",
     "Target",
+    "Floor",
 )
 ANSWERS = (
     "ModelList",

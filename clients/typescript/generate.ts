@@ -32,6 +32,7 @@ const QUESTIONS = [
   "SigmaQuestion",
   "WhyQuestion",
   "Target",
+  "Floor",
 ];
 
 /** Questions whose keys are the query parameters of an operation, by its path. */

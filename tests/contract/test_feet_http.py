@@ -1,8 +1,10 @@
 """Feet of clips over HTTP and on the command line: the default, the two words, and the facts."""
 
+import io
 import json
 import subprocess
 import sys
+import zipfile
 
 import jsonschema
 import pytest
@@ -70,3 +72,34 @@ def test_the_command_writes_the_bytes_of_the_service(get, walk, measured_walk_pa
     told = tmp_path / "walk.json"
     subprocess.run([*command, "-o", str(told)], check=True)
     assert json.loads(told.read_text())["trust"]["feet"]["swings"] >= 2
+
+
+def test_a_floor_is_one_answer_in_a_link_a_body_and_a_command(walk, get, spec, tmp_path):
+    ask = asker(create_app(Readiness(FixedRegistry(ModelRegistry({"walk": walk}))), Settings()))
+    plane = {"height": 0.1, "slope_x": 0.0, "slope_z": 0.2}
+    linked = get("clip.json", floor="0.1,0,0.2")
+    body = {"controls": linked.json()["trust"]["controls"], "floor": plane}
+    sent = ask("POST", "/v1/models/walk/clip.json", json=body)
+    assert sent.status_code == 200 and sent.content == linked.content
+    told = linked.json()["trust"]["feet"]
+    assert told["floor"] == plane
+    schema = {"$ref": "#/components/schemas/FeetResult", "components": spec["components"]}
+    jsonschema.Draft202012Validator(schema).validate(told)
+    assert get("clip.bvh", floor="0").content == get("clip.bvh").content
+    many = {"format": "json", "clips": [body, {**body, "floor": 0.2}]}
+    archive = ask("POST", "/v1/models/walk/clips.zip", json=many)
+    assert archive.status_code == 200, archive.text
+    with zipfile.ZipFile(io.BytesIO(archive.content)) as found:
+        clips = [
+            json.loads(found.read(name)) for name in sorted(found.namelist()) if "clip" in name
+        ]
+    floors = [clip["trust"]["feet"]["floor"]["slope_z"] for clip in clips]
+    assert floors == [0.2, 0.0]
+
+
+@pytest.mark.parametrize("floor", ["0.1,0", "high", "11", "0,0.5,0"])
+def test_a_floor_that_is_none_is_refused(walk, floor):
+    ask = asker(create_app(Readiness(FixedRegistry(ModelRegistry({"walk": walk}))), Settings()))
+    found = ask("GET", "/v1/models/walk/clip.bvh", params={"floor": floor})
+    assert found.status_code in (400, 422)
+    assert found.json()["errors"][0]["parameter"].startswith("floor")

@@ -18,6 +18,7 @@ from posefield_client.generated import (
     OPERATIONS,
     ClipQuestion,
     CrowdQuestion,
+    Floor,
     Operation,
     PoseQuestion,
     Target,
@@ -80,6 +81,8 @@ def _words(question: Struct) -> dict[str, Any]:
             words[key] = ",".join(value)
         elif key == "targets" and value is not UNSET:
             words["target"] = tuple(map(_spelt, value))
+        elif key == "floor" and isinstance(value, Floor):
+            words[key] = ",".join(map(digits, (value.height, value.slope_x, value.slope_z)))
         elif key == "labels" and value is not UNSET:
             words.update(label_words(value))
         elif value is not UNSET:

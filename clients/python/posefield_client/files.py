@@ -18,7 +18,7 @@ from posefield_client.generated import (
     CrowdQuestion,
     NamedClipQuestion,
 )
-from posefield_client.holding import Exact, Targets
+from posefield_client.holding import Exact, FloorValue, Targets
 from posefield_client.questions import Controls, Extrapolate, Labels
 from posefield_client.wire import Request
 
@@ -87,6 +87,7 @@ def clip(
     exact: Exact | None = None,
     targets: Targets | None = None,
     feet: Feet | None = None,
+    floor: FloorValue | None = None,
     take: int | None = None,
     variety: float | None = None,
     detail: bool | None = None,
@@ -101,6 +102,7 @@ def clip(
         **asking.said(body=body, joint_sigma=joint_sigma, feet=feet, labels=labels),
         **asking.said(take=take, variety=variety, detail=detail),
         **holding.said(exact, targets),
+        **holding.floor(floor),
     )
     ask = partial(asking.either, "ClipInFormat", model, question)
     return Files(CLIP, ask, about=asking.about(model, question))

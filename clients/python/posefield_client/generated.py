@@ -65,6 +65,14 @@ class PoseQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     detail: bool | UnsetType = UNSET
 
 
+class Floor(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Plane in the frame of the clip. Since 4.0.0."""
+
+    height: float
+    slope_x: float
+    slope_z: float
+
+
 class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Schema ClipQuestion of the contract."""
 
@@ -83,6 +91,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
     feet: Literal["stand", "as_predicted"] | UnsetType | None = UNSET
+    floor: float | Floor | UnsetType = UNSET
     take: int | UnsetType = UNSET
     variety: float | UnsetType = UNSET
     detail: bool | UnsetType = UNSET
@@ -110,6 +119,7 @@ class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields
     exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
     targets: tuple[Target, ...] | UnsetType = UNSET
     feet: Literal["stand", "as_predicted"] | UnsetType | None = UNSET
+    floor: float | Floor | UnsetType = UNSET
     take: int | UnsetType = UNSET
     variety: float | UnsetType = UNSET
     detail: bool | UnsetType = UNSET
@@ -402,6 +412,7 @@ class FeetResult(Struct, frozen=True, kw_only=True):
     lowered: float
     grounded: float
     left: tuple[str, ...]
+    floor: Floor | None = None
 
 
 class Trust(Struct, frozen=True, kw_only=True):

@@ -8,10 +8,13 @@ from msgspec import UNSET
 
 from posefield_client import asking
 from posefield_client.errors import WrongQuestion
-from posefield_client.generated import Target
+from posefield_client.generated import Floor, Target
 
 Exact = Literal["auto", "none"] | str | Sequence[str]
 """The service's default, none, or the names of measured controls."""
+
+FloorValue = float | Floor | Mapping[str, float]
+"""Height of a level floor, m, or a plane."""
 
 Targets = Iterable[Target | Mapping[str, Any]]
 
@@ -24,6 +27,18 @@ def said(exact: Exact | None, targets: Targets | None) -> dict[str, Any]:
     if targets is not None:
         found["targets"] = tuple(_target(place, each) for place, each in enumerate(targets))
     return found
+
+
+def floor(given: FloorValue | None) -> dict[str, Any]:
+    """Return a floor as a field of a question; WrongQuestion if it is invalid."""
+    if given is None:
+        return {}
+    try:
+        return {"floor": msgspec.convert(asking.sayable("floor", given), float | Floor)}
+    except msgspec.ValidationError as fault:
+        raise WrongQuestion(
+            f"floor: {fault}, expected a height or {', '.join(Floor.__struct_fields__)}"
+        ) from None
 
 
 def _exact(given: Exact) -> Any:

@@ -22,6 +22,7 @@ export type {
   CrowdPoses,
   CrowdQuestion,
   Download,
+  Floor,
   ManifestEntry,
   Met,
   Missed,

@@ -14,6 +14,9 @@ export function checkQuestion(kind: QuestionKind, question: object): void {
   if ("targets" in question && Array.isArray(question.targets)) {
     for (const target of question.targets) checkNames("Target", KEYS.Target, target);
   }
+  if ("floor" in question && typeof question.floor === "object" && question.floor) {
+    checkNames("Floor", KEYS.Floor, question.floor);
+  }
 }
 
 /** WrongQuestion for the first key that is not among the known names. */

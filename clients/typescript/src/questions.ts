@@ -2,7 +2,7 @@
 
 import { WrongQuestion } from "./errors.ts";
 import { MEDIA_TYPES } from "./schema.ts";
-import type { Target } from "./types.ts";
+import type { Floor, Target } from "./types.ts";
 
 export interface Request {
   readonly method: "GET" | "POST";
@@ -60,12 +60,13 @@ export function under(model: string, rest: string): string {
  * Each control is a parameter, lists of times and of targets are `time` and `target` again and
  * again, a place is one text.
  */
-function pairs({ controls, times, targets, labels, camera, ...rest }: Question): string[][] {
+function pairs({ controls, times, targets, labels, floor, camera, ...rest }: Question): string[][] {
   return [
     ...spelt((controls ?? {}) as Record<string, Value>),
     ...((times ?? []) as number[]).map((time) => ["time", text("time", time)]),
     ...((targets ?? []) as Target[]).map((target) => ["target", words(target)]),
     ...Object.entries((labels ?? {}) as Labels).map((entry) => ["label", labelled(...entry)]),
+    ...(floor == null ? [] : [["floor", ground(floor as Floor | number)]]),
     ...spelt(rest as Record<string, Value>),
     ...(camera ? [["camera", place("camera", camera as number[])]] : []),
   ];
@@ -82,6 +83,12 @@ function labelled(name: string, value: Labels[string]): string {
 function words({ joint, position, time, at }: Target): string {
   const moment = at ?? (time === undefined ? "" : plain("target", time));
   return `${joint}@${moment}:${place("target", position)}`;
+}
+
+/** HEIGHT, or HEIGHT,SLOPE_X,SLOPE_Z. */
+function ground(floor: Floor | number): string {
+  if (typeof floor === "number") return plain("floor", floor);
+  return place("floor", [floor.height, floor.slope_x, floor.slope_z]);
 }
 
 function place(name: string, values: readonly number[]): string {

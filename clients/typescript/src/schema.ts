@@ -699,6 +699,25 @@ export interface components {
          * @enum {string|null}
          */
         FeetMode: "stand" | "as_predicted" | null;
+        /** @description Plane in the frame of the clip. Since 4.0.0. */
+        Floor: {
+            /** @description Height at the origin in metres. */
+            height: number;
+            /** @description Rise for each metre along x. */
+            slope_x: number;
+            /** @description Rise for each metre along z. */
+            slope_z: number;
+        };
+        /**
+         * @description Floor on which feet stand, in the frame of the clip: its height in metres, or a plane, which rises by at most 0.3 m for each metre. Stances, swings and the pelvis follow it, and feet are tilted as it is; exact targets and controls stay met. Refused where feet are as predicted, and with a slope for loops and `in_place`. Since 4.0.0.
+         * @default 0
+         * @example {
+         *       "height": 0.1,
+         *       "slope_x": 0,
+         *       "slope_z": 0.15
+         *     }
+         */
+        FloorValue: number | components["schemas"]["Floor"];
         /**
          * @description Seed of another take of the motion, equal for equal seeds. 0 is the prediction. A take deviates as captured clips do; `sigma` stays that of the prediction, and exact controls and targets are met.
          * @default 0
@@ -833,6 +852,7 @@ export interface components {
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
             feet?: components["schemas"]["FeetMode"];
+            floor?: components["schemas"]["FloorValue"];
             take?: components["schemas"]["Take"];
             variety?: components["schemas"]["Variety"];
             detail?: components["schemas"]["Detail"];
@@ -1034,6 +1054,7 @@ export interface components {
             exact?: components["schemas"]["Exact"];
             targets?: components["schemas"]["Targets"];
             feet?: components["schemas"]["FeetMode"];
+            floor?: components["schemas"]["FloorValue"];
             take?: components["schemas"]["Take"];
             variety?: components["schemas"]["Variety"];
             detail?: components["schemas"]["Detail"];
@@ -1128,8 +1149,10 @@ export interface components {
             lowered: number;
             /** @description Distance by which the whole character was lowered to the floor, in metres; negative if it was raised. */
             grounded: number;
-            /** @description One sentence for each foot that is as predicted. */
+            /** @description One sentence for each foot that is as predicted, or does not reach its floor. */
             left: string[];
+            /** @description Floor on which the feet stand. Absent for a floor at height 0. */
+            floor?: components["schemas"]["Floor"];
         };
         /** @description Interval in which a foot stands. */
         Stance: {
@@ -2186,6 +2209,11 @@ export interface components {
         target: string[];
         /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
         feet: "stand" | "as_predicted";
+        /**
+         * @description Floor on which feet stand, in the frame of the clip: its height in metres, or HEIGHT, SLOPE_X,SLOPE_Z, the height at the origin and the rise for each metre along x and z. Expects feet that stand. Since 4.0.0.
+         * @example 0,0,0.15
+         */
+        floor: string;
         /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
         take: components["schemas"]["Take"];
         /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
@@ -2856,6 +2884,11 @@ export interface operations {
                 target?: components["parameters"]["target"];
                 /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
                 feet?: components["parameters"]["feet"];
+                /**
+                 * @description Floor on which feet stand, in the frame of the clip: its height in metres, or HEIGHT, SLOPE_X,SLOPE_Z, the height at the origin and the rise for each metre along x and z. Expects feet that stand. Since 4.0.0.
+                 * @example 0,0,0.15
+                 */
+                floor?: components["parameters"]["floor"];
                 /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
                 take?: components["parameters"]["take"];
                 /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
@@ -3005,6 +3038,11 @@ export interface operations {
                 target?: components["parameters"]["target"];
                 /** @description Whether feet stand where they contact the ground. Default: `stand` for models that travel and know the contacts of their feet. */
                 feet?: components["parameters"]["feet"];
+                /**
+                 * @description Floor on which feet stand, in the frame of the clip: its height in metres, or HEIGHT, SLOPE_X,SLOPE_Z, the height at the origin and the rise for each metre along x and z. Expects feet that stand. Since 4.0.0.
+                 * @example 0,0,0.15
+                 */
+                floor?: components["parameters"]["floor"];
                 /** @description Seed of another take of the motion. A seed is one smooth function of the controls, and two characters with one seed move alike. 0 is the prediction, the mean of all takes. */
                 take?: components["parameters"]["take"];
                 /** @description Size of a take's deviations from the prediction; 1 is that of captured clips. Without a take it changes nothing. */
@@ -4135,6 +4173,7 @@ export const KEYS = {
     "exact",
     "targets",
     "feet",
+    "floor",
     "take",
     "variety",
     "detail",
@@ -4159,6 +4198,7 @@ export const KEYS = {
     "exact",
     "targets",
     "feet",
+    "floor",
     "take",
     "variety",
     "detail"
@@ -4205,6 +4245,11 @@ export const KEYS = {
     "position",
     "time",
     "at"
+  ],
+  "Floor": [
+    "height",
+    "slope_x",
+    "slope_z"
   ],
   "WalkQuestion": [
     "count",

@@ -15,6 +15,7 @@ export type Suggestions = Schemas["Suggestions"];
 export type SigmaGrid = Schemas["SigmaGrid"];
 /** A joint that is to be in its place, at a `time` or `at` a moment of the motion. */
 export type Target = Schemas["Target"];
+export type Floor = Schemas["Floor"];
 export type Trust = Schemas["Trust"];
 
 /** A question as one may write it: what has a default may be left out. */

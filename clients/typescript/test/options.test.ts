@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Client, type ClipQuestion, WrongQuestion } from "../src/index.ts";
+import { Client, type ClipQuestion, type Floor, WrongQuestion } from "../src/index.ts";
 import { similarName } from "../src/option-names.ts";
 import { link } from "../src/questions.ts";
 import { KEYS } from "../src/schema.ts";
@@ -37,6 +37,14 @@ const MISSPELT: Readonly<Record<string, [() => Promise<unknown> | string, string
         targets: [{ joint: "a", position: [0, 1, 0], at: "end", ...{ postion: 1 } }],
       }),
     "Target: found postion (did you mean position?)",
+  ],
+  floor: [
+    () =>
+      client.clip("walk", {
+        controls,
+        floor: { height: 0, slope_x: 0, slope_z: 0.1, ...{ slop_y: 1 } },
+      }),
+    "Floor: found slop_y",
   ],
   crowd: [() => client.crowd("walk", { controls, time: 0, ...{ headng: 1 } }), "headng (did you"],
   walk: [
@@ -107,4 +115,11 @@ test("each label set is a parameter, and weights are a list", () => {
     ],
   );
   assert.deepEqual([...new URL(link("/v1", { labels: {} }), "http://any").searchParams], []);
+});
+
+test("a floor is said as one text", () => {
+  const words = (floor: number | Floor) =>
+    new URL(client.url("walk", "glb", { controls, floor })).searchParams.get("floor")!;
+  assert.equal(words(0.2), "0.2");
+  assert.match(words({ height: 0.1, slope_x: 0, slope_z: 1e-7 }), /^0\.1,0,0\.0000001[0-9]*$/);
 });

@@ -70,10 +70,11 @@ class FeetPlan:
     """Plan of the feet over the frames of a grid.
 
     rate: of the grid, frames a second. cycle: as of the motion. steps: of each leg. changes: of the
-    path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m. followed: the part
-    of it that follows the floor (F,), m; the rest is the pelvis. grounded: how much a character that
-    floats was lowered to the level on which it was captured, m. poses: predicted, of the limbs.
-    floor: on which the feet stand. unreached: legs, by place, none of whose stances reaches it.
+    path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m. followed: the
+    part of it that follows the floor (F,), m; the rest is the pelvis. grounded: how much a
+    character that floats was lowered to the level on which it was captured, m. poses: predicted, of
+    the limbs. floor: on which the feet stand. unreached: legs, by place, none of whose stances
+    reaches it.
     """
 
     character: Character

@@ -15,9 +15,9 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
     height: at the origin, m. slope_x, slope_z: rise for each metre along the axes.
     """
 
-    height: float = 0.0
-    slope_x: float = 0.0
-    slope_z: float = 0.0
+    height: float
+    slope_x: float
+    slope_z: float
 
     @property
     def is_level(self) -> bool:
@@ -48,5 +48,10 @@ class Floor(Struct, frozen=True, forbid_unknown_fields=True):
         return quat.rotate(np.broadcast_to(self.tilt, (*vectors.shape[:-1], 4)), vectors)
 
 
-LEVEL_FLOOR = Floor()
+def at_height(height: float) -> Floor:
+    """Return the level floor at a height, m."""
+    return Floor(height, 0.0, 0.0)
+
+
+LEVEL_FLOOR = at_height(0.0)
 """Floor at height 0, on which motions are captured."""

@@ -7,7 +7,7 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.motion.floor import Floor
+from posefield.motion.floor import Floor, at_height
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import Body
 
@@ -196,7 +196,7 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
     @property
     def ground(self) -> Floor:
         """Return the floor as a plane."""
-        return self.floor if isinstance(self.floor, Floor) else Floor(self.floor)
+        return self.floor if isinstance(self.floor, Floor) else at_height(self.floor)
 
 
 class FileQuestion(ClipQuestion, frozen=True, kw_only=True):

@@ -12,6 +12,7 @@ import pytest
 from posefield_client import (
     Camera,
     Client,
+    Floor,
     NamedClipQuestion,
     Target,
     files,
@@ -111,6 +112,34 @@ def test_targets_and_exact_controls_in_a_query():
         ("feet", "stand"),
     ]
     assert target(questions.pose("m", 0, exact="a")) == target(questions.pose("m", 0, exact=["a"]))
+
+
+PLANE = {"height": 0.1, "slope_x": 0, "slope_z": np.float64(-1e-7)}
+
+
+@pytest.mark.parametrize(
+    ("floor", "text"),
+    [
+        (0.2, "0.2"),
+        (np.float64(-0.5), "-0.5"),
+        (PLANE, "0.1,0.0,-0.0000001"),
+        (Floor(height=0.1, slope_x=0.0, slope_z=-1e-7), "0.1,0.0,-0.0000001"),
+    ],
+)
+def test_floors(floor, text):
+    asked = files.clip("m", floor=floor).request("bvh")
+    assert parse_qsl(urlsplit(asked.target).query) == [("floor", text)]
+    (sent,) = msgspec.json.decode(
+        files.clips("m", [{"controls": {}, "floor": floor}], "usdc").request("zip").body
+    )["clips"]
+    plain = floor if np.isscalar(floor) else {"height": 0.1, "slope_x": 0.0, "slope_z": -1e-7}
+    assert sent == {"controls": {}, "floor": plain}
+
+
+@pytest.mark.parametrize("floor", [{"height": 1}, "0.2", {**PLANE, "slope": 0}, [0, 0, 0]])
+def test_a_floor_that_is_none_is_refused(floor):
+    with pytest.raises(WrongQuestion, match=r"floor: .*expected a height"):
+        files.clip("m", floor=floor)
 
 
 def test_takes_and_detail():

@@ -56,6 +56,8 @@ CYCLES = st.fixed_dictionaries(
         "end": st.sampled_from([0.3, None]),
         "names": st.sampled_from(["own", "own", "vrm", None]),
         "loop": st.booleans(),
+        "feet": st.sampled_from(["stand", "stand", "as_predicted", None]),
+        "floor": st.sampled_from([0.0, 0.2, -0.2, 11.0, None]),
     },
 )
 

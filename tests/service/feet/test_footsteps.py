@@ -8,7 +8,7 @@ import pytest
 from posefield.feet import foot_placement, footsteps, limb_choice, limbs, pelvis
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
-from posefield.motion.floor import Floor
+from posefield.motion.floor import Floor, at_height
 from posefield.motion.foot_contacts import FootContact
 
 RATE, FRAMES = 60.0, 90
@@ -123,7 +123,7 @@ def test_a_character_that_floats_is_moved_to_the_floor(floats):
     assert np.abs(heights - known[0].height).max() <= footsteps.UNEVEN + 1e-9
 
 
-FLOORS = [Floor(0.5), Floor(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2, -0.2)]
+FLOORS = [at_height(0.5), at_height(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2, -0.2)]
 
 
 @pytest.mark.parametrize("floor", FLOORS)
@@ -176,11 +176,11 @@ def test_feet_are_tilted_as_the_floor_is():
 def test_a_floor_out_of_reach_of_a_fixed_body_is_told():
     motion = sliding()
     known, likely = [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
-    plan = footsteps.plan_feet(body(held={0}), motion, known, likely, Floor(-0.3))
+    plan = footsteps.plan_feet(body(held={0}), motion, known, likely, at_height(-0.3))
     assert not plan.lowered.any() and plan.unreached == (0, 1, 2, 3)
     assert footsteps.plan_feet(body(held={0}), motion, known, likely).unreached == ()
     free = replace(body(held={0}), raised=True)
-    risen = footsteps.plan_feet(free, motion, known, likely, Floor(-0.3))
+    risen = footsteps.plan_feet(free, motion, known, likely, at_height(-0.3))
     assert risen.lowered == pytest.approx(0.3) and risen.unreached == ()
 
 

@@ -187,7 +187,10 @@ class FloorCell:
 def _parse_floor(cell: object) -> FloorValue | None:
     if cell is None or isinstance(cell, str):
         return text_decoding.parse_floor(cell) if cell else None
-    found: FloorValue = msgspec.convert(cell, FloorValue)
+    try:
+        found: FloorValue = msgspec.convert(cell, FloorValue)
+    except msgspec.ValidationError as fault:
+        raise ValueError(str(fault)) from None
     return found
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from posefield.batch.rows.cells import BooleanCell, IntegerCell, NumberCell
+from posefield.batch.rows.cells import BooleanCell, FloorCell, IntegerCell, NumberCell
 from posefield.batch.rows.columns import Column, Columns
 from posefield.batch.rows.row_blocks import BLOCK_SIZE, RowBlock
 from posefield.batch.rows.source_files import SourceFile
@@ -91,5 +91,6 @@ _TYPE_TESTS = {
     NumberCell: ("is_floating", "is_integer"),
     IntegerCell: ("is_floating", "is_integer"),
     BooleanCell: ("is_boolean",),
+    FloorCell: ("is_floating", "is_integer", "is_string", "is_large_string"),
 }
-"""Functions of pyarrow.types by kind, for all kinds except strings."""
+"""Functions of pyarrow.types by kind, for all kinds that are not strings alone."""
