@@ -124,6 +124,13 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         items=properties.FEET_ITEMS,
         options={"SKIP_SAVE"},
     )
+    floor: FloatProperty(
+        name="Floor",
+        description="Height of the floor on which feet stand, m; the panel's, if not given",
+        min=-variation.LARGEST_HEIGHT,
+        max=variation.LARGEST_HEIGHT,
+        options={"SKIP_SAVE"},
+    )
     onto: EnumProperty(
         name="Onto",
         items=[
@@ -169,9 +176,9 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         return _ended(self, said)
 
     def _varied(self) -> dict[str, object]:
-        """Return the given ones of take, variety, detail and feet, as fields of Variation."""
-        given = variation.of_sliders(self.take, self.variety, self.detail, self.feet)
-        fields = {"take": "seed", "variety": "variety", "detail": "detail", "feet": "feet"}
+        """Return the given ones of take, variety, detail, feet and floor, as fields of Variation."""
+        given = variation.of_sliders(self.take, self.variety, self.detail, self.feet, self.floor)
+        fields = {"take": "seed"} | {name: name for name in ("variety", "detail", "feet", "floor")}
         return {
             field: getattr(given, field)
             for name, field in fields.items()
@@ -181,7 +188,7 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
     def _tell(self, varied: Variation, clip: Clip, card: Card) -> None:
         """Show take and feet as the operator's own settings, and report the feet to scripts."""
         self.take, self.variety = varied.seed, varied.variety
-        self.detail, self.feet = varied.detail, varied.feet
+        self.detail, self.feet, self.floor = varied.detail, varied.feet, varied.floor
         for sentence in varied.feet_sentences(clip.trust, card.why_no_stances):
             self.report({"INFO"}, sentence)
 

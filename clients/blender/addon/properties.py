@@ -12,7 +12,7 @@ from bpy.props import (
 )
 
 from . import label_sets, live, questions, session
-from .without_blender.variation import FEET, LARGEST_SEED, VARIETY
+from .without_blender.variation import FEET, LARGEST_HEIGHT, LARGEST_SEED, VARIETY
 
 # Blender keeps no reference to the strings of dynamic enum items, so they are kept here.
 _kept: dict[str, list[tuple[str, str, str]]] = {}
@@ -151,6 +151,14 @@ class PosefieldSettings(bpy.types.PropertyGroup):
         name="Feet",
         description="Whether feet stand where they contact the ground",
         items=FEET_ITEMS,
+        update=_changed,
+    )
+    floor: FloatProperty(
+        name="Floor",
+        description="Height of the floor on which feet stand, m",
+        min=-LARGEST_HEIGHT,
+        max=LARGEST_HEIGHT,
+        precision=3,
         update=_changed,
     )
     rate: EnumProperty(

@@ -113,7 +113,7 @@ def question_of(
 
 def variation_of(own) -> Variation:
     """Return the take and the feet of the panel's settings."""
-    return variation.of_sliders(own.take, own.variety, own.detail, own.feet)
+    return variation.of_sliders(own.take, own.variety, own.detail, own.feet, own.floor)
 
 
 def put_variation(own, chosen: Variation) -> None:
@@ -127,6 +127,8 @@ def put_variation(own, chosen: Variation) -> None:
         own.detail = chosen.detail
     if chosen.feet != now.feet:
         own.feet = chosen.feet
+    if chosen.floor != now.floor:
+        own.floor = chosen.floor
 
 
 def _variation(card: Card, own: Variation, varied: Mapping[str, Any]) -> Variation:

@@ -79,6 +79,19 @@ def test_feet_stand_unless_the_prediction_is_asked_for(address):
     ]
 
 
+def test_feet_stand_on_a_floor_of_a_height(address):
+    raised = variation.of_sliders(0, 0.7, False, "default", float(np.float32(0.2)))
+    assert raised == Variation(floor=0.2) and raised.fields() == {"floor": 0.2}
+    _, usual = asked(address, "cmu_walk", Variation())
+    _, standing = asked(address, "cmu_walk", raised)
+    # Z is up.
+    assert np.abs(standing.path - usual.path - [0.0, 0.0, 0.2]).max() < 1e-5
+    assert raised.matches(standing.trust) and not Variation().matches(standing.trust)
+    assert not raised.matches(usual.trust)
+    with pytest.raises(faults.Refused, match="floor"):
+        asked(address, "cmu_walk", Variation(feet="as_predicted", floor=0.2))
+
+
 def test_a_model_without_feet_says_why_nothing_was_done(address):
     card, clip = asked(address, "reach", Variation())
     assert not card.feet

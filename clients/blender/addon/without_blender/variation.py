@@ -10,6 +10,9 @@ import numpy as np
 LARGEST_SEED = 999_999_999
 """Largest seed of a take; 0 is the prediction."""
 
+LARGEST_HEIGHT = 10.0
+"""Largest height of a floor, up or down, m."""
+
 VARIETY = 0.7
 """Default size of a take's deviations; 1 is that of captured clips."""
 
@@ -27,13 +30,15 @@ class Variation:
     """Fields of a request that vary the prediction.
 
     seed: of the take, 0 for the prediction. variety: size of the take's deviations, 0 to 1. detail:
-    True for sampled details that no control predicts. feet: one of FEET.
+    True for sampled details that no control predicts. feet: one of FEET. floor: height of the floor
+    on which feet stand, m.
     """
 
     seed: int = 0
     variety: float = VARIETY
     detail: bool = False
     feet: str = MODEL_DEFAULT
+    floor: float = 0.0
 
     def fields(self) -> dict[str, Any]:
         """Return the fields of a request; what is as by default is left out.
@@ -43,7 +48,8 @@ class Variation:
         take = {"take": self.seed, "variety": self.variety} if self.seed else {}
         detail = {"detail": True} if self.detail else {}
         feet = {} if self.feet == MODEL_DEFAULT else {"feet": self.feet}
-        return {**take, **detail, **feet}
+        floor = {"floor": self.floor} if self.floor else {}
+        return {**take, **detail, **feet, **floor}
 
     def matches(self, trust: Mapping[str, Any]) -> bool:
         """Return True if an answer with this trust information can be of this variation.
@@ -54,7 +60,8 @@ class Variation:
         same = (found.get("seed", 0), bool(found.get("detail"))) == (self.seed, self.detail)
         stands = {"stand": True, "as_predicted": False}.get(self.feet, "feet" in trust)
         varied = not self.seed or found.get("variety") == self.variety
-        return same and varied and stands == ("feet" in trust)
+        floor = trust.get("feet", {}).get("floor", {}).get("height", 0.0)
+        return same and varied and stands == ("feet" in trust) and floor == self.floor
 
     def feet_sentences(self, trust: Mapping[str, Any], why: str) -> list[str]:
         """Return sentences on the feet of an answer: what was planned, or why nothing was done.
@@ -73,9 +80,10 @@ def next_seed(seed: int) -> int:
     return seed + 1 if seed < LARGEST_SEED else 1
 
 
-def of_sliders(seed: int, variety: float, detail: bool, feet: str) -> Variation:
+def of_sliders(seed: int, variety: float, detail: bool, feet: str, floor: float = 0.0) -> Variation:
     """Return the variation of settings that hold float32: 0.7 becomes 0.699999988."""
-    return Variation(seed, float(str(np.float32(variety))), detail, feet)
+    variety, floor = (float(str(np.float32(value))) for value in (variety, floor))
+    return Variation(seed, variety, detail, feet, floor)
 
 
 def why_no_stances(card: Mapping[str, Any]) -> str:
