@@ -17,7 +17,7 @@ import sys
 
 import numpy as np
 
-POSES, GAP, RATE = 6, 1.15, 24
+POSES, GAP, AHEAD, RATE = 6, 1.15, 0.22, 24
 TILE, DEPTH, BAR_WIDTH = 0.1, 0.45, 0.03
 WIDE, HIGH = 1000, 330
 LOOK = math.radians(18.0)
@@ -50,7 +50,8 @@ def strip(clip: str, planned: str, picture: str) -> None:
                 lay_bar(each["position"], aside, paints[1])
     scenes.remove_moving()
     scenes.add_light((-25, -40, 0), 2.5, 0.8)
-    middle, far = -GAP * (POSES - 1) / 2, 20.0
+    # Reaching hands are seen, too.
+    middle, far = -GAP * (POSES - 1) / 2 - AHEAD, 20.0
     place = (-far * math.cos(LOOK), middle, 0.9 + far * math.sin(LOOK))
     camera = scenes.add_camera(place, (math.pi / 2 - LOOK, 0, -math.pi / 2))
     camera.data.type, camera.data.ortho_scale = "ORTHO", GAP * POSES

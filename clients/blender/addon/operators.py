@@ -176,9 +176,10 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         return _ended(self, said)
 
     def _varied(self) -> dict[str, object]:
-        """Return the given ones of take, variety, detail, feet and floor, as fields of Variation."""
+        """Return the given fields of Variation: take, variety, detail, feet and floor."""
         given = variation.of_sliders(self.take, self.variety, self.detail, self.feet, self.floor)
-        fields = {"take": "seed"} | {name: name for name in ("variety", "detail", "feet", "floor")}
+        same = {name: name for name in ("variety", "detail", "feet", "floor")}
+        fields = {"take": "seed"} | same
         return {
             field: getattr(given, field)
             for name, field in fields.items()
