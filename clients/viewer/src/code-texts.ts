@@ -71,7 +71,7 @@ const TAKEN = new Set(
   (
     "False None True and as assert async await break class continue def del elif else except " +
     "finally for from global if import in is lambda nonlocal not or pass raise return try while " +
-    "with yield body controls detail end exact extrapolate feet fps joint_sigma labels level loop model " +
+    "with yield body controls detail end exact extrapolate feet floor fps joint_sigma labels level loop model " +
     "names performer progress root self start take targets unit up variety"
   ).split(" "),
 );
