@@ -9,6 +9,7 @@ import { step } from "./playback.ts";
 import type { Session } from "./session.ts";
 import { place, placed } from "./skeleton.ts";
 import type { State } from "./state.ts";
+import { floorOf } from "./takes.ts";
 import * as theme from "./theme.ts";
 
 export function mount(host: HTMLElement, session: Session): void {
@@ -38,7 +39,11 @@ export function mount(host: HTMLElement, session: Session): void {
   const press = () => {
     const { clip, shown } = player;
     if (!clip || !marks.group.visible) return;
-    marks.group.position.set(shown.carried.x, 0, shown.carried.z);
+    marks.group.position.set(
+      shown.carried.x,
+      floorOf(session.source, session.card, store.state),
+      shown.carried.z,
+    );
     marks.group.rotation.y = shown.carried.turn;
     marks.press(Math.round(store.state.time / step(clip)));
   };

@@ -8,7 +8,14 @@ import type { ModelCard } from "@posefield/client";
 
 import { otherSets } from "./examples.ts";
 import type { State } from "./state.ts";
-import { hasDetail, LARGEST_SEED, standsByDefault, VARIETY, whyFeetCannotStand } from "./takes.ts";
+import {
+  HIGHEST_FLOOR,
+  hasDetail,
+  LARGEST_SEED,
+  standsByDefault,
+  VARIETY,
+  whyFeetCannotStand,
+} from "./takes.ts";
 import { read as number } from "./written.ts";
 
 export interface Address {
@@ -66,6 +73,7 @@ export function initial(model: string, card: ModelCard): State {
     fan: false,
     feet: false,
     stands: standsByDefault(card),
+    floor: 0,
     take: 0,
     variety: VARIETY,
     detail: false,
@@ -163,6 +171,7 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   fan: yes(),
   feet: yes(),
   stands: possible(whyFeetCannotStand),
+  floor: between(() => [-HIGHEST_FLOOR, HIGHEST_FLOOR]),
   take: between(() => [0, LARGEST_SEED], Number.isInteger),
   variety: between(() => [0, 1]),
   detail: possible((card) => (hasDetail(card) ? null : "this model has no details to sample")),

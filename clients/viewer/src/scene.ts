@@ -30,6 +30,7 @@ export class Scene {
   readonly #quality: Quality;
   readonly #steps = new Set<Step>();
   readonly #ground = new Ground();
+  #floor = 0;
   readonly #sun = sun();
   #asked = false;
   #last = 0;
@@ -100,6 +101,14 @@ export class Scene {
     this.#light();
   }
 
+  /** Lays the ground at a height, m. */
+  lay(floor: number): void {
+    if (floor === this.#floor) return;
+    this.#floor = floor;
+    this.#light();
+    this.redraw();
+  }
+
   tint(): void {
     this.root.background = new Color(theme.colour("--paper"));
     this.#ground.tint(
@@ -115,7 +124,7 @@ export class Scene {
     const { x, z } = this.orbit.target;
     this.#sun.position.set(x + 1.8, 4.5, z + 2.2);
     this.#sun.target.position.set(x, 0.6, z);
-    this.#ground.mesh.position.set(x, 0, z);
+    this.#ground.mesh.position.set(x, this.#floor, z);
   }
 
   #draw(now: number): void {

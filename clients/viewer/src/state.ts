@@ -25,6 +25,8 @@ export interface State {
   readonly feet: boolean;
   /** Whether the feet of clips are made to stand; else they are as predicted. */
   readonly stands: boolean;
+  /** Height of the floor on which feet stand, m. */
+  readonly floor: number;
   /** Seed of another take; 0 is the prediction. */
   readonly take: number;
   /** Size of a take's deviations, from 0 to 1. */

@@ -4,10 +4,18 @@ import "./takes.css";
 import { button, el, labelled } from "./dom.ts";
 import { served } from "./page.ts";
 import type { Session } from "./session.ts";
-import { hasDetail, LARGEST_SEED, nextSeed } from "./takes.ts";
+import type { State } from "./state.ts";
+import {
+  floorOf,
+  HIGHEST_FLOOR,
+  hasDetail,
+  LARGEST_SEED,
+  nextSeed,
+  whyFeetCannotStand,
+} from "./takes.ts";
 
 export function mount(host: HTMLElement, session: Session): void {
-  const { card, player, signal, source, store } = session;
+  const { card, player, scene, signal, source, store } = session;
   if (!served(source)) {
     host.append(el("h2", {}, "Takes"), el("p", { class: "about" }, NONE));
     return;
@@ -23,6 +31,8 @@ export function mount(host: HTMLElement, session: Session): void {
   detail.addEventListener("change", () => store.set({ detail: detail.checked }));
   const details = el("label", { class: "takes-check" }, detail, el("span", {}, DETAIL));
   details.hidden = !hasDetail(card);
+  const floor = floorField(store);
+  floor.element.hidden = whyFeetCannotStand(card) !== null;
   const show = () => {
     const { state } = store;
     host.hidden = state.view === "crowd";
@@ -30,6 +40,8 @@ export function mount(host: HTMLElement, session: Session): void {
     seed.show(state.take);
     variety.show(state.variety);
     detail.checked = state.detail;
+    floor.show(state);
+    scene.lay(state.view === "crowd" ? 0 : floorOf(source, card, state));
   };
   host.append(
     el("div", { class: "title" }, el("h2", {}, "Takes"), el("span", {}, taken)),
@@ -38,6 +50,7 @@ export function mount(host: HTMLElement, session: Session): void {
     seed.element,
     variety.element,
     details,
+    floor.element,
   );
   show();
   player.onTrust(({ take }) => {
@@ -74,6 +87,28 @@ function seedField(store: Store) {
     if (Number(field.value) !== take || field.value === "") field.value = String(take);
   };
   const element = labelled("Seed", field);
+  element.classList.add("takes-field");
+  return { element, show };
+}
+
+function floorField(store: Store) {
+  const field = el("input", {
+    type: "number",
+    min: -HIGHEST_FLOOR,
+    max: HIGHEST_FLOOR,
+    step: 0.05,
+    class: "takes-seed",
+  });
+  field.addEventListener("change", () => {
+    const value = Number(field.value);
+    if (field.value !== "" && Math.abs(value) <= HIGHEST_FLOOR) store.set({ floor: value });
+    else field.value = String(store.state.floor);
+  });
+  const show = ({ floor, stands }: Pick<State, "floor" | "stands">) => {
+    if (Number(field.value) !== floor || field.value === "") field.value = String(floor);
+    field.disabled = !stands;
+  };
+  const element = labelled("Floor, m", field);
   element.classList.add("takes-field");
   return { element, show };
 }

@@ -10,8 +10,11 @@ export const VARIETY = 0.7;
 /** The greatest seed. */
 export const LARGEST_SEED = 999_999_999;
 
+/** The greatest height of a floor, up and down, m. */
+export const HIGHEST_FLOOR = 10;
+
 /** Parts of the state that takeAndFeet() asks for. */
-export const TAKE_AND_FEET = ["take", "variety", "detail", "stands"] as const;
+export const TAKE_AND_FEET = ["take", "variety", "detail", "stands", "floor"] as const;
 
 /** The seed after this one; after the last, the first again. */
 export function nextSeed(take: number): number {
@@ -44,6 +47,15 @@ export function standsByDefault(card: ModelCard): boolean {
   return !whyFeetCannotStand(card) && Boolean(card.contacts?.length);
 }
 
+/** Height of the floor on which the feet of clips stand, m; 0 where they are as predicted. */
+export function floorOf(
+  source: Source,
+  card: Pick<ModelCard, "feet" | "root">,
+  { stands, floor }: Pick<State, "stands" | "floor">,
+): number {
+  return served(source) && stands && !whyFeetCannotStand(card) ? floor : 0;
+}
+
 /** Fields of a question that ask for another take; none where no service answers. */
 export function takeFields(
   source: Source,
@@ -63,11 +75,13 @@ export function takeFields(
 export function takeAndFeet(
   source: Source,
   card: ModelCard,
-  state: Pick<State, "take" | "variety" | "detail" | "stands">,
-): Pick<ClipQuestion, "take" | "variety" | "detail" | "feet"> {
+  state: Pick<State, "take" | "variety" | "detail" | "stands" | "floor">,
+): Pick<ClipQuestion, "take" | "variety" | "detail" | "feet" | "floor"> {
+  const floor = floorOf(source, card, state);
   const told = served(source) && state.stands !== standsByDefault(card);
   return {
     ...takeFields(source, card, state),
     ...(told && { feet: state.stands ? "stand" : "as_predicted" }),
+    ...(floor && { floor }),
   };
 }

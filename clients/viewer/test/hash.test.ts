@@ -31,6 +31,7 @@ const OTHER: State = {
   varied: true,
   feet: true,
   stands: true,
+  floor: 0.25,
   take: 7,
   variety: 0.35,
   detail: true,

@@ -33,6 +33,16 @@ test("a take asks for its seed, and for what is not usual", () => {
   assert.deepEqual(takeFields(SERVICE, CARD, { ...START, detail: true }), { detail: true });
 });
 
+test("a floor is asked for where feet stand", () => {
+  const raised = { ...START, floor: 0.2 };
+  assert.deepEqual(takeAndFeet(SERVICE, CARD, raised), { floor: 0.2 });
+  assert.deepEqual(takeAndFeet(SERVICE, CARD, { ...raised, stands: false }), {
+    feet: "as_predicted",
+  });
+  assert.deepEqual(takeAndFeet(SERVICE, PLAIN, { ...raised, stands: false }), {});
+  assert.deepEqual(takeAndFeet(COPY, CARD, raised), {});
+});
+
 test("a model without details is asked for none, and a copy of the page for nothing", () => {
   assert.deepEqual(takeFields(SERVICE, PLAIN, { ...START, detail: true }), {});
   const all = { ...START, take: 7, detail: true, stands: false } as const;
