@@ -78,7 +78,7 @@ def draw_variation(layout, own, card) -> None:
         layout.prop(own, "detail")
     if card.feet or own.feet != variation.MODEL_DEFAULT:
         layout.prop(own, "feet")
-    if (card.feet and own.feet != "as_predicted") or own.floor:
+    if card.feet or own.floor:
         layout.prop(own, "floor")
 
 

@@ -18,8 +18,8 @@ from posefield.common.units import UP, Floats, Indices
 from posefield.feet import stances
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
-from posefield.motion.floor import LEVEL_FLOOR, Floor
 from posefield.motion.foot_contacts import FootContact
+from posefield.question.floor import LEVEL_FLOOR, Floor
 
 # Time over which a change of the path is spread, s.
 SPREAD = 0.1

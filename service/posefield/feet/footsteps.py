@@ -16,8 +16,8 @@ from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stances
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stances import Cycle, FootPath, Interval
-from posefield.motion.floor import LEVEL_FLOOR, Floor
 from posefield.motion.foot_contacts import FootContact
+from posefield.question.floor import LEVEL_FLOOR, Floor
 
 # Rounds in which stances are shortened whose leg does not reach.
 ROUNDS = 4

@@ -7,9 +7,9 @@ import msgspec
 from msgspec import UNSET, Meta, Struct, UnsetType
 
 from posefield.common.units import LengthUnit, UpAxis
-from posefield.motion.floor import Floor, at_height
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import Body
+from posefield.question.floor import Floor, at_height
 
 MAX_TAKE = 999_999_999
 """Largest seed of a take: whole numbers in text have at most nine digits."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from posefield.common.units import Booleans, Floats, Singles
 from posefield.model_file.model_card import Control
 from posefield.motion.clip import Clip
-from posefield.motion.floor import Floor
+from posefield.question.floor import Floor
 from posefield.question.motion_question import LabelValue
 
 Number = TypeVar("Number", bound=np.floating[Any])

@@ -26,7 +26,7 @@ from msgspec import NODEFAULT, Meta, Struct, structs
 
 from posefield.common.errors import FormError
 from posefield.common.name_suggestion import did_you_mean
-from posefield.motion.floor import Floor
+from posefield.question.floor import Floor
 from posefield.question.motion_question import (
     ExactControls,
     FloorValue,

@@ -18,9 +18,9 @@ from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import foot_skate, measures, skeleton
-from posefield.motion.floor import LEVEL_FLOOR, Floor
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.measures import MeasuredMotion
+from posefield.question.floor import LEVEL_FLOOR, Floor
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import FeetResult, PoseAnswer, StanceResult
 from posefield.question.value_validation import check_number, check_range

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 from rowing import faults, rows, text, write_jsonl
 
-from posefield.motion.floor import Floor
+from posefield.question.floor import Floor
 from posefield.registry import model_registry
 
 PLANE = Floor(0.1, 0.0, -0.2)

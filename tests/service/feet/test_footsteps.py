@@ -8,8 +8,8 @@ import pytest
 from posefield.feet import foot_placement, footsteps, limb_choice, limbs, pelvis
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
-from posefield.motion.floor import Floor, at_height
 from posefield.motion.foot_contacts import FootContact
+from posefield.question.floor import Floor, at_height
 
 RATE, FRAMES = 60.0, 90
 # A trunk with four legs: hip, knee, ankle of each; a head keeps the trunk from being a leg.

@@ -7,8 +7,8 @@ import pytest
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.inference import session
-from posefield.motion.floor import Floor, at_height
 from posefield.question import json_decoding, text_decoding
+from posefield.question.floor import Floor, at_height
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
