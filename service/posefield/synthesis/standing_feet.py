@@ -17,7 +17,7 @@ from posefield.inference.graph_ports import CONTACTS
 from posefield.locomotion import floor_plane
 from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import ModelCard
-from posefield.motion import foot_skate, measures, skeleton
+from posefield.motion import foot_skate, measures
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.measures import MeasuredMotion
 from posefield.question.floor import LEVEL_FLOOR, Floor
