@@ -258,13 +258,15 @@ def _measured(
             (after.rotations, after.roots),
         )
     ]
+    # Measures of a motion need no parents; measures of a body are left out above.
+    own_bones, alone = bones[joints], (-1,) * len(joints)
     for name, measure in moving:
         share = (measure.share or 0.0) * (len(both[0]) - 1)
         own_joints = tuple(joints.index(joint) for joint in measure.joints)
         old, new = (
             measures.evaluate(
                 replace(measure, joints=own_joints),
-                MeasuredMotion(own, answer.trust.duration, np.zeros(3), parents, bones, share),
+                MeasuredMotion(own, answer.trust.duration, np.zeros(3), alone, own_bones, share),
             )
             for own in both
         )
