@@ -169,8 +169,8 @@ def _moment(card: ModelCard, field: str, joint: int, when: str) -> Measure:
         return Measure("height", (joint,), when)  # type: ignore[arg-type]
     if card.event is None:
         raise InvalidField(f"{field}/at", "'event', but this model's recipe names none")
-    if card.event.share == 1.0:
-        return Measure("height", (joint,), "end")
+    if card.event.share in (0.0, 1.0):
+        return Measure("height", (joint,), "start" if card.event.share == 0.0 else "end")
     return Measure("height", (joint,), "landmark", card.event.share)
 
 

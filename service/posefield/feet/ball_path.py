@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from posefield.common.array_shapes import Frames, RootPath
 from posefield.common.units import UP, Floats, Indices
-from posefield.feet import stances
+from posefield.feet import banded_systems, stances
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.foot_contacts import FootContact
@@ -100,15 +100,18 @@ def smooth_change(
     if np.isrealobj(path):
         scale, shift = scale.real, shift.real
     stiffness = (SPREAD * rate) ** 4
-    matrix = _normal_matrix(bends, groups, scale, stiffness)
     goal = _right_side(bends, groups, scale, stiffness, path - shift)
     known = np.zeros(len(firsts), path.dtype)
     free = np.ones(len(firsts), bool)
     if values is not None:
         own = groups[[interval.begin for interval in intervals]]
         known[own], free[own] = values, False
+    if cycle is None:
+        bands = _normal_bands(bends, groups, stiffness)
+        known = banded_systems.solve(bands, goal, ~free, known)
+    elif free.any():
+        matrix = _normal_matrix(bends, groups, scale, stiffness)
         goal = goal - matrix @ known
-    if free.any():
         known[free] = np.linalg.solve(matrix[np.ix_(free, free)], goal[free])
     found: Numbers = scale * known[groups] + shift
     return found
@@ -146,6 +149,26 @@ def _normal_matrix(
             own = stiffness * np.conj(values[:, row]) * values[:, column]
             np.add.at(found, (columns[:, row], columns[:, column]), own)
     found[np.arange(size), np.arange(size)] += np.bincount(groups)
+    return found
+
+
+def _normal_bands(
+    bends: _Bends, groups: Annotated[Indices, "frames"], stiffness: float
+) -> Annotated[Floats, "3 size"]:
+    """Return the diagonals of the matrix of a path that does not repeat.
+
+    Unknowns are in the order of their frames, so a second difference couples neighbours alone.
+    """
+    columns, size = groups[bends.frames], int(groups.max()) + 1
+    found = np.zeros((3, size))
+    found[0] = np.bincount(groups, minlength=size)
+    for row in range(3):
+        for column in range(row, 3):
+            first, apart = columns[:, row], columns[:, column] - columns[:, row]
+            # A product off the diagonal of the frames counts twice on that of a stance.
+            share = np.where((apart == 0) & (row != column), 2.0, 1.0)
+            own = stiffness * share * bends.factors[:, row] * bends.factors[:, column]
+            found += np.bincount(apart * size + first, own, 3 * size).reshape(3, size)
     return found
 
 

@@ -181,41 +181,52 @@ def _reachable_steps(
 
     Stances whose leg does not reach are shortened.
     """
-    count = len(body.poses.positions)
+    count, legs = len(body.poses.positions), body.character.legs
     _, below = pelvis.room(body.poses, body.character.kept)
     deepest = pelvis.MOST + STEP * body.floor.slope
     most = np.clip(below - body.followed, 0.0, deepest)
     if body.character.fixed:
         most = np.zeros(count)
-    steps, needs = _steps(body, feet, found)
+    planned = [
+        _plan_foot(body, leg, foot, own) for leg, foot, own in zip(legs, feet, found, strict=True)
+    ]
     for _ in range(ROUNDS):
         shorter = [
-            _shortened(own, pelvis.beyond(need, most), foot.path)
-            for own, need, foot in zip(found, needs, feet, strict=True)
+            _shortened(own, pelvis.beyond(foot.need, most), path.path)
+            for own, foot, path in zip(found, planned, feet, strict=True)
         ]
         if shorter == found:
             break
+        planned = [
+            known if new == old else _plan_foot(body, leg, foot, new)
+            for known, leg, foot, old, new in zip(planned, legs, feet, found, shorter, strict=True)
+        ]
         found = shorter
-        steps, needs = _steps(body, feet, found)
     rate = feet[0].path.rate if feet else 1.0
-    return steps, pelvis.lower(needs, most, rate, bool(feet and feet[0].path.cycle))
+    cyclic = bool(feet and feet[0].path.cycle)
+    needs = [foot.need for foot in planned]
+    return [foot.steps for foot in planned], pelvis.lower(needs, most, rate, cyclic)
 
 
-def _steps(
-    body: _GroundedBody, feet: Sequence[_GroundedFoot], found: Sequence[list[Interval]]
-) -> tuple[list[Footsteps], list[Frames]]:
-    """Return the steps of each foot, and how much lower its leg needs the pelvis to be (F,), m."""
-    poses, steps, needs = body.poses, [], []
-    for leg, foot, own in zip(body.character.legs, feet, found, strict=True):
-        step = ball_path.plan_path(foot.path, own, foot.contact).on_floor(body.floor)
-        ankle = poses.position(leg.lower) - body.grounded * UP
-        target = ankle + step.positions - foot.path.positions
-        if not body.floor.is_level:
-            arm = poses.position(leg.tip) - poses.position(leg.lower)
-            target = target + arm - body.floor.tilted(arm)
-        needs.append(pelvis.need(poses, leg, target, body.followed))
-        steps.append(step)
-    return steps, needs
+@dataclass(frozen=True)
+class _PlannedFoot:
+    """Steps of a foot, and how much lower its leg needs the pelvis to be (F,), m."""
+
+    steps: Footsteps
+    need: Frames
+
+
+def _plan_foot(
+    body: _GroundedBody, leg: Limb, foot: _GroundedFoot, found: list[Interval]
+) -> _PlannedFoot:
+    """Return the steps of a foot that stands in the intervals `found`."""
+    poses = body.poses
+    steps = ball_path.plan_path(foot.path, found, foot.contact).on_floor(body.floor)
+    target = poses.position(leg.lower) - body.grounded * UP + steps.positions - foot.path.positions
+    if not body.floor.is_level:
+        arm = poses.position(leg.tip) - poses.position(leg.lower)
+        target = target + arm - body.floor.tilted(arm)
+    return _PlannedFoot(steps, pelvis.need(poses, leg, target, body.followed))
 
 
 def _unreached(

@@ -6,6 +6,7 @@ are then counted beyond the last.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -69,12 +70,12 @@ class FootPath:
     def __len__(self) -> int:
         return len(self.positions)
 
-    @property
+    @cached_property
     def floor(self) -> Annotated[FloorVectors, "frames"]:
         """Return the path over the floor (F,)."""
         return floor_plane.project(self.positions)
 
-    @property
+    @cached_property
     def heights(self) -> Frames:
         """Return the heights (F,), m."""
         found: Frames = self.positions @ UP

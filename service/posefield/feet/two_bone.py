@@ -18,6 +18,9 @@ from posefield.motion import quat
 REACH, SOFTNESS = 0.995, 0.005
 # Share of the limb's length by which it bends at least, where its plane is taken from its bend.
 LEAST_BEND = 0.01
+# Share of the limb's length up to which a leg that bends backwards is taken as straight; one that
+# bends twice as far bends on so.
+OVERSTRETCHED = 0.1
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,8 @@ def shortest_turn(
 def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
     """Return the unit vectors (..., F, 3), orthogonal to the limb, towards which its middle bends.
 
-    Where a limb is nearly straight its plane is that of the mean bend in its parent's axes.
+    Where a limb is nearly straight its plane is that of the mean bend in its parent's axes; so is
+    that of a leg that bends a little the other way.
     """
     upper, middle = poses.position(limb.upper), poses.position(limb.middle)
     chord = poses.position(limb.lower) - upper
@@ -113,8 +117,12 @@ def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
     least = LEAST_BEND * poses.length(limb.middle)[..., None]
     usual = quat.rotate(frame, np.broadcast_to(mean / np.maximum(size, 1e-9), bend.shape))
     usual = usual - np.sum(usual * old, axis=-1, keepdims=True) * old
-    bent = np.linalg.norm(bend, axis=-1, keepdims=True)
-    mixed = bend + np.maximum(least - bent, 0.0) * usual
+    bent = np.linalg.norm(bend, axis=-1)
+    if limb.tip != limb.lower:
+        # A knee that is a little overstretched would bend backwards where its leg is shortened.
+        little = np.clip(2.0 - bent / (OVERSTRETCHED * poses.length(limb.middle)), 0.0, 1.0)
+        bent = bent + little * (np.sum(bend * usual, axis=-1) - bent)
+    mixed = bend + np.maximum(least - bent[..., None], 0.0) * usual
     side = quat.rotate(shortest_turn(old, towards), mixed)
     side = side - np.sum(side * towards, axis=-1, keepdims=True) * towards
     found: Points = side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-12)

@@ -67,6 +67,19 @@ def test_a_stance_over_the_end_of_a_cycle_is_one_place():
     assert np.ptp(np.abs(planned.places(range(40, 60)) - planned.places([40])[0])) < 1e-12
 
 
+def test_a_long_path_is_that_of_its_parts():
+    # 20,000 frames: as a dense system they would take 3 GB.
+    frames, period = 20_000, 80
+    times = np.arange(frames) / RATE
+    path = 1.2 * times + 0.05j * np.sin(times)
+    held = [Interval(first, first + 40) for first in range(0, frames - period, period)]
+    whole = ball_path.smooth_change(path, held, RATE)
+    part = ball_path.smooth_change(path[8000:9600], held[:19], RATE)
+    # A change falls by e every 0.14 s: four seconds from an end it is the same.
+    assert whole[8240:9120] == pytest.approx(part[240:-480], abs=1e-9)
+    assert np.abs(whole[8000:8040] - part[:40]).max() > 1e-6
+
+
 def test_a_path_without_stances_is_as_predicted(rng):
     path = rng.normal(size=40) + 0j
     assert (ball_path.smooth_change(path, [], RATE) == path).all()

@@ -39,6 +39,11 @@ def poses(rng, frames=30, size=0.3):
     return quat.exp(size * waves), np.tile([0.0, 0.95, 0.0], (frames, 1))
 
 
+def flexed(angles):
+    """Rotations (F, 4) of a knee that bends to the front by angles (F,), rad."""
+    return quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.asarray(angles))
+
+
 def forward(rotations, roots):
     return skeleton.forward_kinematics(PARENTS, rotations, skeleton.translations(BONES, roots))
 
@@ -102,6 +107,7 @@ def test_the_end_reaches_its_target_and_keeps_its_orientation(rng):
 
 def test_a_target_where_the_end_is_changes_nothing(rng):
     rotations, roots = poses(rng)
+    rotations[:, LEG.middle] = flexed(np.linspace(0.1, 1.5, 30))
     before, _ = forward(rotations, roots)
     found = limbs.evaluate_poses(PARENTS, BONES, (LEG,), rotations, roots)
     end = two_bone.reach(found, LEG, np.zeros((30, 3)), before[:, LEG.lower])
@@ -126,3 +132,17 @@ def test_reach_is_firm_and_then_soft(firm):
     assert (found[distance <= firm] == distance[distance <= firm]).all()
     assert (np.diff(found) >= 0.0).all() and found.max() <= 0.8
     assert np.diff(found).max() <= np.diff(distance).max() * (1.0 + 1e-9)
+
+
+def test_a_knee_that_is_overstretched_bends_to_the_front_when_its_leg_is_shortened():
+    rotations, roots = poses(np.random.default_rng(0), size=0.0)
+    rotations[:, LEG.middle] = flexed(np.linspace(0.4, -0.15, 30))
+    before, _ = forward(rotations, roots)
+    bent = before[:, LEG.middle, 2] - before[:, LEG.lower, 2]
+    assert bent[0] > 0.0
+    found = limbs.evaluate_poses(PARENTS, BONES, (LEG,), rotations, roots)
+    end = two_bone.reach(found, LEG, np.tile([0.0, -0.05, 0.0], (30, 1)), before[:, LEG.lower])
+    after, _ = forward(moved(rotations, LEG, two_bone.solve(found, LEG, end)), roots)
+    steps = np.linalg.norm(np.diff(after[:, LEG.middle], axis=0), axis=-1)
+    # One that goes on backwards jumps by 0.2 m.
+    assert steps.max() < 0.02
