@@ -1,0 +1,1 @@
+"""Performances: long continuous motions of several segments, from one script."""

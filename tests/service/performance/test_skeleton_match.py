@@ -1,0 +1,121 @@
+"""Tests of poses of one skeleton for another of the same tree."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.motion import quat, skeleton
+from posefield.motion.skeleton import Skeleton
+from posefield.performance.passages import skeleton_match
+from posefield.performance.passages.skeleton_match import SkeletonsDiffer
+
+# A trunk with two legs of four bones and a head; the toes and the head have end sites.
+PARENTS = (-1, 0, 1, 2, 3, 0, 5, 6, 7, 0)
+LEG = [[0.1, -0.05, 0.0], [0.0, -0.4, 0.02], [0.0, -0.4, -0.02], [0.0, -0.05, 0.15]]
+MIRROR = np.array([-1.0, 1.0, 1.0])
+FEET = (4, 8)
+
+
+def source(names="abcdefghij"):
+    offsets = np.array([[0.0, 0.9, 0.0], *LEG, *(MIRROR * LEG), [0.0, 0.5, 0.0]])
+    tips = np.array([[0.0, 0.0, 0.05], [0.0, 0.0, 0.05], [0.0, 0.15, 0.0]])
+    return Skeleton(tuple(names), PARENTS, offsets, (4, 8, 9), tips)
+
+
+def turned(own, joint, angle, axis=(0.0, 0.0, 1.0)):
+    """The skeleton with a bone turned in the rest pose."""
+    offsets = own.offsets.copy()
+    offsets[joint] = quat.rotate(
+        quat.from_axis_angle(np.array(axis), np.array(angle)), offsets[joint]
+    )
+    return replace(own, offsets=offsets)
+
+
+def poses(count=6):
+    return quat.normalize(np.random.default_rng(3).normal(size=(count, len(PARENTS), 4)))
+
+
+def bones_of(own, rotations):
+    """Directions of the bones (F, J - 1, 3) in the world."""
+    moved = skeleton.translations(own.offsets, np.zeros((len(rotations), 3)))
+    found = skeleton.positions(PARENTS, rotations, moved)
+    arms = found[:, 1:] - found[:, PARENTS[1:]]
+    return arms / np.linalg.norm(arms, axis=-1, keepdims=True)
+
+
+def test_an_equal_skeleton_keeps_poses_bit_for_bit():
+    found = skeleton_match.match(source(), source("ABCDEFGHIJ"), FEET)
+    before = poses()
+    assert found.rotations(before) is before
+    assert found.notes == (
+        "10 of 10 joints have other names, such as 'a' for 'A': joints are matched by their place"
+        " in the tree",
+    )
+    assert skeleton_match.match(source(), source()).notes == ()
+
+
+def test_bones_point_as_in_the_source():
+    target = turned(turned(source(), 2, 0.2), 6, -0.15, (1.0, 0.0, 0.0))
+    found = skeleton_match.match(source(), target)
+    before = poses()
+    after = found.rotations(before)
+    assert np.allclose(bones_of(target, after), bones_of(source(), before), atol=1e-9)
+    # Rotations as they are would not do.
+    assert not np.allclose(bones_of(target, before), bones_of(source(), before), atol=0.05)
+    assert found.notes == (
+        "the rest poses differ by 11.4 degrees at most: bones point as in the source, but for those"
+        " of feet, which are flat where they are in the source",
+    )
+
+
+def test_several_bones_of_a_joint_follow_by_least_squares():
+    whole = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(0.2))
+    target = source()
+    for joint in (1, 5, 9):
+        offsets = target.offsets.copy()
+        offsets[joint] = quat.rotate(whole, offsets[joint])
+        target = replace(target, offsets=offsets)
+    found = skeleton_match.match(source(), target)
+    assert np.allclose(
+        quat.rotate(found.turns[0], target.offsets[[1, 5, 9]]),
+        source().offsets[[1, 5, 9]],
+        atol=1e-5,
+    )
+
+
+def test_soles_keep_their_turn_from_the_rest_pose():
+    target = turned(source(), 4, 0.2, (1.0, 0.0, 0.0))
+    before = np.tile(quat.IDENTITY, (1, len(PARENTS), 1))
+    flat = skeleton_match.match(source(), target, FEET)
+    assert np.allclose(flat.rotations(before), before)
+    tilted = skeleton_match.match(source(), target)
+    assert not np.allclose(tilted.rotations(before), before, atol=0.05)
+
+
+def test_heights_scale_with_the_legs_and_paths_do_not():
+    target = source().offsets.copy()
+    target[1:9] *= 1.1
+    share = skeleton_match.leg_share(PARENTS, source().offsets, target, FEET)
+    assert share == pytest.approx(1.1)
+    assert skeleton_match.leg_share(PARENTS, target, target, ()) == 1.0
+    roots = np.array([[1.0, 0.9, 2.0], [1.5, 1.0, 3.0]])
+    assert skeleton_match.scale_heights(roots, share) == pytest.approx(
+        np.array([[1.0, 0.99, 2.0], [1.5, 1.1, 3.0]])
+    )
+
+
+def test_other_trees_are_refused_in_words():
+    other = Skeleton(("a", "b"), (-1, 0), np.ones((2, 3)), (), np.zeros((0, 3)))
+    with pytest.raises(SkeletonsDiffer, match="10 joints, expected 2"):
+        skeleton_match.match(source(), other)
+    moved = replace(source("ABCDEFGHIJ"), parents=(*PARENTS[:9], 5))
+    with pytest.raises(
+        SkeletonsDiffer, match="joint 9, 'j', is a child of 'a', expected as 'J' of"
+    ):
+        skeleton_match.match(source(), moved)
+    with pytest.raises(
+        SkeletonsDiffer, match="joint 1, 'b', points 26 degrees away from that at 'b'"
+    ):
+        skeleton_match.match(source(), turned(source(), 2, 0.45))
+    skeleton_match.match(source(), turned(source(), 2, 0.34))
