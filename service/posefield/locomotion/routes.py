@@ -10,7 +10,7 @@ from posefield.common.array_shapes import PerPoint
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.inference.level_selection import MAX_COORDINATE
-from posefield.locomotion import floor_plane
+from posefield.locomotion import floor_splines
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.paths import POINT_SPACING, Paths
 
@@ -107,34 +107,10 @@ def _headings(waypoints: Annotated[Floats, "waypoints 2"]) -> tuple[PerPoint, fl
 
     waypoints: (P, 2), m, on the spline.
     """
-    knots = np.pad(np.cumsum(np.linalg.norm(np.diff(waypoints, axis=0), axis=1)), (1, 0))
-    count = POINTS_PER_STEP * int(np.ceil(knots[-1] / POINT_SPACING)) + 1
-    points, slopes = _spline(knots, waypoints, np.linspace(0.0, knots[-1], count))
-    gone = np.pad(np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)), (1, 0))
+    natural = (None, None)
+    gone, headings = floor_splines.headings(waypoints, POINT_SPACING, POINTS_PER_STEP, natural)
     along = np.arange(int(gone[-1] / POINT_SPACING) + 1) * POINT_SPACING
-    headings = np.unwrap(np.angle(floor_plane.project(np.insert(slopes, 1, 0.0, axis=1))))
     return np.interp(along, gone, headings), float(gone[-1])
-
-
-def _spline(
-    knots: Annotated[Floats, "knots"], values: Annotated[Floats, "knots 2"], at: PerPoint
-) -> tuple[Annotated[Floats, "points 2"], Annotated[Floats, "points 2"]]:
-    """Return the natural cubic spline of values (P, 2) at knots (P,): values and slopes at (S,)."""
-    gaps = np.diff(knots)
-    seconds = np.zeros_like(values)
-    # Slopes are continuous at the inner knots: three neighbouring second derivatives per equation.
-    system = np.diag((gaps[:-1] + gaps[1:]) / 3.0)
-    system += np.diag(gaps[1:-1] / 6.0, 1) + np.diag(gaps[1:-1] / 6.0, -1)
-    chords = np.diff(values, axis=0) / gaps[:, None]
-    seconds[1:-1] = np.linalg.solve(system, np.diff(chords, axis=0))
-    piece = np.minimum(np.searchsorted(knots, at, side="right") - 1, len(gaps) - 1)
-    gap = gaps[piece][:, None]
-    b = (at - knots[piece])[:, None] / gap
-    a = 1.0 - b
-    before, after = seconds[piece], seconds[piece + 1]
-    bulge = ((a**3 - a) * before + (b**3 - b) * after) * gap**2 / 6.0
-    lean = ((1.0 - 3.0 * a**2) * before + (3.0 * b**2 - 1.0) * after) * gap / 6.0
-    return a * values[piece] + b * values[piece + 1] + bulge, chords[piece] + lean
 
 
 def _check_turning(gait: Gait, paths: Paths) -> None:

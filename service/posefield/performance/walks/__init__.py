@@ -1,0 +1,1 @@
+"""Walks of a performance: paths, speeds, plans and poses of a cyclic model."""

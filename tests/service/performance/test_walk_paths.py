@@ -1,0 +1,127 @@
+"""Tests of the paths of walks: curves to a place, ways around discs, and speeds along them."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from posefield.locomotion import floor_splines
+from posefield.performance.passages.passage import RATE, FloorMotion
+from posefield.performance.walks import discs, speed_profile, turning_curves
+from posefield.performance.walks.discs import Disc
+from posefield.performance.walks.floor_path import FloorPath
+from posefield.performance.walks.speed_profile import SpeedRamps
+from posefield.performance.walks.turning_curves import Radii
+
+ROLLING, STANDING = SpeedRamps(None, None), SpeedRamps(0.0, 0.0)
+angles = st.floats(-3.1, 3.1)
+
+
+@given(turn=angles, bearing=angles, heading=st.none() | angles, away=st.floats(8.0, 30.0))
+def test_curves_end_where_they_should_and_keep_to_their_radii(turn, bearing, heading, away):
+    start, radii = FloorMotion(turn, 1.0 - 2.0j), Radii(2.0, 3.0)
+    place = start.shift + away * np.exp(1j * bearing)
+    path = turning_curves.connect(start, complex(place), heading, radii)
+    assert path.start == start.shift
+    assert abs(path.end - place) < 1e-3
+    assert path.headings[0] == pytest.approx(turn, abs=1e-6)
+    if heading is not None:
+        assert abs(np.exp(1j * path.headings[-1]) - np.exp(1j * heading)) < 1e-6
+    assert radii.allow(path.curvatures / 1.001)
+    assert path.length >= away - 1e-3
+
+
+def test_radii_limit_curvatures_on_their_own_sides():
+    assert Radii(2.0, 4.0).allow(np.array([0.5, -0.25]))
+    assert not Radii(2.0, 4.0).allow(np.array([0.5, -0.26]))
+    assert not Radii(2.0, 4.0).allow(np.array([0.51, 0.0]))
+
+
+def test_a_place_straight_ahead_is_reached_straight():
+    path = turning_curves.connect(FloorMotion(0.3), 10.0 * np.exp(0.3j), 0.3, Radii(2.0, 2.0))
+    assert path.length == pytest.approx(10.0)
+    assert np.abs(path.curvatures).max() < 1e-6
+
+
+def test_a_turn_of_half_a_circle_is_as_long_as_one():
+    # Averaging the headings adds half a window at both ends, which lie beside the circle.
+    path = turning_curves.connect(FloorMotion(), 40.0j, np.pi, Radii(2.0, 2.0))
+    assert path.length == pytest.approx(40.0 + (np.pi - 2.0) * 2.0, abs=6.0)
+    assert path.length > 40.0 + (np.pi - 2.0) * 2.0 - 0.1
+
+
+def test_there_is_no_room_to_turn_within_a_circle():
+    with pytest.raises(ValueError, match="no curve"):
+        turning_curves.connect(FloorMotion(), 0.5j, None, Radii(3.0, 3.0))
+
+
+def test_a_path_of_an_even_curvature_is_a_circle():
+    path = FloorPath(0j, np.linspace(0.0, 2.0 * np.pi, 401), 2.0 * np.pi * 3.0 / 400)
+    assert abs(path.end) < 1e-9
+    assert np.abs(path.places - 3.0j) == pytest.approx(3.0)
+    assert path.curvatures == pytest.approx(1.0 / 3.0)
+    places, headings = path.at(np.array([0.0, 0.5 * np.pi * 3.0, path.length]))
+    assert np.abs(places - [0.0, 3.0 + 3.0j, 0.0]).max() < 1e-9
+    assert headings == pytest.approx([0.0, 0.5 * np.pi, 2.0 * np.pi])
+
+
+def test_a_spline_begins_and_ends_with_given_slopes():
+    knots, values = np.array([0.0, 2.0, 5.0]), np.array([[0, 0], [1, 2], [0, 5.0]])
+    first, last = np.array([1.0, 0.0]), np.array([0.0, -1.0])
+    ends = np.array([0.0, 5.0])
+    found = floor_splines.spline(knots, values, ends, (first, last))[1]
+    assert np.allclose(found, [first, last])
+    free = floor_splines.spline(knots, values, ends, (None, None))[1]
+    assert not np.allclose(free, [first, last], atol=0.1)
+    # A cubic polynomial is its own spline.
+    cubic = np.column_stack([knots**3 - knots, knots**2])
+    slopes = np.column_stack([3.0 * knots**2 - 1.0, 2.0 * knots])
+    at = np.linspace(0.0, 5.0, 11)
+    points, _ = floor_splines.spline(knots, cubic, at, (slopes[0], slopes[-1]))
+    assert np.allclose(points, np.column_stack([at**3 - at, at**2]))
+
+
+def test_the_way_around_a_disc_is_nearly_the_shortest():
+    corners = discs.way_around(0j, 10.0 + 0j, [Disc(0.0, 5.0, 1.0)], 0.0)
+    way = np.array([0j, *corners, 10.0 + 0j])
+    # Two tangents and an arc.
+    tangent, arc = np.sqrt(24.0), np.arcsin(0.2)
+    assert np.abs(np.diff(way)).sum() == pytest.approx(2.0 * (tangent + arc), rel=0.01)
+    at = way[0] + np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise(way)])
+    assert np.abs(at - 5.0).min() > 0.99
+
+
+def test_there_is_no_way_out_of_a_ring_of_discs():
+    around = np.linspace(0.0, 2.0 * np.pi, 13)
+    ring = [Disc(float(3.0 * np.sin(a)), float(3.0 * np.cos(a)), 0.9) for a in around]
+    assert discs.way_around(0j, 10.0 + 0j, ring, 0.1) is None
+    assert discs.way_around(0j, 10.0 + 0j, ring[2:], 0.1)
+
+
+@given(
+    speeds=st.lists(st.floats(0.5, 1.8), min_size=1, max_size=4),
+    length=st.floats(1.0, 30.0),
+    scale=st.sampled_from(["distance", "time"]),
+    standing=st.booleans(),
+)
+def test_distances_reach_the_length_and_never_go_back(speeds, length, scale, standing):
+    curve = 4.0 * np.arange(len(speeds)), np.array(speeds)
+    ramps = STANDING if standing else ROLLING
+    gone = speed_profile.distances_over_length(curve, scale, length, ramps)
+    assert gone[0] == 0.0
+    assert gone[-1] == pytest.approx(length)
+    assert np.all(np.diff(gone) > -1e-12)
+    assert np.diff(gone).max() * RATE < 1.02 * max(speeds) + 0.01
+
+
+def test_an_even_acceleration_takes_the_time_of_mechanics():
+    curve = np.zeros(1), np.array([1.2])
+    gone = speed_profile.distances_over_length(curve, "distance", 20.0, STANDING)
+    # Two ramps of 3 s and 1.8 m each.
+    assert (len(gone) - 1) / RATE == pytest.approx(6.0 + 16.4 / 1.2, abs=1.0 / RATE)
+    times = np.arange(120) / RATE
+    assert gone[:120] == pytest.approx(0.2 * times**2, abs=2e-3)
+    rolled = speed_profile.distances_over_length(curve, "distance", 20.0, ROLLING)
+    assert (len(rolled) - 1) / RATE == pytest.approx(20.0 / 1.2, abs=1.0 / RATE)

@@ -1,0 +1,422 @@
+"""Tests of the plans and poses of walks, with the shipped model of captured walks."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.inference.takes import TakeSettings
+from posefield.locomotion import floor_plane, gait, stride, walking_crowd
+from posefield.motion import quat, skeleton
+from posefield.performance.passages.passage import RATE, FloorMotion
+from posefield.performance.walks import path_following, walk_passage
+from posefield.performance.walks.discs import Disc
+from posefield.performance.walks.walk_passage import Manner
+from posefield.performance.walks.walk_request import WalkRequest
+from posefield.performance.walks.walk_segment import plan_walk
+from posefield.synthesis.synthesizer import Synthesizer
+
+SHIPPED = Path(__file__).parents[3] / "service/posefield/shipped/cmu_walk.onnx"
+ORIGIN = FloorMotion()
+BENDS = np.array([[0, 0], [1, 4], [0, 8], [-1, 12], [0, 16], [0, 22]], dtype=float)
+CHANGES = ((0.0, 0.8), (7.0, 0.8), (10.0, 1.4), (16.0, 1.4), (18.0, 1.0))
+BOTH = {"start": "standing", "stop": "standing"}
+
+
+def circle(radius):
+    """Return waypoints of a circle to the left."""
+    at = np.linspace(0.0, 2.0 * np.pi, 13)
+    return radius * np.column_stack([1.0 - np.cos(at), np.sin(at)])
+
+
+WALKS = {
+    "straight": WalkRequest(1.2, to=(0.0, 20.0)),
+    "changes": WalkRequest(CHANGES, to=(0.0, 24.0)),
+    "changes from standing": WalkRequest(CHANGES, to=(0.0, 24.0), **BOTH),
+    "bends from standing": WalkRequest(1.0, along=BENDS, **BOTH),
+    "circle": WalkRequest(1.0, along=circle(6.0)),
+    "turning over time": WalkRequest(
+        1.1, seconds=10.0, turn=((0.0, 0.0), (2.0, 0.25), (8.0, -0.2))
+    ),
+    "to behind": WalkRequest(1.0, to=(-3.0, -4.0)),
+    "to an end": WalkRequest(1.1, end=FloorMotion(1.5, 8.0 + 3.0j)),
+}
+
+
+@cache
+def shipped() -> Synthesizer:
+    """Return the shipped model of captured walks."""
+    return Synthesizer("cmu_walk", session.load(SHIPPED))
+
+
+@cache
+def shipped_gait() -> gait.Gait:
+    """Return its gait."""
+    return gait.fit_gait(shipped().session)
+
+
+@pytest.fixture(scope="module")
+def walk() -> Synthesizer:
+    return shipped()
+
+
+@pytest.fixture(scope="module")
+def walking() -> gait.Gait:
+    return shipped_gait()
+
+
+def planned(walking, request, start=ORIGIN, phase=0.1):
+    return plan_walk(walking, request, None if request.along is not None else start, phase)
+
+
+def feet_of(walk, plan, passage):
+    """Return the paths (F, K, 3) of the feet, m."""
+    card = walk.session.card
+    bones = stride.bones(walk.session, plan.controls[:1], plan.walker.labels(1)).astype(float)
+    local = skeleton.translations(bones, passage.roots[None])
+    joints = skeleton.positions(card.skeleton.parents, passage.rotations[None], local)
+    return joints[0][:, list(card.feet)]
+
+
+def slide_per_metre(walk, plan, passage):
+    """Return how far standing feet slide for each metre walked."""
+    feet = feet_of(walk, plan, passage)
+    stands = np.minimum(passage.contacts[1:], passage.contacts[:-1]) > 0.5
+    moved = np.linalg.norm(np.diff(feet, axis=0)[..., [0, 2]], axis=-1)
+    return float((moved * stands).sum() / (plan.distances[-1] - plan.distances[0]))
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_walks_follow_their_paths(walk, walking, name):
+    plan = planned(walking, WALKS[name])
+    made = walk_passage.walk_passage(walk, plan)
+    found = path_following.measure(plan, made.roots, made.rotations)
+    assert found.lateral < 0.005
+    assert found.along < 0.005
+    assert np.degrees(found.heading) < 0.5
+    assert np.degrees(found.facing) < 1.0
+    assert found.speed < 0.01
+    # The measure sees a body that is 2 cm beside its path and one that crabs.
+    left = np.exp(1j * plan.path.at(plan.distances)[1]) * 0.02j
+    beside = made.roots + floor_plane.at_height(left, np.zeros(len(plan)))
+    assert path_following.measure(plan, beside, made.rotations).lateral > 0.015
+    crabs = made.roots + floor_plane.at_height(0.03 * plan.distances * 1j, np.zeros(len(plan)))
+    assert np.degrees(path_following.measure(plan, crabs, made.rotations).heading) > 0.5
+
+
+def test_a_walk_without_a_whole_cycle_has_no_errors(walk, walking):
+    plan = planned(walking, WalkRequest(1.0, seconds=0.5))
+    made = walk_passage.walk_passage(walk, plan)
+    found = path_following.measure(plan, made.roots, made.rotations)
+    assert found.cycles < 1.0
+    assert found.lateral == found.speed == 0.0
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_the_phase_advances_by_the_distance_over_the_stride(walking, name):
+    plan = planned(walking, replace(WALKS[name], stop="rolling"))
+    ways = np.abs(plan.walker.strides(plan.controls).travels)
+    by = np.diff(plan.phases) * 0.5 * (ways[1:] + ways[:-1])
+    assert np.allclose(by, np.diff(plan.distances), rtol=2e-3, atol=1e-7)
+    shorter = 0.99 * by
+    assert not np.allclose(shorter, np.diff(plan.distances), rtol=2e-3, atol=1e-7)
+
+
+def test_feet_slide_no_more_in_starts_and_stops(walk, walking):
+    def slide(request):
+        plan = planned(walking, request)
+        return slide_per_metre(walk, plan, walk_passage.walk_passage(walk, plan))
+
+    slow = walking.region.speeds[0]
+    steady = max(slide(WalkRequest(speed, to=(0.0, 10.0))) for speed in (slow, 0.8, 1.0, 1.2))
+    whole = WalkRequest(0.6, to=(0.0, 2.5), **BOTH)
+    for request in (whole, WalkRequest(1.2, to=(0.0, 10.0), **BOTH)):
+        assert slide(request) < 1.1 * steady
+    # With the phase tied to time instead, feet slide in starts and stops.
+    plan = planned(walking, whole)
+    durations = plan.walker.strides(plan.controls).durations
+    timed = replace(plan, phases=np.cumsum(1.0 / durations) / RATE)
+    made = walk_passage.walk_passage(walk, timed)
+    assert slide_per_metre(walk, timed, made) > 2.0 * steady
+
+
+def test_skate_with_start_and_stop_is_that_of_a_steady_walk(walk, walking):
+    def skate(request):
+        plan = planned(walking, request)
+        feet = feet_of(walk, plan, walk_passage.walk_passage(walk, plan))
+        return walking_crowd.measure_skate_of_feet(walk.session.card, feet[None], RATE).mean()
+
+    for own in (WALKS["changes"], WALKS["circle"]):
+        assert skate(replace(own, **BOTH)) < 1.1 * skate(own)
+
+
+def test_a_walk_stops_in_double_support(walking):
+    for length in (6.0, 6.3, 6.6, 6.9, 7.2):
+        plan = planned(walking, WalkRequest(1.2, to=(0.0, length), **BOTH))
+        quiet = plan.walker.double_supports
+        for phase in (plan.phases[0], plan.phases[-1]):
+            assert np.abs((quiet - phase + 0.5) % 1.0 - 0.5).min() < 0.01
+        assert plan.speeds[0] < 0.02
+        assert plan.speeds[-1] < 0.02
+        # Strides are scaled by 6 % at most.
+        ways = np.abs(plan.walker.strides(plan.controls).travels)
+        shares = np.diff(plan.phases) * ways[1:] / np.diff(plan.distances)
+        assert np.abs(shares[5:-5] - 1.0).max() < 0.065
+
+
+def test_double_support_is_where_both_feet_stand(walk, walking):
+    plan = planned(walking, WalkRequest(1.0, seconds=2.0))
+    quiet = plan.walker.double_supports
+    assert len(quiet) == 2
+    controls = plan.controls[:1].repeat(2, axis=0)
+    labels = plan.walker.labels(2)
+    likely = stride.contact_probabilities(walk.session, controls, labels, quiet)
+    assert likely.min() > 0.5
+    swings = stride.contact_probabilities(walk.session, controls, labels, (quiet + 0.25) % 1.0)
+    assert swings.min() < 0.5
+
+
+def test_a_walk_too_short_to_stop_in_double_support_says_so(walking):
+    notes = [
+        note.code
+        for length in np.linspace(1.5, 2.1, 7)
+        for note in planned(walking, WalkRequest(0.8, to=(0.0, length), stop="standing")).notes
+    ]
+    assert "stops-in-mid-stride" in notes
+    assert notes.count("synthesised-stop") == 7
+
+
+def test_speeds_are_those_of_the_curve_over_distance_and_over_time(walking):
+    over_distance = planned(walking, WALKS["changes"])
+    knots, speeds = np.array(CHANGES).T
+    wanted = np.interp(over_distance.distances, knots, speeds)
+    assert np.abs(over_distance.speeds - wanted).max() < 0.03
+    curve = ((0.0, 0.8), (3.0, 1.4))
+    over_time = planned(walking, WalkRequest(curve, seconds=6.0, speed_over="time"))
+    wanted = np.interp(np.arange(len(over_time)) / RATE, *np.array(curve).T)
+    assert np.abs(over_time.speeds - wanted).max() < 0.03
+    reached = planned(walking, WalkRequest(curve, to=(0.0, 9.0), speed_over="time"))
+    assert (
+        np.abs(reached.speeds - np.interp(np.arange(len(reached)) / RATE, *np.array(curve).T)).max()
+        < 0.03
+    )
+    assert reached.end.shift == pytest.approx(9.0)
+
+
+def test_a_walk_begins_at_the_speed_of_the_one_before(walking):
+    first = planned(walking, WalkRequest(1.3, to=(0.0, 8.0)))
+    speed, turn = first.exit_rates
+    then = WalkRequest(0.9, seconds=6.0, turn=0.1, entry_speed=speed, entry_turn=turn)
+    plan = plan_walk(walking, then, first.end, float(first.phases[-1]))
+    assert np.abs(plan.controls[0] - first.controls[-1]).max() < 0.02
+    assert plan.speeds[-1] == pytest.approx(0.9, abs=0.01)
+    assert plan.exit_rates[1] == pytest.approx(0.1, abs=0.01)
+    assert abs(plan.places[0] - first.places[-1]) < 0.01
+    apart = plan_walk(walking, replace(then, entry_speed=None), first.end, 0.0)
+    assert np.abs(apart.controls[0] - first.controls[-1]).max() > 0.2
+
+
+def test_accelerations_are_comfortable(walking):
+    plan = planned(walking, WalkRequest(1.2, to=(0.0, 20.0), **BOTH))
+    found = np.diff(plan.speeds)[2:-2] * RATE
+    assert np.abs(found).max() < 0.41
+    brisk = planned(walking, WalkRequest(1.2, to=(0.0, 20.0), acceleration=1.2, **BOTH))
+    assert np.abs(np.diff(brisk.speeds)[2:-2] * RATE).max() > 1.0
+    assert brisk.duration < plan.duration
+
+
+def test_given_controls_and_performers_are_kept(walking):
+    plan = planned(walking, WalkRequest(1.1, to=(0.0, 8.0), controls={"stride_length": 1.2}))
+    column = [each.name for each in plan.walker.card.controls].index("stride_length")
+    assert np.all(plan.controls[:, column] == 1.2)
+    assert plan.walker.strides(plan.controls[:1]).speeds == pytest.approx(1.1, abs=0.01)
+    own, other = plan.walker.card.performers[:2]
+    named = planned(walking, WalkRequest(1.1, to=(0.0, 8.0), labels={"performer": own}))
+    mixed = WalkRequest(1.1, to=(0.0, 8.0), labels={"performer": {own: 0.5, other: 0.5}})
+    assert named.walker.weights.sum() == 1.0
+    assert np.sort(planned(walking, mixed).walker.weights[0])[-2:].tolist() == [0.5, 0.5]
+    assert not np.allclose(named.controls[0], planned(walking, WALKS["straight"]).controls[0])
+
+
+def test_takes_and_details_differ_and_stay_on_the_path(walk, walking):
+    plan = planned(walking, WalkRequest(1.1, to=(0.0, 10.0)))
+    mean = walk_passage.walk_passage(walk, plan)
+    manner = Manner(take=TakeSettings(7, 0.7, detail=True))
+    take = walk_passage.walk_passage(walk, plan, manner)
+    again = walk_passage.walk_passage(walk, plan, manner)
+    assert take.rotations.tobytes() == again.rotations.tobytes()
+    assert np.abs(take.rotations - mean.rotations).max() > 0.01
+    assert path_following.measure(plan, take.roots, take.rotations).lateral < 0.025
+    nothing = Manner(take=TakeSettings(0, 0.7, detail=False))
+    same = walk_passage.walk_passage(walk, plan, nothing)
+    assert np.allclose(same.rotations, mean.rotations, atol=1e-4)
+
+
+def test_a_steady_cycle_closes_and_is_that_of_a_walk(walk, walking):
+    plan = planned(walking, WalkRequest(1.2, to=(0.0, 6.0)), phase=0.0)
+    frames = 60
+    cycle = walk_passage.cycle_passage(walk, plan.walker, plan.controls[0], frames)
+    own = plan.walker.strides(plan.controls[:1])
+    step = np.linalg.norm(np.diff(cycle.roots, axis=0), axis=1)
+    closing = cycle.roots[0] + floor_plane.at_height(own.travels, np.zeros(1))[0] - cycle.roots[-1]
+    assert np.linalg.norm(closing) < 1.5 * step.max()
+    assert cycle.phases == pytest.approx(np.arange(frames) / frames)
+    walked = walk_passage.walk_passage(walk, plan)
+    at = int(np.argmin(np.abs(plan.phases - 0.5)))
+    assert np.abs(cycle.rotations[30, 1:] - walked.rotations[at, 1:]).max() < 0.02
+    assert np.abs(cycle.rotations[15, 1:] - walked.rotations[at, 1:]).max() > 0.1
+
+
+def test_a_placed_walk_is_the_same_walk(walk, walking):
+    request = WalkRequest(1.1, to=(0.0, 8.0))
+    own = walk_passage.walk_passage(walk, planned(walking, request))
+    by = FloorMotion(0.7, 2.0 - 3.0j)
+    moved = complex(by.shift + 8.0 * np.exp(0.7j))
+    there = plan_walk(walking, replace(request, to=(moved.imag, moved.real)), by, 0.1)
+    found = walk_passage.walk_passage(walk, there)
+    assert np.allclose(found.roots, own.placed(by).roots, atol=1e-4)
+    same = np.abs(np.sum(found.rotations * own.placed(by).rotations, axis=-1))
+    assert same.min() > 1.0 - 1e-6
+
+
+REFUSED = [
+    (WalkRequest(2.5, to=(0, 5)), "speed", "2.5 m/s, expected 0.4"),
+    (WalkRequest(0.1, to=(0, 5)), "speed", "0.1 m/s"),
+    (WalkRequest(float("nan"), to=(0, 5)), "speed", "finite"),
+    (WalkRequest(((0, 1.0), (5, 3.0)), to=(0, 5)), "speed/1", "3 m/s"),
+    (WalkRequest(((0, 1.0), (0, 1.2)), to=(0, 5)), "speed/1", "pairs in order"),
+    (WalkRequest(((0, 0.6), (0.1, 1.6)), to=(0, 5)), "speed/1", "m/s² from the pair before"),
+    (WalkRequest(((-1, 1.0),), to=(0, 5)), "speed/0", "0 or more"),
+    (WalkRequest((), to=(0, 5)), "speed", "0 pairs"),
+    (WalkRequest(((0, 1.0, 2.0),), to=(0, 5)), "speed/0", "a pair of numbers"),
+    (WalkRequest(1.0), "along", "none given"),
+    (WalkRequest(1.0, to=(0, 5), seconds=3.0), "seconds", "to and seconds given"),
+    (WalkRequest(1.0, seconds=3.0, end=ORIGIN), "end", "given with seconds"),
+    (WalkRequest(1.0, to=(0, 5), turn=0.1), "turn", "without seconds"),
+    (WalkRequest(1.0, to=(0, 5), entry_turn=0.1), "entry_turn", "without seconds"),
+    (WalkRequest(1.0, seconds=3.0, arrive_heading=0.1), "arrive_heading", "without to"),
+    (WalkRequest(1.0, seconds=-1.0), "seconds", "-1 s, expected 0.1"),
+    (WalkRequest(1.0, seconds=3.0, turn=1.5), "turn", "expected -0."),
+    (WalkRequest(1.0, to=(0, 5), entry_speed=3.0), "entry_speed", "3 m/s"),
+    (WalkRequest(1.0, to=(0, 5), entry_speed=1.0, start="standing"), "entry_speed", "standing"),
+    (WalkRequest(1.0, to=(0, 5), acceleration=3.0), "acceleration", "3 m/s²"),
+    (WalkRequest(1.0, to=(0, 0.01)), "to", "0.01 m from where"),
+    (WalkRequest(1.0, to=(0, float("inf"))), "to/1", "finite"),
+    (WalkRequest(1.0, along=np.array([[0, 0], [0, 4.0], [0.2, 0]])), "along/1", "it turns by"),
+    (WalkRequest(1.0, along=np.array([[0, 0], [0, 4.0], [0, 4.0]])), "along/2", "0.000 m from the"),
+    (WalkRequest(1.0, along=np.array([[0, 0.0]])), "along", "one place"),
+    (WalkRequest(1.0, along=np.array([[0, 0.0, 1.0]])), "along", "pairs of finite numbers"),
+    (WalkRequest(1.0, along=np.array([[0, 0.0], [0, 1e9]])), "along/1", "1e+09 m away"),
+    (WalkRequest(1.0, to=(0, 9000.0)), "speed", "a walk of 9000 s"),
+    (WalkRequest(1.0, to=(0, 5), labels={"performer": "cmu_999"}), "labels/performer", "cmu_999"),
+    (WalkRequest(1.0, to=(0, 5), controls={"speeed": 1.0}), "controls/speeed", "did you mean"),
+    (WalkRequest(1.0, to=(0, 5), controls={"speed": 1.5}), "controls/speed", "is asked for"),
+    (WalkRequest(1.0, to=(0, 5), controls={"stride_length": 9}), "controls/stride_length", "9 m"),
+    (WalkRequest(1.0, to=(0, 9), obstacles=(Disc(0.1, 4, 0.5),)), "obstacles/0", "within 0.10 m"),
+    (WalkRequest(1.0, seconds=3.0, detour=True), "detour", "along or seconds"),
+    (WalkRequest(1.0, to=(0, 9), obstacles=(Disc(9, 9, 1),) * 33, detour=True), "obstacles", "33"),
+    (WalkRequest(1.0, to=(0, 9), obstacles=(Disc(4, 4, np.inf),)), "obstacles/0/radius", "finite"),
+    (WalkRequest(1.0, to=(0, 9), obstacles=(Disc(4, 4, -1),)), "obstacles/0/radius", "more than 0"),
+]
+
+
+@pytest.mark.parametrize(("request_", "field", "said"), REFUSED)
+def test_a_walk_that_cannot_be_is_refused_with_its_field(walking, request_, field, said):
+    with pytest.raises(InvalidField, match=r"expected|given|asked") as caught:
+        planned(walking, request_)
+    assert caught.value.field == field
+    assert said in str(caught.value)
+
+
+def test_a_path_beside_an_obstacle_is_walked(walking):
+    clear = WalkRequest(1.0, to=(0.0, 9.0), obstacles=(Disc(0.7, 4.0, 0.5),))
+    assert planned(walking, clear).end.shift == pytest.approx(9.0)
+
+
+def test_a_walk_leads_around_obstacles(walking):
+    crossed = WalkRequest(1.0, to=(0.0, 14.0), obstacles=(Disc(0.3, 5, 1.0), Disc(-0.5, 9, 0.8)))
+    plan = planned(walking, replace(crossed, detour=True))
+    for disc in crossed.obstacles:
+        assert np.abs(plan.path.places - complex(disc.z, disc.x)).min() > disc.radius
+    assert plan.end.shift == pytest.approx(14.0)
+    (note,) = [note for note in plan.notes if note.code == "detour"]
+    assert note.message.startswith("leads around obstacles and is 0.")
+    clear = replace(crossed, obstacles=(Disc(2.0, 5.0, 1.0),), detour=True)
+    assert planned(walking, clear).notes == ()
+    walled = tuple(Disc(x, 7.0, 0.7) for x in np.arange(-9.0, 9.0))
+    with pytest.raises(InvalidField, match="no way around them"):
+        planned(walking, replace(crossed, obstacles=walled, detour=True))
+
+
+@pytest.mark.parametrize("fixture", ["walk_path", "measured_walk_path"])
+def test_models_without_contacts_and_performers_walk(request, fixture):
+    model = Synthesizer("walk", session.load(request.getfixturevalue(fixture)))
+    own = gait.fit_gait(model.session)
+    low, high = own.region.speeds
+    plan = planned(own, WalkRequest(0.5 * (low + high), to=(0.0, 8.0), **BOTH))
+    made = walk_passage.walk_passage(model, plan)
+    found = path_following.measure(plan, made.roots, made.rotations)
+    assert found.lateral < 0.005
+    assert found.along < 0.01
+    assert np.isfinite(made.rotations).all()
+    assert abs(plan.end.shift - 8.0) < 0.01
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    kind=st.sampled_from(["to", "end", "along", "seconds"]),
+    ends=st.tuples(*[st.sampled_from(["rolling", "standing"])] * 2),
+)
+def test_valid_walks_end_where_they_should(seed, kind, ends):
+    walk, walking = shipped(), shipped_gait()
+    rng = np.random.default_rng(seed)
+    start = FloorMotion(rng.uniform(-3, 3), complex(*rng.uniform(-5, 5, 2)))
+    way = rng.uniform(6.0, 20.0) * np.exp(1j * (start.turn + rng.uniform(-3, 3)))
+    place = start.shift + way
+    heading = rng.uniform(-3, 3)
+    given_ = {
+        "to": {"to": (place.imag, place.real)},
+        "end": {"end": FloorMotion(heading, place)},
+        "along": {"along": gentle_waypoints(rng, start)},
+        "seconds": {"seconds": rng.uniform(0.2, 9.0), "turn": rng.uniform(-0.2, 0.2)},
+    }[kind]
+    speed = rng.uniform(0.6, 1.3)
+    request = WalkRequest(speed, **given_, start=ends[0], stop=ends[1])
+    plan = plan_walk(walking, request, start, rng.uniform())
+    made = walk_passage.walk_passage(walk, plan)
+    for array in (made.rotations, made.roots, made.contacts, made.sigmas, made.phases):
+        assert np.isfinite(array).all()
+    assert np.all(np.diff(plan.phases) >= 0.0)
+    assert np.all(np.diff(plan.distances) >= -1e-12)
+    assert abs(quat_norms(made) - 1.0).max() < 1e-4
+    if kind in ("to", "end"):
+        assert abs(plan.end.shift - place) < 0.01
+    if kind == "end":
+        assert abs(np.exp(1j * plan.end.turn) - np.exp(1j * heading)) < 1e-3
+    if kind == "along":
+        assert abs(plan.end.shift - complex(*given_["along"][-1][::-1])) < 0.01
+    if kind == "seconds":
+        assert plan.duration == pytest.approx(request.seconds, abs=0.5 / RATE)
+    again = walk_passage.walk_passage(walk, plan_walk(walking, request, start, plan.phases[0]))
+    if ends[0] == "rolling":
+        assert again.rotations.tobytes() == made.rotations.tobytes()
+        assert again.roots.tobytes() == made.roots.tobytes()
+
+
+def gentle_waypoints(rng, start):
+    """Return waypoints (4, 2) that a walker can follow from a start."""
+    turns = start.turn + np.cumsum(rng.uniform(-0.3, 0.3, 4))
+    places = start.shift + np.cumsum(5.0 * np.exp(1j * turns))
+    return np.column_stack([places.imag, places.real])
+
+
+def quat_norms(passage):
+    """Return the norms of all rotations."""
+    return np.linalg.norm(quat.unroll(passage.rotations), axis=-1)
