@@ -1,0 +1,240 @@
+"""Joins of captured takes: against the real continuation of the take before, as they are and with
+feet that stand.
+
+A reach is joined to what another take of the same performer does after its own target; a stride to
+a stride of another take. The real continuation is the same take's own.
+"""
+
+import argparse
+import sys
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rows import Row, record, table
+
+from posefield.feet import contact_estimates, foot_placement, footsteps, limb_choice
+from posefield.feet.footsteps import Character, SampledMotion
+from posefield.feet.stances import FootPath
+from posefield.motion.clip import Clip
+from posefield.motion.contacts import contact_detection
+from posefield.motion.foot_contacts import FootContact
+from posefield.performance.joins import blends, cut_search, join_quality, join_steps
+from posefield.performance.joins.blends import Blend
+from posefield.performance.joins.cut_search import Cut
+from posefield.performance.joins.join_quality import JoinFacts
+from posefield.performance.passages.passage import RATE, Passage
+from posefield_train.source import clip_table, ingest, recipe, shipped_recipes
+
+ROOT = Path(__file__).resolve().parents[1]
+AFTER, LEAST = 1.2, 0.6
+"""Seconds of a take beyond its event that are joined, and the least that must be there."""
+SQUAT, STOOP = 0.65, 0.75
+"""Heights of the root at the event below, and above, which a deposit is one of the two, m."""
+FAMILIES: tuple[tuple[str, bool, Blend, float | None], ...] = (
+    ("hdm05_grab_high", False, "dead", 2.5),
+    ("hdm05_deposit_floor", False, "dead", None),
+    ("cmu_walk", True, "hermite", 1.2),
+)
+"""Recipes, whether they repeat, their blends, and the goals for peaks over real ones."""
+
+
+@dataclass(frozen=True)
+class Take:
+    """A captured take at `RATE`.
+
+    passage: all of its frames. event: frame at which it is joined. begin: first frame that may be
+    entered, of a stride.
+    """
+
+    name: str
+    performer: str
+    character: Character
+    contacts: tuple[FootContact, ...]
+    passage: Passage
+    event: int
+    begin: int
+
+
+@dataclass(frozen=True)
+class Join:
+    """What is measured of a join: peaks of acceleration, m/s², and of feet, m and m/s."""
+
+    facts: JoinFacts
+    real: float
+    placed: float
+    slides: tuple[float, ...]
+    lowered: float
+    height: tuple[float, float]
+
+
+def takes(name: str, data: Path) -> list[Take]:
+    """Return the takes of a recipe whose files go on beyond the clips."""
+    path = next(Path(shipped_recipes.__file__).parents[1].glob(f"recipes/{name}.toml"))
+    own = recipe.read(path)
+    rows = clip_table.read(own, data)
+    files = ingest.read_files(rows)
+    found = []
+    for row in rows:
+        clip = ingest.clip_of_file(files[str(row.place)], own.source)
+        if row.last_frame is not None and row.last_frame + round(LEAST * clip.rate) < len(clip):
+            found.append(_take(row, clip, own.motion.feet))
+    return found
+
+
+def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
+    """Return the take of a row."""
+    joints = [clip.skeleton.names.index(name) for name in feet]
+    every = round(clip.rate / RATE)
+    paths = clip.positions()[:, joints]
+    contacts = np.stack(
+        [contact_detection.detect_contacts(own, clip.rate, False) for own in paths.swapaxes(0, 1)],
+        axis=1,
+    )[::every]
+    bones = clip.translations[0].copy()
+    bones[0] = 0.0
+    chosen = limb_choice.choose_limbs(clip.skeleton.parents, bones, joints, ()).character
+    known = []
+    for foot, joint in enumerate(joints):
+        path = FootPath(paths[::every, foot], RATE)
+        down = contact_estimates.from_probabilities([path], contacts[:, [foot]].astype(float))[0]
+        known.append(contact_estimates.statistics(joint, path, down))
+    passage = Passage(
+        clip.rotations[::every],
+        clip.root_path[::every],
+        contacts.astype(float),
+        np.zeros(len(contacts)),
+    )
+    first, last = row.first_frame // every, (row.last_frame or 0) // every
+    return Take(row.named, row.performer, chosen, tuple(known), passage, last, first)
+
+
+def pairs(found: Sequence[Take], every: bool = False) -> Iterator[tuple[Take, Take]]:
+    """Yield each take with the next one of its performer, or with every other."""
+    groups = defaultdict(list)
+    for take in found:
+        groups[take.performer].append(take)
+    for group in groups.values():
+        for index, take in enumerate(group):
+            others = [group[(index + ahead) % len(group)] for ahead in range(1, len(group))]
+            yield from ((take, other) for other in (others if every else others[:1]))
+
+
+def join(own: Take, other: Take, cyclic: bool, kind: Blend) -> Join:
+    """Return what a join of two takes measures."""
+    body, rest = own.character, len(other.passage)
+    before = own.passage.part(0, own.event + 1)
+    if cyclic:
+        after = other.passage.part(other.begin, rest)
+        exits, entries = 12, other.event - other.begin
+    else:
+        after = other.passage.part(other.event, min(other.event + round(AFTER * RATE), rest))
+        exits, entries = 15, 21
+    before, _ = join_steps.on_floor(body, before, own.contacts)
+    after, _ = join_steps.on_floor(body, after, own.contacts)
+    window = range(len(before) - exits, len(before))
+    cut = cut_search.find_cut(body, before, after, window, range(entries))
+    after = after.placed(cut.motion)
+    joined = blends.join(before, after, cut, kind)
+    usual = join_quality.usual_acceleration(body, [own.passage, other.passage])
+    facts = join_quality.judge(body, (before, after), cut, kind, joined, usual)
+    stepped, _ = join_steps.add_steps(body, before, after, cut, joined)
+    placed, slides, lowered = _placed(own, stepped, cut)
+    real = _peak(body, own.passage, cut.exit)
+    high, low = (float(side.passage.roots[side.event, 1]) for side in (own, other))
+    return Join(facts, real, _peak(body, placed, cut.exit), slides, lowered, (high, low))
+
+
+def _placed(own: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float, ...], float]:
+    """Return a passage with placed feet, how far feet that stand at the join slide, and the mean
+    lowering of the pelvis near it, m."""
+    motion = SampledMotion(passage.rotations, passage.roots, RATE)
+    plan = footsteps.plan_feet(own.character, motion, own.contacts, passage.contacts)
+    times = np.arange(len(passage)) / RATE
+    found = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
+    placed = Passage(found.rotations, found.roots, passage.contacts, passage.sigmas)
+    near = _near(cut.exit, len(passage))
+    points = cut_search.positions(own.character, placed, 0, len(placed))[..., [0, 2]]
+    slides = []
+    for leg, steps in zip(own.character.legs, plan.steps, strict=True):
+        for stance in steps.stances:
+            if stance.begin < near.stop and stance.end > near.start:
+                path = points[stance.begin : stance.end, leg.tip]
+                slides.append(float(np.linalg.norm(path - path[0], axis=-1).max()))
+    return placed, tuple(slides), float((plan.lowered - plan.grounded)[near].mean())
+
+
+def _near(frame: int, count: int) -> slice:
+    first, last = frame - round(0.1 * RATE), frame + round(0.6 * RATE) + 1
+    return slice(max(first, 0), min(last, count))
+
+
+def _peak(body: Character, passage: Passage, frame: int) -> float:
+    near = _near(frame, len(passage))
+    found = join_quality.accelerations(body, passage, near.start, near.stop)
+    return float(found.max())
+
+
+def rows(data: Path) -> list[Row]:
+    """Return the figures of joins of reaches and of strides."""
+    found = []
+    for name, cyclic, kind, goal in FAMILIES:
+        joins = [join(*pair, cyclic, kind) for pair in pairs(takes(name, data))]
+        found += _rows(f"{name}, {len(joins)} joins", joins, goal)
+    deposits = takes("hdm05_deposit_floor", data)
+    joins = [join(*pair, False, "dead") for pair in pairs(deposits, True)]
+    other = [own for own in joins if min(own.height) < SQUAT and max(own.height) > STOOP]
+    share = 100.0 * float(np.mean([own.facts.hard for own in other]))
+    same = [own for own in joins if own not in other]
+    alike = 100.0 * float(np.mean([own.facts.hard for own in same]))
+    said = f"of {len(other)} joins of a squat and a stoop; {alike:.0f} % of {len(same)} others"
+    missed = Row("hdm05_deposit_floor: joins not flagged", 100.0 - share, "%", said, None, 0.0)
+    return [*found, missed]
+
+
+def _rows(title: str, joins: Sequence[Join], goal: float | None) -> list[Row]:
+    real = float(np.median([own.real for own in joins]))
+    plain, placed = (
+        float(np.median(peaks))
+        for peaks in ([own.facts.peak for own in joins], [own.placed for own in joins])
+    )
+    distance = 100.0 * float(np.median([own.facts.distance for own in joins]))
+    slides = [round(100.0 * one, 3) for own in joins for one in own.slides]
+    slide, worst = float(np.percentile(slides, 90)), max(slides)
+    lowered = 100.0 * float(np.mean([own.lowered for own in joins]))
+    hard = 100.0 * float(np.mean([own.facts.hard for own in joins]))
+    against = f"median peak {plain:.3g} m/s², real continuation {real:.3g}"
+    return [
+        Row(f"{title}: peak over the real one", plain / real, "times", against, None, goal),
+        Row(f"{title}: with feet", placed / real, "times", f"{placed:.3g} m/s²", None, goal),
+        Row(f"{title}: distance at the cut", distance, "cm", "median", None, None),
+        Row(
+            f"{title}: slide of standing feet",
+            slide,
+            "cm",
+            f"90th percentile; worst {worst:.2g}",
+            None,
+            1.0,
+        ),
+        Row(f"{title}: pelvis lowered", lowered, "cm", "mean", None, 5.0),
+        Row(f"{title}: flagged as hard", hard, "%", "", None, None),
+    ]
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the figures; write them where the documentation reads them if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of the captured data")
+    parser.add_argument("--record", action="store_true")
+    given = parser.parse_args(arguments)
+    found = rows(given.data)
+    print(table(found))
+    if given.record:
+        command = "python benchmarks/joins.py DATA --record"
+        record({"joins": found}, command, ROOT / "docs/results")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,1 @@
+"""Joins of a performance: cuts, blends, steps over them, and how hard they are."""

@@ -1,0 +1,134 @@
+"""Tests of steps over joins: which feet step, and that feet then stand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from passages import FEET, PARENTS, character
+
+from posefield.feet import foot_placement, footsteps
+from posefield.feet.footsteps import SampledMotion
+from posefield.motion import quat, skeleton
+from posefield.motion.foot_contacts import FootContact
+from posefield.performance.joins import blends, join_steps
+from posefield.performance.joins.cut_search import Cut
+from posefield.performance.passages.passage import RATE, FloorMotion, Passage
+
+FRAMES = 90
+CONTACTS = tuple(FootContact(foot, 0.04, 0.35, 0.5, 0.05) for foot in FEET)
+CUT = Cut(60, 0, FloorMotion(), 0.0, 0.1)
+
+
+def standing(spread=0.0, height=0.8):
+    """A passage that stands still with its knees bent, and its legs spread."""
+    rotations = np.tile(quat.IDENTITY, (FRAMES, len(PARENTS), 1))
+    for hip, side in ((1, 1.0), (4, -1.0)):
+        outwards = quat.exp(np.array([0.0, 0.0, side * spread]))
+        rotations[:, hip] = quat.mul(outwards, quat.exp(np.array([-0.4, 0.0, 0.0])))
+        rotations[:, hip + 1] = quat.exp(np.array([0.8, 0.0, 0.0]))
+    roots = np.tile([0.0, height, 0.0], (FRAMES, 1))
+    whole = Passage(rotations, roots, np.ones((FRAMES, 2)), np.zeros(FRAMES))
+    return join_steps.on_floor(character(), whole, CONTACTS)[0]
+
+
+def joined(before, after, cut=CUT):
+    whole = blends.join(before, after, cut, "dead")
+    return join_steps.add_steps(character(), before, after, cut, whole)
+
+
+def slides(passage):
+    """Largest way over the floor of each foot while it stands, after the plan."""
+    plan = footsteps.plan_feet(
+        character(),
+        SampledMotion(passage.rotations, passage.roots, RATE),
+        CONTACTS,
+        passage.contacts,
+    )
+    times = np.arange(len(passage)) / RATE
+    placed = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
+    moved = skeleton.translations(character().bones, placed.roots)
+    feet = skeleton.positions(PARENTS, placed.rotations, moved)[:, list(FEET)]
+    found = []
+    for foot, steps in enumerate(plan.steps):
+        for stance in steps.stances:
+            path = feet[stance.begin : stance.end, foot][:, [0, 2]]
+            found.append(np.linalg.norm(path - path[0], axis=-1).max())
+    return found
+
+
+def test_feet_that_stand_apart_step_one_after_another():
+    after = standing(0.1).placed(FloorMotion(0.0, 0.1 + 0.02j))
+    found, steps = joined(standing(), after)
+    assert sorted(step.foot for step in steps) == [0, 1]
+    first, second = steps
+    assert first.distance > second.distance > join_steps.FARTHEST
+    assert (first.begin, first.end) == (60, 81)
+    assert second.begin == first.end + 3
+    up = found.contacts < 0.5
+    assert not (up[:, 0] & up[:, 1]).any()
+    assert up.sum(axis=0).tolist() == [21, 21]
+    assert max(slides(found)) < 0.01
+    # Without steps the feet would be pulled over the floor by the blend.
+    plain = blends.join(standing(), after, CUT, "dead")
+    moved = skeleton.positions(
+        PARENTS, plain.rotations, skeleton.translations(character().bones, plain.roots)
+    )[:, list(FEET)]
+    assert np.linalg.norm(moved[-1] - moved[0], axis=-1).max() > 0.1
+
+
+def test_feet_that_stand_nearly_where_they_stood_stay():
+    found, steps = joined(standing(), standing().placed(FloorMotion(0.0, 0.03)))
+    assert steps == ()
+    assert (found.contacts == 1.0).all()
+    _, far = joined(standing(), standing().placed(FloorMotion(0.0, 0.06)))
+    assert len(far) == 2
+
+
+def test_a_foot_that_swings_lands_when_it_is_near_its_place():
+    before, after = standing(), standing(0.15)
+    before.contacts[50:, 0] = 0.0
+    found, steps = joined(before, after)
+    assert 0 not in [step.foot for step in steps]
+    lands = 60 + int(np.argmax(found.contacts[60:, 0]))
+    assert 60 < lands < 60 + round(join_steps.LANDING * RATE)
+    # The other foot waits until it has landed.
+    (step,) = steps
+    assert (step.foot, step.begin) == (1, lands)
+
+
+def test_a_swing_of_the_other_foot_waits_for_the_step():
+    before, after = standing(), standing()
+    after = after.placed(FloorMotion(0.0, 0.2))
+    only = replace(CUT, exit=60)
+    before.contacts[:, 1] = 1.0
+    after.contacts[10:40, 1] = 0.0
+    after = replace(after, roots=after.roots.copy())
+    found, steps = joined(before, after, only)
+    first = steps[0]
+    other = 1 - first.foot
+    assert (found.contacts[first.begin : first.end, other] == 1.0).all()
+    assert (found.contacts[first.begin : first.end, first.foot] == 0.0).all()
+
+
+def test_steps_do_not_depend_on_the_passages_after_the_join():
+    before, after = standing(), standing(0.1).placed(FloorMotion(0.0, 0.1))
+    found, steps = joined(before, after)
+    again, same = joined(before, after)
+    assert steps == same
+    assert np.array_equal(found.contacts, again.contacts)
+    assert np.array_equal(found.contacts[:60], before.contacts[:60])
+    short, clipped = joined(before, after.part(0, 10))
+    assert len(short) == 70
+    assert clipped[0].begin == 60
+
+
+def test_a_passage_is_brought_to_the_floor():
+    raised = replace(standing(), roots=standing().roots + np.array([0.0, 0.03, 0.0]))
+    found, by = join_steps.on_floor(character(), raised, CONTACTS)
+    assert by == pytest.approx(-0.03)
+    assert found.roots == pytest.approx(standing().roots)
+    flying = replace(raised, contacts=np.zeros((FRAMES, 2)))
+    assert join_steps.on_floor(character(), flying, CONTACTS)[1] == 0.0
+    upstairs, by = join_steps.on_floor(character(), raised, CONTACTS, floor=0.5)
+    assert by == pytest.approx(0.47)
+    assert upstairs.roots[0, 1] == pytest.approx(standing().roots[0, 1] + 0.5)
