@@ -18,6 +18,8 @@ RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 SHIPPED = (
     "hdm05_grab_high",
     "hdm05_deposit_floor",
+    "hdm05_grab_return",
+    "hdm05_deposit_return",
     "hdm05_kick",
     "hdm05_hop",
     "bandai_raise_hand",

@@ -1,0 +1,230 @@
+"""Places of acts: at a point of the floor, or where the joint of a target meets it."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+
+from posefield.common.array_shapes import Vector
+from posefield.common.errors import InvalidField, OutOfReach
+from posefield.constraints import constraint_solver
+from posefield.constraints.constrained_motion import ConstrainedMotion
+from posefield.constraints.constraint import PositionConstraint
+from posefield.constraints.targets import NO_CONSTRAINTS, JointTarget
+from posefield.locomotion import floor_plane
+from posefield.model_file.model_card import Control, ModelCard
+from posefield.performance.acts import act_segment
+from posefield.performance.acts.act_segment import Act
+from posefield.performance.passages.passage import FloorMotion
+from posefield.question import value_validation
+from posefield.question.motion_question import MotionQuestion, Target
+from posefield.question.results import split_results
+from posefield.synthesis import synthesizer
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.question_validation import ValidatedQuestion
+
+# The first pose moves when targets are met, and the targets in its frame with it: the most rounds,
+# and the distance, m, and the angle, rad, from the asked place at which they end.
+MAX_ROUNDS, PLACE_TOLERANCE = 16, 1e-5
+
+
+@dataclass(frozen=True)
+class PlacedAct:
+    """An act in the frame of its segment, and the motion that places it in the world."""
+
+    act: Act
+    by: FloorMotion
+
+
+@dataclass(frozen=True)
+class TargetedAct:
+    """An act that takes place where a joint meets a target of the world.
+
+    point: where on the floor the joint is at its moment, in the frame of the segment. goal: where
+    on the floor the target is in the world.
+    """
+
+    act: Act
+    point: complex
+    goal: complex
+
+    def facing(self, facing: float) -> PlacedAct:
+        """Return the act with the heading `facing`, rad, of its first frame."""
+        turn = facing - self.act.heading
+        return PlacedAct(
+            self.act, FloorMotion(turn, complex(self.goal - np.exp(1j * turn) * self.point))
+        )
+
+    def straight_from(self, place: complex) -> PlacedAct:
+        """Return the act whose first frame faces along the straight way to it from a place.
+
+        Raises InvalidField for a place that is nearer to the target than the act begins.
+        """
+        start = complex(floor_plane.project(self.act.passage.roots[0]))
+        # Of the joint, seen from the start along its heading: ahead and to the left.
+        arm = complex(np.exp(-1j * self.act.heading) * (self.point - start))
+        away = self.goal - place
+        ahead = abs(away) ** 2 - arm.imag**2
+        if ahead < max(arm.real, 0.0) ** 2:
+            raise InvalidField(
+                "targets",
+                f"{abs(away):.3g} m from where the act is come to, expected at least "
+                f"{abs(complex(max(arm.real, 0.0), arm.imag)):.3g} m, from which it begins",
+            )
+        return self.facing(float(np.angle(away) - np.arctan2(arm.imag, np.sqrt(ahead))))
+
+
+def act_at(
+    model: Synthesizer, asked: MotionQuestion, by: FloorMotion, world: Iterable[int] = ()
+) -> Act:
+    """Return the act of a question in the frame of a segment that `by` places in the world.
+
+    world: indices of the targets whose positions are in the world; the other ones are in the frame
+    of the segment. Raises as `act_segment.act_passage` does.
+    """
+    back, moved = by.inverse(), list(asked.targets)
+    for index in world:
+        found = back.place(np.array(_checked(index, moved[index])))
+        moved[index] = _at(moved[index], found)
+    return act_segment.act_passage(model, msgspec.structs.replace(asked, targets=tuple(moved)))
+
+
+def act_from(
+    model: Synthesizer,
+    asked: MotionQuestion,
+    position: complex,
+    facing: float,
+    world: Iterable[int] = (),
+    rounds: int = MAX_ROUNDS,
+) -> PlacedAct:
+    """Return the act whose first frame's root is at a place of the floor with a heading.
+
+    position: forward is its real part, left its imaginary part, m. facing: rad. world: as in
+    `act_at`. rounds: largest number of them. Raises InvalidField for targets that move the first
+    pose in each round, and as `act_at` does.
+    """
+    world = tuple(world)
+    rest = tuple(own for index, own in enumerate(asked.targets) if index not in world)
+    free = act_segment.act_passage(model, msgspec.structs.replace(asked, targets=rest))
+    if not world:
+        return PlacedAct(free, free.motion_to(position, facing))
+    by = free.motion_to(position, facing)
+    trial = msgspec.structs.replace(asked, extrapolate="ok")
+    for _ in range(rounds):
+        found = act_at(model, trial, by, world)
+        start = complex(floor_plane.project(by.place(found.passage.roots[:1]))[0])
+        gap, turn = abs(start - position), abs(by.turn + found.heading - facing)
+        if max(gap, turn) < PLACE_TOLERANCE:
+            return PlacedAct(act_at(model, asked, by, world), by)
+        by = found.motion_to(position, facing)
+    raise InvalidField(
+        "at", f"the targets move the first pose {gap:.3g} m from it, expected targets that do not"
+    )
+
+
+def place_by_target(model: Synthesizer, asked: MotionQuestion, world: int = 0) -> TargetedAct:
+    """Return the act that takes place where its target in the world is.
+
+    world: index of the target whose position is in the world; the other ones are in the frame of
+    the segment. The target's height constrains the motion; over the floor the joint stays where the
+    motion without that target takes it, so that the motion does not depend on the place. Raises
+    OutOfReach for a height that the motion does not reach, unless `extrapolate` is "ok", and as
+    `act_segment.act_passage` does.
+    """
+    target = asked.targets[world]
+    height = _checked(world, target)[1]
+    given, point = _expected_position(model, asked, world)
+    moved = list(asked.targets)
+    moved[world] = _at(target, np.array([point[0], height, point[2]]))
+    own = msgspec.structs.replace(given, targets=tuple(moved))
+    try:
+        act = act_segment.act_passage(model, own)
+    except OutOfReach as fault:
+        if fault.field != f"targets/{world}":
+            raise
+        raise _out_of_reach(model, asked, world, fault.message) from fault
+    _, results = split_results(act.trust.targets, len(moved))
+    if asked.extrapolate != "ok" and not results[world].reached:
+        said = synthesizer.miss_warnings(results[world : world + 1])[0]
+        raise _out_of_reach(model, asked, world, said)
+    return TargetedAct(
+        act,
+        complex(floor_plane.project(point)),
+        complex(floor_plane.project(np.array(target.position))),
+    )
+
+
+def _at(target: Target, position: Vector) -> Target:
+    return msgspec.structs.replace(target, position=tuple(map(float, position)))
+
+
+def _checked(index: int, target: Target) -> tuple[float, ...]:
+    """Return the position of a target; InvalidField for other than three numbers."""
+    if len(target.position) != 3:
+        raise InvalidField(
+            f"targets/{index}/position", f"{len(target.position)} numbers, expected three"
+        )
+    return tuple(
+        value_validation.check_number(f"targets/{index}/position/{axis}", value)
+        for axis, value in enumerate(target.position)
+    )
+
+
+def _expected_position(
+    model: Synthesizer, asked: MotionQuestion, index: int
+) -> tuple[MotionQuestion, Vector]:
+    """Return the question with the target's height as a control, and where the joint then is.
+
+    The position (3,), m, is that of the motion without this target, at the target's moment.
+    """
+    without = tuple(own for at, own in enumerate(asked.targets) if at != index)
+    free = msgspec.structs.replace(asked, targets=without)
+    goal = model.solver.constraints(model.question(free), asked).targets[index]
+    heights = _heights(model.session.card, asked, goal)
+    free = msgspec.structs.replace(free, controls={**asked.controls, **heights})
+    question = model.question(free)
+    held = model.solver.solve(question, model.solver.constraints(question, free))
+    return free, _position(model, question, goal, held)
+
+
+def _heights(card: ModelCard, asked: MotionQuestion, goal: JointTarget) -> dict[str, float]:
+    """Return the control that is the height of a target, if there is one that is not given."""
+    found = constraint_solver.controls_from_targets(card, asked.controls, (goal,))
+    own = {control.name for control in card.controls if _measures_height(control)}
+    return {name: value for name, value in found.items() if name in own}
+
+
+def _measures_height(control: Control) -> bool:
+    return control.measure is not None and control.measure.quantity == "height"
+
+
+def _position(
+    model: Synthesizer, question: ValidatedQuestion, goal: JointTarget, held: ConstrainedMotion
+) -> Vector:
+    """Return the position (3,), m, of a target's joint at its moment of a motion."""
+    at = (goal.moment.share or 0.0) * (held.scene.reduced.frames - 1)
+    if goal.time is not None:
+        when = np.array([goal.time])
+        at = float(
+            model.session.state(question.point, when, question.labels, question.level).frames[0]
+        )
+    aim = PositionConstraint((goal.name,), goal.moment, (0, 1, 2), np.zeros(3), at)
+    return aim.evaluate(held.scene, held.numbers)[0]
+
+
+def _out_of_reach(
+    model: Synthesizer, asked: MotionQuestion, index: int, message: str
+) -> OutOfReach:
+    """Return the error of a target at a height that is out of reach, with those within it."""
+    question = model.question(msgspec.structs.replace(asked, targets=()))
+    goal = model.solver.constraints(question, asked).targets[index]
+    card, heights = model.session.card, []
+    for controls, labels in zip(card.examples, card.clip_labels, strict=True):
+        own = replace(question, point=np.array([controls]), labels=labels[None])
+        held = model.solver.solve(own, NO_CONSTRAINTS)
+        heights.append(_position(model, own, goal, held)[1])
+    return OutOfReach(
+        f"targets/{index}",
+        f"{message}; captured clips have heights of {min(heights):.2f} to {max(heights):.2f} m",
+    )

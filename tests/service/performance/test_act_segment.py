@@ -1,0 +1,145 @@
+"""Tests of acts: frames through the event, poses, contacts, and bad input."""
+
+import acting
+import numpy as np
+import pytest
+
+from posefield.common.errors import InvalidField, OutOfReach
+from posefield.feet import contact_estimates
+from posefield.feet.stances import FootPath
+from posefield.inference import session
+from posefield.inference.graph_ports import CONTACTS
+from posefield.locomotion import floor_plane
+from posefield.model_file.model_card import Event
+from posefield.performance.acts import act_segment
+from posefield.performance.passages.passage import RATE
+from posefield.question.motion_question import ClipQuestion, MotionQuestion, PoseQuestion, Target
+from posefield.synthesis import clips, poses
+from posefield.synthesis.synthesizer import Synthesizer
+
+HIGH = {"target_height": 1.6}
+
+
+@pytest.fixture(scope="module")
+def reach(model_path):
+    return acting.measured_reach(Synthesizer("reach", session.load(model_path)))
+
+
+@pytest.fixture(scope="module")
+def walker(walk_path):
+    return Synthesizer("stroll", session.load(walk_path))
+
+
+def test_times_pass_through_the_moment_at_the_rate():
+    for moment, duration in ((0.0, 1.01), (1.01, 1.01), (0.333, 1.01), (0.5, 0.52)):
+        times, frame = act_segment.times_through(moment, duration)
+        assert times[frame] == moment
+        assert np.allclose(np.diff(times), 1.0 / RATE, atol=1e-12)
+        assert 0.0 <= times[0] < 1.0 / RATE
+        assert duration - 1.0 / RATE < times[-1] <= duration
+
+
+def test_a_moment_on_the_grid_keeps_the_first_and_the_last_frame():
+    times, frame = act_segment.times_through(20 / RATE, 50 / RATE)
+    assert (len(times), frame) == (51, 20)
+
+
+def test_a_motion_of_one_frame_is_refused():
+    with pytest.raises(InvalidField, match=r"a motion of 0\.01 s, expected at least two frames"):
+        act_segment.times_through(0.01, 0.01)
+
+
+def test_an_act_has_the_poses_of_the_model_at_its_times(reach):
+    asked = MotionQuestion(controls=HIGH)
+    found = act_segment.act_passage(reach, asked)
+    times = found.begins + np.arange(len(found.passage)) / RATE
+    own = poses.synthesize_poses(reach, PoseQuestion(controls=HIGH, times=times.tolist()))
+    assert np.allclose(found.passage.rotations, own.rotations, atol=1e-6)
+    assert np.allclose(found.passage.roots, own.root_position, atol=1e-6)
+    assert np.all(found.passage.sigmas == own.trust.sigma)
+    assert found.trust.duration == own.trust.duration
+    assert found.passage.phases is None
+    # Frames that are not those of the event are other poses.
+    plain = clips.synthesize_clip(reach, ClipQuestion(controls=HIGH, fps=RATE, feet="as_predicted"))
+    assert not np.allclose(found.passage.roots[0], plain.clip.root_path[0], atol=1e-6)
+
+
+def test_the_event_is_a_frame_whose_hand_meets_its_target(reach):
+    place = (-0.1, 1.5, 0.5)
+    asked = MotionQuestion(controls={}, targets=(Target("RightHand", place, at="event"),))
+    found = act_segment.act_passage(reach, asked)
+    assert found.event == len(found.passage) - 1
+    hand = acting.joint_path(reach, found, "RightHand")
+    assert np.linalg.norm(hand[found.event] - place) < 1e-3
+    assert np.linalg.norm(hand[found.event - 12] - place) > 1e-2
+    assert [met.what for met in found.trust.targets] == ["RightHand at event"]
+
+
+def test_an_event_within_the_motion_is_a_frame_of_its_canonical_time(reach):
+    early = acting.with_card(reach, event=Event(reach.session.card.event.joint, 0.5))
+    found = act_segment.act_passage(early, MotionQuestion(controls=HIGH))
+    question = early.question(MotionQuestion(controls=HIGH))
+    time = np.array([found.begins + found.event / RATE])
+    frame = early.session.state(question.point, time, question.labels).frames[0]
+    assert frame == pytest.approx(0.5 * (early.session.card.frames - 1), abs=1e-2)
+    assert found.event < len(found.passage) - 1
+
+
+def test_a_model_without_event_has_none(reach):
+    found = act_segment.act_passage(
+        acting.with_card(reach, event=None), MotionQuestion(controls=HIGH)
+    )
+    assert found.event is None
+    assert found.begins + (len(found.passage) - 1) / RATE == pytest.approx(found.trust.duration)
+
+
+def test_contacts_are_detected_where_the_model_has_none(reach):
+    found = act_segment.act_passage(reach, MotionQuestion(controls=HIGH))
+    toes = acting.joint_path(reach, found, "RightToeBase")
+    assert found.passage.contacts.shape == (len(found.passage), 2)
+    detected = contact_estimates.detect(FootPath(toes, RATE))
+    assert np.array_equal(found.passage.contacts[:, 1], detected)
+
+
+def test_contacts_are_those_of_the_model_in_the_order_of_its_feet(walker):
+    card = walker.session.card
+    still = acting.with_card(walker, cyclic=False, feet=card.feet[::-1])
+    asked = MotionQuestion(controls={own.name: own.default for own in card.controls})
+    found = act_segment.act_passage(still, asked)
+    times = found.begins + np.arange(len(found.passage)) / RATE
+    question = still.question(asked)
+    (likely,) = still.session.run(question.point, times[None], CONTACTS, labels=question.labels)
+    assert np.allclose(found.passage.contacts, likely[0][:, ::-1], atol=1e-6)
+    assert not np.allclose(found.passage.contacts, likely[0], atol=1e-2)
+
+
+def test_a_takes_seed_changes_the_act_and_is_told(reach):
+    own, other = (
+        act_segment.act_passage(reach, MotionQuestion(controls=HIGH, take=take)) for take in (0, 7)
+    )
+    assert not np.allclose(own.passage.rotations, other.passage.rotations, atol=1e-3)
+    assert other.trust.take["seed"] == 7
+
+
+def test_motion_to_places_the_first_frame(reach):
+    found = act_segment.act_passage(reach, MotionQuestion(controls=HIGH))
+    by = found.motion_to(2.0 - 1.0j, 0.8)
+    placed = found.passage.placed(by)
+    assert floor_plane.project(placed.roots[0]) == pytest.approx(2.0 - 1.0j)
+    assert act_segment.heading(placed.rotations[0]) == pytest.approx(0.8)
+
+
+def test_a_cyclic_model_is_refused(walker):
+    with pytest.raises(InvalidField, match=r"act: stroll is a cycle, expected a model of another"):
+        act_segment.act_passage(walker, MotionQuestion(controls={}))
+
+
+def test_a_target_out_of_reach_is_told_or_refused(reach):
+    far = (Target("RightHand", (0.0, 4.0, 0.0), at="event"),)
+    found = act_segment.act_passage(reach, MotionQuestion(controls={}, targets=far))
+    assert not found.trust.targets[0].reached
+    assert any("out of reach" in text for text in found.trust.warnings)
+    with pytest.raises(OutOfReach, match=r"^targets/0"):
+        act_segment.act_passage(
+            reach, MotionQuestion(controls={}, targets=far, extrapolate="refuse")
+        )

@@ -1,0 +1,183 @@
+"""Tests of holds: rest, sway, a joint that stays, and bad input."""
+
+import acting
+import numpy as np
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.motion import quat
+from posefield.performance.acts import act_segment, hold_segment, sway
+from posefield.performance.acts.hold_segment import Hold
+from posefield.performance.passages.passage import RATE, Passage
+from posefield.question.motion_question import MotionQuestion
+from posefield.synthesis.synthesizer import Synthesizer
+
+STILL = 1e-4
+"""Distance, m, within which a held joint stays."""
+
+
+@pytest.fixture(scope="module")
+def reach(model_path):
+    return acting.measured_reach(Synthesizer("reach", session.load(model_path)))
+
+
+@pytest.fixture(scope="module")
+def act(reach):
+    return act_segment.act_passage(reach, MotionQuestion(controls={"target_height": 1.5}))
+
+
+@pytest.fixture(scope="module")
+def rested(act):
+    return hold_segment.come_to_rest(act.passage.part(0, act.event - 5))
+
+
+@pytest.fixture(scope="module")
+def body(reach, act):
+    return hold_segment.body_of(reach.session.card, act.bones)
+
+
+def path(reach, act, passage, name):
+    joint = reach.session.card.skeleton.names.index(name)
+    return acting.positions(reach, passage, act.bones)[:, joint]
+
+
+def line(frames, speed=1.0):
+    """A body of one joint that moves ahead, m/s, and turns by as many rad/s."""
+    gone = speed * np.arange(frames) / RATE
+    turns = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), gone)[:, None]
+    roots = np.stack([np.zeros(frames), np.ones(frames), gone], axis=1)
+    return Passage(turns, roots, np.zeros((frames, 1)), np.full(frames, 0.1))
+
+
+def test_a_motion_comes_to_rest_in_its_last_pose():
+    own = line(40)
+    found = hold_segment.come_to_rest(own)
+    assert len(found) == 40 + hold_segment.REST_FRAMES // 2
+    assert np.allclose(found.roots[-1], own.roots[-1], atol=1e-9)
+    assert np.allclose(found.rotations[-1], own.rotations[-1], atol=1e-9)
+    speeds = np.linalg.norm(np.diff(found.roots, axis=0), axis=-1) * RATE
+    assert speeds[30] == pytest.approx(1.0, abs=0.02)
+    assert speeds[-1] < 0.01
+    assert np.all(np.diff(speeds) < 1e-9)
+    # The largest deceleration of 1 - 3 u^2 + 2 u^3 over its time.
+    steepest = 1.5 * RATE / hold_segment.REST_FRAMES
+    assert np.abs(np.diff(speeds)).max() * RATE == pytest.approx(steepest, rel=0.02)
+    turned = quat.twist(found.rotations[:, 0], np.array([0.0, 1.0, 0.0]))
+    assert np.allclose(turned, found.roots[:, 2], atol=1e-9)
+
+
+def test_a_motion_of_few_frames_comes_to_rest_in_as_few():
+    assert len(hold_segment.come_to_rest(line(4))) == 7
+    assert len(hold_segment.come_to_rest(line(1))) == 1
+
+
+def test_frames_between_frames_lie_on_the_curve():
+    times = np.arange(30) / RATE
+
+    def wave(at):
+        return np.stack([np.sin(7.0 * at), np.cos(5.0 * at), at], axis=1)
+
+    own = Passage(quat.exp(wave(times))[:, None], wave(times), np.zeros((30, 1)), np.zeros(30))
+    places = np.array([0.3, 4.0, 11.5, 28.7])
+    found = hold_segment.at_frames(own, places)
+    exact = wave(places / RATE)
+    assert np.allclose(found.roots, exact, atol=2e-5)
+    assert np.allclose(quat.log(found.rotations[:, 0]), exact, atol=1e-4)
+    # A straight line between the frames is farther away.
+    mean = 0.5 * (own.roots[11] + own.roots[12])
+    assert np.abs(mean - exact[2]).max() > 1e-3
+
+
+def test_a_held_hand_stays_while_the_body_sways(reach, act, rested, body):
+    found = hold_segment.hold_passage(rested, Hold(3.0, "RightHand", seed=3), body).passage
+    assert len(found) == 180
+    place = path(reach, act, rested, "RightHand")[-1]
+    hand = path(reach, act, found, "RightHand")
+    assert np.linalg.norm(hand - place, axis=-1).max() < STILL
+    head = path(reach, act, found, "Head")
+    assert 0.002 < np.linalg.norm(head - head[0], axis=-1).max() < 0.05
+    # The hand of a body that only sways does not stay.
+    free = hold_segment.hold_passage(rested, Hold(3.0, seed=3), body).passage
+    moved = path(reach, act, free, "RightHand")
+    assert np.linalg.norm(moved - place, axis=-1).max() > 10.0 * STILL
+
+
+def test_a_held_finger_stays_with_its_hand(reach, act, rested, body):
+    found = hold_segment.hold_passage(rested, Hold(2.0, "RightHand", seed=3), body).passage
+    finger = path(reach, act, found, "RightIndex1")
+    place = path(reach, act, rested, "RightIndex1")[-1]
+    assert np.linalg.norm(finger - place, axis=-1).max() < STILL
+
+
+def test_a_stretched_arm_holds_its_hand(reach, act, rested, body):
+    straight = rested.rotations.copy()
+    elbow = body.names.index("RightForeArm")
+    straight[:, elbow] = quat.IDENTITY
+    own = Passage(straight, rested.roots, rested.contacts, rested.sigmas)
+    place = path(reach, act, own, "RightHand")[-1]
+    found = hold_segment.hold_passage(own, Hold(3.0, "RightHand", seed=3), body).passage
+    hand = path(reach, act, found, "RightHand")
+    assert np.linalg.norm(hand - place, axis=-1).max() < 1e-3
+    free = hold_segment.hold_passage(own, Hold(3.0, seed=3), body).passage
+    assert not np.allclose(found.roots, free.roots, atol=1e-4)
+
+
+def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, body):
+    asked = Hold(1.0, "RightHand", look_at=(2.0, 1.6, 3.0), seed=3)
+    found = hold_segment.hold_passage(rested, asked, body)
+    assert np.allclose(found.passage.roots[-1], rested.roots[-1], atol=1e-12)
+    dots = np.abs(np.sum(found.passage.rotations[-1] * rested.rotations[-1], axis=-1))
+    assert np.allclose(dots, 1.0, atol=1e-9)
+    whole = hold_segment.joined(rested, found.passage)
+    own, after = (
+        np.linalg.norm(np.diff(acting.positions(reach, passage, act.bones), 2, axis=0), axis=-1)
+        .mean(axis=-1)
+        .max()
+        * RATE**2
+        for passage in (rested, whole)
+    )
+    assert after <= own + 1e-9
+    # Without coming to rest the motion stops at once.
+    cut = act.passage.part(0, act.event - 5)
+    stopped = hold_segment.joined(cut, hold_segment.hold_passage(cut, asked, body).passage)
+    x = acting.positions(reach, stopped, act.bones)
+    assert np.linalg.norm(np.diff(x, 2, axis=0), axis=-1).mean(axis=-1).max() * RATE**2 > own
+
+
+def test_contacts_and_sigmas_go_on(rested, body):
+    found = hold_segment.hold_passage(rested, Hold(0.5), body).passage
+    assert np.all(found.contacts == rested.contacts[-1])
+    assert np.all(found.sigmas == rested.sigmas[-1])
+    assert found.phases is None
+
+
+def test_equal_seeds_sway_equally(rested, body):
+    own, same, other = (
+        hold_segment.hold_passage(rested, Hold(1.0, seed=seed), body).passage for seed in (1, 1, 2)
+    )
+    assert np.array_equal(own.rotations, same.rotations)
+    assert not np.allclose(own.rotations, other.rotations, atol=1e-5)
+
+
+def test_waves_have_the_stated_moments():
+    found = np.stack([sway.waves(600, RATE, 50, seed) for seed in range(20)])
+    assert abs(found.mean()) < 0.05
+    assert found.var() == pytest.approx(1.0, abs=0.1)
+    # Smooth: the largest step is that of the fastest wave.
+    assert np.abs(np.diff(found, axis=1)).max() < 2.0 * np.pi * 0.61 / RATE * 4.0
+
+
+@pytest.mark.parametrize(
+    ("asked", "text"),
+    [
+        (Hold(0.0), r"^hold: 0 s, expected at least 0\.0167 s"),
+        (Hold(-1.0), r"^hold: -1 s, expected at least"),
+        (Hold(float("nan")), r"^hold: nan, expected a finite number"),
+        (Hold(1.0, "RightHnd"), r"^joint: 'RightHnd' \(did you mean 'RightHand'\?\), expected"),
+        (Hold(1.0, "Spine"), r"^joint: 'Spine', expected a joint that an arm or a leg leads to"),
+    ],
+)
+def test_holds_that_are_none_are_refused(rested, body, asked, text):
+    with pytest.raises(InvalidField, match=text):
+        hold_segment.hold_passage(rested, asked, body)
