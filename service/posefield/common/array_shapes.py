@@ -8,7 +8,8 @@ the tests check them (tests/shape_checks.py, decision 0048).
 Axes of several modules, with the letters of the docstrings. Motions: frames (F; canonical ones T;
 asked ones S), joints (J), poses (P), clips, characters or motions (N, M), strides, levels of detail
 (L), labels (p, of all label sets) and combinations of them, feet (K), knots of a warp, features of
-a trace, waves of a sum; chosen ones of them.
+a trace, waves of a sum; chosen ones of them. Walks: waypoints, paths, exits and entries of a cut,
+seeds, samples and directions of variables.
 Kriging: points (B; a and b where there are two kinds), samples (n), their coordinates (d + p),
 controls (d), functions of a drift (k), rows of the system (n + k), linear functions (p + 1 + d),
 values (m). Tensors: dof of a pose (D), those varying (D'), freedoms (r1), times (r2) and modes (r3)

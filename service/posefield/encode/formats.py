@@ -24,10 +24,10 @@ from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
 from posefield.question.body_kind import BodyKind
-from posefield.question.results import ClipAnswer, PoseAnswer, SigmaGrid
+from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, SigmaGrid
 
 
-def bvh(answer: ClipAnswer, convention: Convention) -> bytes:
+def bvh(answer: SampledClip, convention: Convention) -> bytes:
     """Return a BVH file; the format cannot store provenance, unit or up axis."""
     clip = axis_conversion.convert_clip(Convention(1.0, convention.up), answer.clip)
     return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
@@ -48,7 +48,7 @@ class ClipEncoder(Format):
     whether the format carries a body. has_curves: whether it carries curves.
     """
 
-    write: Callable[[Sequence[ClipAnswer], Convention], list[bytes]]
+    write: Callable[[Sequence[SampledClip], Convention], list[bytes]]
     bytes_per_joint: int
     usual: Convention = METRES
     convention_fixed: bool = False
@@ -82,7 +82,7 @@ class ClipEncoder(Format):
         warnings = (*answer.trust.warnings, left_out(answer.clip.curves.names, self.extension))
         return replace(answer, trust=replace(answer.trust, warnings=warnings))
 
-    def encode(self, answer: ClipAnswer, convention: Convention | None = None) -> bytes:
+    def encode(self, answer: SampledClip, convention: Convention | None = None) -> bytes:
         """Return the file of one result, in the format's default convention unless one is given."""
         return self.write([answer], convention or self.usual)[0]
 
@@ -106,11 +106,11 @@ def max_poses(size: int, joints: int, per_joint: int, curves: int = 0) -> int:
 
 
 def sequential_writer(
-    encode: Callable[[ClipAnswer, Convention], bytes],
-) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+    encode: Callable[[SampledClip, Convention], bytes],
+) -> Callable[[Sequence[SampledClip], Convention], list[bytes]]:
     """Return a function that encodes several results one after the other."""
 
-    def write(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    def write(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
         files = []
         for answer in answers:
             cancellation.check()
@@ -122,20 +122,20 @@ def sequential_writer(
 
 def table_writer(
     write: Callable[[Table], bytes],
-) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+) -> Callable[[Sequence[SampledClip], Convention], list[bytes]]:
     """Return a function that encodes several results as tables."""
     return sequential_writer(
         lambda answer, convention: write(clip_tables.table(answer, convention))
     )
 
 
-def _lazy_usd_writer(name: str) -> Callable[[Sequence[ClipAnswer], Convention], list[bytes]]:
+def _lazy_usd_writer(name: str) -> Callable[[Sequence[SampledClip], Convention], list[bytes]]:
     """Return the USD writer of that name, which imports usd-core when it is first called.
 
     The import takes 0.12 CPU seconds, a seventh of the service's start.
     """
 
-    def write(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+    def write(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
         from posefield.encode.usd import usd_clip
 
         writers = {"usda": usd_clip.usda, "usdc": usd_clip.usdc, "usdz": usd_clip.usdz}

@@ -16,13 +16,13 @@ from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.glb_buffer import GlbBuffer
 from posefield.motion import quat
 from posefield.motion.clip import Clip
-from posefield.question.results import ClipAnswer
+from posefield.question.results import SampledClip
 
 CONSTANT_TOLERANCE = 1e-9
 """Largest variation, m, of a joint's translation that is taken as constant."""
 
 
-def glb(answer: ClipAnswer, said: Convention) -> bytes:
+def glb(answer: SampledClip, said: Convention) -> bytes:
     """Return the glTF file of one clip, with the provenance in `asset.extras.posefield`.
 
     Raises InvalidField for a convention other than metres with Y up.

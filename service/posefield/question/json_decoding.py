@@ -70,27 +70,30 @@ def _form_error(form: Any, said: str, plain: Any) -> FormError:
         path, found = _resolve_path(error_path(said), plain)
     message = said.rpartition(_PATH)[0] or said
     typed = said.startswith("Expected") and not isinstance(found, dict | list)
-    shown = f" {found!r}" if typed else _accepted_names(form, path, found)
+    shown = f" {found!r}" if typed else _accepted_names(form, path, plain, found)
     return FormError(json_pointer(*path).removeprefix("/"), message + shown)
 
 
-def _accepted_names(form: Any, path: Sequence[str], found: Any) -> str:
+def _accepted_names(form: Any, path: Sequence[str], plain: Any, found: Any) -> str:
     """Return the names that a type accepts at the path of an error, to follow its message.
 
     They are the keys of the object whose unknown key ends the path, or the choices of a text. Empty
     if the path leads to neither.
     """
-    keys = getattr(_type_at(form, path[:-1]), "__struct_encode_fields__", ())
+    keys = getattr(_type_at(form, path[:-1], plain), "__struct_encode_fields__", ())
     if path and keys and path[-1] not in keys:
         return f"{did_you_mean(path[-1], keys)}, expected some of {', '.join(keys)}"
-    choices = get_args(_type_at(form, path))
+    choices = get_args(_type_at(form, path, plain)) or _tags(form, path, plain)
     if isinstance(found, str) and choices and all(isinstance(each, str) for each in choices):
         return f"{did_you_mean(found, choices)}, expected one of {', '.join(choices)}"
     return ""
 
 
-def _type_at(form: Any, path: Sequence[str]) -> Any:
-    """Return the type at a path in a value of a type; None if it is not known."""
+def _type_at(form: Any, path: Sequence[str], plain: Any) -> Any:
+    """Return the type at a path in a value of a type; None if it is not known.
+
+    plain: the value, whose tags tell which member of a union it has.
+    """
     kind = _without_absence(form)
     for step in path:
         if hasattr(kind, "__struct_fields__"):
@@ -99,8 +102,33 @@ def _type_at(form: Any, path: Sequence[str]) -> Any:
             kind = get_args(kind)[0]
         else:
             kind = None
-        kind = _without_absence(kind)
+        plain = _member(plain, step)
+        kind = _tagged(_without_absence(kind), plain)
     return kind
+
+
+def _member(plain: Any, step: str) -> Any:
+    """Return a member of a plain value; None if it has none of that name."""
+    if isinstance(plain, dict):
+        return plain.get(step)
+    found = isinstance(plain, list) and step.isdigit() and int(step) < len(plain)
+    return plain[int(step)] if found else None
+
+
+def _tagged(kind: Any, plain: Any) -> Any:
+    """Return the member of a union of tagged structs that a plain value has; others unchanged."""
+    for each in get_args(kind):
+        config = getattr(each, "__struct_config__", None)
+        if config and isinstance(plain, dict) and plain.get(config.tag_field) == config.tag:
+            return each
+    return kind
+
+
+def _tags(form: Any, path: Sequence[str], plain: Any) -> tuple[str, ...]:
+    """Return the tags of the union at a path that ends with the name of its tag."""
+    members = get_args(_type_at(form, path[:-1], plain)) if path else ()
+    configs = [getattr(each, "__struct_config__", None) for each in members]
+    return tuple(own.tag for own in configs if own and own.tag_field == path[-1])
 
 
 def _without_absence(kind: Any) -> Any:
@@ -108,7 +136,9 @@ def _without_absence(kind: Any) -> Any:
     if get_origin(kind) not in (Union, UnionType):
         return kind
     rest = [each for each in get_args(kind) if each not in (type(None), msgspec.UnsetType)]
-    return rest[0] if len(rest) == 1 else None
+    if len(rest) != 1 and not all(hasattr(each, "__struct_fields__") for each in rest):
+        return None
+    return rest[0] if len(rest) == 1 else kind
 
 
 def _with_whole_numbers(node: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Generic, Literal, Protocol, TypeVar
 
 import numpy as np
 from msgspec import structs
@@ -226,11 +226,32 @@ class PoseAnswer(Generic[Number]):
     curves: NDArray[Number] | None = None
 
 
+class Provenance(Protocol):
+    """Facts about a motion that its files carry."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return one sentence for each thing that a user should know."""
+
+    def document(self) -> dict[str, Any]:
+        """Return the facts as the contract's schema has them."""
+
+    def facts(self) -> dict[str, Any]:
+        """Return the facts that are not empty as plain values, for the metadata of files."""
+
+
 @dataclass(frozen=True)
-class ClipAnswer:
-    """A clip sampled at a constant rate."""
+class SampledClip:
+    """A motion sampled at a constant rate, with the facts about it, as encoders write it."""
 
     clip: Clip
+    trust: Provenance
+
+
+@dataclass(frozen=True)
+class ClipAnswer(SampledClip):
+    """A clip of one model."""
+
     trust: Trust
 
 

@@ -10,6 +10,7 @@ from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
 from posefield.constraints.targets import ConstraintSet
 from posefield.inference.named_model import NamedModel
+from posefield.locomotion.gait import Gait, fit_gait
 from posefield.model_file.model_card import PERFORMER
 from posefield.question.motion_question import ExtrapolationPolicy, MotionQuestion
 from posefield.question.results import ConstraintResult, Deviation, Trust, split_results
@@ -29,6 +30,11 @@ class Synthesizer(NamedModel):
     def solver(self) -> ConstraintSolver:
         """Constraint solver of this model."""
         return ConstraintSolver(self.session)
+
+    @cached_property
+    def gait(self) -> Gait:
+        """Gait of this model; raises InvalidField as `fit_gait` does."""
+        return fit_gait(self.session)
 
     @cached_property
     def validator(self) -> QuestionValidator:

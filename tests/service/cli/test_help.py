@@ -73,7 +73,7 @@ def test_the_options_of_examples_exist(name):
         command.make_context(name, list(words), resilient_parsing=True)
 
 
-@pytest.mark.parametrize("name", sorted(set(NAMES) - {"serve", "demo"}))
+@pytest.mark.parametrize("name", sorted(set(NAMES) - {"serve", "demo", "mcp"}))
 def test_json_is_a_flag_of_every_command_with_a_result(name):
     """Services have no result; their log is JSON by a setting."""
     (found,) = [param for param in GROUP.commands[name].params if "--json" in param.opts]
@@ -97,7 +97,7 @@ def test_evaluate_takes_json_as_a_flag_and_with_a_file_as_before(words, parsed):
 
 
 def test_an_unknown_command_suggests_one(posefield):
-    code, _, err = posefield("clp")
+    code, _, err = posefield("clipp")
     assert code == 2 and "Did you mean 'clip'?" in err
 
 

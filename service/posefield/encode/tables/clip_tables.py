@@ -11,7 +11,7 @@ from posefield.encode.files.file_convention import Convention
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import Table
 from posefield.motion.clip import Clip
-from posefield.question.results import ClipAnswer, PoseAnswer
+from posefield.question.results import PoseAnswer, SampledClip
 
 UNITS = {
     "length": "metre",
@@ -26,7 +26,7 @@ DECIMALS = 6
 """Decimals of lengths in JSON: a micrometre, near float32's precision a few metres away."""
 
 
-def clip_json(answer: ClipAnswer, convention: Convention) -> bytes:
+def clip_json(answer: SampledClip, convention: Convention) -> bytes:
     """Return one JSON object: the skeleton, all rotations and root positions, and provenance.
 
     Numbers are rounded, unlike those of `table`, since the time to write JSON grows with its
@@ -47,7 +47,7 @@ def clip_json(answer: ClipAnswer, convention: Convention) -> bytes:
     return tables.json_object(content)
 
 
-def table(answer: ClipAnswer, convention: Convention) -> Table:
+def table(answer: SampledClip, convention: Convention) -> Table:
     """Return the clip as a table of one row per frame; bone offsets are one array for all."""
     clip = axis_conversion.convert_clip(convention, answer.clip)
     numbers = {name: tables.as_float32(values) for name, values in motion_arrays(clip).items()}

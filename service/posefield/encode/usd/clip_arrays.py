@@ -17,7 +17,7 @@ from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import custom_data
 from posefield.encode.usd.layer_content import WEIGHTS, Array, LayerContent, Samples
 from posefield.motion.clip import Clip
-from posefield.question.results import ClipAnswer
+from posefield.question.results import SampledClip
 
 FRAMES_AT_ONCE = 3200
 """Frames of clips that are computed at a time; a longer clip is computed alone."""
@@ -36,7 +36,7 @@ class ClipArrays(NamedTuple):
 
 
 def arrays_with_character(
-    answers: Sequence[ClipAnswer], convention: Convention
+    answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[ClipArrays]:
     """Yield takes in the order of their results, with samples, character values and facts."""
     for rig, some in _grouped_by_rig(answers, convention):
@@ -51,7 +51,7 @@ def arrays_with_character(
 
 
 def arrays_without_character(
-    answers: Sequence[ClipAnswer], convention: Convention
+    answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[ClipArrays]:
     """Yield takes in the order of their results, with samples and facts only."""
     for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
@@ -61,12 +61,12 @@ def arrays_without_character(
 
 
 def _grouped_by_rig(
-    answers: Sequence[ClipAnswer], convention: Convention
-) -> Iterator[tuple[CharacterRig, list[ClipAnswer]]]:
+    answers: Sequence[SampledClip], convention: Convention
+) -> Iterator[tuple[CharacterRig, list[SampledClip]]]:
     """Yield consecutive results of one skeleton, at most TOGETHER frames at a time."""
     _keep_freed_memory()
     for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
-        part: list[ClipAnswer] = []
+        part: list[SampledClip] = []
         frames = 0
         for answer in some:
             frames += len(answer.clip)
@@ -89,7 +89,7 @@ def _keep_freed_memory() -> None:
 
 
 def _clip_arrays(
-    rig: CharacterRig, answer: ClipAnswer, samples: Samples, values: Mapping[str, Array]
+    rig: CharacterRig, answer: SampledClip, samples: Samples, values: Mapping[str, Array]
 ) -> ClipArrays:
     cancellation.check()
     content = LayerContent(samples, values, custom_data.split_facts(answer.trust.facts()))
@@ -98,7 +98,7 @@ def _clip_arrays(
 
 
 def _samples(
-    made: AnimationSamples, answers: Sequence[ClipAnswer], convention: Convention
+    made: AnimationSamples, answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[Samples]:
     translations = axis_conversion.convert_positions(convention, made.translations)
     rotations = axis_conversion.convert_rotations(convention, made.rotations)

@@ -11,7 +11,7 @@ from posefield.encode.usd import character_prims, clip_arrays, prim_specs
 from posefield.encode.usd.layer_content import Array, LayerContent
 from posefield.encode.usd.layer_metadata import BaseLayerBuilder
 from posefield.encode.usd.template_cache import CRATE_CACHE
-from posefield.question.results import ClipAnswer
+from posefield.question.results import SampledClip
 
 ANIMATION_NAME = "Anim"
 
@@ -45,7 +45,7 @@ class AnimationLayerBuilder(BaseLayerBuilder):
         return made
 
 
-def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, with the facts and without a character."""
     return [
         CRATE_CACHE.write(

@@ -18,7 +18,7 @@ from posefield.encode.usd import character_prims, clip_arrays, prim_specs
 from posefield.encode.usd.layer_content import Array, LayerContent
 from posefield.encode.usd.layer_metadata import BaseLayerBuilder
 from posefield.encode.usd.template_cache import CRATE_CACHE, TEXTS
-from posefield.question.results import ClipAnswer
+from posefield.question.results import SampledClip
 
 ROOT = Sdf.Path("/Character")
 ANIMATION = ROOT.AppendChild("Anim")
@@ -69,17 +69,17 @@ def _character_prims(rig: CharacterRig, convention: Convention, curves: tuple[st
     return made
 
 
-def usda(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+def usda(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USD layers as text."""
     return [TEXTS.write(*each) for each in builders_and_contents(answers, convention)]
 
 
-def usdc(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USD layers in binary form."""
     return [CRATE_CACHE.write(*each) for each in builders_and_contents(answers, convention)]
 
 
-def usdz(answers: Sequence[ClipAnswer], convention: Convention) -> list[bytes]:
+def usdz(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USDZ files of one binary layer each."""
     return list(map(usdz_package, usdc(answers, convention)))
 
@@ -90,7 +90,7 @@ def usdz_package(layer: bytes) -> bytes:
 
 
 def builders_and_contents(
-    answers: Sequence[ClipAnswer], convention: Convention
+    answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[tuple[ClipLayerBuilder, LayerContent]]:
     """Yield the author and the content of the layer of each answer."""
     for take in clip_arrays.arrays_with_character(answers, convention):

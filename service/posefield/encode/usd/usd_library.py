@@ -25,7 +25,7 @@ from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import character_prims, layer_metadata, prim_specs
 from posefield.motion.skeleton import Skeleton
-from posefield.question.results import ClipAnswer
+from posefield.question.results import SampledClip
 
 ROOT = Sdf.Path("/Character")
 CLIPS = ROOT.AppendChild("Clips")
@@ -49,7 +49,7 @@ class LibraryEntry:
     high: Corner
 
 
-def library_entry(name: str, file: str, answer: ClipAnswer) -> LibraryEntry:
+def library_entry(name: str, file: str, answer: SampledClip) -> LibraryEntry:
     """Return the entry of a result; its box holds for any rotations of the joints."""
     clip = answer.clip
     low, high = reach.pose_independent_box(

@@ -1,0 +1,174 @@
+"""Performances: one motion of all segments of a script, its feet, and the report about it."""
+
+from dataclasses import replace
+
+import numpy as np
+import orjson
+
+from posefield.common import cancellation
+from posefield.common.array_shapes import Frames, RootPath, Rotations
+from posefield.common.errors import InvalidField
+from posefield.feet import foot_placement, footsteps
+from posefield.feet.foot_placement import PlacedFrames
+from posefield.feet.footsteps import FeetPlan, SampledMotion
+from posefield.motion import joint_roles, quat
+from posefield.motion.clip import assemble
+from posefield.performance import act_steps, hold_steps, reporting, walk_steps
+from posefield.performance.acts.staged_act import StagedAct
+from posefield.performance.joins import join_quality
+from posefield.performance.passages import limb_targets
+from posefield.performance.passages.passage import RATE
+from posefield.performance.script import Script, errors_under
+from posefield.performance.timeline import Composed, Timeline, from_poses, resample
+from posefield.question.performance_question import Act, Hold, Segment, Walk
+from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
+from posefield.question.results import FeetResult
+from posefield.synthesis import standing_feet
+
+
+def plan(script: Script, most: int) -> PerformanceReport:
+    """Return the report of a performance without its poses. most: largest number of frames.
+
+    Raises QueryError with a pointer into the script.
+    """
+    composed = compose(script)
+    times = frame_times(composed, script.question.fps, most)
+    _judge_joins(script, composed, None)
+    return reporting.report(script, composed, len(times), None)
+
+
+def perform(script: Script, most: int) -> PerformanceAnswer:
+    """Return the performance of a script as one clip. most: largest number of frames.
+
+    Raises QueryError with a pointer into the script.
+    """
+    composed = compose(script)
+    times = frame_times(composed, script.question.fps, most)
+    rotations, roots = resample(composed.motion.rotations, composed.motion.roots, RATE, times)
+    told: FeetResult | None = None
+    planned: FeetPlan | None = None
+    if script.question.feet == "stand" and script.character.feet:
+        planned = plan_feet(script, composed)
+        rotations, roots = _placed(planned, times, rotations, roots)
+        told = standing_feet.describe(planned, script.character.skeleton.names)
+    _judge_joins(script, composed, planned)
+    character = script.character
+    joints = joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
+    turns = quat.normalize(rotations)
+    clip = assemble(joints, turns, roots, character.bones, script.question.fps)
+    return PerformanceAnswer(clip, reporting.report(script, composed, len(clip), told))
+
+
+def _judge_joins(script: Script, composed: Composed, planned: FeetPlan | None) -> None:
+    """Judge the joins as they are sent: with targets met, and feet placed where they stand."""
+    timeline, motion = composed.timeline, composed.motion
+    shift = timeline.begin
+
+    def placed(rows: slice) -> PlacedFrames:
+        rotations, roots = motion.rotations[rows], motion.roots[rows]
+        if planned is None:
+            return PlacedFrames(rotations, roots)
+        times = np.arange(rows.start, rows.stop) / RATE
+        return foot_placement.place_feet(planned, times, rotations, roots)
+
+    joins = [(own.frame - shift, own.facts) for own in timeline.seams]
+    found = join_quality.judge_again(script.character.body, len(motion), joins, placed)
+    for index, facts in enumerate(found):
+        seam = timeline.seams[index]
+        timeline.seams[index] = replace(seam, facts=facts)
+        if facts.hard and not seam.facts.hard:
+            timeline.warn(f"/segments/{seam.segment}", "; ".join(facts.reasons))
+
+
+def plan_document(report: PerformanceReport) -> bytes:
+    """Return a plan as JSON."""
+    return orjson.dumps({"trust": report.document()})
+
+
+def compose(script: Script) -> Composed:
+    """Return the motion of all segments, joined one after another."""
+    timeline = Timeline(script.character)
+    if script.question.start.poses:
+        poses = script.question.start.poses
+        timeline.begin_with(from_poses(poses, script.question.fps, script.character))
+        timeline.begin = len(timeline.done) - 1
+        timeline.exits = range(timeline.begin, timeline.begin + 1)
+    staged: StagedAct | None = None
+    for index, own in enumerate(script.segments):
+        cancellation.check()
+        ahead = _stage_ahead(script, index)
+        with errors_under("segments", index):
+            if isinstance(own, Walk):
+                staged = _walk(timeline, script, index, ahead)
+            elif isinstance(own, Hold):
+                hold_steps.add_hold(timeline, script, index)
+            else:
+                act = staged or act_steps.stage_at_join(timeline, script, index)
+                act_steps.add_act(timeline, script, act)
+                staged = None
+            timeline.check_duration()
+    motion, missed = limb_targets.meet_targets(
+        script.character.body, timeline.done, timeline.targets
+    )
+    return Composed(motion.part(timeline.begin, len(motion)), timeline, missed)
+
+
+def _is_open(own: Segment) -> bool:
+    """Return whether a segment is a walk without an end of its own."""
+    return isinstance(own, Walk) and own.along is None and own.to is None and own.seconds is None
+
+
+def _stage_ahead(script: Script, index: int) -> StagedAct | None:
+    """Return the act that a walk without an end of its own leads to; None for other segments.
+
+    Its errors are of the act's segment.
+    """
+    if not _is_open(script.segments[index]):
+        return None
+    following = script.segments[index + 1] if index + 1 < len(script.segments) else None
+    if not isinstance(following, Act) or not act_steps.has_place(following):
+        raise InvalidField(
+            f"segments/{index}",
+            "a walk without along, to or seconds, expected one of them, or an act with a place "
+            "after it: at, or a target in the world",
+        )
+    with errors_under("segments", index + 1):
+        return act_steps.stage_after_walk(script, index + 1)
+
+
+def _walk(
+    timeline: Timeline, script: Script, index: int, ahead: StagedAct | None
+) -> StagedAct | None:
+    """Go on with a walk; return the act that it leads to with its place, if there is one."""
+    if ahead is None:
+        walk_steps.add_walk(timeline, script, index)
+        return None
+    return walk_steps.add_walk_to(timeline, script, index, ahead)
+
+
+def frame_times(composed: Composed, fps: float, most: int) -> Frames:
+    """Return the times (F,), s, of the frames; InvalidField for more than `most`."""
+    seconds = (len(composed.motion) - 1) / RATE
+    count = int(seconds * fps + 1e-6) + 1
+    if count > most:
+        raise InvalidField(
+            "segments", f"{count} frames at {fps:g} a second, expected at most {most}"
+        )
+    return np.arange(count) / fps
+
+
+def plan_feet(script: Script, composed: Composed) -> FeetPlan:
+    """Return the plan of the feet over a whole performance; limbs with targets keep their ends."""
+    character, targets = script.character, composed.timeline.targets
+    limbs = limb_targets.find_limbs(character.body, targets).values()
+    kept = tuple(dict.fromkeys(limb for limb in limbs if limb is not None))
+    body = replace(character.body, kept=kept)
+    motion = SampledMotion(composed.motion.rotations, composed.motion.roots, RATE)
+    return footsteps.plan_feet(body, motion, character.contacts, composed.motion.contacts)
+
+
+def _placed(
+    planned: FeetPlan, times: Frames, rotations: Rotations, roots: RootPath
+) -> tuple[Rotations, RootPath]:
+    placed = foot_placement.place_feet(planned, times, rotations, roots)
+    return placed.rotations, placed.roots

@@ -1,0 +1,290 @@
+"""Scripts whose models and character are known, checked before any motion is made."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+
+from posefield.common.array_shapes import Bones
+from posefield.common.errors import InvalidField, QueryError
+from posefield.feet import limb_choice
+from posefield.feet.footsteps import Character
+from posefield.locomotion import stride
+from posefield.locomotion.gait import Gait
+from posefield.model_file.model_card import ModelCard
+from posefield.motion.foot_contacts import FootContact
+from posefield.motion.skeleton import Skeleton
+from posefield.performance import script_bounds
+from posefield.performance.joins import join_steps
+from posefield.performance.passages import skeleton_match
+from posefield.performance.passages.passage import Passage
+from posefield.performance.passages.skeleton_match import SkeletonMatch, SkeletonsDiffer
+from posefield.question.motion_question import MotionQuestion
+from posefield.question.performance_question import (
+    Act,
+    Hold,
+    PerformanceQuestion,
+    Segment,
+    Walk,
+)
+from posefield.synthesis import walking_feet
+from posefield.synthesis.synthesizer import Synthesizer
+
+MIN_SECONDS, MAX_SECONDS = 0.1, 600.0
+"""Shortest segment with a duration of its own, and longest performance, s."""
+MIN_FPS, MAX_FPS = 1.0, 240.0
+
+
+@dataclass(frozen=True)
+class Source:
+    """Model of a segment, and what turns its poses into poses of the character.
+
+    share: leg length of the character over that of the model's own bones at its typical controls.
+    feet: for each leg of the character, the column of its foot in the contacts of passages.
+    gait: of a cyclic model.
+    """
+
+    model: Synthesizer
+    match: SkeletonMatch
+    share: float
+    feet: tuple[int, ...]
+    gait: Gait | None = None
+
+    @property
+    def walks(self) -> Gait:
+        """Return the gait of a cyclic model; TypeError for another one."""
+        if self.gait is None:
+            raise TypeError(f"{self.model.name}, expected a model of a gait")
+        return self.gait
+
+    def adapted(self, passage: Passage) -> Passage:
+        """Return a passage of the model as one of the character."""
+        roots = skeleton_match.scale_heights(passage.roots, self.share)
+        return Passage(
+            self.match.rotations(passage.rotations),
+            roots,
+            passage.contacts[:, list(self.feet)],
+            passage.sigmas,
+            passage.phases,
+        )
+
+
+@dataclass(frozen=True)
+class Protagonist:
+    """Character of a performance.
+
+    identity: of the model whose bones it has. roles: of the joints. facing: of the rest pose, rad,
+    from +Z to the left. feet: joints that stand.
+    contacts: of these feet, as captured.
+    """
+
+    identity: str
+    skeleton: Skeleton
+    roles: Mapping[str, str]
+    facing: float
+    bones: Bones
+    body: Character
+    feet: tuple[int, ...]
+    contacts: tuple[FootContact, ...]
+
+
+@dataclass(frozen=True)
+class Script:
+    """A script whose models are known. sources: of the segments; None for holds."""
+
+    question: PerformanceQuestion
+    sources: tuple[Source | None, ...]
+    character: Protagonist
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """Segments in order."""
+        return self.question.segments
+
+    def adapted(self, segment: int, passage: Passage) -> Passage:
+        """Return the motion of a segment's model as one of the character, on the floor."""
+        source, own = self.sources[segment], self.character
+        if source is None:
+            return passage
+        return join_steps.on_floor(own.body, source.adapted(passage), own.contacts)[0]
+
+    @property
+    def identities(self) -> tuple[str, ...]:
+        """Identities of the models, each once, in the order of the script."""
+        return tuple(dict.fromkeys(own.model.identity for own in self.sources if own))
+
+
+@contextmanager
+def errors_under(*path: str | int) -> Iterator[None]:
+    """Raise QueryErrors of the block with the path of a part of the script before their field."""
+    try:
+        yield
+    except QueryError as fault:
+        inner = fault.field if fault.index is None else f"{fault.field}/{fault.index}"
+        # The end of a walk to an act is no field of the script.
+        inner = "" if inner == "end" else inner
+        # Obstacles are those of the whole script.
+        whole = () if inner.startswith("obstacles") else path
+        field = "/".join(str(part) for part in (*whole, inner) if part != "")
+        raise type(fault)(field, fault.message) from fault
+
+
+def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesizer]) -> Script:
+    """Return a script with its models and its character.
+
+    find: returns the model of a name; raises UnknownModel. Raises QueryError, whose field is a
+    pointer into the script, for a model that cannot play its part, for skeletons that differ, and
+    for numbers out of range.
+    """
+    _check_numbers(question)
+    script_bounds.check_bounds(question)
+    models = [_model(index, own, find) for index, own in enumerate(question.segments)]
+    script_bounds.check_level(question.level, models)
+    character = _character(question, models, find)
+    return Script(question, tuple(_sources(question, models, character)), character)
+
+
+def _check_numbers(question: PerformanceQuestion) -> None:
+    if not MIN_FPS <= question.fps <= MAX_FPS:
+        raise InvalidField("fps", f"{question.fps:g}, expected {MIN_FPS:g} to {MAX_FPS:g}")
+    for index, own in enumerate(question.segments):
+        seconds = None if isinstance(own, Act) else own.seconds
+        if seconds is not None and not MIN_SECONDS <= seconds <= MAX_SECONDS:
+            field = f"segments/{index}/seconds"
+            raise InvalidField(field, f"{seconds:g}, expected {MIN_SECONDS:g} to {MAX_SECONDS:g}")
+        if not isinstance(own, Hold):
+            _check_join(index, own)
+    for index, disc in enumerate(question.obstacles):
+        if not disc.radius > 0.0:
+            field = f"obstacles/{index}/radius"
+            raise InvalidField(field, f"{disc.radius:g}, expected more than 0")
+
+
+def _check_join(index: int, own: Walk | Act) -> None:
+    """Raise InvalidField for a join of no or too long a blend, and for no distance."""
+    field, join = f"segments/{index}/join", own.join
+    if join.seconds is not None and not 0.0 < join.seconds <= 5.0:
+        raise InvalidField(f"{field}/seconds", f"{join.seconds:g}, expected more than 0, at most 5")
+    if join.most is not None and not join.most > 0.0:
+        raise InvalidField(f"{field}/most", f"{join.most:g}, expected more than 0")
+
+
+def _model(index: int, own: Segment, find: Callable[[str], Synthesizer]) -> Synthesizer | None:
+    """Return the model of a segment; None for a hold."""
+    if isinstance(own, Hold):
+        return None
+    with errors_under("segments", index):
+        model = find(own.model)
+        card = model.session.card
+        if isinstance(own, Act) and card.cyclic:
+            raise InvalidField(
+                "model", f"{card.name} is a cycle, expected an act of another motion"
+            )
+        if isinstance(own, Walk) and not (card.cyclic and card.root == "travelling"):
+            raise InvalidField("model", f"{card.name} does not walk, expected a cycle that travels")
+        return model
+
+
+def _character(
+    question: PerformanceQuestion,
+    models: Sequence[Synthesizer | None],
+    find: Callable[[str], Synthesizer],
+) -> Protagonist:
+    """Return the character: that of the script, else of the first act, else of the first walk.
+
+    An act meets its targets with its own bones; a walk is at ease with any.
+    """
+    if question.character is not None:
+        chosen = question.character
+        with errors_under("character"):
+            return _protagonist(
+                find(chosen.model), chosen.controls, chosen.performer, chosen.labels
+            )
+    every = list(enumerate(question.segments))
+    for kind in (Act, Walk):
+        for index, own in every:
+            model = models[index]
+            if isinstance(own, kind) and model is not None:
+                with errors_under("segments", index):
+                    return _protagonist(model, {}, own.performer, own.labels)
+    raise InvalidField("character", "none, expected one: no segment has a model")
+
+
+def _protagonist(
+    model: Synthesizer,
+    controls: dict[str, float],
+    performer: str | None,
+    labels: dict[str, str | dict[str, float]],
+) -> Protagonist:
+    card = model.session.card
+    bones = _bones(model, MotionQuestion(controls=controls, performer=performer, labels=labels))
+    known = [own for own in card.contacts if own.joint in card.feet]
+    choice = limb_choice.choose_limbs(
+        card.skeleton.parents, bones, [own.joint for own in known], ()
+    )
+    contacts = tuple(known[place] for place in choice.feet)
+    feet = tuple(own.joint for own in contacts)
+    facing = math.radians(card.making.facing or 0.0)
+    return Protagonist(
+        model.identity, card.skeleton, card.roles, facing, bones, choice.character, feet, contacts
+    )
+
+
+def _bones(model: Synthesizer, asked: MotionQuestion) -> Bones:
+    """Return bone offsets (J, 3), m, at the controls and labels of a question."""
+    question = model.question(asked)
+    found = stride.bones(model.session, question.point, question.labels)[0]
+    return np.asarray(found, np.float64)
+
+
+def _sources(
+    question: PerformanceQuestion,
+    models: Sequence[Synthesizer | None],
+    character: Protagonist,
+) -> Iterator[Source | None]:
+    """Yield the sources of the segments; those of equal walkers are made once."""
+    made: dict[tuple[str, str | None, bytes], Source] = {}
+    for index, (own, model) in enumerate(zip(question.segments, models, strict=True)):
+        if model is None or isinstance(own, Hold):
+            yield None
+            continue
+        key = (model.identity, own.performer, msgspec.json.encode(own.labels))
+        if key not in made:
+            made[key] = _source(index, own, model, character)
+        yield made[key]
+
+
+def _source(index: int, segment: Walk | Act, model: Synthesizer, character: Protagonist) -> Source:
+    """Return the model of a segment as a source of the character's poses."""
+    card, field = model.session.card, f"segments/{index}/model"
+    try:
+        match = skeleton_match.match(card.skeleton, character.skeleton, character.feet)
+    except SkeletonsDiffer as fault:
+        raise InvalidField(
+            field, f"{card.name} has another skeleton than {character.identity}: {fault}"
+        ) from fault
+    feet = _feet(field, card, character)
+    whose = MotionQuestion(controls={}, performer=segment.performer, labels=segment.labels)
+    own = _bones(model, whose)
+    share = skeleton_match.leg_share(card.skeleton.parents, own, character.bones, character.feet)
+    with errors_under("segments", index):
+        walks = model.gait if card.cyclic else None
+    return Source(model, match, share, feet, walks)
+
+
+def _feet(field: str, card: ModelCard, character: Protagonist) -> tuple[int, ...]:
+    """Return the columns of the character's feet in the contacts of a model's passages."""
+    # Walks have the contacts that the model knows; acts detect those that it does not.
+    known = [own.joint for own in walking_feet.foot_contacts(card)]
+    columns = known if card.cyclic else list(card.feet)
+    absent = [joint for joint in character.feet if joint not in columns]
+    if absent:
+        raise InvalidField(
+            field,
+            f"{card.name} knows no contacts of {card.skeleton.names[absent[0]]!r}, expected those "
+            f"of the feet of {character.identity}",
+        )
+    return tuple(columns.index(joint) for joint in character.feet)

@@ -1,0 +1,222 @@
+"""Motion of a performance as it grows, segment by segment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Frames, RootPath, Rotations
+from posefield.common.errors import InvalidField
+from posefield.common.units import UP, Floats
+from posefield.motion import quat
+from posefield.performance.joins import blends, cut_search, join_quality, join_steps
+from posefield.performance.joins.blends import Blend
+from posefield.performance.joins.cut_search import Cut
+from posefield.performance.joins.join_quality import JoinFacts
+from posefield.performance.passages.limb_targets import WorldTarget
+from posefield.performance.passages.passage import RATE, FloorMotion, Passage
+from posefield.performance.script import MAX_SECONDS, Protagonist
+from posefield.performance.walks.walk_segment import WalkPlan
+from posefield.question.performance_question import GivenPose, Join
+from posefield.question.performance_report import ScriptWarning, SegmentKind
+from posefield.question.results import ConstraintResult
+
+
+@dataclass(frozen=True)
+class Span:
+    """A segment that is part of the motion.
+
+    kind: walk, act or hold. begin: frame at which it takes over. first: frame of the motion that is
+    the first one of the segment's own, at most `begin`. event: frame. plan: of a walk.
+    """
+
+    kind: SegmentKind
+    model: str
+    begin: int
+    first: int
+    sigma: float
+    controls: dict[str, float] = field(default_factory=dict)
+    phase: float | None = None
+    event: int | None = None
+    targets: tuple[ConstraintResult, ...] = ()
+    supported: bool = True
+    plan: WalkPlan | None = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Seam:
+    """A join that was made. segment: index of the one that begins. frame: at which it does."""
+
+    segment: int
+    frame: int
+    seconds: float
+    facts: JoinFacts
+
+
+@dataclass
+class Timeline:
+    """A growing motion.
+
+    motion: so far; None before the first segment. exits: frames from which the next segment may go
+    on. begin: first frame that belongs to the performance; earlier ones are of the given poses.
+    usual: largest usual acceleration of the last segment's motion, m/s².
+    """
+
+    character: Protagonist
+    motion: Passage | None = None
+    exits: range = range(0)
+    begin: int = 0
+    usual: float = 0.0
+    spans: list[Span] = field(default_factory=list)
+    seams: list[Seam] = field(default_factory=list)
+    targets: list[WorldTarget] = field(default_factory=list)
+    warnings: list[ScriptWarning] = field(default_factory=list)
+
+    @property
+    def done(self) -> Passage:
+        """Return the motion so far; ValueError before the first segment."""
+        if self.motion is None:
+            raise ValueError("no motion, expected a segment before this one")
+        return self.motion
+
+    @property
+    def seconds(self) -> float:
+        """Duration so far, s."""
+        return 0.0 if self.motion is None else (len(self.motion) - 1 - self.begin) / RATE
+
+    def find_cut(self, after: Passage, entries: range, motion: FloorMotion | None = None) -> Cut:
+        """Return the best cut from an exit of the motion to an entry of a passage."""
+        return cut_search.find_cut(
+            self.character.body, self.done, after, self.exits, entries, motion
+        )
+
+    def warn(self, pointer: str, message: str) -> None:
+        """Add a warning, once."""
+        found = ScriptWarning(pointer, message)
+        if found not in self.warnings:
+            self.warnings.append(found)
+
+    def begin_with(self, passage: Passage) -> None:
+        """Make a placed passage the beginning of the motion."""
+        self.motion = passage
+        self.usual = join_quality.usual_acceleration(self.character.body, [passage])
+
+    def go_on(self, placed: Passage) -> int:
+        """Go on with a passage whose first frame is the last one; return its frame.
+
+        What is left between the two, such as the height of another speed's poses, fades.
+        """
+        last = len(self.done) - 1
+        cut = Cut(last, 0, FloorMotion(), 0.0, 0.0)
+        own = join_quality.usual_acceleration(self.character.body, [placed])
+        self.motion, self.usual = blends.join(self.done, placed, cut, "hermite"), own
+        return last
+
+    def join(self, segment: int, placed: Passage, cut: Cut, kind: Blend, seconds: float) -> int:
+        """Go on with a placed passage from a cut; return the frame of its own first frame."""
+        before, body = self.done, self.character.body
+        fits = min(seconds, max(len(placed) - 1 - cut.entry, 0) / RATE)
+        joined = blends.join(before, placed, cut, kind, fits)
+        self.motion, _ = join_steps.add_steps(body, before, placed, cut, joined)
+        own = join_quality.usual_acceleration(body, [placed])
+        usual, self.usual = max(self.usual, own), own
+        facts = join_quality.judge(body, (before, placed), cut, kind, joined, usual)
+        self.seams.append(Seam(segment, cut.exit, fits, facts))
+        if facts.hard:
+            self.warn(f"/segments/{segment}", "; ".join(facts.reasons))
+        return cut.exit - cut.entry
+
+    def check_duration(self) -> None:
+        """Raise InvalidField, for the segment itself, for a performance that is too long now."""
+        if self.seconds > MAX_SECONDS:
+            raise InvalidField(
+                "",
+                f"{self.seconds:.0f} s with this segment, expected {MAX_SECONDS:g} s at most",
+            )
+
+
+@dataclass(frozen=True)
+class Composed:
+    """Motion of a script at `RATE`, before its feet are placed.
+
+    motion: from its first frame. timeline: with frames of its own. missed: distances of the
+    timeline's targets, m.
+    """
+
+    motion: Passage
+    timeline: Timeline
+    missed: tuple[float, ...]
+
+
+def choose_blend(join: Join, gaits: tuple[bool, bool]) -> tuple[Blend, float]:
+    """Return the kind and the seconds of a blend.
+
+    gaits: whether the segment before walks, and whether the one after does.
+    """
+    kind: Blend = ("hermite" if gaits[1] else "dead") if join.blend == "auto" else join.blend
+    if kind == "cut":
+        return kind, 0.0
+    usual = blends.SECONDS["hermite"] if all(gaits) else blends.SECONDS["dead"]
+    return kind, usual if join.seconds is None else join.seconds
+
+
+def check_distance(join: Join, cut: Cut) -> None:
+    """Raise InvalidField for a cut of more than the largest distance of a join."""
+    if join.most is not None and cut.distance > join.most:
+        raise InvalidField(
+            "join/most",
+            f"poses {cut.distance:.3f} m apart at the cut, expected {join.most:g} m at most",
+        )
+
+
+def from_poses(poses: Sequence[GivenPose], fps: float, character: Protagonist) -> Passage:
+    """Return given poses at a frame rate as a passage at `RATE` that ends with the last one.
+
+    Raises InvalidField for poses of another number of joints and for rotations of no length.
+    """
+    joints = len(character.skeleton)
+    for index, own in enumerate(poses):
+        if len(own.rotations) != joints:
+            raise InvalidField(
+                f"start/poses/{index}/rotations",
+                f"{len(own.rotations)} rotations, expected {joints}, one for each joint of "
+                f"{character.identity}",
+            )
+    turns = np.array([own.rotations for own in poses], dtype=np.float64)
+    sizes = np.linalg.norm(turns, axis=-1)
+    if not (np.abs(sizes - 1.0) < 0.01).all():
+        index = int(np.argmax(np.abs(sizes - 1.0).max(axis=1)))
+        raise InvalidField(
+            f"start/poses/{index}/rotations", "not of length 1, expected unit quaternions w x y z"
+        )
+    roots = np.array([own.root_position for own in poses], dtype=np.float64)
+    if not (np.isfinite(roots).all() and (np.abs(roots) < 1e5).all()):
+        raise InvalidField("start/poses", "root positions beyond 100 km, expected nearer ones")
+    times = _times_to_end((len(poses) - 1) / fps)
+    rotations, path = resample(quat.unroll(quat.normalize(turns)), roots, fps, times)
+    none = np.zeros((len(times), len(character.feet)))
+    return Passage(rotations, path, none, np.zeros(len(times)))
+
+
+def _times_to_end(seconds: float) -> Frames:
+    """Return times (F,), s, at `RATE` that end with a last one."""
+    return seconds - np.arange(int(seconds * RATE + 1e-6), -1, -1) / RATE
+
+
+def resample(
+    rotations: Rotations, roots: RootPath, rate: float, times: Annotated[Floats, "samples"]
+) -> tuple[Annotated[Floats, "samples joints 4"], Annotated[Floats, "samples 3"]]:
+    """Return rotations (S, J, 4) and roots (S, 3), m, at times (S,), s, of frames at a rate."""
+    at = np.clip(times * rate, 0.0, len(roots) - 1.0)
+    before = np.minimum(at.astype(np.int64), max(len(roots) - 2, 0))
+    after = np.minimum(before + 1, len(roots) - 1)
+    share = at - before
+    turned = quat.slerp(rotations[before], rotations[after], share[:, None])
+    return turned, roots[before] + share[:, None] * (roots[after] - roots[before])
+
+
+def heading(passage: Passage, frame: int) -> float:
+    """Return the heading of the root in a frame, rad."""
+    return float(quat.twist(passage.rotations[frame, 0], UP))

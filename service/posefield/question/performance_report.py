@@ -1,0 +1,156 @@
+"""Report of a performance: its timeline, joins, contacts, targets and warnings."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from posefield.question.results import ConstraintResult, FeetResult, SampledClip
+
+SegmentKind = Literal["walk", "act", "hold"]
+
+
+@dataclass(frozen=True)
+class ScriptWarning:
+    """Warning about a script. pointer: JSON pointer to its cause."""
+
+    pointer: str
+    message: str
+
+    @property
+    def sentence(self) -> str:
+        """Return the warning in one line."""
+        return f"{self.pointer}: {self.message}"
+
+
+@dataclass(frozen=True)
+class SegmentReport:
+    """A segment in the time of the performance.
+
+    kind: walk, act or hold. model: name@contenthash; empty for a hold. begins, ends: s, without the
+    blend into the next segment. place: of the root on the floor where it begins, [x, z], m.
+    heading: there, rad. controls: at its begin. sigma: expected distance from a captured clip, m,
+    root mean square; of a hold, that of the pose. phase: of the cycle where a walk begins. event:
+    time of the event of an act, s. targets: residuals of its targets. notes: on what was chosen.
+    path: how far a walk is from its path.
+    """
+
+    kind: SegmentKind
+    model: str
+    begins: float
+    ends: float
+    place: tuple[float, float]
+    heading: float
+    sigma: float
+    controls: Mapping[str, float] = field(default_factory=dict)
+    phase: float | None = None
+    event: float | None = None
+    targets: tuple[ConstraintResult, ...] = ()
+    path: "PathReport | None" = None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PathReport:
+    """Deviations of a walk from its path, means over each cycle, root mean square over the walk.
+
+    lateral, along: m. heading: rad. speed: m/s.
+    """
+
+    lateral: float
+    along: float
+    heading: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class JoinReport:
+    """A join of two segments.
+
+    segment: index of the segment that begins. time: s. distance: of the two motions at the cut, m.
+    blend: its kind. seconds: of it. peak: largest acceleration near the join, mean over joints
+    relative to the root, m/s². usual: the same of the motions away from the join. hard: whether the
+    join is unlike anything that the motions do.
+    """
+
+    segment: int
+    time: float
+    distance: float
+    blend: str
+    seconds: float
+    peak: float
+    usual: float
+    hard: bool
+
+
+@dataclass(frozen=True)
+class PerformanceReport:
+    """Facts about a performance.
+
+    models: name@contenthash, in the order of the script. character: of the bones. sigma: expected
+    distance from captured motion, m, root mean square over frames. supported: whether similar clips
+    were captured for all segments. feet: None for feet as predicted.
+    """
+
+    models: tuple[str, ...]
+    character: str
+    duration: float
+    frames: int
+    sigma: float
+    supported: bool
+    segments: tuple[SegmentReport, ...]
+    joins: tuple[JoinReport, ...]
+    feet: FeetResult | None
+    script_warnings: tuple[ScriptWarning, ...] = ()
+
+    @property
+    def model(self) -> str:
+        """Return the first model, after which files are named."""
+        return self.models[0]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return the warnings as sentences."""
+        return tuple(each.sentence for each in self.script_warnings)
+
+    def document(self) -> dict[str, Any]:
+        """Return the Performance (schema of the contract)."""
+        return self.facts()
+
+    def facts(self) -> dict[str, Any]:
+        """Return the fields that are not empty as plain values, for the metadata of files."""
+        found: dict[str, Any] = {
+            "models": list(self.models),
+            "character": self.character,
+            "duration": self.duration,
+            "frames": self.frames,
+            "sigma": self.sigma,
+            "supported": self.supported,
+            "segments": [_plain(each) for each in self.segments],
+            "joins": [asdict(each) for each in self.joins],
+            "warnings": [asdict(each) for each in self.script_warnings],
+        }
+        return found | ({} if self.feet is None else {"feet": _listed(self.feet.facts())})
+
+
+@dataclass(frozen=True)
+class PerformanceAnswer(SampledClip):
+    """A performance as one clip."""
+
+    trust: PerformanceReport
+
+
+def _plain(each: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that are given, with tuples as lists."""
+    return {name: _listed(value) for name, value in asdict(each).items() if _is_given(value)}
+
+
+def _is_given(value: Any) -> bool:
+    return value is not None and value not in ((), {})
+
+
+def _listed(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_listed(each) for each in value]
+    if isinstance(value, dict):
+        return {name: _listed(each) for name, each in value.items()}
+    return value

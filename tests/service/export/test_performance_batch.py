@@ -1,0 +1,212 @@
+"""Tests of many scripts: files, manifest, resumption, and scripts at fault."""
+
+import hashlib
+import json
+
+import pytest
+
+from posefield.batch.scripts import performance_batch, script_rows
+from posefield.batch.scripts.performance_batch import PerformanceBatch
+from posefield.common.errors import FileError, InvalidField
+
+
+def walk(**more):
+    return {"segments": [{"kind": "walk", "model": "walk", "seconds": 1.0}], **more}
+
+
+def lines(*scripts):
+    return "".join(json.dumps(script) + "\n" for script in scripts)
+
+
+@pytest.fixture
+def scripts(tmp_path):
+    """A file of three scripts, of which two are named."""
+    path = tmp_path / "scripts.jsonl"
+    path.write_text(lines(walk(name="slow"), walk(fps=24), walk(name="take", take=3)))
+    return path
+
+
+@pytest.fixture
+def batch(models, tmp_path):
+    return PerformanceBatch((models,), str(tmp_path / "out"), "bvh")
+
+
+def entries(folder):
+    return [json.loads(line) for line in (folder / "manifest.jsonl").read_text().splitlines()]
+
+
+def contents(folder):
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_file()
+    }
+
+
+def test_each_script_has_a_file_and_a_line(batch, scripts, tmp_path):
+    told = []
+    outcome = performance_batch.run(
+        batch, script_rows.read_scripts(scripts), advance=lambda count: told.append(count)
+    )
+    out = tmp_path / "out"
+    found = entries(out)
+    assert [each["name"] for each in found] == ["slow", "000002", "take"]
+    assert sorted(contents(out)) == [
+        "manifest.jsonl",
+        *(f"performances/{name}.bvh" for name in ("000002", "slow", "take")),
+    ]
+    for each in found:
+        content = (out / each["file"]).read_bytes()
+        assert each["sha256"] == hashlib.sha256(content).hexdigest()
+        assert each["bytes"] == len(content) and content.startswith(b"HIERARCHY")
+        assert each["segments"][0]["kind"] == "walk" and each["warnings"] == []
+    assert (found[1]["frames"], found[0]["frames"]) == (25, 31)
+    assert outcome.before == 0 and told == [0, 1, 1, 1]
+    assert outcome.sentence.startswith("3 performances, 0.")
+
+
+def test_a_folder_of_scripts_is_the_same(batch, tmp_path, models):
+    folder = tmp_path / "scripts"
+    folder.mkdir()
+    (folder / "slow.json").write_text(json.dumps(walk()))
+    (folder / "notes.txt").write_text("no script")
+    performance_batch.run(batch, script_rows.read_scripts(folder))
+    assert [each["file"] for each in entries(tmp_path / "out")] == ["performances/slow.bvh"]
+
+
+def test_only_what_changed_is_made_again(batch, scripts, tmp_path):
+    out = tmp_path / "out"
+    rows = script_rows.read_scripts(scripts)
+    performance_batch.run(batch, rows)
+    whole = contents(out)
+    assert performance_batch.run(batch, rows).before == 3
+    (out / "performances/take.bvh").unlink()
+    assert performance_batch.run(batch, rows).before == 2
+    assert contents(out) == whole
+    scripts.write_text(lines(walk(name="slow", fps=60), walk(fps=24)))
+    outcome = performance_batch.run(batch, script_rows.read_scripts(scripts))
+    assert outcome.before == 1 and [each["name"] for each in outcome.entries] == ["slow", "000002"]
+    assert contents(out)["performances/slow.bvh"] != whole["performances/slow.bvh"]
+
+
+def test_a_stopped_run_is_resumed_with_the_same_bytes(batch, scripts, tmp_path, models):
+    rows = script_rows.read_scripts(scripts)
+
+    class Stopped(Exception):
+        pass
+
+    def stop(count):
+        if count and len(list((tmp_path / "out/performances").iterdir())) == 2:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        performance_batch.run(batch, rows, advance=stop)
+    assert not (tmp_path / "out/manifest.jsonl").exists()
+    assert performance_batch.run(batch, rows).before == 2
+    other = PerformanceBatch((models,), str(tmp_path / "other"), "bvh")
+    performance_batch.run(other, rows)
+    assert contents(tmp_path / "out") == contents(tmp_path / "other")
+
+
+def test_all_scripts_at_fault_are_named_and_nothing_is_written(batch, tmp_path):
+    path = tmp_path / "scripts.jsonl"
+    reech = {"segments": [{"kind": "act", "model": "reech"}]}
+    path.write_text(lines(walk(), reech, walk(fps=5000)))
+    with pytest.raises(InvalidField) as caught:
+        performance_batch.run(batch, script_rows.read_scripts(path))
+    said = str(caught.value).splitlines()
+    assert said[0] == "scripts: 2 that cannot be performed:"
+    assert said[1].startswith("  scripts.jsonl:2: segments/0/model: no model 'reech' (did you")
+    assert said[2].startswith("  scripts.jsonl:3: fps: 5000, expected 1 to ")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (lines(walk(name="a"), walk(name="a")), "name: 'a' is that of scripts.jsonl:1, expected"),
+        (lines(walk(name="../a")), "scripts.jsonl:1: name: "),
+        (lines(walk(sped=1)), "scripts.jsonl:1: sped: Object contains unknown field `sped`"),
+        ("not JSON\n", "scripts.jsonl:1: expected UTF-8 JSON"),
+        (lines(walk(name="a" * 300_000)), "bytes, expected at most 262144"),
+        ("\n\n", "scripts.jsonl has no script, expected at least one"),
+    ],
+)
+def test_scripts_that_cannot_be_read_are_named(tmp_path, text, said):
+    path = tmp_path / "scripts.jsonl"
+    path.write_text(text)
+    with pytest.raises(InvalidField) as caught:
+        script_rows.read_scripts(path)
+    assert said in str(caught.value)
+
+
+def test_a_script_whose_performance_fails_is_named_and_the_others_are_kept(batch, tmp_path):
+    path = tmp_path / "scripts.jsonl"
+    lost = {"segments": [{"kind": "walk", "model": "walk"}], "name": "lost"}
+    path.write_text(lines(walk(name="kept"), lost))
+    with pytest.raises(InvalidField, match=r"scripts\.jsonl:2: segments/0: a walk without along"):
+        performance_batch.run(batch, script_rows.read_scripts(path))
+    path.write_text(lines(walk(name="kept"), walk(name="lost")))
+    assert performance_batch.run(batch, script_rows.read_scripts(path)).before == 1
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [("other.txt", "mine"), ("manifest.jsonl", '{"name": "a", "file": "a"}\n')],
+)
+def test_a_target_of_something_else_is_left_alone(batch, scripts, tmp_path, file, content):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / file).write_text(content)
+    with pytest.raises(FileError):
+        performance_batch.run(batch, script_rows.read_scripts(scripts))
+    assert contents(tmp_path / "out") == {file: content.encode()}
+
+
+@pytest.mark.system
+def test_processes_give_the_same_bytes(batch, scripts, tmp_path, models):
+    rows = script_rows.read_scripts(scripts)
+    performance_batch.run(batch, rows)
+    several = PerformanceBatch((models,), str(tmp_path / "several"), "bvh")
+    performance_batch.run(several, rows, workers=2)
+    assert contents(tmp_path / "several") == contents(tmp_path / "out")
+
+
+def test_the_command_performs_many(posefield, scripts, models, tmp_path):
+    words = ("perform", scripts, "--model", models, "-o", tmp_path / "out", "--workers", 1)
+    code, said, _ = posefield(*words, "--format", "glb")
+    assert code == 0 and said.startswith(f"{tmp_path}/out: 3 performances, 0.")
+    code, said, _ = posefield(*words, "--format", "glb", "--json")
+    assert json.loads(said) | {"bytes": 0} == {
+        "target": str(tmp_path / "out"),
+        "performances": 3,
+        "bytes": 0,
+        "warned": 0,
+        "before": 3,
+    }
+    assert (tmp_path / "out/performances/slow.glb").read_bytes().startswith(b"glTF")
+
+
+def test_the_command_writes_to_a_url(posefield, scripts, models, tmp_path):
+    url = f"file://{tmp_path}/out"
+    code, said, _ = posefield("perform", scripts, "--model", models, "-o", url, "--workers", 1)
+    assert code == 0 and said.startswith(url)
+    assert len(entries(tmp_path / "out")) == 3
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("scripts.jsonl",), "output: none, expected a folder for the files of many scripts"),
+        (("scripts.jsonl", "--plan"), "plan: given for many scripts, expected one script in JSON"),
+        (("scripts.jsonl", "-o", "out", "--workers", 0), "workers: 0, expected 1 or more"),
+        (("scripts.jsonl", "-o", "out", "--format", "usd"), "'performance.usd' ends in none of"),
+        (("one.json", "-o", "a.glb", "--format", "glb"), "format: given for one script, expected"),
+        (("one.json", "-o", "a.glb", "--workers", 2), "workers: given for one script, expected a"),
+        (("gone.jsonl", "-o", "out"), "gone.jsonl: No such file or directory, expected scripts"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(posefield, scripts, monkeypatch, words, said):
+    monkeypatch.chdir(scripts.parent)
+    (scripts.parent / "one.json").write_text(json.dumps(walk()))
+    code, _, told = posefield("perform", *words)
+    assert code in (2, 3) and said in told
