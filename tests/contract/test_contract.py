@@ -139,13 +139,14 @@ def expected_statuses(path, method):
     statuses = {"200", "400", "405", "414", "421", "431", "500"}
     if path not in OPEN:
         statuses |= {"401", "403"}
-    if "{model}" in path:
+    if "{model}" in path or "performances" in path:
         statuses.add("404")
     if method == "get" and ("{model}" in path or path in PAGES):
         statuses.add("304")
     if path.startswith("/v1") or path == "/readyz":
         statuses.add("503")
-    if path.startswith("/v1") and path.count("/") > 3 and not path.endswith("/character.glb"):
+    asks = path.count("/") > 3 and not path.endswith("/character.glb")
+    if path.startswith("/v1") and (asks or "performances" in path):
         statuses.add("422")
         # A path that names no format asks which is accepted.
         statuses |= (

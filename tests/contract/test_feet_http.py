@@ -12,7 +12,7 @@ from asking import asker
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.readiness import Readiness
+from posefield.http.concurrency.readiness import Readiness
 from posefield.inference import session
 from posefield.registry.model_registry import ModelRegistry
 from posefield.registry.model_reload import FixedRegistry

@@ -19,7 +19,7 @@ from asking import asker
 from posefield.common.errors import ModelError
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.readiness import Readiness
+from posefield.http.concurrency.readiness import Readiness
 from posefield.inference import graph_ports, onnx_runtime
 from posefield.inference import session as sessions
 from posefield.inference.session import Session

@@ -11,7 +11,7 @@ from model_files import numbered
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.http.readiness import Readiness
+from posefield.http.concurrency.readiness import Readiness
 from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry, VersionLimits
 from posefield.registry.model_reload import FixedRegistry, ReloadingRegistry

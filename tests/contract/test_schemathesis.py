@@ -51,6 +51,7 @@ def test_every_answer_keeps_the_contract(spec, app, phases):
     # A drawn name would meet 404 before anything else of the request is looked at.
     aimed["components"]["parameters"]["model"]["schema"] = {"enum": ["reach", "nobody"]}
     with_few_tags(aimed)
+    with_one_way(aimed)
     with_one_label(aimed)
     with_crowds_apart(aimed)
     found, calls, asked = run(aimed, app, accepted, list(GenerationMode), phases, examples=40)
@@ -118,6 +119,19 @@ def with_one_label(spec):
         if parameter["name"] == "label":
             items = {"type": "string", "pattern": "^[^=]+=[^,:]+$"}
             parameter["schema"] = {"type": "array", "items": items, "maxItems": 1}
+
+
+def with_one_way(spec):
+    """Leave walks one way to end, performances one way to begin, targets one moment, and no plan
+    in the format of a file: no schema here says that fields exclude each other."""
+    parts = spec["components"]
+    for name in ("to", "turn", "seconds"):
+        del parts["schemas"]["Walk"]["properties"][name]
+    del parts["schemas"]["PerformanceStart"]["properties"]["poses"]
+    spec["components"]["parameters"]["plan"]["schema"] = {"enum": [False]}
+    target = parts["schemas"]["PlacedTarget"]
+    del target["properties"]["time"]
+    target["required"] = ["joint", "position", "at"]
 
 
 def with_crowds_apart(spec):

@@ -14,10 +14,10 @@ from posefield.http.api import contract, problems
 from posefield.http.api.contract import Contract, Operation
 from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
+from posefield.http.concurrency.readiness import Readiness
 from posefield.http.middleware import cors, request_head
 from posefield.http.middleware.request_head import HeadLimits
 from posefield.http.operations import OPERATIONS
-from posefield.http.readiness import Readiness
 from posefield.http.request_cycle import ServerState
 from posefield.http.routing import Route, RouteTree
 from posefield.http.service import Service

@@ -18,7 +18,6 @@ from posefield.http import responses
 from posefield.http.concurrency import worker_threads
 from posefield.http.decoding import crowd_query, request_body
 from posefield.http.steps import Context, Steps, from_url
-from posefield.locomotion import gait
 from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
 from posefield.question.body_kind import DEFAULT_BODY, BodyKind
@@ -107,7 +106,7 @@ async def plan_walk(context: Walks, task: WalkTask) -> CrowdClip:
 
 
 def _planned(model: Synthesizer, task: WalkTask) -> CrowdClip:
-    return walking_feet.build_crowd(model, gait.fit_gait(model.session), task.order)
+    return walking_feet.build_crowd(model, model.gait, task.order)
 
 
 async def encode_walk(context: Walks, task: WalkTask, answer: CrowdClip) -> Iterator[bytes]:

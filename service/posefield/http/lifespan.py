@@ -13,7 +13,7 @@ from multiprocessing.synchronize import Semaphore
 from types import FrameType
 from typing import Any
 
-from posefield.http.readiness import Readiness
+from posefield.http.concurrency.readiness import Readiness
 from posefield.http.request_cycle import ServerState
 from posefield.http.telemetry import metrics
 from posefield.registry.model_reload import ReloadingRegistry

@@ -10,6 +10,7 @@ from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import (
     clip_operations,
     crowd_operations,
+    performance_operations,
     pose_operations,
     responses,
     trust_operations,
@@ -75,6 +76,7 @@ _FORMATTED: dict[str, Handler] = {
     "queryClips": clip_operations.query_clips(CLIP_ENCODERS),
     "getCrowd": crowd_operations.GET_CROWD,
     "queryCrowd": crowd_operations.QUERY_CROWD,
+    "queryPerformance": performance_operations.QUERY_PERFORMANCE,
     "getSigma": trust_operations.GET_SIGMA,
     "querySigma": trust_operations.QUERY_SIGMA,
 }

@@ -244,7 +244,8 @@ async def answer(handler: Handler, service: Service, request: Request) -> Respon
     if not isinstance(handler, Steps):
         return await handler(service, request)
     scope = request.scope
-    context = Context(service, scope["model"], handler.formats.get(scope["format"]))
+    form = handler.formats.get(scope["format"])
+    context = Context(service, scope["library"], scope.get("model"), form)
     question = await handler.decode(context, request)
     task = await handler.validate(context, question)
     async with handler.places(context, task):

@@ -11,6 +11,7 @@ from starlette.responses import Response, StreamingResponse
 from posefield.encode.files.media_types import Format
 from posefield.http.concurrency import worker_threads
 from posefield.model_file import model_card as cards
+from posefield.question.performance_report import PerformanceReport
 from posefield.question.results import Trust
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
@@ -80,6 +81,19 @@ def clip_file(content: bytes, form: Format, trust: Trust) -> Response:
             said = {"what": met.what, "miss": met.miss, "unit": met.unit}
             made.headers.append("Posefield-Missed", json.dumps(said))
     return _add_warnings(made, trust.warnings)
+
+
+def performance_file(content: bytes, form: Format, report: PerformanceReport) -> Response:
+    """Return a response with a performance, or its plan; headers hold facts of its report."""
+    headers = {
+        **_disposition(form, "performance"),
+        "Posefield-Model": report.model,
+        "Posefield-Sigma": repr(report.sigma),
+        "Posefield-Duration": repr(report.duration),
+        "Posefield-Supported": "true" if report.supported else "false",
+    }
+    made = Response(content, headers=headers, media_type=form.media_type)
+    return _add_warnings(made, report.warnings)
 
 
 def _add_warnings(response: Response, warnings: Sequence[str]) -> Response:

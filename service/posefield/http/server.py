@@ -27,9 +27,9 @@ from posefield.common.cpu_cores import SINGLE_THREAD_ENV
 from posefield.common.errors import InvalidField, WorkerDied
 from posefield.http.api.settings import Settings
 from posefield.http.app import App, create_app
+from posefield.http.concurrency.readiness import Readiness
 from posefield.http.lifespan import StartAnnouncement, lifespan
 from posefield.http.middleware.coalescing import CoalescingProtocol
-from posefield.http.readiness import Readiness
 from posefield.http.telemetry import log, metrics, tracing
 from posefield.http.telemetry.telemetry import Telemetry
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits

@@ -8,10 +8,10 @@ from posefield.http.access.access_policy import AccessPolicy
 from posefield.http.api.settings import Settings
 from posefield.http.concurrency.clip_batching import ClipBatcher
 from posefield.http.concurrency.pose_batching import PoseBatcher
+from posefield.http.concurrency.readiness import Readiness
 from posefield.http.decoding.request_body import BodyMemory
 from posefield.http.middleware import caching
 from posefield.http.pages.static_page import StaticPage
-from posefield.http.readiness import Readiness
 from posefield.http.telemetry.telemetry import NO_TELEMETRY, Telemetry
 from posefield.registry.model_registry import ModelRegistry
 

@@ -14,6 +14,7 @@ from starlette.responses import Response
 from posefield.http.decoding import request_body
 from posefield.http.service import Service
 from posefield.question import json_decoding, text_decoding
+from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.synthesizer import Synthesizer
 
 _ESCAPES = re.compile("[%+]")
@@ -28,11 +29,22 @@ Content = TypeVar("Content")
 
 @dataclass(frozen=True)
 class Context(Generic[Form]):
-    """A request about a model, after it was authorised: state of the service, model and format."""
+    """A request after it was authorised: state of the service, models and format.
+
+    library: models that the client may read. named: model of the path; None without one.
+    """
 
     service: Service
-    model: Synthesizer
+    library: ModelRegistry
+    named: Synthesizer | None
     form: Form
+
+    @property
+    def model(self) -> Synthesizer:
+        """Return the model of the path; LookupError for an operation whose path names none."""
+        if self.named is None:
+            raise LookupError("a model, which the path of this operation does not name")
+        return self.named
 
 
 PlainHandler = Callable[[Service, Request], Awaitable[Response]]

@@ -1,1 +1,1 @@
-"""Threads of a worker, and batching of concurrent requests."""
+"""Threads of a worker, batching of concurrent requests, and whether it is ready for them."""

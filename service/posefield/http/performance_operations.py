@@ -1,0 +1,117 @@
+"""Steps of requests for performances: one motion through the segments of a script."""
+
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+
+from starlette.requests import Request
+from starlette.responses import Response
+
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
+from posefield.http import responses
+from posefield.http.api.problems import BAD_PARAMETER, RequestError
+from posefield.http.concurrency import worker_threads
+from posefield.http.decoding import request_body
+from posefield.http.steps import Context, Steps, query_pairs
+from posefield.performance import composition
+from posefield.performance.script import Script, resolve_script
+from posefield.question import json_decoding
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
+
+MAX_SCRIPT_BYTES = 256 * 1024
+PLAN_FORMAT = "json"
+
+Performances = Context[ClipEncoder]
+
+
+@dataclass(frozen=True)
+class ScriptRequest:
+    """A decoded script. plan: whether the answer is the plan alone."""
+
+    question: PerformanceQuestion
+    plan: bool
+
+
+@dataclass(frozen=True)
+class PerformanceTask:
+    """A script whose models are known, and the limits of its format.
+
+    most: largest number of frames. convention: unit and up axis of the file.
+    """
+
+    script: Script
+    plan: bool
+    most: int
+    convention: Convention
+
+
+async def decode(context: Performances, request: Request) -> ScriptRequest:
+    """Return the script of a body; raises RequestError for a plan in another format than JSON."""
+    plan = _wants_plan(context, dict(query_pairs(request.scope["query_string"])))
+    content = await request_body.read_body(request, MAX_SCRIPT_BYTES, context.service.bodies)
+    return ScriptRequest(json_decoding.decode_question(PerformanceQuestion, content), plan)
+
+
+def _wants_plan(context: Performances, query: dict[str, str]) -> bool:
+    given = query.get("plan", "false")
+    place = {"parameter": "plan"}
+    if given not in ("true", "false"):
+        raise RequestError(BAD_PARAMETER, f"plan: {given!r}, expected true or false", place)
+    if given == "true" and context.form.extension != PLAN_FORMAT:
+        found = context.form.extension
+        detail = f"plan: true in the format {found}, expected the format {PLAN_FORMAT}"
+        raise RequestError(BAD_PARAMETER, detail, place)
+    return given == "true"
+
+
+async def validate(context: Performances, asked: ScriptRequest) -> PerformanceTask:
+    """Return the script with its models; raises QueryError with a pointer into the script."""
+    question, encoder = asked.question, context.form
+    convention = encoder.convention(question.unit, question.up, question.body)
+    script = resolve_script(question, context.library.find)
+    joints = len(script.character.skeleton)
+    most = max_poses(context.service.settings.output_limit, joints, encoder.bytes_per_joint)
+    return PerformanceTask(script, asked.plan, most, convention)
+
+
+def places(context: Performances, task: PerformanceTask) -> AbstractAsyncContextManager[None]:
+    """Return the limit on requests that the constraint solver answers."""
+    return worker_threads.SOLVER_LIMITER
+
+
+async def synthesise(
+    context: Performances, task: PerformanceTask
+) -> PerformanceAnswer | PerformanceReport:
+    """Return the performance as a clip, or its plan."""
+    if task.plan:
+        return await worker_threads.within(composition.plan, task.script, task.most)
+    return await worker_threads.within(composition.perform, task.script, task.most)
+
+
+async def encode(
+    context: Performances, task: PerformanceTask, answer: PerformanceAnswer | PerformanceReport
+) -> bytes:
+    """Return the performance as a file, or its plan as JSON."""
+    if isinstance(answer, PerformanceReport):
+        return composition.plan_document(answer)
+    return await worker_threads.within(context.form.encode, answer, task.convention)
+
+
+def respond(
+    context: Performances, answer: PerformanceAnswer | PerformanceReport, content: bytes
+) -> Response:
+    """Return the response, with the facts of the report in its headers."""
+    report = answer if isinstance(answer, PerformanceReport) else answer.trust
+    return responses.performance_file(content, context.form, report)
+
+
+QUERY_PERFORMANCE = Steps(
+    {PLAN_FORMAT: CLIP_ENCODERS[PLAN_FORMAT], **CLIP_ENCODERS},
+    decode,
+    validate,
+    places,
+    synthesise,
+    encode,
+    respond,
+)

@@ -1,0 +1,79 @@
+"""Performances over HTTP: bad scripts are problems that name their place in the script."""
+
+import json
+
+import bad_scripts
+import pytest
+from bad_scripts import ABSENT, REFUSED, UNREADABLE
+
+ADDRESS = "/v1/performances.json"
+JSON = {"content-type": "application/json"}
+
+
+def assert_problem(answer, status):
+    assert answer.status_code == status, answer.text[:300]
+    assert answer.headers["content-type"] == "application/problem+json"
+    return answer.json()
+
+
+@pytest.mark.parametrize("name", UNREADABLE | REFUSED)
+def test_a_bad_script_is_a_problem_with_a_pointer(ask, name):
+    document, pointer, words = (UNREADABLE | REFUSED)[name]
+    found = assert_problem(ask("POST", ADDRESS, json=document), 400 if name in UNREADABLE else 422)
+    assert [own["pointer"] for own in found["errors"]] == [pointer]
+    assert words in found["errors"][0]["detail"]
+    assert len(found["detail"]) < 1000
+
+
+@pytest.mark.parametrize("name", ABSENT)
+def test_an_absent_model_is_not_found(ask, name):
+    document, pointer = ABSENT[name]
+    found = assert_problem(ask("POST", ADDRESS, json=document), 404)
+    assert [own["pointer"] for own in found["errors"]] == [pointer]
+    assert "there are reach@" in found["errors"][0]["detail"]
+
+
+def test_a_plan_is_json(ask):
+    script = bad_scripts.walk()
+    answer = ask("POST", f"{ADDRESS}?plan=true", json=script)
+    assert answer.status_code == 200 and answer.json().keys() == {"trust"}
+    for address, said in (
+        ("/v1/performances.usdc?plan=true", "expected the format json"),
+        (f"{ADDRESS}?plan=yes", "expected true or false"),
+    ):
+        found = assert_problem(ask("POST", address, json=script), 400)
+        assert found["errors"][0]["parameter"] == "plan" and said in found["detail"]
+
+
+@pytest.mark.parametrize(
+    ("form", "field", "value"),
+    [("glb", "unit", "cm"), ("glb", "up", "z"), ("json", "body", "bones")],
+)
+def test_a_format_that_does_not_carry_a_convention_refuses_it(ask, form, field, value):
+    script = {**bad_scripts.walk(), field: value}
+    found = assert_problem(ask("POST", f"/v1/performances.{form}", json=script), 422)
+    assert [own["pointer"] for own in found["errors"]] == [f"/{field}"]
+
+
+@pytest.mark.parametrize(
+    ("content", "status"),
+    [
+        (b'{"segments":[' + b" " * 2_000_000 + b"]}", 413),
+        (b"[" * 100_000, 400),
+        (b'{"segments":[{"kind":"walk","model":"walk","seconds":NaN}]}', 400),
+        (b'{"segments":[{"kind":"walk","model":"walk","seconds":1e999}]}', 400),
+        (b"", 400),
+        (b"\xff", 400),
+    ],
+    ids=["2 MB", "deep", "NaN", "1e999", "empty", "not UTF-8"],
+)
+@pytest.mark.parametrize("plan", ["", "?plan=true"])
+def test_a_body_that_is_no_script_is_a_problem(ask, content, status, plan):
+    found = assert_problem(ask("POST", ADDRESS + plan, content=content, headers=JSON), status)
+    assert found["detail"]
+
+
+def test_a_script_that_is_deep_inside_is_a_problem(ask):
+    deep = "[" * 50_000 + "]" * 50_000
+    content = json.dumps(bad_scripts.walk(speed="deep")).replace('"deep"', deep)
+    assert_problem(ask("POST", ADDRESS, content=content.encode(), headers=JSON), 400)
