@@ -127,7 +127,7 @@ def _submit(
     pool: ProcessPoolExecutor, work: WorkerInput, task: ChunkTask
 ) -> "Future[ChunkResult | None]":
     # A submission may start a worker, which inherits this environment.
-    with _worker_environment():
+    with worker_environment():
         try:
             return pool.submit(_run_task, work, task)
         except OSError as fault:
@@ -136,7 +136,7 @@ def _submit(
 
 
 @contextmanager
-def _worker_environment() -> Iterator[None]:
+def worker_environment() -> Iterator[None]:
     """Set the environment and signal mask that worker processes inherit when they are started.
 
     Each uses one thread, as there is a worker per core, and blocks SIGINT: a terminal sends Ctrl-C

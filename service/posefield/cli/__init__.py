@@ -21,8 +21,10 @@ from posefield.cli import (
     command_demo,
     command_export,
     command_inspect,
+    command_mcp,
     command_models,
     command_page,
+    command_perform,
     command_serve,
     command_why,
 )
@@ -55,6 +57,7 @@ EXTRAS = {
     "jwt": ("jwt", "cryptography"),
     "trace": ("opentelemetry",),
     "parquet": ("pyarrow",),
+    "mcp": ("mcp",),
 }
 TRAINING = {
     "fetch": "Convert downloaded motion data for a shipped recipe.",
@@ -149,6 +152,15 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
             "crowd walk.onnx --camera=-60,1.7,0 -o crowd.usdz",
         ],
     ),
+    "perform": (
+        command_perform.perform,
+        ASK,
+        [
+            "perform script.json -o performance.usdc",
+            "perform script.json --model my_models --plan",
+            "perform scripts.jsonl -o performances --format glb",
+        ],
+    ),
     "why": (command_why.why, ASK, ["why walk.onnx -c speed=1.2 --nearest 5"]),
     "suggest": (command_why.suggest, ASK, ["suggest walk.onnx --count 5"]),
     "export": (
@@ -162,6 +174,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
     ),
     "check": (command_check.check, ASK, ["check walk.usda", "check walk.usda --json"]),
     "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
+    "mcp": (command_mcp.mcp, SERVE, ["mcp my_models -o clips", "mcp --schema"]),
     "key": (command_serve.key, SERVE, ["key anna --model walk >> keys.txt"]),
     "page": (command_page.page, SERVE, ["page walk.onnx -o walk.html"]),
 }

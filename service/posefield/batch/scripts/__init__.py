@@ -1,0 +1,1 @@
+"""Performances of many scripts: scripts in, files and their manifest out."""

@@ -1,0 +1,237 @@
+"""Performances of many scripts as files with a manifest; the same command resumes.
+
+The folder contains `performances/NAME.FORMAT` and `manifest.jsonl`, one line for each script in its
+order: file, checksum, digest of what made it, and report. Until all are made, each finished file
+has its line in `.posefield/performances`. A file is made again if it is missing, or if its script,
+a model or a version changed.
+"""
+
+import hashlib
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import orjson
+
+from posefield import __version__
+from posefield.batch import checkpoint, manifest, process_pool
+from posefield.batch.job import VERSIONED_PACKAGES
+from posefield.batch.scripts import script_rows
+from posefield.batch.scripts.script_rows import ScriptRow
+from posefield.batch.target import (
+    STATE_FOLDER,
+    ExportTarget,
+    WrittenFile,
+    is_intact,
+    open_target,
+    put_file,
+    read_lines,
+)
+from posefield.common.errors import FileError, QueryError, WorkerDied
+from posefield.encode.formats import CLIP_ENCODERS
+from posefield.performance import composition
+from posefield.performance.script import Script, resolve_script
+from posefield.registry import shipped_models
+from posefield.registry.model_registry import ModelRegistry
+from posefield.synthesis.frame_times import MAX_POSES
+
+MAX_FRAMES = 10 * MAX_POSES
+MANIFEST, PARTS = "manifest.jsonl", f"{STATE_FOLDER}/performances"
+MARK = f"{STATE_FOLDER}/performances.json"
+"""File of a target whose performances are not finished."""
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class PerformanceBatch:
+    """Many performances of one format.
+
+    models: files and folders of models besides the shipped ones. place: folder or URL. form:
+    extension of the files.
+    """
+
+    models: tuple[Path, ...]
+    place: str
+    form: str
+
+
+@dataclass(frozen=True)
+class BatchOutcome:
+    """Result of a batch: the entries of its manifest, and how many were finished before."""
+
+    entries: tuple[Entry, ...]
+    before: int
+
+    def facts(self, place: str) -> dict[str, Any]:
+        """Return the totals as plain values."""
+        return {
+            "target": place,
+            "performances": len(self.entries),
+            "bytes": sum(entry["bytes"] for entry in self.entries),
+            "warned": sum(bool(entry["warnings"]) for entry in self.entries),
+            "before": self.before,
+        }
+
+    @property
+    def sentence(self) -> str:
+        """Return the totals in a sentence."""
+        found = self.facts("")
+        text = f"{found['performances']} performances, {found['bytes'] / 1e6:.1f} MB"
+        if found["warned"]:
+            text += f", with a warning in the manifest: {found['warned']}"
+        return f"{text}, finished before: {self.before}" if self.before else text
+
+
+def run(
+    batch: PerformanceBatch,
+    rows: Sequence[ScriptRow],
+    workers: int = 1,
+    advance: Callable[[int], None] = lambda count: None,
+) -> BatchOutcome:
+    """Make the files that are missing, then the manifest.
+
+    advance: called with the number of files that were found or made. Raises InvalidField, which
+    lists all scripts at fault before a file is written, or names one whose performance failed;
+    FileError if the target cannot be used; WorkerDied. Finished files are kept.
+    """
+    digests = _checked(batch, rows)
+    target = open_target(batch.place)
+    found = _finished(target, batch, rows, digests)
+    target.prepare()
+    target.create(MARK, b"{}\n")
+    advance(len(found))
+    left = [(row, digests[row.name]) for row in rows if row.name not in found]
+    for entry in _made(batch, left, workers):
+        found[entry["name"]] = entry
+        advance(1)
+    entries = tuple(found[row.name] for row in rows)
+    put_file(target, MANIFEST, map(manifest.line, entries))
+    target.remove(STATE_FOLDER)
+    return BatchOutcome(entries, len(rows) - len(left))
+
+
+def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, str]:
+    """Return the digest of each script with its models; InvalidField for scripts without answer."""
+    registry, encoder = open_models(batch.models), CLIP_ENCODERS[batch.form]
+    digests: dict[str, str] = {}
+    faults: list[str] = []
+    for row in rows:
+        try:
+            encoder.convention(row.script.unit, row.script.up, row.script.body)
+            script = resolve_script(row.script, registry.find)
+            digests[row.name] = _digest(batch.form, script, registry)
+        except QueryError as fault:
+            faults.append(f"{row.place}: {fault}")
+    if faults:
+        raise script_rows.faulty_scripts(faults)
+    return digests
+
+
+def _digest(form: str, script: Script, registry: ModelRegistry) -> str:
+    """Return a digest of all that determines the bytes of a performance."""
+    chosen = script.question.character
+    facts = [
+        form,
+        __version__,
+        *(version(name) for name in VERSIONED_PACKAGES),
+        *script.identities,
+        "" if chosen is None else registry.find(chosen.model).identity,
+    ]
+    content = msgspec.json.encode(script.question)
+    return hashlib.sha256(orjson.dumps(facts) + content).hexdigest()
+
+
+def _finished(
+    target: ExportTarget,
+    batch: PerformanceBatch,
+    rows: Sequence[ScriptRow],
+    digests: dict[str, str],
+) -> dict[str, Entry]:
+    """Return the entries of intact files by name; FileError for a target of something else."""
+    try:
+        known = {entry["name"]: entry for entry in _recorded(target, rows)}
+        found = {
+            name: entry
+            for name, entry in known.items()
+            if entry["made_of"] == digests.get(name)
+            and is_intact(target, WrittenFile(*_written(entry)), verify=False)
+        }
+    except (ValueError, LookupError, TypeError) as fault:
+        raise FileError(
+            batch.place, f"holds another export, expected performances or nothing ({fault!r})"
+        ) from fault
+    if target.read(checkpoint.JOB) is not None:
+        raise FileError(batch.place, "holds an export of clips, expected performances or nothing")
+    if not known and target.read(MARK) is None and not target.empty(but=STATE_FOLDER):
+        raise FileError(batch.place, "is not empty and has no manifest of performances")
+    return found
+
+
+def _recorded(target: ExportTarget, rows: Iterable[ScriptRow]) -> Iterator[Entry]:
+    """Yield the entries of the manifest, then those of files that were made after it."""
+    yield from map(orjson.loads, read_lines(target, MANIFEST))
+    parts = target.names(PARTS)
+    for name in (row.name for row in rows if f"{row.name}.json" in parts):
+        yield orjson.loads(target.read(f"{PARTS}/{name}.json") or b"")
+
+
+def _written(entry: Entry) -> tuple[str, int, str]:
+    return entry["file"], entry["bytes"], entry["sha256"]
+
+
+def _made(
+    batch: PerformanceBatch, left: list[tuple[ScriptRow, str]], workers: int
+) -> Iterator[Entry]:
+    """Make files in this process or in several; yield their entries in the order of the scripts."""
+    if min(workers, len(left)) < 2:
+        yield from (make_one(batch, row, digest) for row, digest in left)
+        return
+    context = multiprocessing.get_context("spawn")
+    with process_pool.worker_environment():
+        pool = ProcessPoolExecutor(min(workers, len(left)), context)
+        futures = [pool.submit(make_one, batch, row, digest) for row, digest in left]
+    try:
+        for future in futures:
+            yield future.result()
+    except BrokenProcessPool as fault:
+        raise WorkerDied("a worker process has died; the same command resumes") from fault
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def make_one(batch: PerformanceBatch, row: ScriptRow, digest: str) -> Entry:
+    """Write the file of a script and return its entry; QueryError names the script."""
+    script = row.script
+    encoder = CLIP_ENCODERS[batch.form]
+    try:
+        convention = encoder.convention(script.unit, script.up, script.body)
+        resolved = resolve_script(script, open_models(batch.models).find)
+        answer = composition.perform(resolved, MAX_FRAMES)
+    except QueryError as fault:
+        raise script_rows.faulty_scripts([f"{row.place}: {fault}"]) from fault
+    path = f"performances/{row.name}.{batch.form}"
+    target = open_target(batch.place)
+    written = put_file(target, path, [encoder.encode(answer, convention)])
+    entry = {
+        "name": row.name,
+        "file": written.file,
+        "bytes": written.bytes,
+        "sha256": written.sha256,
+        "made_of": digest,
+        **answer.trust.document(),
+    }
+    target.write([(f"{PARTS}/{row.name}.json", manifest.line(entry))])
+    return entry
+
+
+@lru_cache(maxsize=1)
+def open_models(places: tuple[Path, ...]) -> ModelRegistry:
+    """Return the models, cached so that a process opens them once."""
+    return shipped_models.with_shipped(places)

@@ -1,0 +1,151 @@
+"""The `posefield perform` command: one long motion from a script."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import FileError, InvalidField
+from posefield.console.arguments import Json, encoder_for
+from posefield.console.output import as_json
+from posefield.console.question_options import with_option_groups
+from posefield.question import json_decoding
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_report import PerformanceReport
+from posefield.registry import shipped_models
+from posefield.synthesis.frame_times import MAX_POSES
+
+MAX_FRAMES = 10 * MAX_POSES
+
+
+@dataclass(frozen=True)
+class ManyArguments:
+    """Options for many scripts."""
+
+    format: Annotated[
+        str | None, typer.Option(help="format of the files of many scripts; default: usdc")
+    ] = None
+    workers: Annotated[
+        int | None,
+        typer.Option(help="number of processes for many scripts; default: one per core"),
+    ] = None
+
+
+@with_option_groups
+def perform(
+    script: Annotated[
+        Path,
+        typer.Argument(
+            help="JSON file with the script; for many scripts a folder of them, or JSON Lines",
+            metavar="SCRIPT",
+        ),
+    ],
+    many: ManyArguments,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            "--output",
+            "-o",
+            help="output file, whose extension selects the format; for many scripts a folder or "
+            "the URL of an object store",
+            metavar="PATH",
+        ),
+    ] = None,
+    model: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="model file or folder of them, besides the shipped ones; may be repeated",
+            metavar="MODEL",
+        ),
+    ] = None,
+    plan: Annotated[
+        bool, typer.Option("--plan", help="print the timeline and the warnings, and no poses")
+    ] = False,
+    json: Json = False,
+) -> None:
+    """Write the motion of a script: walks, acts and holds as one.
+
+    The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack. Of many
+    scripts, each has a file in the folder performances and a line in manifest.jsonl; the same
+    command resumes, and makes again what changed.
+    """
+    from posefield.batch.scripts import script_rows
+    from posefield.performance import composition
+    from posefield.performance.script import resolve_script
+
+    if script_rows.are_many(script):
+        if plan:
+            raise InvalidField("plan", "given for many scripts, expected one script in JSON")
+        _perform_many(script, output, tuple(model or ()), many, json)
+        return
+    if many.format is not None or many.workers is not None:
+        option = "workers" if many.format is None else "format"
+        raise InvalidField(option, "given for one script, expected a folder or a .jsonl file")
+    if (output is None) != plan:
+        found = "neither --output nor --plan" if output is None else "--output and --plan"
+        raise InvalidField("output", f"{found}, expected one of them")
+    question = json_decoding.decode_question(PerformanceQuestion, _read(script))
+    resolved = resolve_script(question, shipped_models.with_shipped(model or []).find)
+    if output is None:
+        report = composition.plan(resolved, MAX_FRAMES)
+        typer.echo(as_json(report.document()) if json else report_text(report))
+        return
+    path = Path(output)
+    encoder = encoder_for(path)
+    convention = encoder.convention(question.unit, question.up, question.body)
+    answer = composition.perform(resolved, MAX_FRAMES)
+    atomic_files.write(encoder.encode(answer, convention), path)
+    facts = {"file": str(path), **answer.trust.document()}
+    typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
+
+
+def _perform_many(
+    scripts: Path, output: str | None, models: tuple[Path, ...], many: ManyArguments, json: bool
+) -> None:
+    from posefield.batch import process_pool
+    from posefield.batch.scripts import performance_batch, script_rows
+    from posefield.console.progress import ProgressBar
+
+    if output is None:
+        raise InvalidField("output", "none, expected a folder for the files of many scripts")
+    form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
+    workers = process_pool.usable_cores() if many.workers is None else many.workers
+    if workers < 1:
+        raise InvalidField("workers", f"{workers}, expected 1 or more")
+    rows = script_rows.read_scripts(scripts)
+    batch = performance_batch.PerformanceBatch(models, output, form)
+    with ProgressBar("performances", len(rows), 0) as bar:
+        outcome = performance_batch.run(batch, rows, workers, bar.advance)
+    typer.echo(as_json(outcome.facts(output)) if json else f"{output}: {outcome.sentence}")
+
+
+def _read(script: Path) -> bytes:
+    """Return the content of a script; FileError if there is none to read."""
+    try:
+        return script.read_bytes()
+    except OSError as fault:
+        raise FileError(script, f"{fault.strerror}, expected a script in JSON") from fault
+
+
+def report_text(report: PerformanceReport) -> str:
+    """Return a report as lines: segments, joins, feet and warnings."""
+    lines = [f"{report.duration:.2f} s, {report.frames} frames, character of {report.character}"]
+    for index, own in enumerate(report.segments):
+        name = own.model.partition("@")[0]
+        lines.append(
+            f"{index}  {own.begins:6.2f} to {own.ends:6.2f} s  {own.kind} {name}, "
+            f"give or take {100.0 * own.sigma:.1f} cm"
+        )
+    for join in report.joins:
+        lines.append(
+            f"join at {join.time:.2f} s: {100.0 * join.distance:.1f} cm apart, {join.blend} over "
+            f"{join.seconds:g} s, peak {join.peak:.1f} m/s² (usual {join.usual:.1f})"
+        )
+    if report.feet is not None:
+        lines.append(
+            f"feet skate {100.0 * report.feet.skate:.1f} cm/s, before "
+            f"{100.0 * report.feet.skate_before:.1f} cm/s"
+        )
+    return "\n".join([*lines, *(f"warning: {sentence}" for sentence in report.warnings)])

@@ -1,0 +1,88 @@
+"""Tests of the example scripts with models of real motion capture: no warnings, targets are met."""
+
+from pathlib import Path
+
+import numpy as np
+import orjson
+import pytest
+
+from posefield.agents.toolbox import Toolbox
+from posefield.motion import skeleton
+from posefield.registry import shipped_models
+from posefield_train import train
+from posefield_train.graph import onnx_export
+from posefield_train.source import ingest, recipe
+
+pytestmark = pytest.mark.system
+
+RECIPES = Path(recipe.__file__).parents[1] / "recipes"
+SCRIPTS = Path(__file__).parents[1] / "docs/scripts"
+TRAINED = ("hdm05_grab_high", "hdm05_grab_return")
+KINDS = {
+    "walk-along-a-path": ["walk"],
+    "go-there-and-take": ["walk", "act"],
+    "take-hold-and-walk-on": ["walk", "act", "hold", "act", "walk"],
+}
+# The issue's limits, of which a reach's join is allowed 2.5 times the peak of its motions.
+MOST_PEAK, MOST_MISS = 2.5, 1e-3
+
+
+@pytest.fixture(scope="module")
+def trained_folder(real_data, tmp_path_factory):
+    """Folder with the models of the scripts that do not ship."""
+    folder = tmp_path_factory.mktemp("acts")
+    for name in TRAINED:
+        own = recipe.read(RECIPES / f"{name}.toml")
+        examples, notes = ingest.ingest(own, real_data)
+        trained = train.train(own, examples, lambda _: None)
+        exported = onnx_export.export_model(own, trained, notes)
+        (folder / f"{name}.onnx").write_bytes(exported.content)
+    return folder
+
+
+@pytest.fixture
+def box(trained_folder, tmp_path):
+    return Toolbox(shipped_models.with_shipped([trained_folder]), tmp_path)
+
+
+def test_every_script_is_listed_here():
+    assert {path.stem for path in SCRIPTS.glob("*.json")} == set(KINDS)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_script_is_performed(box, name):
+    script = orjson.loads((SCRIPTS / f"{name}.json").read_bytes())
+    made = box.call("perform", {"script": script, "file": f"{name}.usdc"})
+    assert Path(made["file"]).read_bytes().startswith(b"PXR-USDC")
+    assert [each["kind"] for each in made["segments"]] == KINDS[name]
+    assert made["supported"] and made["warnings"] == []
+    assert not any(join["hard"] for join in made["joins"])
+    peaks = [join["peak"] / join["usual"] for join in made["joins"]]
+    assert max(peaks, default=0.0) < MOST_PEAK
+    misses = [met["miss"] for each in made["segments"] for met in each.get("targets", ())]
+    assert len(misses) == KINDS[name].count("act") - ("hold" in KINDS[name])
+    assert max(misses, default=0.0) < MOST_MISS
+
+
+def test_the_hand_is_where_the_script_puts_it(box):
+    """Oracle: the joint's place in the file's own numbers. Control: a frame before it is not."""
+    script = orjson.loads((SCRIPTS / "go-there-and-take.json").read_bytes())
+    target = script["segments"][1]["targets"][0]
+    made = box.call("perform", {"script": {**script, "fps": 120}, "file": "made.json"})
+    found = orjson.loads(Path(made["file"]).read_bytes())
+    event = next(each["event"] for each in made["segments"] if "event" in each)
+    path = joint_path(found, target["joint"])
+    distances = np.linalg.norm(path - target["position"], axis=1)
+    assert distances[round(event * found["rate"])] < 0.02
+    assert distances[round(event * found["rate"]) - 24] > 0.05
+
+
+def joint_path(document, name):
+    """Path (F, 3), m, of a joint of a performance in JSON."""
+
+    bones = skeleton.translations(
+        np.array(document["bone_offsets"]), np.array(document["root_position"])
+    )
+    rotations = np.array(document["rotations"])
+    places = skeleton.positions(document["parents"], rotations, bones)
+    return places[:, document["names"].index(name)]
