@@ -35,6 +35,16 @@ QUESTIONS = (
     "Camera",
     "Target",
     "Floor",
+    "PerformanceQuestion",
+    "CharacterChoice",
+    "PerformanceStart",
+    "GivenPose",
+    "Obstacle",
+    "Walk",
+    "Act",
+    "Hold",
+    "Join",
+    "PlacedTarget",
 )
 ANSWERS = (
     "ModelList",
@@ -45,6 +55,7 @@ ANSWERS = (
     "ManifestEntry",
     "Liveness",
     "Readiness",
+    "PerformanceReport",
     "Problem",
 )
 PLAIN = {"string": "str", "integer": "int", "number": "float", "boolean": "bool", "null": "None"}
@@ -139,8 +150,12 @@ class Writer:
 
     def classes(self, name: str, schema: Node) -> list[str]:
         """Sources of the classes."""
-        fields = [self._field(name, schema, key) for key in schema["properties"]]
+        tag = _tag(schema) if self.asked else None
+        fields = [self._field(name, schema, key) for key in schema["properties"] if key != tag]
         strict = ", forbid_unknown_fields=True" if self.asked else ""
+        if tag is not None:
+            word = schema["properties"][tag]["const"]
+            strict += f", tag_field={json.dumps(tag)}, tag={json.dumps(word)}"
         lines = [f"class {name}(Struct, frozen=True, kw_only=True{strict}):"]
         said = schema.get("description") or f"Schema {name} of the contract."
         lines += textwrap.wrap(f'"""{" ".join(said.split())}', 95, **INDENTED)
@@ -195,6 +210,12 @@ class Writer:
         if size is not None and size == schema.get("maxItems"):
             return f"tuple[{', '.join([item] * size)}]"
         return f"tuple[{item}, ...]"
+
+
+def _tag(schema: Node) -> str | None:
+    """Name of the required field that tells the schema from others; None if it has none."""
+    found = (key for key, part in schema["properties"].items() if "const" in part)
+    return next((key for key in found if key in schema.get("required", ())), None)
 
 
 INDENTED: Any = {"initial_indent": "    ", "subsequent_indent": "    "}

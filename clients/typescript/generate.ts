@@ -15,6 +15,7 @@ const LOOKED_AT = [
   "ManifestEntry",
   "ModelCard",
   "ModelList",
+  "PerformanceReport",
   "Problem",
   "Readiness",
   "Reasons",
@@ -33,6 +34,12 @@ const QUESTIONS = [
   "WhyQuestion",
   "Target",
   "Floor",
+  "PerformanceQuestion",
+  "Walk",
+  "Act",
+  "Hold",
+  "Join",
+  "PlacedTarget",
 ];
 
 /** Questions whose keys are the query parameters of an operation, by its path. */

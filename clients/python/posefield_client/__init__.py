@@ -1,4 +1,4 @@
-"""Client of a posefield service: poses as NumPy arrays, clips and crowds as files or tables.
+"""Client of a posefield service: poses as NumPy arrays, motions and crowds as files or tables.
 
     from posefield_client import Client
 
@@ -10,9 +10,16 @@ lists the exceptions.
 """
 
 from posefield_client import errors
-from posefield_client.aio import AsyncClient, AsyncClip, AsyncCrowd, AsyncModel, AsyncSaving
+from posefield_client.aio import (
+    AsyncClient,
+    AsyncClip,
+    AsyncCrowd,
+    AsyncModel,
+    AsyncPerformance,
+    AsyncSaving,
+)
 from posefield_client.cache import NOTHING, Cache, Memory
-from posefield_client.client import Client, Clip, Crowd, Model, Saving
+from posefield_client.client import Client, Clip, Crowd, Model, Performance, Saving
 from posefield_client.disk import Disk
 from posefield_client.errors import PosefieldError
 from posefield_client.generated import (
@@ -24,14 +31,17 @@ from posefield_client.generated import (
     Met,
     ModelCard,
     NamedClipQuestion,
+    PerformanceQuestion,
+    PerformanceReport,
     Reasons,
     Suggestions,
     Target,
     Trust,
 )
-from posefield_client.numbers import ClipNumbers, CrowdPoses, Pose, SigmaGrid
+from posefield_client.numbers import ClipNumbers, CrowdPoses, PerformanceNumbers, Pose, SigmaGrid
 from posefield_client.retry import NEVER, Retry
 from posefield_client.saving import Missed, Progress, Saved
+from posefield_client.scripts import Script
 
 __all__ = [
     "CONTRACT",
@@ -41,6 +51,7 @@ __all__ = [
     "AsyncClip",
     "AsyncCrowd",
     "AsyncModel",
+    "AsyncPerformance",
     "AsyncSaving",
     "Cache",
     "Camera",
@@ -59,6 +70,10 @@ __all__ = [
     "Model",
     "ModelCard",
     "NamedClipQuestion",
+    "Performance",
+    "PerformanceNumbers",
+    "PerformanceQuestion",
+    "PerformanceReport",
     "Pose",
     "PosefieldError",
     "Progress",
@@ -66,6 +81,7 @@ __all__ = [
     "Retry",
     "Saved",
     "Saving",
+    "Script",
     "SigmaGrid",
     "Suggestions",
     "Target",

@@ -10,13 +10,22 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import anyio
 import httpx
 
-from posefield_client import asking, files, numbers, questions, saving, tables, transport
+from posefield_client import (
+    asking,
+    files,
+    numbers,
+    performances,
+    questions,
+    saving,
+    tables,
+    transport,
+)
 from posefield_client.cache import Cache
 from posefield_client.errors import PosefieldError
 from posefield_client.exchange import Core
 from posefield_client.files import Files
 from posefield_client.generated import Control, ModelCard
-from posefield_client.numbers import ClipNumbers, CrowdPoses
+from posefield_client.numbers import ClipNumbers, CrowdPoses, PerformanceNumbers
 from posefield_client.retry import Retry
 from posefield_client.saving import Saved, Watch
 from posefield_client.wire import Call, Reply, Send, Sleep, Steps
@@ -46,6 +55,18 @@ def _ask_model(
     async def method(self: "AsyncModel", /, *args: P.args, **kwargs: P.kwargs) -> T:
         call = question(self.name, *args, **kwargs)
         return await self.client.run(self.client.core.answer(call))
+
+    return method
+
+
+def _perform(
+    question: Callable[P, Files],
+) -> Callable[Concatenate["AsyncClient", P], "AsyncPerformance"]:
+    """Return a method of the client that sends its request when the result is read or saved."""
+
+    @wraps(question)
+    def method(self: "AsyncClient", /, *args: P.args, **kwargs: P.kwargs) -> "AsyncPerformance":
+        return AsyncPerformance(self, question(*args, **kwargs))
 
     return method
 
@@ -89,6 +110,8 @@ class AsyncClient:
     models = _ask(questions.models)
     live = _ask(questions.live)
     ready = _ask(questions.ready)
+    plan = _ask(performances.plan)
+    performance = _perform(performances.performance)
 
     def model(self, name: str) -> "AsyncModel":
         """Return a model by name or name@hash, without a request."""
@@ -175,6 +198,15 @@ class AsyncClip(AsyncSaving):
     def numbers(self) -> Later[ClipNumbers]:
         """Return a coroutine of the frames as arrays."""
         return self._numbers(numbers.clip)
+
+
+class AsyncPerformance(AsyncSaving):
+    """One continuous motion through the segments of a script."""
+
+    @property
+    def numbers(self) -> Later[PerformanceNumbers]:
+        """Return a coroutine of the frames as arrays."""
+        return self._numbers(numbers.performance)
 
 
 class AsyncCrowd(AsyncSaving):

@@ -16,12 +16,15 @@ from msgspec import UNSET, Struct
 from posefield_client.errors import WrongQuestion
 from posefield_client.generated import (
     OPERATIONS,
+    Act,
     ClipQuestion,
     CrowdQuestion,
     Floor,
     Operation,
+    PerformanceQuestion,
     PoseQuestion,
     Target,
+    Walk,
 )
 from posefield_client.wire import Request
 
@@ -34,7 +37,7 @@ LONGEST_NAME = 40
 OPTIONS = sorted(
     {
         name
-        for form in (PoseQuestion, ClipQuestion, CrowdQuestion)
+        for form in (PoseQuestion, ClipQuestion, CrowdQuestion, PerformanceQuestion, Walk, Act)
         for name in form.__struct_fields__
     }
 )
@@ -144,7 +147,8 @@ def number(name: str, value: Any) -> float:
     """Return a finite number as a Python int or float; NumPy scalars are accepted."""
     found = value.item() if isinstance(value, np.generic) else value
     if type(found) not in (int, float) or not _is_finite(found):
-        hint = "" if isinstance(found, int | float) else did_you_mean(name, OPTIONS)
+        known = isinstance(found, int | float) or name in OPTIONS
+        hint = "" if known else did_you_mean(name, OPTIONS)
         raise WrongQuestion(f"{name}{hint} is {value!r}, expected a finite number")
     plain: float = found
     return plain
@@ -236,7 +240,7 @@ def said(**words: Any) -> dict[str, Any]:
 def sayable(name: str, value: Any) -> Any:
     """Return a value as JSON types, recursively; WrongQuestion if that is impossible."""
     if isinstance(value, Struct):
-        value = {key: getattr(value, key) for key in value.__struct_fields__}
+        value = _fields(value)
     found = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     if isinstance(found, Mapping):
         return {key: sayable(key, each) for key, each in found.items() if each is not UNSET}
@@ -246,3 +250,10 @@ def sayable(name: str, value: Any) -> Any:
         return found
     # JSON would encode a non-finite number as null, which has another meaning.
     return number(name, found)
+
+
+def _fields(value: Struct) -> dict[str, Any]:
+    """Return the fields of a struct, and what tells it from other structs of a union."""
+    fields = {key: getattr(value, key) for key in value.__struct_fields__}
+    config = value.__struct_config__
+    return fields if config.tag is None else {str(config.tag_field): config.tag, **fields}

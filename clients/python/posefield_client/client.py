@@ -16,6 +16,7 @@ from posefield_client import (
     files,
     notebook,
     numbers,
+    performances,
     questions,
     saving,
     tables,
@@ -26,7 +27,7 @@ from posefield_client.errors import PosefieldError
 from posefield_client.exchange import Core
 from posefield_client.files import Files
 from posefield_client.generated import Control, ModelCard
-from posefield_client.numbers import ClipNumbers, CrowdPoses
+from posefield_client.numbers import ClipNumbers, CrowdPoses, PerformanceNumbers
 from posefield_client.retry import Retry
 from posefield_client.saving import Saved, Watch
 from posefield_client.wire import Call, Reply, Send, Sleep, Steps
@@ -55,6 +56,18 @@ def _ask_model(
     def method(self: "Model", /, *args: P.args, **kwargs: P.kwargs) -> T:
         call = question(self.name, *args, **kwargs)
         return self.client.run(self.client.core.answer(call))
+
+    return method
+
+
+def _perform(
+    question: Callable[P, Files],
+) -> Callable[Concatenate["Client", P], "Performance"]:
+    """Return a method of the client that sends its request when the result is read or saved."""
+
+    @wraps(question)
+    def method(self: "Client", /, *args: P.args, **kwargs: P.kwargs) -> "Performance":
+        return Performance(self, question(*args, **kwargs))
 
     return method
 
@@ -100,6 +113,8 @@ class Client:
     models = _ask(questions.models)
     live = _ask(questions.live)
     ready = _ask(questions.ready)
+    plan = _ask(performances.plan)
+    performance = _perform(performances.performance)
 
     def model(self, name: str) -> "Model":
         """Return a model by name or name@hash, without a request."""
@@ -184,10 +199,28 @@ class Clip(Saving):
 
     def _repr_html_(self) -> str:
         """Return the moving figure for a notebook, or the reason for which there is none."""
-        try:
-            return notebook.picture(self.numbers)
-        except PosefieldError as fault:
-            return f"<pre>{escape(repr(self))}: {escape(str(fault))}</pre>"
+        return _shown(self)
+
+
+class Performance(Saving):
+    """One continuous motion through the segments of a script."""
+
+    @cached_property
+    def numbers(self) -> PerformanceNumbers:
+        """Return the frames as arrays, requested once."""
+        return self._numbers(numbers.performance)
+
+    def _repr_html_(self) -> str:
+        """Return the moving figure for a notebook, or the reason for which there is none."""
+        return _shown(self)
+
+
+def _shown(motion: Clip | Performance) -> str:
+    """Return a motion as HTML."""
+    try:
+        return notebook.picture(motion.numbers)
+    except PosefieldError as fault:
+        return f"<pre>{escape(repr(motion))}: {escape(str(fault))}</pre>"
 
 
 class Crowd(Saving):

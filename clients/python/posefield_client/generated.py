@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "4.0.0"
+CONTRACT = "4.1.0"
 """Version of the contract that this client was made for."""
 
 
@@ -196,6 +196,131 @@ class WhyQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True)
     extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
     performer: str | UnsetType | None = UNSET
     labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
+
+
+class Join(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Join of a segment with the one before it."""
+
+    seconds: float | UnsetType | None = UNSET
+    blend: Literal["auto", "dead", "hermite", "cut"] | UnsetType = UNSET
+    cut: Literal["best", "end"] | UnsetType = UNSET
+    most: float | UnsetType | None = UNSET
+
+
+class Walk(
+    Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="walk"
+):
+    """Segment in which a cyclic model walks: along a curve through points, to a point, or for
+    some seconds. Without any of the three it goes where the next segment begins.
+    """
+
+    model: str
+    along: tuple[tuple[float, float], ...] | UnsetType | None = UNSET
+    to: tuple[float, float] | UnsetType | None = UNSET
+    seconds: float | UnsetType | None = UNSET
+    speed: float | tuple[tuple[float, float], ...] | UnsetType | None = UNSET
+    speed_over: Literal["distance", "time"] | UnsetType = UNSET
+    turn: float | tuple[tuple[float, float], ...] | UnsetType | None = UNSET
+    controls: dict[str, float] | UnsetType = UNSET
+    performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
+    start: Literal["rolling", "standing"] | UnsetType = UNSET
+    stop: Literal["rolling", "standing"] | UnsetType = UNSET
+    join: Join | UnsetType = UNSET
+
+
+class PlacedTarget(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Target position of a joint at a moment of a segment."""
+
+    joint: str
+    position: tuple[float, float, float]
+    time: float | UnsetType = UNSET
+    at: Literal["start", "end", "event", "highest", "lowest", "farthest"] | UnsetType = UNSET
+    frame: Literal["world", "segment"] | UnsetType = UNSET
+
+
+class Act(
+    Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="act"
+):
+    """Segment in which a model without cycle moves once. It takes place where the segment
+    before it ends; after a walk without an end of its own, where `at` or its first target in
+    the world is met.
+    """
+
+    model: str
+    controls: dict[str, float] | UnsetType = UNSET
+    performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
+    exact: Literal["auto", "none"] | tuple[str, ...] | UnsetType = UNSET
+    targets: tuple[PlacedTarget, ...] | UnsetType = UNSET
+    at: tuple[float, float] | UnsetType | None = UNSET
+    facing: float | UnsetType | None = UNSET
+    join: Join | UnsetType = UNSET
+
+
+class Hold(
+    Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="kind", tag="hold"
+):
+    """Segment in which the character stays as it is, with small movements of balance. After an
+    act whose model has an event, such as the grasp of a reach, the act stops at its event.
+    """
+
+    seconds: float
+    joint: str | UnsetType | None = UNSET
+    look_at: tuple[float, float, float] | UnsetType | None = UNSET
+
+
+class CharacterChoice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Model, performer and controls whose bones the character has. By default those of the
+    first act, and of the first walk without any: acts meet their targets with their own bones.
+    """
+
+    model: str
+    performer: str | UnsetType | None = UNSET
+    labels: dict[str, str | dict[str, float]] | UnsetType = UNSET
+    controls: dict[str, float] | UnsetType = UNSET
+
+
+class GivenPose(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Pose of the character."""
+
+    rotations: tuple[tuple[float, float, float, float], ...]
+    root_position: tuple[float, float, float]
+
+
+class PerformanceStart(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Where a performance begins, or what it goes on from."""
+
+    position: tuple[float, float] | UnsetType = UNSET
+    heading: float | UnsetType = UNSET
+    poses: tuple[GivenPose, ...] | UnsetType = UNSET
+
+
+class Obstacle(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Disc on the floor that no path of a walk may touch."""
+
+    position: tuple[float, float]
+    radius: float
+
+
+class PerformanceQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Script of a performance, and how it is written."""
+
+    segments: tuple[Walk | Act | Hold, ...]
+    character: CharacterChoice | UnsetType | None = UNSET
+    start: PerformanceStart | UnsetType = UNSET
+    obstacles: tuple[Obstacle, ...] | UnsetType = UNSET
+    fps: float | UnsetType = UNSET
+    take: int | UnsetType = UNSET
+    variety: float | UnsetType = UNSET
+    detail: bool | UnsetType = UNSET
+    level: int | UnsetType = UNSET
+    feet: Literal["stand", "as_predicted"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
+    names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
+    unit: Literal["m", "cm"] | UnsetType | None = UNSET
+    up: Literal["y", "z"] | UnsetType | None = UNSET
+    body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
 
 
 class ModelSummary(Struct, frozen=True, kw_only=True):
@@ -570,6 +695,68 @@ class Readiness(Struct, frozen=True, kw_only=True):
     reload: Reload
 
 
+class PathReport(Struct, frozen=True, kw_only=True):
+    """Deviations of a walk from its path, means over each cycle, root mean square."""
+
+    lateral: float
+    along: float
+    heading: float
+    speed: float
+
+
+class SegmentReport(Struct, frozen=True, kw_only=True):
+    """A segment in the time of the performance."""
+
+    kind: str
+    model: str
+    begins: float
+    ends: float
+    place: tuple[float, float]
+    heading: float
+    sigma: float
+    controls: dict[str, float] = {}
+    phase: float | None = None
+    event: float | None = None
+    targets: tuple[Met, ...] = ()
+    path: PathReport | None = None
+    notes: tuple[str, ...] = ()
+
+
+class JoinReport(Struct, frozen=True, kw_only=True):
+    """A join of two segments."""
+
+    segment: int
+    time: float
+    distance: float
+    blend: str
+    seconds: float
+    peak: float
+    usual: float
+    hard: bool
+
+
+class ScriptWarning(Struct, frozen=True, kw_only=True):
+    """Schema ScriptWarning of the contract."""
+
+    pointer: str
+    message: str
+
+
+class PerformanceReport(Struct, frozen=True, kw_only=True):
+    """Timeline, joins, contacts and warnings of a performance."""
+
+    models: tuple[str, ...]
+    character: str
+    duration: float
+    frames: int
+    sigma: float
+    supported: bool
+    segments: tuple[SegmentReport, ...]
+    joins: tuple[JoinReport, ...]
+    feet: FeetResult | None = None
+    warnings: tuple[ScriptWarning, ...]
+
+
 class ProblemErrors(Struct, frozen=True, kw_only=True):
     """Schema ProblemErrors of the contract."""
 
@@ -861,6 +1048,50 @@ OPERATIONS = {
                 "msgpack": "application/vnd.msgpack",
                 "npz": "application/x-npz",
                 "arrow": "application/vnd.apache.arrow.stream",
+            },
+        ),
+        Operation(
+            "queryPerformance",
+            "POST",
+            "/v1/performances",
+            (
+                "model/vnd.usdc",
+                "model/vnd.usda",
+                "model/vnd.usdz+zip",
+                "application/json",
+                "application/x-bvh",
+                "model/gltf-binary",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+                "application/vnd.msgpack",
+            ),
+            {},
+        ),
+        Operation(
+            "queryPerformanceInFormat",
+            "POST",
+            "/v1/performances.{format}",
+            (
+                "model/vnd.usdc",
+                "model/vnd.usda",
+                "model/vnd.usdz+zip",
+                "application/json",
+                "application/x-bvh",
+                "model/gltf-binary",
+                "application/x-npz",
+                "application/vnd.apache.arrow.stream",
+                "application/vnd.msgpack",
+            ),
+            {
+                "usda": "model/vnd.usda",
+                "usdc": "model/vnd.usdc",
+                "usdz": "model/vnd.usdz+zip",
+                "json": "application/json",
+                "bvh": "application/x-bvh",
+                "glb": "model/gltf-binary",
+                "npz": "application/x-npz",
+                "arrow": "application/vnd.apache.arrow.stream",
+                "msgpack": "application/vnd.msgpack",
             },
         ),
         Operation("getMetrics", "GET", "/metrics", ("text/plain",), {}),

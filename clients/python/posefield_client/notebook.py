@@ -1,4 +1,4 @@
-"""A clip as a picture for notebooks: a stick figure that moves while the view turns around it.
+"""A clip or a performance as a picture for notebooks: a stick figure in a view that turns.
 
 It is an SVG with animated attributes, which needs neither scripts nor a network.
 """
@@ -8,12 +8,15 @@ from html import escape
 import numpy as np
 import numpy.typing as npt
 
-from posefield_client.numbers import ClipNumbers
+from posefield_client.generated import PerformanceReport
+from posefield_client.numbers import ClipNumbers, PerformanceNumbers
 
 TURN_SECONDS = 6.0
 """Time of a whole turn of the view, which lasts a whole number of clips, s."""
 MAX_PICTURES = 120
 """Poses in a whole turn: between them the picture interpolates."""
+PICTURE_RATE, MOST_PICTURES = 10.0, 600
+"""Poses a second of a motion that is longer than MAX_PICTURES of them, and their largest number."""
 WIDTH, HEIGHT, MARGIN = 240, 260, 12
 TILT = np.radians(12.0)
 """Angle by which the view looks down, rad."""
@@ -21,16 +24,16 @@ TILT = np.radians(12.0)
 Array = npt.NDArray[np.float64]
 
 
-def picture(clip: ClipNumbers) -> str:
-    """Return HTML with the animated figure, the model, the duration and the warnings."""
+def picture(clip: ClipNumbers | PerformanceNumbers) -> str:
+    """Return HTML with the animated figure, the models, the duration and the warnings."""
     seconds = max(len(clip.times) - 1, 1) / clip.rate
     repeats = max(1, round(TURN_SECONDS / seconds))
-    frames = _frames(len(clip.times), repeats)
+    most = max(MAX_PICTURES, min(MOST_PICTURES, round(PICTURE_RATE * seconds * repeats)))
+    frames = _frames(len(clip.times), repeats, most)
     shown = _projected(positions(clip)[frames], np.linspace(0.0, 2.0 * np.pi, len(frames)))
     paths = [_path(points, clip.parents) for points in shown]
-    trust = clip.trust
-    said = f"{trust.model}: {seconds:.2f} s, give or take {100.0 * trust.sigma:.1f} cm"
-    warnings = "".join(f"<br>{escape(warning)}" for warning in trust.warnings)
+    said, noted = _caption(clip, seconds)
+    warnings = "".join(f"<br>{escape(warning)}" for warning in noted)
     return (
         f'<figure style="display:inline-block;margin:0"><svg width="{WIDTH}" height="{HEIGHT}" '
         f'viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{escape(said)}">'
@@ -41,14 +44,25 @@ def picture(clip: ClipNumbers) -> str:
     )
 
 
-def _frames(count: int, repeats: int) -> npt.NDArray[np.intp]:
-    """Return the frames of a clip that is shown several times, at most MAX_PICTURES of them."""
-    each = min(count, max(2, MAX_PICTURES // repeats))
+def _caption(clip: ClipNumbers | PerformanceNumbers, seconds: float) -> tuple[str, tuple[str, ...]]:
+    """Return what a picture shows, and the warnings below it."""
+    trust = clip.trust
+    if isinstance(trust, PerformanceReport):
+        name = ", ".join(trust.models)
+        noted = tuple(f"{each.pointer}: {each.message}" for each in trust.warnings)
+    else:
+        name, noted = trust.model, tuple(trust.warnings)
+    return f"{name}: {seconds:.2f} s, give or take {100.0 * trust.sigma:.1f} cm", noted
+
+
+def _frames(count: int, repeats: int, most: int) -> npt.NDArray[np.intp]:
+    """Return the frames of a clip that is shown several times, at most `most` of them."""
+    each = min(count, max(2, most // repeats))
     once = np.linspace(0, count - 1, each).round().astype(np.intp)
     return np.tile(once, repeats)
 
 
-def positions(clip: ClipNumbers) -> Array:
+def positions(clip: ClipNumbers | PerformanceNumbers) -> Array:
     """Return the joint positions (F, J, 3) with y up, by forward kinematics."""
     turns = np.asarray(clip.rotations, float)
     places = np.zeros((*turns.shape[:-1], 3))

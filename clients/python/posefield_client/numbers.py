@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec import Struct
 
-from posefield_client.generated import Trust
+from posefield_client.generated import PerformanceReport, Trust
 from posefield_client.wire import Reply
 
 T = TypeVar("T")
@@ -29,6 +29,8 @@ def _shape(value: Any) -> str:
         return f"<{value.dtype} {value.shape}>"
     if isinstance(value, Trust):
         return f"<{value.model}, sigma {value.sigma:.3g} m>"
+    if isinstance(value, PerformanceReport):
+        return f"<{len(value.segments)} segments, sigma {value.sigma:.3g} m>"
     return f"<{len(value)} items>" if isinstance(value, tuple) and len(value) > 3 else repr(value)
 
 
@@ -66,6 +68,20 @@ class ClipNumbers(Arrays, frozen=True, eq=False):
     bone_offsets: Array
     curve_names: tuple[str, ...] = ()
     curves: Array | None = None
+
+
+class PerformanceNumbers(Arrays, frozen=True, eq=False):
+    """A performance of F frames of J joints, with arrays as in ClipNumbers and its own report."""
+
+    trust: PerformanceReport
+    units: dict[str, str]
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    rate: float
+    times: Array
+    rotations: Array
+    root_position: Array
+    bone_offsets: Array
 
 
 class SigmaGrid(Arrays, frozen=True, eq=False):
@@ -144,6 +160,14 @@ SHAPES: dict[Any, dict[str, str]] = {
         "curve_names": "C",
         "curves": "FC",
     },
+    PerformanceNumbers: {
+        "names": "J",
+        "parents": "J",
+        "times": "F",
+        "rotations": "FJ4",
+        "root_position": "F3",
+        "bone_offsets": "J3",
+    },
     SigmaGrid: {
         "across_values": "C",
         "along_values": "R",
@@ -191,6 +215,7 @@ def _checked(found: T) -> T:
 
 _POSE = msgspec.msgpack.Decoder(Pose, dec_hook=_array)
 _CLIP = msgspec.msgpack.Decoder(ClipNumbers, dec_hook=_array)
+_PERFORMANCE = msgspec.msgpack.Decoder(PerformanceNumbers, dec_hook=_array)
 _GRID = msgspec.msgpack.Decoder(SigmaGrid, dec_hook=_array)
 _CROWD = msgspec.msgpack.Decoder(CrowdPoses, dec_hook=_array)
 
@@ -203,6 +228,11 @@ def pose(reply: Reply) -> Pose:
 def clip(reply: Reply) -> ClipNumbers:
     """Return the clip of a MessagePack response; ValueError if it is invalid."""
     return _checked(_CLIP.decode(reply.content))
+
+
+def performance(reply: Reply) -> PerformanceNumbers:
+    """Return the performance of a MessagePack response; ValueError if it is invalid."""
+    return _checked(_PERFORMANCE.decode(reply.content))
 
 
 def grid(reply: Reply) -> SigmaGrid:

@@ -1,17 +1,26 @@
 /** Questions to a service, as promises. */
 
 import { END, expectEnd, opened } from "./archives.ts";
-import { json, read } from "./documents.ts";
-import { Unexpected, WrongQuestion } from "./errors.ts";
+import {
+  type ArchiveOptions,
+  addressOf,
+  type ClientOptions,
+  checkArchive,
+  checkClientOptions,
+  checkTransferOptions,
+  printable,
+} from "./client-options.ts";
+import { checked, json, read } from "./documents.ts";
+import { Unexpected } from "./errors.ts";
 import type { Whole } from "./memory.ts";
 import { named } from "./named.ts";
-import { crowd, motion, poses } from "./numbers.ts";
-import { checkNames, checkQuestion, type QuestionKind } from "./option-names.ts";
+import { crowd, motion, performance, poses } from "./numbers.ts";
+import { checkQuestion, type QuestionKind } from "./option-names.ts";
 import { asFile, get, link, post, type Request, request, under } from "./questions.ts";
+import { type Script, scriptQuestion } from "./scripts.ts";
 import { streamed } from "./streams.ts";
 import type {
   Archive,
-  ArchiveFormat,
   ClipFormat,
   ClipQuestion,
   CrowdFormat,
@@ -22,6 +31,9 @@ import type {
   ModelSummary,
   Motion,
   NamedClipQuestion,
+  PerformanceMotion,
+  PerformanceQuestion,
+  PerformanceReport,
   PoseQuestion,
   Poses,
   Readiness,
@@ -36,48 +48,7 @@ import type {
 } from "./types.ts";
 import { Wire } from "./wire.ts";
 
-export interface ClientOptions {
-  /** API key or token, sent as `Authorization: Bearer`. */
-  readonly key?: string;
-  /** Milliseconds without a byte after which a question ends with TimedOut; 30,000. */
-  readonly timeout?: number;
-  /** How often to ask again where a fault may pass; 3. */
-  readonly retries?: number;
-  /** Milliseconds before asking again for the first time, each time after that twice as many; 200. */
-  readonly pause?: number;
-  /** Bytes of answers to keep, for where no browser does it; 0. */
-  readonly cacheBytes?: number;
-  /** Characters up to which a question is a link (GET), beyond them a body (POST); 2,000. */
-  readonly longestLink?: number;
-  /** Asks in place of the platform's own. */
-  readonly fetch?: typeof fetch;
-}
-
-export interface ArchiveOptions extends TransferOptions {
-  /** What the clips are sent in; zip. */
-  readonly as?: ArchiveFormat;
-}
-
 type Content = Uint8Array<ArrayBuffer>;
-
-/** Names of ClientOptions, TransferOptions and ArchiveOptions, which have no values at run time. */
-const CLIENT_NAMES = {
-  key: true,
-  timeout: true,
-  retries: true,
-  pause: true,
-  cacheBytes: true,
-  longestLink: true,
-  fetch: true,
-} as const satisfies Record<keyof ClientOptions, true>;
-const TRANSFER_NAMES = { signal: true, onProgress: true } as const satisfies Record<
-  keyof TransferOptions,
-  true
->;
-const ARCHIVE_NAMES = { ...TRANSFER_NAMES, as: true } as const satisfies Record<
-  keyof ArchiveOptions,
-  true
->;
 
 export class Client {
   readonly base: string;
@@ -89,7 +60,7 @@ export class Client {
    * where that is no address, or the key none that a header can hold.
    */
   constructor(base = "", options: ClientOptions = {}) {
-    checkNames("ClientOptions", Object.keys(CLIENT_NAMES), options);
+    checkClientOptions(options);
     this.base = addressOf(base).replace(/\/+$/, "");
     this.#longest = options.longestLink ?? 2000;
     this.#wire = new Wire({
@@ -179,9 +150,38 @@ export class Client {
     options: TransferOptions = {},
   ): Promise<Download> {
     checkQuestion("WalkQuestion", question);
-    checkNames("TransferOptions", Object.keys(TRANSFER_NAMES), options);
+    checkTransferOptions(options);
     const asked = asFile(get(link(under(model, `/crowd.${format}`), question)), format);
     return this.#file(asked, `${model}.${format}`, options);
+  }
+
+  /** One motion through the segments of a script, as numbers. */
+  async performance(
+    script: Script | PerformanceQuestion,
+    signal?: AbortSignal,
+  ): Promise<PerformanceMotion> {
+    const asked = post("/v1/performances.msgpack", scriptQuestion(script));
+    return this.#read(asked, performance, signal);
+  }
+
+  /** The same as a file. */
+  async performanceFile(
+    format: ClipFormat,
+    script: Script | PerformanceQuestion,
+    options: TransferOptions = {},
+  ): Promise<Download> {
+    checkTransferOptions(options);
+    const asked = asFile(post(`/v1/performances.${format}`, scriptQuestion(script)), format);
+    return this.#file(asked, `performance.${format}`, options);
+  }
+
+  /** Timeline, joins and warnings of a performance, without its poses. */
+  async plan(
+    script: Script | PerformanceQuestion,
+    signal?: AbortSignal,
+  ): Promise<PerformanceReport> {
+    const asked = post("/v1/performances?plan=true", scriptQuestion(script));
+    return this.#read(asked, (found) => checked("PerformanceReport", trustOf(found)), signal);
   }
 
   /** Many clips in one file, looked through: all are there, and as long as they should be. */
@@ -279,18 +279,6 @@ export class Client {
   }
 }
 
-function checkArchive(clips: readonly NamedClipQuestion[], options: TransferOptions): void {
-  for (const clip of clips) checkQuestion("NamedClipQuestion", clip);
-  checkNames("ArchiveOptions", Object.keys(ARCHIVE_NAMES), options);
-}
-
-function addressOf(base: string): string {
-  if (base === "" || (/^https?:\/\/[^?#@\s]+$/i.test(base) && URL.canParse(base))) return base;
-  throw new WrongQuestion("the address: expected http://host:port or https://host:port");
-}
-
-/** A key that a header can hold; the error does not say it. */
-function printable(key: string): string {
-  if (/^[\x21-\x7e]+$/.test(key)) return key;
-  throw new WrongQuestion("the key: expected printable ASCII without blanks");
+function trustOf(content: Content): unknown {
+  return (json(content) as { readonly trust?: unknown } | null)?.trust;
 }

@@ -1,6 +1,7 @@
 /** Client of a posefield service: what the contract says, as types, promises and typed arrays. */
 
-export { type ArchiveOptions, Client, type ClientOptions } from "./client.ts";
+export { Client } from "./client.ts";
+export type { ArchiveOptions, ClientOptions } from "./client-options.ts";
 export {
   Broken,
   type Place,
@@ -13,7 +14,15 @@ export {
   WrongQuestion,
 } from "./errors.ts";
 export { CONTRACT } from "./schema.ts";
+export {
+  type ActOptions,
+  type HoldOptions,
+  type PerformanceOptions,
+  Script,
+  type WalkOptions,
+} from "./scripts.ts";
 export type {
+  ActSegment,
   Archive,
   ArchiveFormat,
   ClipFormat,
@@ -23,6 +32,7 @@ export type {
   CrowdQuestion,
   Download,
   Floor,
+  HoldSegment,
   ManifestEntry,
   Met,
   Missed,
@@ -31,11 +41,15 @@ export type {
   Motion,
   NamedClipQuestion,
   OnProgress,
+  PerformanceMotion,
+  PerformanceQuestion,
+  PerformanceReport,
   PoseQuestion,
   Poses,
   Progress,
   Readiness,
   Reasons,
+  Segment,
   SigmaGrid,
   SigmaQuestion,
   Suggestions,
@@ -44,5 +58,6 @@ export type {
   TransferOptions,
   Trust,
   WalkQuestion,
+  WalkSegment,
   WhyQuestion,
 } from "./types.ts";

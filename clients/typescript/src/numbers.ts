@@ -10,7 +10,7 @@ import { decode } from "@msgpack/msgpack";
 
 import { checked, isList, isTexts } from "./documents.ts";
 import { Unexpected } from "./errors.ts";
-import type { CrowdPoses, Motion, Poses } from "./types.ts";
+import type { CrowdPoses, Motion, PerformanceMotion, Poses } from "./types.ts";
 
 type Packed = Readonly<Record<string, unknown>>;
 type Shape = readonly number[];
@@ -22,12 +22,22 @@ interface PackedArray {
 }
 
 export function poses(content: Uint8Array<ArrayBuffer>): Poses {
-  return posesOf(unpacked(content));
+  const found = unpacked(content);
+  return { ...arraysOf(found), trust: checked("Trust", found["trust"]) };
 }
 
 export function motion(content: Uint8Array<ArrayBuffer>): Motion {
   const found = unpacked(content);
-  const own = posesOf(found);
+  return { ...motionOf(found), trust: checked("Trust", found["trust"]) };
+}
+
+export function performance(content: Uint8Array<ArrayBuffer>): PerformanceMotion {
+  const found = unpacked(content);
+  return { ...motionOf(found), trust: checked("PerformanceReport", found["trust"]) };
+}
+
+function motionOf(found: Packed): Omit<Motion, "trust"> {
+  const own = arraysOf(found);
   const names = strings(found, "names");
   expectLength("names", names.length, own.boneOffsets.length / 3);
   return {
@@ -62,10 +72,9 @@ export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
   };
 }
 
-function posesOf(found: Packed): Poses {
+function arraysOf(found: Packed): Omit<Poses, "trust"> {
   const [frames = 0, joints = 0] = array(found, "rotations").shape;
   return {
-    trust: checked("Trust", found["trust"]),
     times: float64(found, "times", [frames]),
     rotations: float32(found, "rotations", [frames, joints, 4]),
     rootPosition: float32(found, "root_position", [frames, 3]),

@@ -437,6 +437,52 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/performances": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Query a performance in an accepted format
+         * @description A performance is one continuous motion of one character through the segments of a script: walks, acts of models without cycle, and holds. The response is JSON, or the format that `Accept` prefers. The same script gives the same bytes. With `plan=true` it is JSON without the poses: timeline, joins, targets and warnings. Since 4.1.0.
+         */
+        post: operations["queryPerformance"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/performances.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @example usda
+                 */
+                format: components["parameters"]["clipFormat"];
+            };
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Query a performance in a format
+         * @description The response is the whole performance as `usda`, `usdc`, `usdz`, `json`, `bvh`, `glb`, `npz`, `arrow` or `msgpack`. Only `json` has a plan. Since 4.1.0.
+         */
+        post: operations["queryPerformanceInFormat"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/metrics": {
         parameters: {
             query?: never;
@@ -862,6 +908,392 @@ export interface components {
         };
         /** @default 10 */
         Nearest: number;
+        /**
+         * @description Point on the floor: x to the left and z forward of the world, in metres.
+         * @example [
+         *       0.5,
+         *       3
+         *     ]
+         */
+        FloorPoint: number[];
+        /**
+         * @description Pairs of a distance or time from the start of the segment and a value, in increasing order; linear between them, constant before the first and after the last.
+         * @example [
+         *       [
+         *         0,
+         *         0.9
+         *       ],
+         *       [
+         *         3,
+         *         1.4
+         *       ]
+         *     ]
+         */
+        NumberCurve: number[][];
+        /**
+         * @description Speed in metres a second: a number, or a curve over `speed_over`. By default the mean of the captured clips.
+         * @default null
+         */
+        Speed: number | components["schemas"]["NumberCurve"] | null;
+        /**
+         * @description Rate of turning to the left in radians a second: a number, or a curve over the seconds of the segment. For a walk of `seconds` only.
+         * @default null
+         */
+        Turn: number | components["schemas"]["NumberCurve"] | null;
+        /**
+         * @description `rolling` begins or ends at full speed. `standing` begins or ends at rest: no captured clip does, so it is synthesised from slower steps.
+         * @default rolling
+         * @enum {string}
+         */
+        GaitEnd: "rolling" | "standing";
+        /**
+         * @description Values of controls of the model; omitted controls are inferred.
+         * @default {}
+         */
+        GivenControls: {
+            [key: string]: number;
+        };
+        /** @description Join of a segment with the one before it. */
+        Join: {
+            /**
+             * @description Duration of the blend in seconds. By default 0.5, between gaits 0.3.
+             * @default null
+             */
+            seconds: number | null;
+            /**
+             * @description `dead` continues the motion before with a velocity that decays while the next one fades in, `hermite` lets the difference of both fade out, `cut` blends nothing. `auto` is `hermite` into a walk, else `dead`.
+             * @default auto
+             * @enum {string}
+             */
+            blend: "auto" | "dead" | "hermite" | "cut";
+            /**
+             * @description `best` joins at the frames that are most alike, `end` at the last frame before and the first one after.
+             * @default best
+             * @enum {string}
+             */
+            cut: "best" | "end";
+            /**
+             * @description Largest distance of the poses at the cut in metres; a join beyond it is refused.
+             * @default null
+             */
+            most: number | null;
+        };
+        /** @description Target position of a joint at a moment of a segment. */
+        PlacedTarget: {
+            /**
+             * @description Name of a joint of the model's skeleton.
+             * @example RightHand
+             */
+            joint: string;
+            /**
+             * @description Position x y z in metres, in `frame`.
+             * @example [
+             *       0.3,
+             *       1.2,
+             *       4
+             *     ]
+             */
+            position: number[];
+            /** @description Seconds from the start of the segment's motion, at most its duration. */
+            time?: number;
+            at?: components["schemas"]["Moment"];
+            /**
+             * @description Frame of the position. That of a segment has its origin and heading at the first pose.
+             * @default world
+             * @enum {string}
+             */
+            frame: "world" | "segment";
+        } & (unknown | unknown);
+        /** @description Segment in which a cyclic model walks: along a curve through points, to a point, or for some seconds. Without any of the three it goes where the next segment begins. */
+        Walk: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "walk";
+            /**
+             * @description Name of a cyclic model that travels.
+             * @example cmu_walk
+             */
+            model: string;
+            /**
+             * @description Points of the world that a smooth curve from the current place leads through.
+             * @default null
+             */
+            along: components["schemas"]["FloorPoint"][] | null;
+            /**
+             * @description Point of the world to walk to.
+             * @default null
+             */
+            to: components["schemas"]["FloorPoint"] | null;
+            /**
+             * @description Duration in seconds, straight ahead or with `turn`.
+             * @default null
+             */
+            seconds: number | null;
+            speed?: components["schemas"]["Speed"];
+            /**
+             * @description What a curve of speeds runs over: metres or seconds from the start of the segment.
+             * @default distance
+             * @enum {string}
+             */
+            speed_over: "distance" | "time";
+            turn?: components["schemas"]["Turn"];
+            controls?: components["schemas"]["GivenControls"];
+            /**
+             * @description Name of a captured performer.
+             * @default null
+             */
+            performer: string | null;
+            labels?: components["schemas"]["Labels"];
+            start?: components["schemas"]["GaitEnd"];
+            stop?: components["schemas"]["GaitEnd"];
+            join?: components["schemas"]["Join"];
+        };
+        /** @description Segment in which a model without cycle moves once. It takes place where the segment before it ends; after a walk without an end of its own, where `at` or its first target in the world is met. */
+        Act: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "act";
+            /**
+             * @description Name of a model without cycle.
+             * @example hdm05_grab_high
+             */
+            model: string;
+            controls?: components["schemas"]["GivenControls"];
+            /**
+             * @description Name of a captured performer.
+             * @default null
+             */
+            performer: string | null;
+            labels?: components["schemas"]["Labels"];
+            exact?: components["schemas"]["Exact"];
+            /** @default [] */
+            targets: components["schemas"]["PlacedTarget"][];
+            /**
+             * @description Point of the floor at which the root of its first pose is.
+             * @default null
+             */
+            at: components["schemas"]["FloorPoint"] | null;
+            /**
+             * @description Heading of its first pose in radians, positive to the left of +Z.
+             * @default null
+             */
+            facing: number | null;
+            join?: components["schemas"]["Join"];
+        };
+        /** @description Segment in which the character stays as it is, with small movements of balance. After an act whose model has an event, such as the grasp of a reach, the act stops at its event. */
+        Hold: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "hold";
+            /** @description Duration in seconds. */
+            seconds: number;
+            /**
+             * @description Joint that stays where it is, such as a hand that holds something.
+             * @default null
+             */
+            joint: string | null;
+            /**
+             * @description Point of the world in metres that the head turns to.
+             * @default null
+             */
+            look_at: number[] | null;
+        };
+        Segment: components["schemas"]["Walk"] | components["schemas"]["Act"] | components["schemas"]["Hold"];
+        /** @description Model, performer and controls whose bones the character has. By default those of the first act, and of the first walk without any: acts meet their targets with their own bones. */
+        CharacterChoice: {
+            model: string;
+            /** @default null */
+            performer: string | null;
+            labels?: components["schemas"]["Labels"];
+            controls?: components["schemas"]["GivenControls"];
+        };
+        /** @description Pose of the character. */
+        GivenPose: {
+            /** @description Unit quaternion w x y z of each joint, local to the parent. */
+            rotations: components["schemas"]["Quaternion"][];
+            root_position: components["schemas"]["Vector"];
+        };
+        /** @description Where a performance begins, or what it goes on from. */
+        PerformanceStart: {
+            position?: components["schemas"]["FloorPoint"];
+            /**
+             * @description In radians, positive to the left of +Z.
+             * @default 0
+             */
+            heading: number;
+            /**
+             * @description Last frames of a motion before, at the frame rate of the script, such as those of an earlier performance; two or more keep its velocity. The performance begins with the last one.
+             * @default []
+             */
+            poses: components["schemas"]["GivenPose"][];
+        };
+        /** @description Disc on the floor that no path of a walk may touch. */
+        Obstacle: {
+            position: components["schemas"]["FloorPoint"];
+            /** @description In metres. */
+            radius: number;
+        };
+        /**
+         * @description Script of a performance, and how it is written.
+         * @example {
+         *       "segments": [
+         *         {
+         *           "kind": "walk",
+         *           "model": "cmu_walk",
+         *           "along": [
+         *             [
+         *               0,
+         *               2
+         *             ],
+         *             [
+         *               1,
+         *               5
+         *             ]
+         *           ],
+         *           "speed": 1.2
+         *         }
+         *       ]
+         *     }
+         */
+        PerformanceQuestion: {
+            segments: components["schemas"]["Segment"][];
+            /** @default null */
+            character: components["schemas"]["CharacterChoice"] | null;
+            start?: components["schemas"]["PerformanceStart"];
+            /** @default [] */
+            obstacles: components["schemas"]["Obstacle"][];
+            /**
+             * @description Frame rate in frames a second.
+             * @default 30
+             */
+            fps: number;
+            take?: components["schemas"]["Take"];
+            variety?: components["schemas"]["Variety"];
+            detail?: components["schemas"]["Detail"];
+            level?: components["schemas"]["LevelNumber"];
+            /**
+             * @description Whether feet stand where they contact the ground.
+             * @default stand
+             * @enum {string}
+             */
+            feet: "stand" | "as_predicted";
+            extrapolate?: components["schemas"]["Extrapolate"];
+            names?: components["schemas"]["Names"];
+            unit?: components["schemas"]["Unit"];
+            up?: components["schemas"]["Up"];
+            body?: components["schemas"]["Body"];
+        };
+        /** @description A performance with its report; with `plan=true` the report alone. */
+        PerformanceDocument: {
+            trust: components["schemas"]["PerformanceReport"];
+            /** @description Units of the numbers. By default lengths are in metres and Y is up. */
+            units?: {
+                [key: string]: string;
+            };
+            /** @description Names of the joints. */
+            names?: string[];
+            /** @description Index of each joint's parent; -1 for the root. */
+            parents?: number[];
+            /** @description Frame rate in frames a second. */
+            rate?: number;
+            frames?: number;
+            /** @description Time of each frame, in seconds from the first frame. */
+            times?: number[];
+            rotations?: components["schemas"]["Rotations"];
+            root_position?: components["schemas"]["RootPosition"];
+            bone_offsets?: components["schemas"]["BoneOffsets"];
+        };
+        /** @description Timeline, joins, contacts and warnings of a performance. */
+        PerformanceReport: {
+            /** @description Models of the script, in order. */
+            models: components["schemas"]["Identity"][];
+            character: components["schemas"]["Identity"];
+            /** @description In seconds. */
+            duration: number;
+            frames: number;
+            /** @description Expected distance from captured motion in metres, root mean square over joints and frames. */
+            sigma: number;
+            /** @description True if clips with similar controls were captured for every segment. */
+            supported: boolean;
+            segments: components["schemas"]["SegmentReport"][];
+            joins: components["schemas"]["JoinReport"][];
+            feet?: components["schemas"]["FeetResult"];
+            warnings: components["schemas"]["ScriptWarning"][];
+        };
+        /** @description A segment in the time of the performance. */
+        SegmentReport: {
+            /** @description walk, act or hold. */
+            kind: string;
+            /** @description Identity of its model; that of the act before for a hold. */
+            model: string;
+            /** @description In seconds. */
+            begins: number;
+            /** @description In seconds. */
+            ends: number;
+            /** @description Root on the floor where it begins, x and z in metres. */
+            place: number[];
+            /** @description There, in radians. */
+            heading: number;
+            /** @description In metres. */
+            sigma: number;
+            /** @description Controls where it begins. */
+            controls?: {
+                [key: string]: number;
+            };
+            /** @description Phase of the cycle at which a walk begins. */
+            phase?: number;
+            /** @description Time of the event of an act in seconds. */
+            event?: number;
+            /** @description Residuals of its targets. */
+            targets?: components["schemas"]["Met"][];
+            path?: components["schemas"]["PathReport"];
+            /** @description What was chosen or synthesised. */
+            notes?: string[];
+        };
+        /** @description Deviations of a walk from its path, means over each cycle, root mean square. */
+        PathReport: {
+            /** @description In metres. */
+            lateral: number;
+            /** @description In metres. */
+            along: number;
+            /** @description In radians. */
+            heading: number;
+            /** @description In metres a second. */
+            speed: number;
+        };
+        /** @description A join of two segments. */
+        JoinReport: {
+            /** @description Index of the segment that begins. */
+            segment: number;
+            /** @description In seconds. */
+            time: number;
+            /** @description Distance of the two motions at the cut in metres. */
+            distance: number;
+            /** @description dead, hermite or cut. */
+            blend: string;
+            /** @description Duration of the blend. */
+            seconds: number;
+            /** @description Largest acceleration near the join, mean over joints relative to the root, in metres a second squared. */
+            peak: number;
+            /** @description Largest acceleration of the motions away from the join. */
+            usual: number;
+            /** @description True if the join is unlike what the motions do; a warning says so. */
+            hard: boolean;
+        };
+        ScriptWarning: {
+            /**
+             * @description JSON pointer to the cause in the script.
+             * @example /segments/2/targets/0
+             */
+            pointer: string;
+            message: string;
+        };
         WhyQuestion: {
             controls: components["schemas"]["Controls"];
             nearest?: components["schemas"]["Nearest"];
@@ -1851,6 +2283,33 @@ export interface components {
                 "application/vnd.apache.arrow.stream": string;
             };
         };
+        /** @description The performance as a clip, or its plan. Default format: JSON. */
+        Performance: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                ETag: components["headers"]["ETag"];
+                Vary: components["headers"]["Vary"];
+                "Content-Disposition": components["headers"]["Disposition"];
+                "Posefield-Model": components["headers"]["Model"];
+                "Posefield-Sigma": components["headers"]["Sigma"];
+                "Posefield-Duration": components["headers"]["Duration"];
+                "Posefield-Supported": components["headers"]["Supported"];
+                "Posefield-Warning": components["headers"]["Warning"];
+                [name: string]: unknown;
+            };
+            content: {
+                "model/vnd.usdc": string;
+                "model/vnd.usda": string;
+                "model/vnd.usdz+zip": string;
+                "application/json": components["schemas"]["PerformanceDocument"];
+                "application/x-bvh": string;
+                "model/gltf-binary": string;
+                "application/x-npz": string;
+                "application/vnd.apache.arrow.stream": string;
+                "application/vnd.msgpack": string;
+            };
+        };
         /** @description The archive. Default format: zip. */
         Clips: {
             headers: {
@@ -2169,6 +2628,8 @@ export interface components {
         controls: {
             [key: string]: number;
         };
+        /** @description True for the plan of a performance: the JSON response without the poses. */
+        plan: boolean;
         /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
         ifNoneMatch: string;
         /**
@@ -2327,6 +2788,12 @@ export interface components {
         walkLabel: string[];
     };
     requestBodies: {
+        /** @description Limits: 256 KiB, 256 segments and ten minutes. */
+        PerformanceQuestion: {
+            content: {
+                "application/json": components["schemas"]["PerformanceQuestion"];
+            };
+        };
         /** @description Default limits: 32 MiB and 100,000 characters. */
         CrowdQuestion: {
             content: {
@@ -3802,6 +4269,69 @@ export interface operations {
             503: components["responses"]["Overloaded"];
         };
     };
+    queryPerformance: {
+        parameters: {
+            query?: {
+                /** @description True for the plan of a performance: the JSON response without the poses. */
+                plan?: components["parameters"]["plan"];
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: components["requestBodies"]["PerformanceQuestion"];
+        responses: {
+            200: components["responses"]["Performance"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
+            406: components["responses"]["NotAcceptable"];
+            413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
+            415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
+            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
+    queryPerformanceInFormat: {
+        parameters: {
+            query?: {
+                /** @description True for the plan of a performance: the JSON response without the poses. */
+                plan?: components["parameters"]["plan"];
+            };
+            header?: never;
+            path: {
+                /**
+                 * @description File format: USD text, binary USD, a USDZ package, JSON, BVH, glTF, NumPy arrays, an Arrow stream or MessagePack.
+                 * @example usda
+                 */
+                format: components["parameters"]["clipFormat"];
+            };
+            cookie?: never;
+        };
+        requestBody: components["requestBodies"]["PerformanceQuestion"];
+        responses: {
+            200: components["responses"]["Performance"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
+            413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
+            415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
+            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
     getMetrics: {
         parameters: {
             query?: never;
@@ -4001,7 +4531,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "4.0.0";
+export const CONTRACT = "4.1.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -4047,6 +4577,17 @@ export const REQUIRED = {
   ],
   "ModelList": [
     "models"
+  ],
+  "PerformanceReport": [
+    "models",
+    "character",
+    "duration",
+    "frames",
+    "sigma",
+    "supported",
+    "segments",
+    "joins",
+    "warnings"
   ],
   "Problem": [
     "type",
@@ -4116,6 +4657,12 @@ export const LISTS = {
   ],
   "ModelList": [
     "models"
+  ],
+  "PerformanceReport": [
+    "models",
+    "segments",
+    "joins",
+    "warnings"
   ],
   "Problem": [
     "errors"
@@ -4250,6 +4797,70 @@ export const KEYS = {
     "height",
     "slope_x",
     "slope_z"
+  ],
+  "PerformanceQuestion": [
+    "segments",
+    "character",
+    "start",
+    "obstacles",
+    "fps",
+    "take",
+    "variety",
+    "detail",
+    "level",
+    "feet",
+    "extrapolate",
+    "names",
+    "unit",
+    "up",
+    "body"
+  ],
+  "Walk": [
+    "kind",
+    "model",
+    "along",
+    "to",
+    "seconds",
+    "speed",
+    "speed_over",
+    "turn",
+    "controls",
+    "performer",
+    "labels",
+    "start",
+    "stop",
+    "join"
+  ],
+  "Act": [
+    "kind",
+    "model",
+    "controls",
+    "performer",
+    "labels",
+    "exact",
+    "targets",
+    "at",
+    "facing",
+    "join"
+  ],
+  "Hold": [
+    "kind",
+    "seconds",
+    "joint",
+    "look_at"
+  ],
+  "Join": [
+    "seconds",
+    "blend",
+    "cut",
+    "most"
+  ],
+  "PlacedTarget": [
+    "joint",
+    "position",
+    "time",
+    "at",
+    "frame"
   ],
   "WalkQuestion": [
     "count",

@@ -9,6 +9,8 @@ export type ManifestEntry = Schemas["ManifestEntry"];
 export type Met = Schemas["Met"];
 export type ModelCard = Schemas["ModelCard"];
 export type ModelSummary = Schemas["ModelSummary"];
+/** Timeline, joins and warnings of a performance. */
+export type PerformanceReport = Schemas["PerformanceReport"];
 export type Readiness = Schemas["Readiness"];
 export type Reasons = Schemas["Reasons"];
 export type Suggestions = Schemas["Suggestions"];
@@ -25,6 +27,29 @@ export type NamedClipQuestion = Asked<Schemas["NamedClipQuestion"], "controls">;
 export type CrowdQuestion = Asked<Schemas["CrowdQuestion"], "controls" | "time">;
 export type SigmaQuestion = Asked<Schemas["SigmaQuestion"], "across" | "along">;
 export type WhyQuestion = Asked<Schemas["WhyQuestion"], "controls">;
+
+/** A segment of a script as one may write it. */
+export type WalkSegment = Part<"Walk", "kind" | "model">;
+export type ActSegment = Omit<Part<"Act", "kind" | "model">, "targets"> & {
+  readonly targets?: readonly Part<"PlacedTarget", "joint" | "position">[];
+};
+export type HoldSegment = Part<"Hold", "kind" | "seconds">;
+export type Segment = WalkSegment | ActSegment | HoldSegment;
+
+/** A script as one may write it, and how it is written to a file. */
+export type PerformanceQuestion = Omit<
+  Part<"PerformanceQuestion", never>,
+  "segments" | "character" | "start"
+> & {
+  readonly segments: readonly Segment[];
+  readonly character?: Part<"CharacterChoice", "model"> | null;
+  readonly start?: Partial<Schemas["PerformanceStart"]>;
+};
+
+type Part<Name extends keyof Schemas, Needed extends keyof Schemas[Name]> = Omit<
+  Asked<Schemas[Name], Needed>,
+  "join"
+> & { readonly join?: Partial<Schemas["Join"]> };
 
 /** Characters that walk; the camera as three numbers, m, and labels of all of them by label set. */
 export type WalkQuestion = Omit<Walk, "camera" | "label"> & {
@@ -68,6 +93,11 @@ export interface Motion extends Poses {
   readonly frames: number;
   /** What the numbers are: other lengths and another axis up, where the question asked for them. */
   readonly units: Readonly<Record<string, string>>;
+}
+
+/** A performance as numbers, with a report in place of a clip's. */
+export interface PerformanceMotion extends Omit<Motion, "trust"> {
+  readonly trust: PerformanceReport;
 }
 
 /** A pose of each of N characters, roots in the world. */

@@ -12,6 +12,7 @@ import type {
   CrowdFormat,
   CrowdQuestion,
   NamedClipQuestion,
+  PerformanceQuestion,
   PoseQuestion,
   SigmaQuestion,
   Target,
@@ -43,6 +44,15 @@ const why: Ask = (client, model, question) => client.why(model, question as WhyQ
 
 const clip: Ask = (client, model, question) => client.clip(model, question as ClipQuestion);
 const crowd: Ask = (client, model, question) => client.crowd(model, question as CrowdQuestion);
+
+const performance: Ask = (client, _, question) =>
+  client.performance(question as PerformanceQuestion);
+const performanceFile = (format: ClipFormat): Ask => {
+  return (client, _, question) => client.performanceFile(format, question as PerformanceQuestion);
+};
+const plan: Ask = async (client, _, question) => ({
+  trust: await client.plan(question as PerformanceQuestion),
+});
 
 /** Call by format; a text says why the client does not ask for it. */
 type ByFormat = Readonly<Record<string, Ask | string>>;
@@ -85,6 +95,11 @@ const ASKED: Record<string, Ask | string | ByFormat> = {
   getWhy: why,
   queryWhy: why,
   getSuggestions: (client, model, asked) => client.suggestions(model, asked as object),
+  queryPerformance: plan,
+  queryPerformanceInFormat: {
+    ...Object.fromEntries(FILES.map((format) => [format, performanceFile(format)])),
+    msgpack: performance,
+  },
   getReadiness: (client) => client.ready(),
   getLiveness: (client) => client.contract(),
   getMetrics: "read by Prometheus",
@@ -147,7 +162,7 @@ for (const [operation, format, ask] of CASES) {
 
 /** Whether the client's answer is the service's document. */
 function isSame(operation: string): boolean {
-  return /Why|Sigma|listModels|getModel|getReadiness/.test(operation);
+  return /Why|Sigma|queryPerformance$|listModels|getModel|getReadiness/.test(operation);
 }
 
 function modelOf(path: string): string {

@@ -38,6 +38,8 @@ test("the examples of the README run", () => {
     assert.match(said, /^\d+ frames of \d+ joints, sigma 0\.\d+ m$/m);
     assert.match(said, /^times? .*expected 0 to/m);
     assert.match(said, /^turn-20\.usdc \d+ /m);
+    assert.match(said, /^\d+ frames, 1 join$/m);
+    assert.match(said, /^performance\.glb has \d+ bytes$/m);
     assert.ok(statSync(`${folder}/reach.tar`).size > 1024);
     assert.ok(!existsSync(`${folder}/reach.tar.part`));
   } finally {

@@ -13,6 +13,7 @@ from asking import contains, listening
 from contract_examples import CASES
 from posefield_client import NOTHING, AsyncClient, Client
 from posefield_client.files import CLIP, CLIPS, CROWD, WALK
+from posefield_client.performances import PERFORMANCE
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
@@ -109,6 +110,10 @@ def clips(ending):
     return lambda client, r: model(client, r).clips(**words(r)).content(ending)
 
 
+def performance(ending):
+    return lambda client, r: client.performance(r["body"]).content(ending)
+
+
 CALLS = {
     ("listModels", None): lambda client, r: client.models(),
     ("getLiveness", None): lambda client, r: client.live(),
@@ -127,6 +132,11 @@ CALLS = {
     **{("getCrowdInFormat", form): walk(form) for form in WALK},
     **{("queryCrowdInFormat", form): crowd(form) for form in CROWD},
     **{("queryClipsInFormat", form): clips(form) for form in CLIPS},
+    ("queryPerformance", None): lambda client, r: client.plan(r["body"]),
+    **{("queryPerformanceInFormat", form): performance(form) for form in PERFORMANCE},
+    ("queryPerformanceInFormat", "msgpack"): (
+        lambda client, r: client.performance(r["body"]).numbers
+    ),
     ("getClipInFormat", "msgpack"): lambda client, r: model(client, r).clip(**words(r)).numbers,
     ("queryCrowdInFormat", "msgpack"): lambda client, r: model(client, r).crowd(**words(r)).numbers,
     ("queryCrowdInFormat", "arrow"): lambda client, r: model(client, r).crowd(**words(r)).table(),
@@ -236,10 +246,12 @@ def as_promised(name, form, request, found, place):
     else:
         # Of arrays the example of the same question in JSON says what is in them.
         expected = contract_examples.response(name, form and "json")["body"]
-        whole = {"models": plain(found)} if name == "listModels" else plain(found)
+        whole = {WRAPPERS[name]: plain(found)} if name in WRAPPERS else plain(found)
         assert contains(whole, expected)
 
 
+WRAPPERS = {"listModels": "models", "queryPerformance": "trust"}
+"""Keys of documents of which the client returns the only value."""
 SHOWN_BY_TABLES = {
     ("getClipInFormat", "msgpack"): (25.0, 13),
     ("queryCrowdInFormat", "arrow"): ["levels", 2],

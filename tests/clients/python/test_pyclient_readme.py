@@ -28,7 +28,17 @@ def test_every_example_runs(address, tmp_path, monkeypatch, capsys):
     for each in ("client", "patient", "once", "on_disk", "larger", "more", "none"):
         names[each].close()
     written = {path.name for path in tmp_path.iterdir()}
-    assert written == {*("clip.usdc", "clip.glb", "crowd.usdz", "clips.zip", "later.usdc", "kept")}
+    assert written == {
+        *(
+            "clip.usdc",
+            "clip.glb",
+            "performance.usdc",
+            "crowd.usdz",
+            "clips.zip",
+            "later.usdc",
+            "kept",
+        )
+    }
     said = capsys.readouterr().out
     assert "8 of 8 clips" in said
     assert "turn" in said
