@@ -1,0 +1,1 @@
+"""Server for agents: tools to look at models and to plan and write performances, over MCP."""

@@ -1,0 +1,234 @@
+"""Tools for agents: list models, plan a performance, write one to a file."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import orjson
+from msgspec import Struct
+
+from posefield.agents import contract_schema
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
+from posefield.encode.formats import CLIP_ENCODERS
+from posefield.performance import composition
+from posefield.performance.script import Script, errors_under, resolve_script
+from posefield.question import json_decoding
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.registry.model_registry import ModelRegistry
+from posefield.synthesis.frame_times import MAX_POSES
+from posefield.synthesis.synthesizer import Synthesizer
+
+MAX_FRAMES = 10 * MAX_POSES
+FILE_NAME = re.compile(r"[\w-][\w. -]{0,99}", re.ASCII)
+"""Names of files that agents may write: no folders, no leading dot."""
+Facts = dict[str, Any]
+
+
+class Nothing(Struct, frozen=True, forbid_unknown_fields=True):
+    """Arguments of a tool without any."""
+
+
+class PlanRequest(Struct, frozen=True, forbid_unknown_fields=True):
+    """Arguments of a plan."""
+
+    script: PerformanceQuestion
+
+
+class FileRequest(Struct, frozen=True, forbid_unknown_fields=True):
+    """Arguments of a performance. file: name in the folder of the server."""
+
+    script: PerformanceQuestion
+    file: str
+
+
+@dataclass(frozen=True)
+class AgentTool:
+    """A tool: its name, what it does, and the JSON Schemas of its arguments and its result.
+
+    call: returns the result; raises MotionError. writes: whether it writes a file.
+    """
+
+    name: str
+    description: str
+    arguments: Facts
+    result: Facts
+    call: Callable[[Mapping[str, Any]], Facts]
+    writes: bool = False
+
+
+@dataclass(frozen=True)
+class Toolbox:
+    """Models that agents may use, and the folder that files are written to."""
+
+    models: ModelRegistry
+    folder: Path
+    tools: Mapping[str, AgentTool] = field(init=False)
+
+    def __post_init__(self) -> None:
+        listed = (_list_tool(self), _plan_tool(self), _perform_tool(self))
+        object.__setattr__(self, "tools", {tool.name: tool for tool in listed})
+
+    def call(self, name: str, arguments: Mapping[str, Any]) -> Facts:
+        """Return the result of a tool.
+
+        Raises InvalidField for an unknown tool, QueryError, whose field is a JSON pointer into the
+        arguments, and FileError if the file cannot be written.
+        """
+        if name not in self.tools:
+            known = ", ".join(self.tools)
+            hint = did_you_mean(name, self.tools)
+            raise InvalidField("", f"no tool {name!r}{hint}, expected one of {known}")
+        return self.tools[name].call(arguments)
+
+    def list_models(self, arguments: Mapping[str, Any]) -> Facts:
+        """Return the models, what segment of a script each can be, and its controls."""
+        _decode(Nothing, arguments)
+        return {"models": [_model_facts(model) for model in self.models.models.values()]}
+
+    def plan(self, arguments: Mapping[str, Any]) -> Facts:
+        """Return the report of a performance, without its poses."""
+        script = self._resolve(_decode(PlanRequest, arguments).script)
+        with errors_under("script"):
+            return composition.plan(script, MAX_FRAMES).document()
+
+    def perform(self, arguments: Mapping[str, Any]) -> Facts:
+        """Write a performance to a file; return its path and its report."""
+        asked = _decode(FileRequest, arguments)
+        path = self.folder / _file_name(asked.file)
+        encoder, question = CLIP_ENCODERS[path.suffix[1:]], asked.script
+        with errors_under("script"):
+            convention = encoder.convention(question.unit, question.up, question.body)
+        script = self._resolve(question)
+        with errors_under("script"):
+            answer = composition.perform(script, MAX_FRAMES)
+        atomic_files.write(encoder.encode(answer, convention), path)
+        return {"file": str(path), **answer.trust.document()}
+
+    def _resolve(self, question: PerformanceQuestion) -> Script:
+        with errors_under("script"):
+            return resolve_script(question, self.models.find)
+
+
+def _decode(form: Any, arguments: Mapping[str, Any]) -> Any:
+    return json_decoding.decode_question(form, orjson.dumps(arguments))
+
+
+def _file_name(name: str) -> str:
+    """Return the name of a file; InvalidField unless it is a plain name in a known format."""
+    if FILE_NAME.fullmatch(name) is None:
+        raise InvalidField("file", f"{name[:100]!r}, expected a name without folders")
+    ending = Path(name).suffix[1:]
+    if ending not in CLIP_ENCODERS:
+        known = ", ".join(CLIP_ENCODERS)
+        hint = did_you_mean(ending, CLIP_ENCODERS)
+        raise InvalidField("file", f"{name!r} ends in none of {known}{hint}")
+    return name
+
+
+def _model_facts(model: Synthesizer) -> Facts:
+    card = model.session.card
+    walks = card.cyclic and card.root == "travelling"
+    kind = "walk" if walks else "none" if card.cyclic else "act"
+    controls = [
+        {
+            "name": own.name,
+            "unit": own.unit,
+            "minimum": own.minimum,
+            "maximum": own.maximum,
+            "description": own.description,
+        }
+        for own in card.controls
+    ]
+    return {
+        "name": model.name,
+        "identity": model.identity,
+        "description": card.description,
+        "segment": kind,
+        "seconds": list(card.durations),
+        "controls": controls,
+        "event": card.event is not None,
+        "joints": list(card.skeleton.names),
+        "labels": {own.name: list(own.names) for own in card.labels},
+    }
+
+
+def _object(required: Mapping[str, Facts]) -> Facts:
+    return {
+        "type": "object",
+        "properties": dict(required),
+        "required": list(required),
+        "additionalProperties": False,
+    }
+
+
+def _list_tool(box: Toolbox) -> AgentTool:
+    text, numbers = {"type": "string"}, {"type": "array", "items": {"type": "number"}}
+    texts = {"type": "array", "items": text}
+    kind = {
+        "type": "string",
+        "enum": ["walk", "act", "none"],
+        "description": "Kind of segment that the model can be; none for a cycle in place.",
+    }
+    model = _object(
+        {
+            "name": text,
+            "identity": text,
+            "description": text,
+            "segment": kind,
+            "seconds": {**numbers, "description": "Shortest and longest captured clip."},
+            "controls": {"type": "array", "items": {"type": "object"}},
+            "event": {"type": "boolean", "description": "Whether targets may be at its event."},
+            "joints": texts,
+            "labels": {"type": "object", "additionalProperties": texts},
+        }
+    )
+    return AgentTool(
+        "list_models",
+        "List the models of motions: their names, whether each is for walks or for acts, their "
+        "controls with units and ranges, and the names of their joints. Read this first.",
+        _object({}),
+        _object({"models": {"type": "array", "items": model}}),
+        box.list_models,
+    )
+
+
+def _plan_tool(box: Toolbox) -> AgentTool:
+    return AgentTool(
+        "plan_performance",
+        "Plan one continuous motion through the segments of a script, without making it: when each "
+        "segment begins, how well the joins and targets go, and warnings with pointers into the "
+        "script. Errors say what to change.",
+        _object({"script": contract_schema.schema("PerformanceQuestion")}),
+        contract_schema.schema("PerformanceReport"),
+        box.plan,
+    )
+
+
+def _perform_tool(box: Toolbox) -> AgentTool:
+    endings = ", ".join(CLIP_ENCODERS)
+    file = {
+        "type": "string",
+        "pattern": f"^{FILE_NAME.pattern}$",
+        "description": f"Name of the file; its ending is one of {endings}. An existing file is "
+        "replaced.",
+        "examples": ["performance.usdc"],
+    }
+    report = contract_schema.schema("PerformanceReport")
+    path = {"type": "string", "description": "Path of the written file."}
+    return AgentTool(
+        "perform",
+        "Write one continuous motion through the segments of a script to a file, and return its "
+        "path and its report. The same script gives the same bytes.",
+        _object({"script": contract_schema.schema("PerformanceQuestion"), "file": file}),
+        {
+            **report,
+            "properties": {"file": path, **report["properties"]},
+            "required": ["file", *report["required"]],
+        },
+        box.perform,
+        writes=True,
+    )
