@@ -84,7 +84,9 @@ export class App {
   /** A step that one may go back. */
   #choose(model: string): void {
     history.pushState(null, "", `#${encodeURIComponent(model)}`);
-    void this.#go({ model, entries: [] });
+    // A performance is not of one model, and stays as it is.
+    const script = this.#open?.store.state.script;
+    void this.#go({ model, entries: script ? [["~script", script]] : [] });
   }
 
   /** Shows that model as the address says, or says why not. A later call overtakes this one. */
@@ -200,8 +202,9 @@ export class App {
       .filter(([name]) => known.has(name))
       .map(([name, value]) => [name, String(value)] as const);
     const { state } = restored({ model, entries }, model, card);
-    const { playing, body, fan, ghost, feet, loop, speed, take, variety, view } = store.state;
-    const kept = { playing, body, fan, ghost, feet, loop, speed, take, variety, view };
+    const { playing, body, fan, ghost, feet, loop, speed } = store.state;
+    const { script, take, variety, view } = store.state;
+    const kept = { playing, body, fan, ghost, feet, loop, speed, script, take, variety, view };
     this.#show(model, shape, new Store({ ...state, ...kept }), models);
     this.#notice.remark("model", `${model} has been replaced on the service: this is the new one.`);
   }

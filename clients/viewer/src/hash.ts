@@ -7,6 +7,7 @@
 import type { ModelCard } from "@posefield/client";
 
 import { otherSets } from "./examples.ts";
+import { LONGEST_SCRIPT, read as readScript } from "./performance/script.ts";
 import type { State } from "./state.ts";
 import {
   HIGHEST_FLOOR,
@@ -84,6 +85,7 @@ export function initial(model: string, card: ModelCard): State {
     crowd: 300,
     varied: false,
     pixels: 4,
+    script: "",
   };
 }
 
@@ -180,12 +182,18 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
     read: point,
     write: (value) => (value ?? []).map(rounded).join(","),
   },
-  view: one("one", "levels", "crowd"),
+  view: one("one", "levels", "crowd", "performance"),
   across: control(),
   along: control(),
   crowd: between(() => [50, 1000], Number.isInteger),
   varied: yes(),
   pixels: between(() => [0.25, 16]),
+  script: {
+    expected: () => "the script of a performance as JSON",
+    read: (text) => (typeof readScript(text) === "string" ? undefined : text),
+    // A longer one is a file: not all that pass links on keep them whole.
+    write: (value) => (value.length > LONGEST_SCRIPT ? "" : value),
+  },
 };
 
 function between(

@@ -10,6 +10,7 @@ import * as theme from "./theme.ts";
 const VIEWS = [
   ["one", "Single"],
   ["crowd", "Crowd"],
+  ["performance", "Performance"],
 ] as const;
 
 const KEYS = [

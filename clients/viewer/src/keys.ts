@@ -32,6 +32,8 @@ export function mount(session: Session): void {
   const press = (event: KeyboardEvent) => {
     const key = event.key.toLowerCase();
     const act = acts[key];
+    // A performance has keys of its own.
+    if (store.state.view === "performance") return;
     if (!act || event.ctrlKey || event.metaKey || event.altKey || taken(event.target, key)) return;
     event.preventDefault();
     act(event);
@@ -44,7 +46,7 @@ function defaults(controls: Session["card"]["controls"]): Record<string, number>
 }
 
 /** Whether the element that has the focus does something with the key itself. */
-function taken(target: EventTarget | null, key: string): boolean {
+export function taken(target: EventTarget | null, key: string): boolean {
   if (!(target instanceof HTMLElement) || target.closest("dialog")) return true;
   if (target instanceof HTMLInputElement) return target.type !== "range" || key.length > 1;
   if (target instanceof HTMLSelectElement || target instanceof HTMLTextAreaElement) return true;

@@ -15,6 +15,7 @@ import * as keys from "./keys.ts";
 import * as levels from "./levels.ts";
 import * as map from "./map.ts";
 import * as options from "./options.ts";
+import * as performance from "./performance/part.ts";
 import type { Session } from "./session.ts";
 import * as takes from "./takes-panel.ts";
 import * as target from "./target.ts";
@@ -69,4 +70,5 @@ export function mount(session: Session): void {
       part(section, session);
     }
   }
+  performance.mount(session);
 }

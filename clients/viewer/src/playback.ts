@@ -27,8 +27,11 @@ export function pose(joints: number): Pose {
   return { rotations: new Float32Array(4 * joints), root: new Float32Array(3) };
 }
 
+/** What poses between frames are taken from. */
+export type Track = Pick<Motion, "rate" | "times" | "rotations" | "rootPosition">;
+
 /** The pose at `time` between the two frames around it, written into `out`. */
-export function sample(out: Pose, clip: Motion, time: number): Pose {
+export function sample(out: Pose, clip: Track, time: number): Pose {
   const joints = out.rotations.length / 4;
   const last = clip.times.length - 1;
   const at = Math.min(last, Math.max(0, (time - clip.times[0]!) / step(clip)));
@@ -54,7 +57,7 @@ export function sample(out: Pose, clip: Motion, time: number): Pose {
 }
 
 /** Seconds from a frame to the next. */
-export function step(clip: Motion): number {
+export function step(clip: Pick<Track, "rate" | "times">): number {
   const { times } = clip;
   return times.length > 1 ? (times.at(-1)! - times[0]!) / (times.length - 1) : 1 / clip.rate;
 }

@@ -198,8 +198,9 @@ export class Player {
 
   #step(seconds: number): boolean {
     this.#stopwatch.drawn();
-    const { loop, playing, speed, time } = this.#page.store.state;
-    if (!playing || !this.#clip) return false;
+    const { loop, playing, speed, time, view } = this.#page.store.state;
+    // A performance has a time of its own.
+    if (!playing || !this.#clip || view === "performance") return false;
     const next = advanced(time, seconds * speed, this.duration, loop);
     for (let lap = 0; lap < Math.min(next.laps, 4); lap++)
       this.#carried = after(this.#carried, this.#lap);

@@ -109,6 +109,18 @@ export class Scene {
     this.redraw();
   }
 
+  /** Shows that place on the ground from above, +Z upwards; `size`: of what is to be seen, m. */
+  above(x: number, z: number, size: number): void {
+    const half = Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, this.camera.aspect);
+    const up = Math.min(this.orbit.maxDistance, Math.max(3, (0.6 * size) / half));
+    this.orbit.target.set(x, 0, z);
+    // Never straight down, where the camera would not know which way is up.
+    this.camera.position.set(x, up, z - 0.02 * up);
+    this.orbit.update();
+    this.#light();
+    this.redraw();
+  }
+
   tint(): void {
     this.root.background = new Color(theme.colour("--paper"));
     this.#ground.tint(

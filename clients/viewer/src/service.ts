@@ -3,6 +3,7 @@
 import { Client, type ClientOptions, CONTRACT } from "@posefield/client";
 
 import type { Source } from "./page.ts";
+import { post } from "./post.ts";
 
 /** The page asks again by itself (watch.ts), and asks so that nothing fills caches on the way. */
 const ASKING: ClientOptions = { retries: 0, timeout: 8000, longestLink: 0 };
@@ -11,11 +12,13 @@ const KEPT = "posefield-key";
 /** A source whose key may change while others hold it. */
 export class Service implements Source {
   #client = new Client("", kept());
+  #key = stored();
 
   /** For this tab alone, and gone with it. */
   use(key: string): void {
     // First, for it refuses a key that none can be: kept, that would refuse the whole page.
     this.#client = new Client("", { ...ASKING, key });
+    this.#key = key;
     keep(key);
   }
 
@@ -28,6 +31,10 @@ export class Service implements Source {
   readonly sigma: Source["sigma"] = (...words) => this.#client.sigma(...words);
   readonly file: Client["file"] = (...words) => this.#client.file(...words);
   readonly why: Source["why"] = (...words) => this.#client.why(...words);
+
+  /** The answer to a question as JSON; a Problem where it is refused. */
+  readonly post = (path: string, body: string, signal: AbortSignal): Promise<Response> =>
+    post(path, body, this.#key, signal);
 }
 
 /** Whether it may be asked again. */

@@ -1,6 +1,6 @@
 /** What the page shows, in one place; the address bar's hash holds it, so that it can be sent on. */
 
-export type View = "one" | "levels" | "crowd";
+export type View = "one" | "levels" | "crowd" | "performance";
 
 export interface State {
   readonly model: string;
@@ -44,6 +44,8 @@ export interface State {
   /** Whether the crowd's motions are takes, so that hardly any two are alike. */
   readonly varied: boolean;
   readonly pixels: number;
+  /** Of the performance, as JSON; empty until one is begun. */
+  readonly script: string;
 }
 
 export type Listener = (state: State, changed: ReadonlySet<keyof State>) => void;

@@ -4,6 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { address, initial, restored, written } from "../src/hash.ts";
+import { LONGEST_SCRIPT } from "../src/performance/script.ts";
 import type { State } from "../src/state.ts";
 import { CARD as PLAIN } from "./card.ts";
 
@@ -41,6 +42,7 @@ const OTHER: State = {
   along: "speed",
   crowd: 500,
   pixels: 2,
+  script: '{"segments":[{"kind":"hold","seconds":1}]}',
 };
 
 function back(state: State) {
@@ -125,4 +127,15 @@ test("what a model cannot do is refused with the reason, and feet stand where co
 
 test("a hash without anything names no model", () => {
   for (const text of ["", "#", "#?"]) assert.equal(address(text).model, null);
+});
+
+test("a script that is too long for a link stays out of it, one that is none is named", () => {
+  const hold = (joint: string) => `{"segments":[{"kind":"hold","seconds":1,"joint":"${joint}"}]}`;
+  const room = LONGEST_SCRIPT - hold("").length;
+  const longest = { ...START, script: hold("x".repeat(room)) };
+  assert.equal(back(longest).state.script, longest.script);
+  assert.equal(back({ ...START, script: hold("x".repeat(room + 1)) }).state.script, "");
+  const { faults, state } = restored(address("#hop?~script=%7B"), "hop", CARD);
+  assert.match(faults[0]!, /^~script: .*expected the script of a performance/);
+  assert.equal(state.script, "");
 });

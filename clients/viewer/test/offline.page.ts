@@ -191,6 +191,9 @@ for (const model of ["reaching", "cmu_walk"]) {
       await note.getByText(`${centimetres(copy.errors.worst)} at most`).waitFor();
       await page.locator(".map-words", { hasText: "Within" }).waitFor();
       await page.locator(".files-said", { hasText: "need a service" }).waitFor();
+      await page.getByRole("button", { name: "Performance", exact: true }).click();
+      await page.getByText("A performance needs a service").waitFor();
+      await page.getByRole("button", { name: "Single", exact: true }).click();
       assert.equal(await page.locator(".files-get, .files pre").count(), 0);
       assert.equal(await page.getByText("Made of these captured clips").count(), 0);
       assert.equal(await page.getByRole("button", { name: "Ghost" }).count(), 0);
