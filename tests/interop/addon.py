@@ -24,7 +24,11 @@ from compare import FURTHEST, TURNED
 from posefield.inference import session
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip, assemble
+from posefield.performance import composition
+from posefield.performance.script import resolve_script
+from posefield.question import json_decoding
 from posefield.question.motion_question import ClipQuestion
+from posefield.question.performance_question import PerformanceQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -32,6 +36,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 ADDON = ROOT / "clients/blender"
 TIMEOUT = 900.0
+MAX_FRAMES = 1000
 
 WALK = "cmu_walk"
 
@@ -171,6 +176,9 @@ class _Expected:
 
     def of(self, other: dict[str, Any]) -> Clip:
         """The clip as asked, but for what is other."""
+        script = other.get("script", self.case.get("script"))
+        if script is not None:
+            return self._on(self.case["body"], self._performed(script))
         question = dict(self.case["question"])
         body = other.get("body", self.case.get("body", "clip"))
         changed = {key: value for key, value in other.items() if key != "body"}
@@ -178,6 +186,12 @@ class _Expected:
             changed["controls"] = question["controls"] | changed["controls"]
         clip = clips.synthesize_clip(self.model, ClipQuestion(**question | changed)).clip
         return self._on(body, _cycles(clip, self.case.get("cycles", 1)))
+
+    def _performed(self, script: dict[str, Any]) -> Clip:
+        content = json.dumps(script).encode()
+        asked = json_decoding.decode_question(PerformanceQuestion, content)
+        resolved = resolve_script(asked, lambda _: self.model)
+        return composition.perform(resolved, MAX_FRAMES).clip
 
     def _on(self, body: str, clip: Clip) -> Clip:
         if body == "clip":

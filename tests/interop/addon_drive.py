@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import addon_motion
+import addon_perform
 import addon_trouble
 import bpy
 import numpy as np
@@ -78,6 +79,7 @@ if __name__ == "__main__":
         addon_motion.walking(*given)
     addon_motion.styles("styled")
     addon_motion.takes("stroll")
+    addon_perform.performed(json.loads(walks)[-1][0], (1.2, 1.0))
     addon_trouble.undone()
     addon_trouble.refused()
     addon_trouble.another_model(*json.loads(walks)[0][:2])

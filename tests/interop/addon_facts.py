@@ -135,4 +135,24 @@ FACTS: dict[str, Any] = {
     "off: threads": _is([]),
     "off: left": _is([]),
     "on again": _is(True),
+    "script: none": _holds("no text block is picked"),
+    "script: not drawn": _is(False),
+    "script: drawn": _is(True),
+    "script: markers": lambda found: (
+        [each[0].split()[:3] for each in found]
+        == [["go_on.json:", "0", "walk"], ["go_on.json:", "1", "walk"]]
+        and found[0][1] == 1 < found[1][1] <= 61
+    ),
+    "script: again": _is([1, 1, 2]),
+    "script: refused": _holds("go_on.json, line 13: ", "segments/1/tu"),
+    "script: line": lambda found: found.startswith('"tu"') or found == "[",
+    "script: no JSON": _holds("go_on.json, line 2: no JSON"),
+    "script: no text": _holds("no text block is named other; there are go_on.json"),
+    "script: unchanged": _is(True),
+    "script: no fit": _holds("the clip"),
+    "script: onto": _is([1, 2]),
+    "script: new": _is(2),
+    "a script: named": _is("go_on.json"),
+    "a script again: named": _is("go_on.json"),
+    "a script onto an armature: named": _is("go_on.json"),
 }

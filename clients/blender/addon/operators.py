@@ -24,15 +24,6 @@ from .without_blender.clips import Clip
 from .without_blender.service import Service
 from .without_blender.variation import Variation
 
-FINISHED, CANCELLED = {"FINISHED"}, {"CANCELLED"}
-
-
-def _ended(operator, sentences, level="INFO"):
-    session.current.tell(*sentences, failed=level == "ERROR")
-    for sentence in sentences:
-        operator.report({level}, sentence)
-    return CANCELLED if level == "ERROR" else FINISHED
-
 
 class POSEFIELD_OT_refresh(bpy.types.Operator):
     """Ask the service which models it has, and for the picked one's controls"""
@@ -46,8 +37,8 @@ class POSEFIELD_OT_refresh(bpy.types.Operator):
         try:
             questions.refresh(context, context.scene)
         except faults.Fault as fault:
-            return _ended(self, [str(fault)], "ERROR")
-        return _ended(self, [])
+            return session.ended(self, [str(fault)], "ERROR")
+        return session.ended(self, [])
 
 
 class POSEFIELD_OT_reset(bpy.types.Operator):
@@ -62,8 +53,8 @@ class POSEFIELD_OT_reset(bpy.types.Operator):
         try:
             sliders.reset(context.scene, questions.card_of(context.scene))
         except faults.Fault as fault:
-            return _ended(self, [str(fault)], "ERROR")
-        return FINISHED
+            return session.ended(self, [str(fault)], "ERROR")
+        return session.FINISHED
 
 
 class POSEFIELD_OT_next_take(bpy.types.Operator):
@@ -77,7 +68,7 @@ class POSEFIELD_OT_next_take(bpy.types.Operator):
         """Raise the seed by one."""
         own = context.scene.posefield
         own.take = variation.next_seed(own.take)
-        return FINISHED
+        return session.FINISHED
 
 
 class POSEFIELD_OT_import_clip(bpy.types.Operator):
@@ -164,7 +155,7 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             clip = clips.ask(asked, question)
             _check(armature, clip)
         except faults.Fault as fault:
-            return _ended(self, [str(fault)], "ERROR")
+            return session.ended(self, [str(fault)], "ERROR")
         if picked.card is not session.current.card:
             questions.take(context.scene, picked)
         said = self._put(context, armature, clip, question.loop)
@@ -173,7 +164,7 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
         questions.put_variation(context.scene.posefield, question.variation)
         sliders.put(context.scene, picked.card, others)
         self._tell(question.variation, clip, picked.card)
-        return _ended(self, said)
+        return session.ended(self, said)
 
     def _varied(self) -> dict[str, object]:
         """Return the given fields of Variation: take, variety, detail, feet and floor."""
@@ -194,16 +185,7 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
             self.report({"INFO"}, sentence)
 
     def _armature(self, context):
-        if self.onto == "NEW":
-            return None
-        found = context.view_layer.objects.active
-        if found is None or found.type != "ARMATURE":
-            raise faults.Mismatch(
-                f"the active object is {found.name if found else 'none'}, expected an armature"
-            )
-        if found.mode == "EDIT":
-            raise faults.Mismatch(f"{found.name} is being edited: leave edit mode first")
-        return found
+        return None if self.onto == "NEW" else rig.active(context)
 
     def _picked(self, asked: Service, scene) -> Picked:
         known, name = session.current.card is not None, scene.posefield.model_name

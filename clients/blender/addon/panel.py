@@ -23,6 +23,7 @@ class VIEW3D_PT_posefield(bpy.types.Panel):
         """Draw the panel; without a card, draw the reason in place of the controls."""
         layout, scene = self.layout, context.scene
         draw_service(layout, context)
+        draw_performance(layout, scene.posefield)
         try:
             card = questions.card_of(scene)
         except faults.Fault as fault:
@@ -43,6 +44,13 @@ def draw_service(layout, context) -> None:
     row.prop(preferences.of(context), "address", text="")
     row.operator("posefield.refresh", text="", icon="FILE_REFRESH")
     layout.prop(context.scene.posefield, "model")
+
+
+def draw_performance(layout, own) -> None:
+    """Draw the script of a performance and its button, in a file with texts."""
+    if own.script is not None or bpy.data.texts:
+        layout.prop(own, "script")
+        layout.operator("posefield.perform_script", icon="PLAY").set_scene = own.set_scene
 
 
 def draw_controls(layout, scene, card) -> None:

@@ -43,6 +43,12 @@ def frames(scene, clip: Clip, loop: bool) -> tuple[int, int]:
     return int(placing.start), max(last, int(placing.start))
 
 
+def frame_of(scene, clip: Clip, time: float) -> int:
+    """Return the frame of the scene that is nearest to a time of a clip, s."""
+    placing = _placing(scene, clip, False)
+    return round(placing.start + placing.step * clip.rate * time)
+
+
 def unrepeated(clip: Clip, loop: bool) -> list[str]:
     """Return the reason that a loop has no Cycles modifiers; empty if it has some."""
     turn = bones.heading_left(clip)

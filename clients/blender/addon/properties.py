@@ -191,6 +191,11 @@ class PosefieldSettings(bpy.types.PropertyGroup):
         description="The scene plays the clip as fast as it is, and from end to end",
         default=True,
     )
+    script: PointerProperty(
+        name="Script",
+        description="Text block with the script of a performance, in JSON",
+        type=bpy.types.Text,
+    )
     live: BoolProperty(
         name="Update in place as sliders move",
         description="The imported clip follows the controls",

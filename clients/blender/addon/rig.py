@@ -38,6 +38,23 @@ def _bones(edited, clip: Clip, card: Card) -> None:
             bone.parent = edited[parent]
 
 
+def active(context):
+    """Return the active armature; raise Mismatch for another object, and in edit mode."""
+    found = context.view_layer.objects.active
+    if found is None or found.type != "ARMATURE":
+        raise faults.Mismatch(
+            f"the active object is {found.name if found else 'none'}, expected an armature"
+        )
+    return editable(found)
+
+
+def editable(armature):
+    """Return an armature; raise Mismatch for one in edit mode."""
+    if armature.mode == "EDIT":
+        raise faults.Mismatch(f"{armature.name} is being edited: leave edit mode first")
+    return armature
+
+
 def check(armature, clip: Clip) -> None:
     """Raise Mismatch for an armature that does not fit the clip."""
     if not armature.is_editable or not armature.data.is_editable:

@@ -27,6 +27,19 @@ class Session:
 
 current = Session()
 
+FINISHED, CANCELLED = {"FINISHED"}, {"CANCELLED"}
+
+
+def ended(operator, sentences, level="INFO"):
+    """Report an operator's sentences, show them in the panel, and return its outcome.
+
+    level: of the report; "ERROR" for an operator that has changed nothing.
+    """
+    current.tell(*sentences, failed=level == "ERROR")
+    for sentence in sentences:
+        operator.report({level}, sentence)
+    return CANCELLED if level == "ERROR" else FINISHED
+
 
 def forget() -> None:
     """Clear the state."""

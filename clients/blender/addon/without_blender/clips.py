@@ -4,6 +4,7 @@ import io
 import json
 import math
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -100,23 +101,28 @@ def ask(service: Service, question: Question) -> Clip:
     return decode(content)
 
 
-def decode(content: bytes) -> Clip:
-    """Return the clip of an npz file with Y up, in metres; Unintelligible describes an error."""
+def decode(content: bytes, check: Callable[[dict[str, Any]], None] | None = None) -> Clip:
+    """Return the clip of an npz file with Y up, in metres; Unintelligible describes an error.
+
+    check: of the trust, raises ValueError, KeyError or TypeError; by default that of a clip.
+    """
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as found:
-            return _clip(found)
+            return _clip(found, check or _check_trust)
     except (ValueError, KeyError, TypeError, OSError, EOFError, zipfile.BadZipFile) as fault:
         raise faults.Unintelligible(f"the clip cannot be read: {fault}") from fault
 
 
-def _clip(found: Any) -> Clip:
+def _clip(found: Any, check: Callable[[dict[str, Any]], None]) -> Clip:
     names = [str(name) for name in found["names"]]
     rotations = np.asarray(found["rotations"], dtype=float)
     path = np.asarray(found["root_position"], dtype=float)
     offsets = np.asarray(found["bone_offsets"], dtype=float)
     rate, trust = float(found["rate"]), json.loads(str(found["trust"]))
     _check(json.loads(str(found["units"])), names, (rotations, path, offsets))
-    _check_said(rate, trust)
+    if not (math.isfinite(rate) and rate > 0):
+        raise ValueError(f"{rate:g} frames a second, expected more than 0")
+    check(trust)
     return Clip(
         parents=parents_by_name(names, found["parents"].tolist()),
         rotations=axes.unrolled(axes.z_up_turns(rotations)),
@@ -144,9 +150,7 @@ def _check(units: dict[str, str], names: list[str], arrays: tuple[Floats, Floats
         raise ValueError(f"a quaternion whose length is {furthest:.2g} off one")
 
 
-def _check_said(rate: float, trust: dict[str, Any]) -> None:
-    if not (math.isfinite(rate) and rate > 0):
-        raise ValueError(f"{rate:g} frames a second, expected more than 0")
+def _check_trust(trust: dict[str, Any]) -> None:
     known = isinstance(trust["model"], str) and isinstance(trust["controls"], dict)
     if not (known and math.isfinite(trust["sigma"])):
         raise ValueError(f"trust is {trust}, expected a model, its controls and a finite sigma")

@@ -8,6 +8,7 @@ Fault
 ├── CutOff          the response is incomplete
 ├── Unintelligible  not a posefield service, or of another version
 ├── Refused         problem document of the service (RFC 9457)
+├── InScript        error in the script of a performance, with its line
 └── Mismatch        the clip does not fit the armature
 """
 
@@ -49,8 +50,11 @@ class Mismatch(Fault):
 class Refused(Fault):
     """The service refused the request.
 
-    status: of HTTP. kind: type of the problem, such as `outside-samples`.
+    status: of HTTP. kind: type of the problem, such as `outside-samples`. pointer: JSON pointer to
+    the cause in the body; None if it is not stated.
     """
+
+    pointer: str | None = None
 
     def __init__(self, status: int, kind: str, title: str, detail: str) -> None:
         super().__init__(f"{title} ({status}): {detail}" if detail else f"{title} ({status})")
@@ -58,11 +62,26 @@ class Refused(Fault):
         self.kind = kind
 
 
+class InScript(Fault):
+    """The script of a performance cannot be performed.
+
+    pointer: JSON pointer to the cause. line: its line in the text, from 1.
+    """
+
+    def __init__(self, words: str, pointer: str, line: int) -> None:
+        super().__init__(f"line {line}: {words}")
+        self.pointer = pointer
+        self.line = line
+
+
 def of_problem(status: int, content: bytes) -> Refused:
     """Return the error of a problem document, or of the status alone if the document is invalid."""
     try:
         document = json.loads(content)
         kind = str(document["type"]).rpartition(":")[2].rpartition("/")[2]
-        return Refused(status, kind, document["title"], document["detail"])
-    except (ValueError, KeyError, TypeError):
+        found = Refused(status, kind, document["title"], document["detail"])
+        pointers = [each.get("pointer") for each in document.get("errors", [])]
+        found.pointer = next((each for each in pointers if isinstance(each, str)), None)
+        return found
+    except (ValueError, KeyError, TypeError, AttributeError):
         return Refused(status, "", "The service answers no question", "it does not say why")
