@@ -25,7 +25,8 @@ class Row:
         """Return whether the goal is met; None without a goal."""
         if self.goal is None:
             return None
-        return self.value <= self.goal if self.ratio is None else self.ratio >= self.goal
+        # Numbers may be NumPy's, whose comparisons JSON does not know.
+        return bool(self.value <= self.goal if self.ratio is None else self.ratio >= self.goal)
 
 
 def table(rows: list[Row]) -> str:

@@ -1,0 +1,216 @@
+"""Performances of trained models: joins, feet, paths, processor time, memory, and random scripts.
+
+MODELS are the files of hdm05_grab_high, hdm05_grab_return, hdm05_deposit_floor and
+hdm05_deposit_return; the walk is the shipped one.
+"""
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import random_scripts
+from performance_costs import (
+    TARGETS,
+    WALK,
+    Figure,
+    Find,
+    Made,
+    make,
+    memory_rows,
+    time_rows,
+    whole,
+)
+from random_scripts import Document
+from rows import Row, record, table
+
+from posefield.common.array_shapes import Frames
+from posefield.feet import foot_placement
+from posefield.performance import composition
+from posefield.performance.passages.passage import RATE
+from posefield.registry import model_registry, shipped_models
+from posefield.synthesis.synthesizer import Synthesizer
+
+ROOT = Path(__file__).resolve().parents[1]
+BENDS = [[1.0, 4.0], [0.0, 8.0], [-1.0, 12.0], [0.0, 16.0], [0.0, 22.0]]
+CURVE = [[0.0, 0.8], [7.0, 0.8], [10.0, 1.4], [16.0, 1.4], [18.0, 1.0]]
+NEAR = (0.1, 0.6)
+"""Times before and after a join in which feet that stand are looked at, s."""
+
+
+def whole_rows(find: Find) -> list[Row]:
+    """Return the figures of whole performances with several targets."""
+    made = [make(whole(target), find) for target in TARGETS]
+    peaks = [max(join.peak for join in own.answer.trust.joins) for own in made]
+    feet = [own.answer.trust.feet for own in made]
+    skates = [100.0 * own.skate for own in feet if own is not None]
+    before = 100.0 * float(np.mean([own.skate_before for own in feet if own is not None]))
+    slides, lowered = zip(*map(stood, made), strict=True)
+    missed = [1000.0 * _missed(*pair) for pair in zip(made, TARGETS, strict=True)]
+    said = f"{len(made)} targets; mean of the worst joins {np.mean(peaks):.3g}"
+    title = "walk, grab, hold, return, walk"
+    worst = f"mean {np.mean(skates):.2g}; without placed feet {before:.2g}"
+    return [
+        Figure(f"{title}: largest peak at a join", max(peaks), "m/s²", said, None, 16.0, 8.0),
+        Figure(f"{title}: feet skate, worst", max(skates), "cm/s", worst, None, 8.0, 2.0),
+        _lowering(f"{title}: pelvis lowered", [value for own in lowered for value in own]),
+        _sliding(f"{title}: slide of standing feet at joins", [x for own in slides for x in own]),
+        Figure(
+            f"{title}: hand from its target",
+            max(missed),
+            "mm",
+            f"worst; mean {np.mean(missed):.2g}",
+            None,
+            1.0,
+        ),
+    ]
+
+
+def _lowering(name: str, lowered: Sequence[float]) -> Row:
+    mean, worst = float(np.mean(lowered)), max(lowered)
+    return Figure(name, mean, "cm", f"mean; worst {worst:.2g}", None, 5.0, 2.0)
+
+
+def _sliding(name: str, slides: Sequence[float]) -> Row:
+    said = f"90th percentile of {len(slides)}; worst {max(slides):.2g}"
+    found = round(float(np.percentile(slides, 90)), 3)
+    return Figure(name, found, "cm", said, None, 1.0, 0.2)
+
+
+def stood(made: Made) -> tuple[list[float], Frames]:
+    """Return how far each foot that stands at a join slides, and how low the pelvis is, cm."""
+    plan = composition.plan_feet(made.script, made.composed)
+    motion, timeline = made.composed.motion, made.composed.timeline
+    times = np.arange(len(motion)) / RATE
+    paths = foot_placement.foot_paths(plan).after
+    slides = []
+    for seam in timeline.seams:
+        time = (seam.frame - timeline.begin) / RATE
+        near = (times >= time - NEAR[0]) & (times <= time + NEAR[1])
+        for foot, steps in enumerate(plan.steps):
+            for stance in steps.stances:
+                if near[stance.begin : stance.end].any():
+                    path = paths[stance.begin : stance.end, foot][:, [0, 2]]
+                    slides.append(100.0 * float(np.linalg.norm(path - path[0], axis=-1).max()))
+    return slides, 100.0 * np.abs(plan.lowered - plan.grounded)
+
+
+def _missed(made: Made, target: Sequence[float]) -> float:
+    """Return how far the hand is from its target at the event in the clip, m."""
+    clip, report = made.answer.clip, made.answer.trust
+    hand = clip.skeleton.names.index("rhand")
+    frame = round((report.segments[1].event or 0.0) * clip.rate)
+    return float(np.linalg.norm(clip.positions()[frame, hand] - np.array(target)))
+
+
+def walk_rows(find: Find) -> list[Row]:
+    """Return how walks follow paths, and how feet skate in starts and stops."""
+    ways = {
+        "straight": {"to": [0.0, 20.0], "speed": 1.2},
+        "with changes of speed": {"to": [0.0, 24.0], "speed": CURVE},
+        "along bends": {"along": BENDS, "speed": 1.0},
+        "turning": {"seconds": 12.0, "turn": 0.15, "speed": 1.1},
+    }
+    found: dict[str, tuple[float, float, float]] = {}
+    for name, way in ways.items():
+        made = make(_walk(way), find)
+        path = made.answer.trust.segments[0].path
+        if path is not None:
+            found[name] = (100.0 * path.lateral, np.degrees(path.heading), 100.0 * path.speed)
+    worst = {part: max(found, key=lambda name: found[name][part]) for part in range(3)}
+    rows: list[Row] = [
+        Figure(
+            f"path following, means over cycles: {name}",
+            found[worst[part]][part],
+            unit,
+            f"worst of {len(found)} walks: {worst[part]}",
+            None,
+            must,
+            0.5,
+        )
+        for part, (name, unit, must) in enumerate(
+            [("lateral", "cm", 2.5), ("heading", "°", 1.5), ("speed", "cm/s", 2.0)]
+        )
+    ]
+    return [*rows, *_starts(find)]
+
+
+def _walk(way: Mapping[str, object]) -> Document:
+    return {"fps": RATE, "segments": [{"kind": "walk", "model": WALK, **way}]}
+
+
+def _starts(find: Find) -> list[Row]:
+    """Return the skate of walks that start and stop over that of steady ones."""
+    way = {"to": [0.0, 12.0], "speed": 1.1}
+    steady, both = (
+        make(_walk(way | ends), find).answer.trust.feet
+        for ends in ({}, {"start": "standing", "stop": "standing"})
+    )
+    if steady is None or both is None:
+        raise ValueError("no feet, expected feet that stand")
+    ratio = both.skate_before / steady.skate_before
+    said = (
+        f"{100 * both.skate_before:.3g} and {100 * steady.skate_before:.3g} cm/s; with placed feet "
+        f"{100 * both.skate:.2g} and {100 * steady.skate:.2g}"
+    )
+    return [Figure("starts and stops: skate over steady walk", ratio, "times", said, None, 1.1)]
+
+
+def flag_rows(find: Find) -> list[Row]:
+    """Return the share of joins of a squat and a stoop that no flag tells of."""
+    heights = [(low, high) for low in (0.45, 0.5, 0.55) for high in (0.85, 0.9, 0.95)]
+    pairs = [*heights, *(pair[::-1] for pair in heights)]
+    joins = [make(_deposited(*pair), find).answer.trust.joins[0] for pair in pairs]
+    missed = 100.0 * float(np.mean([not own.hard for own in joins]))
+    said = f"of {len(joins)} joins of models"
+    return [Figure("squat into stoop: joins not flagged", missed, "%", said, None, 0.0)]
+
+
+def _deposited(first: float, second: float) -> Document:
+    acts = [("hdm05_deposit_floor", first), ("hdm05_deposit_return", second)]
+    return {
+        "fps": RATE,
+        "segments": [
+            {"kind": "act", "model": name, "controls": {"root_height": height}}
+            for name, height in acts
+        ],
+    }
+
+
+def random_rows(models: Mapping[str, Synthesizer], count: int) -> list[Row]:
+    """Return how many random scripts have a fault."""
+    cast = random_scripts.cast(models)
+    faulty = refused = 0
+    for number, document in enumerate(random_scripts.scripts(cast, count)):
+        found = random_scripts.check(document, cast.find)
+        refused += bool(found.refused)
+        faulty += bool(found.faults)
+        for fault in found.faults:
+            print(f"script {number}: {fault}", file=sys.stderr)
+    said = f"of {count}; {refused} refused with a pointer"
+    return [Figure("random scripts with a fault", faulty, "scripts", said, None, 0.0)]
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the figures; write them where the documentation reads them if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("models", type=Path, nargs="+", help="model files")
+    parser.add_argument("--scripts", type=int, default=1000, help="number of random scripts")
+    parser.add_argument("--record", action="store_true")
+    given = parser.parse_args(arguments)
+    models = {
+        **model_registry.load([shipped_models.FOLDER / f"{WALK}.onnx"]).models,
+        **model_registry.load(given.models).models,
+    }
+    find = models.__getitem__
+    found = [*whole_rows(find), *walk_rows(find), *flag_rows(find), *time_rows(find)]
+    found += [*memory_rows(), *random_rows(models, given.scripts)]
+    print(table(found))
+    if given.record:
+        command = f"python benchmarks/performances.py MODELS --scripts {given.scripts} --record"
+        record({"performed": found}, command, ROOT / "docs/results")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,299 @@
+"""Random scripts of performances that the schema takes, and checks of what is made of them."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from posefield.common.array_shapes import Frames, Positions
+from posefield.common.errors import QueryError
+from posefield.locomotion import gait
+from posefield.motion.clip import Clip
+from posefield.performance import composition
+from posefield.performance.script import Script, resolve_script
+from posefield.question import json_decoding
+from posefield.question.performance_question import Act, PerformanceQuestion
+from posefield.question.performance_report import PerformanceAnswer
+from posefield.synthesis.synthesizer import Synthesizer
+
+FPS = 60.0
+MOST_FRAMES = 100_000
+MOST_PEAK = 3.0
+"""Acceleration over the usual one from which on a frame is a jump."""
+BEFORE, AFTER = 0.1, 0.6
+"""Times before and after a join that belong to it, s."""
+DEEPEST = 0.0105
+"""How far a foot may be below the floor, m: feet may be uneven by 1 cm."""
+
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Cast:
+    """Models that scripts are drawn from. walks: with their slowest and fastest speeds, m/s."""
+
+    walks: Mapping[str, tuple[float, float]]
+    acts: Mapping[str, Synthesizer]
+    models: Mapping[str, Synthesizer]
+
+    def find(self, name: str) -> Synthesizer:
+        """Return the model of a name."""
+        return self.models[name]
+
+
+def cast(models: Mapping[str, Synthesizer]) -> Cast:
+    """Return models as the cast of random scripts."""
+    walks, acts = {}, {}
+    for name, model in models.items():
+        if model.session.card.cyclic:
+            walks[name] = gait.fit_gait(model.session).region.speeds
+        else:
+            acts[name] = model
+    return Cast(walks, acts, models)
+
+
+def scripts(cast: Cast, count: int, seed: int = 0) -> Iterator[Document]:
+    """Yield random scripts as JSON values."""
+    for number in range(count):
+        yield draw(cast, np.random.Generator(np.random.PCG64([seed, number])))
+
+
+def draw(cast: Cast, rng: np.random.Generator) -> Document:
+    """Return a random script of one to six segments."""
+    here, segments = [0.0, 0.0], []
+    for _ in range(int(rng.integers(1, 7))):
+        if cast.acts and rng.random() < 0.1:
+            segments += _lead(cast, rng, here)
+            continue
+        kinds = ["walk"] * 3 + ["act"] * (3 if cast.acts else 0) + (["hold"] if segments else [])
+        kind = str(rng.choice(kinds))
+        made = {"walk": _walk, "act": _act, "hold": _hold}[kind]
+        segments.append(made(cast, rng, here))
+    found: Document = {"segments": segments, "fps": FPS}
+    if rng.random() < 0.3:
+        position = [_round(value) for value in rng.uniform(-3.0, 3.0, 2)]
+        found["start"] = {"position": position, "heading": _round(rng.uniform(-1.2, 1.2))}
+    if rng.random() < 0.3:
+        found |= {"take": int(rng.integers(0, 1000)), "detail": bool(rng.random() < 0.5)}
+    if rng.random() < 0.2:
+        found["feet"] = "as_predicted"
+    if rng.random() < 0.2:
+        found["extrapolate"] = "refuse"
+    return found
+
+
+def _walk(cast: Cast, rng: np.random.Generator, here: list[float]) -> Document:
+    name = str(rng.choice(list(cast.walks)))
+    low, high = cast.walks[name]
+    speeds = rng.uniform(low, min(high, 1.8), 3)
+    own: Document = {"kind": "walk", "model": name}
+    if rng.random() < 0.7:
+        own["speed"] = _round(speeds[0])
+    elif rng.random() < 0.5:
+        pairs = zip((0.0, 2.0, 5.0), speeds, strict=True)
+        own["speed"] = [[place, _round(speed)] for place, speed in pairs]
+        own["speed_over"] = str(rng.choice(["distance", "time"]))
+    way = str(rng.choice(["seconds", "seconds", "seconds", "to", "along"]))
+    if way == "seconds":
+        own["seconds"] = _round(rng.uniform(0.3, 6.0))
+        if rng.random() < 0.5:
+            own["turn"] = _round(rng.uniform(-0.4, 0.4))
+    elif way == "to":
+        own["to"] = _ahead(rng, here)
+    elif way == "along":
+        own["along"] = [_ahead(rng, here) for _ in range(int(rng.integers(1, 4)))]
+    for end in ("start", "stop"):
+        if rng.random() < 0.25:
+            own[end] = "standing"
+    return own | _joined(rng)
+
+
+def _lead(cast: Cast, rng: np.random.Generator, here: list[float]) -> list[Document]:
+    """Return a walk without an end of its own, and the act that it leads to."""
+    own = {"kind": "walk", "model": str(rng.choice(list(cast.walks)))}
+    act = _act(cast, rng, here)
+    if "at" not in act:
+        targets = act.get("targets", [])
+        if not targets or targets[0]["frame"] != "world":
+            act |= {"at": _ahead(rng, here), "targets": []}
+    return [own, act]
+
+
+def _ahead(rng: np.random.Generator, here: list[float]) -> list[float]:
+    here[0] += float(rng.normal(0.0, 0.7))
+    here[1] += float(rng.uniform(2.0, 8.0))
+    return [_round(value) for value in here]
+
+
+def _act(cast: Cast, rng: np.random.Generator, here: list[float]) -> Document:
+    name = str(rng.choice(list(cast.acts)))
+    card = cast.acts[name].session.card
+    own: Document = {"kind": "act", "model": name}
+    if rng.random() < 0.5:
+        own["controls"] = {
+            each.name: _round(rng.uniform(each.minimum, each.maximum))
+            for each in card.controls
+            if rng.random() < 0.7
+        }
+    if card.performers and rng.random() < 0.3:
+        own["performer"] = str(rng.choice(card.performers))
+    if rng.random() < 0.5 and card.event is not None:
+        own["targets"] = [_target(cast.acts[name], rng, here)]
+    if rng.random() < 0.3:
+        own["at"] = _ahead(rng, here)
+        own["facing"] = _round(rng.uniform(-3.2, 3.2))
+    return own | _joined(rng)
+
+
+def _target(model: Synthesizer, rng: np.random.Generator, here: list[float]) -> Document:
+    card = model.session.card
+    frame = str(rng.choice(["world", "segment"]))
+    height = [own for own in card.controls if "height" in own.name]
+    low, high = (height[0].minimum, height[0].maximum) if height else (0.2, 1.5)
+    x, z = _ahead(rng, list(here)) if frame == "world" else rng.uniform(-0.3, 0.8, 2)
+    joint = card.skeleton.names[card.event.joint] if card.event else card.skeleton.names[-1]
+    position = [_round(x), _round(rng.uniform(low, high)), _round(z)]
+    return {"joint": joint, "position": position, "at": "event", "frame": frame}
+
+
+def _hold(cast: Cast, rng: np.random.Generator, here: list[float]) -> Document:
+    own: Document = {"kind": "hold", "seconds": _round(rng.uniform(0.1, 3.0))}
+    if rng.random() < 0.3:
+        own["look_at"] = [_round(value) for value in rng.uniform([-3, 0, 0], [3, 2, 9])]
+    return own
+
+
+def _joined(rng: np.random.Generator) -> Document:
+    if rng.random() < 0.8:
+        return {}
+    kinds = ["auto", "dead", "hermite"]
+    return {"join": {"seconds": _round(rng.uniform(0.1, 0.8)), "blend": str(rng.choice(kinds))}}
+
+
+def _round(value: float) -> float:
+    return round(float(value), 3)
+
+
+@dataclass
+class Outcome:
+    """What became of a script. faults: what is wrong with it; refused: the message of a refusal."""
+
+    faults: list[str] = field(default_factory=list)
+    refused: str = ""
+    answer: PerformanceAnswer | None = None
+
+
+def check(document: Document, find: Callable[[str], Synthesizer]) -> Outcome:
+    """Return what becomes of a script, and all that is wrong with it."""
+    question = read(document)
+    try:
+        script = resolve_script(question, find)
+        answer = composition.perform(script, MOST_FRAMES)
+    except QueryError as refusal:
+        said = f"/{refusal.field}: {refusal.message}"
+        known = exists(msgspec.to_builtins(question), f"/{refusal.field}")
+        return Outcome([] if known else [f"no such pointer: {said}"], said)
+    return Outcome(list(faults(script, answer)), "", answer)
+
+
+def read(document: Document) -> PerformanceQuestion:
+    """Return the script of a JSON value."""
+    return json_decoding.decode_question(PerformanceQuestion, msgspec.json.encode(document))
+
+
+def exists(document: Any, pointer: str) -> bool:
+    """Return whether a JSON pointer leads to a value of a document."""
+    for part in pointer.split("/")[1:]:
+        if isinstance(document, list | tuple):
+            if not part.isdecimal() or int(part) >= len(document):
+                return False
+            document = document[int(part)]
+        elif isinstance(document, dict) and part in document:
+            document = document[part]
+        else:
+            return False
+    return True
+
+
+def faults(script: Script, answer: PerformanceAnswer) -> Iterator[str]:
+    """Yield all that is wrong with a performance."""
+    clip, report = answer.clip, answer.trust
+    numbers = (clip.rotations, clip.translations, clip.root_path)
+    if not all(np.isfinite(own).all() for own in numbers):
+        yield "numbers that are not finite"
+        return
+    if len(clip) != report.frames:
+        yield f"{len(clip)} frames, {report.frames} said"
+    lengths = np.linalg.norm(clip.rotations, axis=-1)
+    if np.abs(lengths - 1.0).max() > 1e-5:
+        yield f"quaternions of length {lengths.min():g} to {lengths.max():g}"
+    for own in report.script_warnings:
+        if not exists(msgspec.to_builtins(script.question), own.pointer):
+            yield f"no such pointer in a warning: {own.sentence}"
+    positions = clip.positions()
+    yield from _timeline(answer)
+    yield from _jumps(answer, accelerations(clip, positions))
+    yield from _depth(script, positions)
+
+
+def accelerations(clip: Clip, positions: Positions) -> Frames:
+    """Return the mean accelerations (F,) of the joints relative to the root, m/s²; ends are 0."""
+    found = positions - positions[:, :1]
+    means = np.zeros(len(clip))
+    if len(clip) > 2:
+        second = np.diff(found, n=2, axis=0) * clip.rate**2
+        means[1:-1] = np.linalg.norm(second, axis=-1).mean(axis=-1)
+    return means
+
+
+def _timeline(answer: PerformanceAnswer) -> Iterator[str]:
+    report = answer.trust
+    ends = [own.ends for own in report.segments]
+    begins = [own.begins for own in report.segments]
+    if begins[0] != 0.0 or abs(ends[-1] - report.duration) > 1e-5 or begins[1:] != ends[:-1]:
+        yield f"segments from {begins} to {ends}, {report.duration} s in all"
+    if any(own.ends < own.begins for own in report.segments):
+        yield f"a segment ends before it begins: {begins}, {ends}"
+    if any(not math.isfinite(own.sigma) for own in report.segments):
+        yield "a sigma that is not finite"
+
+
+def _jumps(answer: PerformanceAnswer, found: Frames) -> Iterator[str]:
+    """Yield jumps that no join tells of."""
+    joins = answer.trust.joins
+    usual = max((own.usual for own in joins), default=float(np.percentile(found, 99.0)))
+    times = np.arange(len(found)) / answer.clip.rate
+    free = np.ones(len(found), dtype=bool)
+    for own in joins:
+        near = (times >= own.time - BEFORE) & (times <= own.time + AFTER)
+        free &= ~near
+        peak = float(found[near].max(initial=0.0))
+        allowed = max(own.peak, MOST_PEAK * own.usual)
+        if not own.hard and peak > allowed:
+            yield (
+                f"join at {own.time:.2f} s: {peak:.1f} m/s², {own.peak:.1f} said, usual "
+                f"{own.usual:.1f}"
+            )
+    worst = float(found[free].max(initial=0.0))
+    if worst > MOST_PEAK * usual:
+        time = float(times[free][np.argmax(found[free])])
+        yield f"{worst:.1f} m/s² at {time:.2f} s, away from joins; usual {usual:.1f}"
+
+
+def _depth(script: Script, positions: Positions) -> Iterator[str]:
+    feet = script.character.feet
+    if script.question.feet != "stand" or not feet:
+        return
+    # A foot with a target goes where its act leads it.
+    acts = [own for own in script.segments if isinstance(own, Act)]
+    led = {each.joint for own in acts for each in own.targets}
+    for foot, known in zip(feet, script.character.contacts, strict=True):
+        if script.character.skeleton.names[foot] in led:
+            continue
+        depth = known.height - float(positions[:, foot, 1].min())
+        if depth > DEEPEST:
+            frame = int(np.argmin(positions[:, foot, 1]))
+            yield f"foot {foot} is {100 * depth:.1f} cm below the floor in frame {frame}"
