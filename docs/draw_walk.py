@@ -1,4 +1,4 @@
-"""Draws the README's moving picture: a walk whose speed follows a slider.
+"""Draws the guide's moving picture of a control: a walk whose speed follows a slider.
 
 .venv/bin/python docs/draw_walk.py build/models/cmu_walk.onnx docs/walk.gif
 

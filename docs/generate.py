@@ -24,6 +24,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "results/quality.md": lambda: data_pages.results("quality"),
     "results/targets.md": lambda: data_pages.results("targets"),
     "results/support.md": lambda: data_pages.results("support"),
+    "results/performances.md": lambda: data_pages.results("performances"),
     "results/speed.md": lambda: data_pages.results("speed"),
 }
 

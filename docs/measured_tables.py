@@ -133,16 +133,16 @@ def _learning(found: Found) -> Rows:
 def _value(row: Found) -> str:
     if row["value"] is None:
         return ""
-    others = [_number(value) for value in row.get("other_runs", []) if row["ratio"] is None]
-    text = f"{_number(row['value'])} {row['unit']}"
+    others = [number(value) for value in row.get("other_runs", []) if row["ratio"] is None]
+    text = f"{number(row['value'])} {row['unit']}"
     return f"{text} ({' and '.join(others)} in other runs)" if others else text
 
 
 def _ratio(row: Found) -> str:
     if row["ratio"] is None:
         return ""
-    others = [_number(value) for value in row.get("other_runs", [])]
-    text = _number(row["ratio"])
+    others = [number(value) for value in row.get("other_runs", [])]
+    text = number(row["ratio"])
     return f"{text} ({' and '.join(others)} in other runs)" if others else text
 
 
@@ -150,9 +150,9 @@ def _goal(row: Found) -> str:
     if row["goal"] is None:
         return ""
     unit = row["unit"] if row["ratio"] is None else "times"
-    return f"{_number(row['goal'])} {unit}, {'met' if row['met'] else '**missed**'}"
+    return f"{number(row['goal'])} {unit}, {'met' if row['met'] else '**missed**'}"
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
     """Return a number with three significant digits, and groups of thousands."""
     return f"{float(f'{value:.3g}'):,.0f}" if abs(value) >= 1000 else f"{value:.3g}"

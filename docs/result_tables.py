@@ -6,6 +6,7 @@ from itertools import chain
 import equal_tables
 import evaluation_tables as tables
 import measured_tables
+import performed_tables
 import take_tables
 from evaluation_tables import Rows, known_performer, new_performer
 
@@ -58,6 +59,8 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
     "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
     "learning": measured_tables.learning,
+    "performed": lambda: (performed_tables.COLUMNS, performed_tables.performed()),
+    "joins": lambda: (performed_tables.COLUMNS, performed_tables.joins()),
     **{
         name: lambda name=name: (measured_tables.SPEED_COLUMNS, measured_tables.speed(name))
         for name in SPEED
@@ -73,6 +76,6 @@ REMARKS: dict[str, Callable[[], str]] = {
 """A sentence made of the rows of a table, for some of them."""
 
 ORIGINS: dict[str, str] = {"recipes": "models", "levels": "models", "learning": "learning"} | {
-    name: name for name in SPEED
+    name: name for name in (*SPEED, "performed", "joins")
 }
 """File of docs/results that names the command and the date of a table's figures."""
