@@ -18,6 +18,12 @@ from posefield.batch.rows.columns import OPTION_KINDS
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api.problems import PROBLEM_KINDS
 from posefield.http.api.settings import PREFIX, Settings
+from posefield.http.performance_operations import MAX_SCRIPT_BYTES
+from posefield.performance.joins import join_quality
+from posefield.performance.script import MAX_SECONDS
+from posefield.question import json_decoding
+from posefield.question.performance_question import MAX_SEGMENTS, PerformanceQuestion
+from posefield.question.performance_report import JoinReport, PerformanceReport
 from posefield_train.cli import commands
 from posefield_train.source.recipe import Recipe
 
@@ -51,9 +57,9 @@ def test_the_readme_is_short():
     assert len(re.findall(r"^!\[", text, re.MULTILINE)) == 1
 
 
-def test_architecture_is_ten_short_pages():
+def test_architecture_is_eleven_short_pages():
     pages = sorted((DOCS / "architecture").glob("*.md"))
-    assert [path.name[:2] for path in pages] == [f"{number:02d}" for number in range(10)]
+    assert [path.name[:2] for path in pages] == [f"{number:02d}" for number in range(11)]
     assert [
         path.name for path in pages if len(path.read_text().splitlines()) > MOST_PAGE_LINES
     ] == []
@@ -221,3 +227,40 @@ def test_whole_recipes_in_the_documents_are_valid():
     whole = [each for each in found if "schema" in each]
     assert len(found) > 4 and len(whole) == 1
     assert Recipe.model_validate(whole[0]).name == "my_walk"
+
+
+# --- performances in the documents ----------------------------------------------------------------
+
+
+def scripts_of_performances():
+    """Return the scripts of the guide: files that its examples write, and JSON blocks."""
+    text = page("guide/performances.md")
+    written = re.findall(r"<<'END'\n(.*?)\nEND\n", text, re.DOTALL)
+    shown = [each.text for each in document_pages.blocks(text) if each.language == "json"]
+    return [*written, *shown]
+
+
+def test_scripts_of_performances_in_the_guide_are_valid():
+    found = [
+        json_decoding.decode_question(PerformanceQuestion, text.encode())
+        for text in scripts_of_performances()
+    ]
+    # The fifth script for the shipped models is a Python example.
+    assert len(found) == 5
+    kinds = [type(each).__name__ for each in found[-1].segments]
+    assert kinds == ["Walk", "Act", "Hold", "Act", "Walk"]
+
+
+def test_every_field_of_a_performance_report_is_described():
+    text = page("guide/performances.md")
+    names = {each.name for kind in (PerformanceReport, JoinReport) for each in fields(kind)}
+    own = {"begins", "ends", "place", "heading", "event", "targets", "path", "pointer", "message"}
+    assert undescribed(sorted(names - {"script_warnings"} | own | {"warnings"}), text) == []
+
+
+def test_the_limits_of_performances_are_those_of_the_code():
+    text = page("guide/performances.md")
+    assert f"at most {MAX_SCRIPT_BYTES // 1024} KiB and {MAX_SEGMENTS} segments" in text
+    assert MAX_SECONDS == 600.0 and "a performance ten minutes" in text
+    assert f"poses more than {100 * join_quality.MOST_DISTANCE:.0f} cm apart" in text
+    assert f"heights differ by {100 * join_quality.MOST_DROP:.0f} cm" in text

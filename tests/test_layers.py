@@ -176,7 +176,7 @@ def test_onnxruntime_by_itself_would_not_find_it_off():
 
 
 # What a request may need and the start must not pay for: 0.25 of 0.85 CPU seconds.
-LATE = ("pxr", "jinja2", "obstore", "scipy", "onnx", "rich.progress")
+LATE = ("pxr", "jinja2", "obstore", "mcp", "scipy", "onnx", "rich.progress")
 
 
 @pytest.mark.parametrize("module", ["posefield.cli", "posefield.http.app", "posefield_train.cli"])

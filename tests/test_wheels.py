@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 BIN = Path(sys.executable).parent
 NAMES = ("posefield", "posefield-train")
 SHIPPED = [f"posefield/shipped/{name}" for name in ("cmu_walk.onnx", "reaching.onnx", "NOTICE")]
-TABLES = ("cmu_walk/strides.csv", "hdm05_reach/clips.csv", "hdm05_kick/clips.csv")
+TABLES = ("cmu_walk/strides.csv", "hdm05_reach/returns.csv", "hdm05_kick/clips.csv")
 
 pytestmark = pytest.mark.system
 
