@@ -218,6 +218,9 @@ def narrowed(spec, card):
     # Nor can it say which formats have a body.
     for question in ("ClipQuestion", "ClipsQuestion"):
         del parts["schemas"][question]["properties"]["body"]
+    # Feet of this model are as predicted, so that they stand on no floor but the level one.
+    parts["schemas"]["FloorValue"] = {"enum": [0.0]}
+    parts["parameters"]["floor"]["schema"] = {"enum": ["0"]}
     # That names differ cannot be said in a schema.
     del parts["schemas"]["NamedClipQuestion"]["properties"]["name"]
     parts["schemas"]["ClipsQuestion"]["properties"]["clips"]["maxItems"] = 3
@@ -255,6 +258,9 @@ def narrowed(spec, card):
     for name in ("label", "whoseLabel"):
         parts["parameters"][name]["schema"] = {"type": "array", "maxItems": 0}
     parts["schemas"]["Labels"] = {"type": "object", "additionalProperties": False}
+    # Which segments follow one another, and which fields exclude each other, no schema can say.
+    for path in ("performances", "performances.{format}"):
+        del narrow["paths"][f"/v1/{path}"]
     crowd = parts["schemas"]["CrowdQuestion"]["properties"]
     crowd["labels"] = {"type": "object", "additionalProperties": False}
     for parameter in parts["parameters"].values():

@@ -14,6 +14,7 @@ export interface Control {
 export interface Model {
   readonly name: string;
   readonly controls: readonly Control[];
+  readonly cyclic?: boolean;
 }
 
 type Values = Readonly<Record<string, Json>>;
@@ -62,7 +63,7 @@ export function foldDescription(document: JsonObject): void {
 }
 
 /** Values of parameters and properties by name: the smallest question that the model answers. */
-function valuesOf({ name, controls }: Model): Values {
+function valuesOf({ name, controls, cyclic = false }: Model): Values {
   const given = Object.fromEntries(controls.map((control) => [control.name, control.default]));
   const [across, along] = controls.map((control) => control.name);
   return {
@@ -71,6 +72,9 @@ function valuesOf({ name, controls }: Model): Values {
     time: [0],
     times: [0],
     clips: [{ name: "first", controls: given }],
+    segments: cyclic
+      ? [{ kind: "walk", model: name, seconds: 2 }]
+      : [{ kind: "act", model: name, controls: given }],
     ...(across && along ? { across, along } : {}),
   };
 }

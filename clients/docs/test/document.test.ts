@@ -71,6 +71,11 @@ test("bodies hold what is needed and nothing else", () => {
   assert.deepEqual(found.get("/v1/models/{model}/sigma"), { across: "height", along: "twist" });
   const clips = { format: "usdc", clips: [{ name: "first", controls: CONTROLS }] };
   assert.deepEqual({ ...found.get("/v1/models/{model}/clips"), format: "usdc" }, clips);
+  const act = { segments: [{ kind: "act", model: MODEL.name, controls: CONTROLS }] };
+  assert.deepEqual(found.get("/v1/performances"), act);
+  const gait = bodies(withExamples(CONTRACT, { ...MODEL, cyclic: true }));
+  const walk = { segments: [{ kind: "walk", model: MODEL.name, seconds: 2 }] };
+  assert.deepEqual(gait.get("/v1/performances.{format}"), walk);
   for (const [path, body] of found) assert.ok(!Object.values(body).includes(null), path);
 });
 

@@ -1162,6 +1162,15 @@ export interface components {
          *     }
          */
         PerformanceQuestion: {
+            /**
+             * @example [
+             *       {
+             *         "kind": "walk",
+             *         "model": "cmu_walk",
+             *         "seconds": 2
+             *       }
+             *     ]
+             */
             segments: components["schemas"]["Segment"][];
             /** @default null */
             character: components["schemas"]["CharacterChoice"] | null;
