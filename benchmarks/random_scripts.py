@@ -22,6 +22,8 @@ from posefield.synthesis.synthesizer import Synthesizer
 FPS = 60.0
 MOST_FRAMES = 100_000
 MOST_PEAK = 3.0
+# Largest acceleration of captured walking, m/s²: steps of a slow walk may be as sudden.
+CAPTURED_PEAK = 16.0
 """Acceleration over the usual one from which on a frame is a jump."""
 BEFORE, AFTER = 0.1, 0.6
 """Times before and after a join that belong to it, s."""
@@ -278,7 +280,7 @@ def _jumps(answer: PerformanceAnswer, found: Frames) -> Iterator[str]:
                 f"{own.usual:.1f}"
             )
     worst = float(found[free].max(initial=0.0))
-    if worst > MOST_PEAK * usual:
+    if worst > max(MOST_PEAK * usual, CAPTURED_PEAK):
         time = float(times[free][np.argmax(found[free])])
         yield f"{worst:.1f} m/s² at {time:.2f} s, away from joins; usual {usual:.1f}"
 

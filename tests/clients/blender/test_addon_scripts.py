@@ -54,7 +54,12 @@ def test_a_script_is_performed(address):
     found = scripts.moments(clip)
     assert [each.words.partition(" (")[0] for each in found] == ["0 walk walk", "1 walk walk"]
     assert found[0].time == 0.0 < found[1].time < 2.5
-    assert "join, " in found[1].words
+    assert "join, " not in found[1].words, "a walk of the same walker goes on without a join"
+    script = json.loads(TEXT)
+    del script["a/b"]
+    script["segments"].insert(1, {"kind": "hold", "seconds": 0.5})
+    held = scripts.moments(scripts.ask(asked, json.dumps(script), 24.0))
+    assert "join, " in held[2].words
 
 
 def test_a_script_has_its_own_frame_rate(address):
