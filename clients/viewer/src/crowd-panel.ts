@@ -80,7 +80,7 @@ function people(page: Page): HTMLElement {
 
 /** Whether the motions are takes; only a service has them. */
 function takes({ signal, source, store }: Page): HTMLElement {
-  const label = `${TAKES} motions instead of a few, each a take of its own`;
+  const label = `No two alike: ${TAKES} motions instead of a few, each a take of its own`;
   const own = toggle("No two alike", label, (on) => store.set({ varied: on }));
   own.hidden = !served(source);
   const show = () => own.set(store.state.varied);

@@ -33,11 +33,11 @@ class TimelineView {
     step: "any",
     "aria-label": "Time in the performance",
   });
-  readonly #time = el("span", { class: "time" });
+  readonly #time = el("span", { class: "clock" });
   readonly #bars = el("ol", { class: "bars", "aria-label": "Segments over time" });
   readonly #marks = el("div", { class: "joins", "aria-hidden": "true" });
   readonly #lanes = el("div", { class: "lanes", role: "img" });
-  readonly #head = el("div", { class: "head", "aria-hidden": "true" });
+  readonly #head = el("div", { class: "playhead", "aria-hidden": "true" });
   readonly #track = el("div", { class: "track-of-time" });
   #drawn: Report | null = null;
 
