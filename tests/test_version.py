@@ -77,12 +77,16 @@ def test_no_other_file_names_a_version_of_the_image_or_of_an_archive():
 
 
 def _texts() -> Iterator[tuple[str, str]]:
-    """Yield names and contents of documents, manifests and configurations."""
+    """Yield names and contents of documents, manifests and configurations that are not built."""
     for folder in ("docs", "service/deploy", "clients/blender", "clients/typescript", "."):
         within = "*" if folder == "." else "**/*"
         for path in (ROOT / folder).glob(within):
+            name = path.relative_to(ROOT)
+            # The client's package, where it was built, has a copy of the client's README.
+            if "dist" in name.parts:
+                continue
             if path.suffix in (".md", ".yaml", ".toml", ".cff") or path.name == "Dockerfile":
-                yield path.relative_to(ROOT).as_posix(), path.read_text()
+                yield name.as_posix(), path.read_text()
 
 
 def _project(folder: str) -> dict:
