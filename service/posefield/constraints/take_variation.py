@@ -16,7 +16,8 @@ from posefield.inference.session import Session
 from posefield.inference.takes import EVENTFUL_TIMES, TakeSampler, TakeSettings
 from posefield.kriging import random_field
 from posefield.model_file.model_card import ModelCard
-from posefield.question.motion_question import MAX_TAKE, MotionQuestion
+from posefield.question.motion_question import MotionQuestion
+from posefield.question.value_validation import check_take
 from posefield.validation.question_validation import ValidatedQuestion
 
 DETAIL_CACHE = 512
@@ -118,10 +119,7 @@ def change_coefficients(
 
 def check(card: ModelCard, asked: MotionQuestion) -> None:
     """Raise InvalidField for a seed or a variety out of range, and for a model without takes."""
-    if not 0 <= asked.take <= MAX_TAKE:
-        raise InvalidField("take", f"{asked.take}, expected 0 to {MAX_TAKE}")
-    if not 0.0 <= asked.variety <= 1.0:
-        raise InvalidField("variety", f"{asked.variety:g}, expected 0 to 1")
+    check_take(asked.take, asked.variety)
     if asked.take and not random_field.has_features(card.kriging):
         found = card.kriging.covariance
         raise InvalidField("take", f"{asked.take}, but no takes can be drawn of {found} kriging")

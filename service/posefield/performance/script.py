@@ -33,10 +33,6 @@ from posefield.question.performance_question import (
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
 
-MIN_SECONDS, MAX_SECONDS = 0.1, 600.0
-"""Shortest segment with a duration of its own, and longest performance, s."""
-MIN_FPS, MAX_FPS = 1.0, 240.0
-
 
 @dataclass(frozen=True)
 class Source:
@@ -139,37 +135,11 @@ def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesi
     pointer into the script, for a model that cannot play its part, for skeletons that differ, and
     for numbers out of range.
     """
-    _check_numbers(question)
     script_bounds.check_bounds(question)
     models = [_model(index, own, find) for index, own in enumerate(question.segments)]
     script_bounds.check_level(question.level, models)
     character = _character(question, models, find)
     return Script(question, tuple(_sources(question, models, character)), character)
-
-
-def _check_numbers(question: PerformanceQuestion) -> None:
-    if not MIN_FPS <= question.fps <= MAX_FPS:
-        raise InvalidField("fps", f"{question.fps:g}, expected {MIN_FPS:g} to {MAX_FPS:g}")
-    for index, own in enumerate(question.segments):
-        seconds = None if isinstance(own, Act) else own.seconds
-        if seconds is not None and not MIN_SECONDS <= seconds <= MAX_SECONDS:
-            field = f"segments/{index}/seconds"
-            raise InvalidField(field, f"{seconds:g}, expected {MIN_SECONDS:g} to {MAX_SECONDS:g}")
-        if not isinstance(own, Hold):
-            _check_join(index, own)
-    for index, disc in enumerate(question.obstacles):
-        if not disc.radius > 0.0:
-            field = f"obstacles/{index}/radius"
-            raise InvalidField(field, f"{disc.radius:g}, expected more than 0")
-
-
-def _check_join(index: int, own: Walk | Act) -> None:
-    """Raise InvalidField for a join of no or too long a blend, and for no distance."""
-    field, join = f"segments/{index}/join", own.join
-    if join.seconds is not None and not 0.0 < join.seconds <= 5.0:
-        raise InvalidField(f"{field}/seconds", f"{join.seconds:g}, expected more than 0, at most 5")
-    if join.most is not None and not join.most > 0.0:
-        raise InvalidField(f"{field}/most", f"{join.most:g}, expected more than 0")
 
 
 def _model(index: int, own: Segment, find: Callable[[str], Synthesizer]) -> Synthesizer | None:

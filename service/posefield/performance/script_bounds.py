@@ -1,5 +1,6 @@
 """Bounds of the numbers of a script, as the schema says them, and of its levels of detail."""
 
+import math
 from collections.abc import Iterator, Sequence
 
 from posefield.common.errors import InvalidField
@@ -11,12 +12,16 @@ from posefield.question.performance_question import (
     Segment,
     Walk,
 )
-from posefield.question.value_validation import check_number, check_range
+from posefield.question.value_validation import check_number, check_range, check_take
 from posefield.synthesis.synthesizer import Synthesizer
 
 MOST_PLACE, MOST_ANGLE, MOST_RADIUS, MOST_RATE = 1e4, 1e3, 1e3, 1e3
 """Largest coordinates, m, angles, rad, radii, m, and speeds, m/s or rad/s."""
-MOST_TAKE = 999_999_999
+MIN_SECONDS, MAX_SECONDS = 0.1, 600.0
+"""Shortest segment with a duration of its own, and longest performance, s."""
+MIN_FPS, MAX_FPS = 1.0, 240.0
+MAX_BLEND = 5.0
+"""Longest time of a blend, s."""
 
 Bounded = tuple[str, float, float, float, str]
 """Field, value, least, most and unit."""
@@ -26,10 +31,10 @@ def check_bounds(question: PerformanceQuestion) -> None:
     """Raise InvalidField for a number out of bounds, with a pointer into the script."""
     for field, value, low, high, unit in _numbers(question):
         check_range(field, check_number(field, value), low, high, unit)
-    if not 0.0 <= question.variety <= 1.0:
-        raise InvalidField("variety", f"{question.variety:g}, expected 0 to 1")
-    if not 0 <= question.take <= MOST_TAKE:
-        raise InvalidField("take", f"{question.take}, expected 0 to {MOST_TAKE}")
+    for field, value, unit in _positive(question):
+        if not value > 0.0:
+            raise InvalidField(field, f"{value:.9g} {unit}, expected more than 0 {unit}")
+    check_take(question.take, question.variety)
 
 
 def check_level(level: int, models: Sequence[Synthesizer | None]) -> None:
@@ -42,17 +47,34 @@ def check_level(level: int, models: Sequence[Synthesizer | None]) -> None:
 
 
 def _numbers(question: PerformanceQuestion) -> Iterator[Bounded]:
+    yield "fps", question.fps, MIN_FPS, MAX_FPS, "frames/s"
     yield from _places("start/position", question.start.position)
     yield "start/heading", question.start.heading, -MOST_ANGLE, MOST_ANGLE, "rad"
     for index, disc in enumerate(question.obstacles):
         yield from _places(f"obstacles/{index}/position", disc.position)
-        # The least radius has a message of its own.
         yield f"obstacles/{index}/radius", disc.radius, -MOST_RADIUS, MOST_RADIUS, "m"
     for index, own in enumerate(question.segments):
         yield from _of_segment(f"segments/{index}", own)
 
 
+def _positive(question: PerformanceQuestion) -> Iterator[tuple[str, float, str]]:
+    """Yield field, value and unit of what is more than 0."""
+    for index, disc in enumerate(question.obstacles):
+        yield f"obstacles/{index}/radius", disc.radius, "m"
+    for index, own in enumerate(question.segments):
+        if not isinstance(own, Hold):
+            field, join = f"segments/{index}/join", own.join
+            yield f"{field}/seconds", math.inf if join.seconds is None else join.seconds, "s"
+            yield f"{field}/most", math.inf if join.most is None else join.most, "m"
+
+
 def _of_segment(field: str, own: Segment) -> Iterator[Bounded]:
+    if not isinstance(own, Act) and own.seconds is not None:
+        yield f"{field}/seconds", own.seconds, MIN_SECONDS, MAX_SECONDS, "s"
+    if not isinstance(own, Hold) and own.join.seconds is not None:
+        yield f"{field}/join/seconds", own.join.seconds, -MAX_BLEND, MAX_BLEND, "s"
+    if not isinstance(own, Hold) and own.join.most is not None:
+        yield f"{field}/join/most", own.join.most, -MOST_PLACE, MOST_PLACE, "m"
     if isinstance(own, Walk):
         yield from _curve(f"{field}/turn", own.turn, "rad/s")
         yield from _curve(f"{field}/speed", own.speed, "m/s")

@@ -16,7 +16,8 @@ from posefield.performance.joins.cut_search import Cut
 from posefield.performance.joins.join_quality import JoinFacts
 from posefield.performance.passages.limb_targets import WorldTarget
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
-from posefield.performance.script import MAX_SECONDS, Protagonist
+from posefield.performance.script import Protagonist
+from posefield.performance.script_bounds import MAX_SECONDS
 from posefield.performance.walks.walk_segment import WalkPlan
 from posefield.question.performance_question import GivenPose, Join
 from posefield.question.performance_report import ScriptWarning, SegmentKind

@@ -3,6 +3,7 @@
 import math
 
 from posefield.common.errors import InvalidField
+from posefield.question.motion_question import MAX_TAKE
 
 FLOAT32_EPSILON = 2.0**-23
 """Relative error of a number in single precision."""
@@ -41,3 +42,11 @@ def check_rounded_range(field: str, value: float, low: float, high: float, unit:
         return high
     check_range(field, value, low, high, unit)
     return value
+
+
+def check_take(seed: int, variety: float) -> None:
+    """Raise InvalidField for the seed or the variety of a take out of range."""
+    if not 0 <= seed <= MAX_TAKE:
+        raise InvalidField("take", f"{seed}, expected 0 to {MAX_TAKE}")
+    if not 0.0 <= variety <= 1.0:
+        raise InvalidField("variety", f"{variety:g}, expected 0 to 1")
