@@ -1,18 +1,28 @@
 """Skeleton: a tree of joints, and its forward kinematics."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 
 from posefield.common.array_shapes import Bones
 from posefield.common.bounded_types import Index, Name, Parent
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Indices
 from posefield.motion import quat_planes
 
 # Poses that are computed at once: their planes take 7 MB for 31 joints.
 POSES_PER_BLOCK = 2000
+FEW_POSES = 64
+"""Poses up to which all joints of one depth are computed at once: most of their time is that of
+calling NumPy, and a tree has fewer depths than joints."""
+# Components of b in the terms of a product a b, which are those of w, x, y and z of a in this
+# order, and their signs.
+ORDERS = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
+SIGNS = np.array([[1, 1, 1, 1], [-1, 1, -1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1]], dtype=float)
 
 
 @dataclass(frozen=True)
@@ -90,6 +100,8 @@ def forward_kinematics(
     each other.
     """
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
+    if math.prod(lead) <= FEW_POSES:
+        return _at_once(parents, lead, rotations, translations)
     places, turns = np.empty((*lead, len(parents), 3)), np.empty((*lead, len(parents), 4))
     turning = frozenset(range(len(parents)))
     for block, own_turns, own_arms in _blocks(lead, rotations, translations):
@@ -105,10 +117,22 @@ def positions(
 ) -> Annotated[Floats, "*poses joints 3"]:
     """Return the joint positions (..., J, 3) alone; arguments as for `forward_kinematics`."""
     lead = np.broadcast_shapes(rotations.shape[:-2], translations.shape[:-2])
+    if math.prod(lead) <= FEW_POSES:
+        return _at_once(parents, lead, rotations, translations)[0]
     places = np.empty((*lead, len(parents), 3))
     for block, own_turns, own_arms in _blocks(lead, rotations, translations):
         _rows(places)[block] = _from_planes(position_planes(parents, own_turns, own_arms))
     return places
+
+
+def _at_once(
+    parents: tuple[int, ...], lead: tuple[int, ...], rotations: Floats, translations: Floats
+) -> tuple[Annotated[Floats, "*poses joints 3"], Annotated[Floats, "*poses joints 4"]]:
+    """Return what `forward_kinematics` does, of few poses."""
+    turns = np.broadcast_to(rotations, (*lead, len(parents), 4)).reshape(-1, len(parents), 4)
+    arms = np.broadcast_to(translations, (*lead, len(parents), 3)).reshape(-1, len(parents), 3)
+    placed, turned = _accumulate_levels(parents, turns, arms)
+    return placed.reshape(*lead, len(parents), 3), turned.reshape(*lead, len(parents), 4)
 
 
 def position_planes(
@@ -173,6 +197,83 @@ def _accumulate(
         if joint in turning:
             quat_planes.product(turns[parent], rotations[joint], out=turns[joint])
     return places, turns
+
+
+@dataclass(frozen=True)
+class TreeLevel:
+    """Joints of one depth. rows: in the order of the levels. parents: of each, in that order."""
+
+    rows: slice
+    parents: Indices
+
+
+@dataclass(frozen=True)
+class TreeLevels:
+    """Levels of a tree without its root. order: joints by level. places: of the joints in it."""
+
+    levels: tuple[TreeLevel, ...]
+    order: Indices
+    places: Indices
+
+
+@lru_cache(64)
+def tree_levels(parents: tuple[int, ...]) -> TreeLevels:
+    """Return the levels of a tree, whose parents precede their children."""
+    depths = [0] * len(parents)
+    for joint, parent in enumerate(parents[1:], start=1):
+        depths[joint] = depths[parent] + 1
+    order = np.argsort(depths, kind="stable")
+    places = np.argsort(order)
+    ends = np.cumsum(np.bincount(depths))
+    levels = [
+        TreeLevel(slice(int(begin), int(end)), places[np.array(parents)[order[begin:end]]])
+        for begin, end in pairwise(ends)
+    ]
+    return TreeLevels(tuple(levels), order, places)
+
+
+def _accumulate_levels(
+    parents: tuple[int, ...],
+    rotations: Annotated[Floats, "poses joints 4"],
+    translations: Annotated[Floats, "poses joints 3"],
+) -> tuple[Annotated[Floats, "poses joints 3"], Annotated[Floats, "poses joints 4"]]:
+    """Return joint positions (P, J, 3) and orientations (P, J, 4) of few poses.
+
+    The same operations in the same order as in `quat_planes`, so that results are bitwise equal; a
+    quaternion has x and y once more at its end, so that its cyclic permutations are slices.
+    """
+    tree, count = tree_levels(parents), len(rotations)
+    own = rotations.transpose(2, 1, 0)[:, tree.order]
+    arms = translations.transpose(2, 1, 0)[:, tree.order]
+    arms = np.concatenate([arms, arms[:2]])
+    terms = own[ORDERS] * SIGNS[..., None, None]
+    places, turns = np.empty((3, len(parents), count)), np.empty((6, len(parents), count))
+    places[:, 0], turns[:4, 0], turns[4:, 0] = arms[:3, 0], own[:, 0], own[1:3, 0]
+    for level in tree.levels:
+        rows, above = level.rows, turns[:, level.parents]
+        placed = _rotated(above, arms[:, rows])
+        placed += places[:, level.parents]
+        places[:, rows] = placed
+        turned = above[0] * terms[0, :, rows]
+        for component in (1, 2, 3):
+            turned += above[component] * terms[component, :, rows]
+        turns[:4, rows], turns[4:, rows] = turned, turned[1:3]
+    # Sums over an array depend on its layout, which is therefore that of larger numbers of poses.
+    placed = np.ascontiguousarray(places[:, tree.places].T)
+    return placed, np.ascontiguousarray(turns[:4, tree.places].T)
+
+
+def _rotated(
+    q: Annotated[Floats, "6 joints poses"], v: Annotated[Floats, "5 joints poses"]
+) -> Annotated[Floats, "3 joints poses"]:
+    """Return vectors (3, ...), with x and y again at their end, turned by quaternions."""
+    yzx, zxy = q[2:5], q[3:6]
+    across = np.empty(v.shape)
+    np.multiply(2.0, yzx * v[2:] - zxy * v[1:4], out=across[:3])
+    across[3:] = across[:2]
+    found = v[:3] + q[0] * across[:3]
+    found += yzx * across[2:] - zxy * across[1:4]
+    return np.asarray(found)
 
 
 def joint_chain(parents: tuple[int, ...], joint: int) -> tuple[int, ...]:

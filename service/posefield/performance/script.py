@@ -10,6 +10,7 @@ import numpy as np
 
 from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField, QueryError
+from posefield.common.value_cache import ValueCache
 from posefield.feet import limb_choice
 from posefield.feet.footsteps import Character
 from posefield.locomotion import stride
@@ -32,6 +33,9 @@ from posefield.question.performance_question import (
 )
 from posefield.synthesis import walking_feet
 from posefield.synthesis.synthesizer import Synthesizer
+
+# Characters whose bones are kept, by model, controls and labels; 1 kB each.
+KEPT_BONES = 256
 
 
 @dataclass(frozen=True)
@@ -205,9 +209,18 @@ def _protagonist(
 
 def _bones(model: Synthesizer, asked: MotionQuestion) -> Bones:
     """Return bone offsets (J, 3), m, at the controls and labels of a question."""
+    key = model.session.digest, msgspec.json.encode(asked)
+    return _kept_bones.find(key, lambda: _evaluated_bones(model, asked))
+
+
+_kept_bones: ValueCache[tuple[str, bytes], Bones] = ValueCache(KEPT_BONES)
+
+
+def _evaluated_bones(model: Synthesizer, asked: MotionQuestion) -> Bones:
     question = model.question(asked)
-    found = stride.bones(model.session, question.point, question.labels)[0]
-    return np.asarray(found, np.float64)
+    found = stride.bones(model.session, question.point, question.labels)[0].astype(np.float64)
+    found.flags.writeable = False
+    return np.asarray(found)
 
 
 def _sources(

@@ -133,3 +133,22 @@ def test_broken_tree_is_refused_saying_what_was_found(parents, changes, message)
     with pytest.raises(ValueError) as refusal:
         named(parents, **changes)
     assert str(refusal.value) == message
+
+
+@pytest.mark.parametrize("count", [0, 1, 7, skeleton.FEW_POSES])
+def test_few_poses_are_those_of_many_bit_for_bit(rng, count):
+    most = skeleton.FEW_POSES + 1
+    many = quat.normalize(rng.normal(size=(most, 6, 4))), rng.normal(size=(most, 6, 3))
+    few = tuple(each[:count] for each in many)
+    found = skeleton.forward_kinematics(PARENTS, *few)
+    for own, expected in zip(found, skeleton.forward_kinematics(PARENTS, *many), strict=True):
+        assert own.tobytes() == expected[:count].tobytes()
+        assert own.flags.c_contiguous
+    assert skeleton.positions(PARENTS, *few).tobytes() == found[0].tobytes()
+
+
+def test_levels_of_a_tree_hold_each_joint_after_its_parent():
+    found = skeleton.tree_levels(PARENTS)
+    assert found.order.tolist() == [0, 1, 5, 2, 3, 4]
+    assert [own.parents.tolist() for own in found.levels] == [[0, 0], [1, 1], [4]]
+    assert found.order[found.places].tolist() == list(range(6))

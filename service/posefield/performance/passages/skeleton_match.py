@@ -1,6 +1,6 @@
 """Poses of one skeleton for another of the same tree, whose names and rest pose may differ."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated
@@ -10,6 +10,7 @@ import numpy as np
 from posefield.common.array_shapes import Bones, RootPath
 from posefield.common.errors import MotionError
 from posefield.common.units import Floats
+from posefield.common.value_cache import ValueCache
 from posefield.feet import limbs, two_bone
 from posefield.motion import quat, skeleton
 from posefield.motion.skeleton import Skeleton
@@ -22,6 +23,8 @@ SHORTEST_BONE = 1e-3
 NO_TURN = 1e-6
 # Smaller angles are rounding, rad.
 LEAST_ANGLE = 1e-9
+# Pairs of skeletons that are kept: a match takes as long as a second of poses.
+KEPT_MATCHES = 64
 
 
 class SkeletonsDiffer(MotionError):
@@ -62,9 +65,23 @@ def match(source: Skeleton, target: Skeleton, feet: Sequence[int] = ()) -> Skele
 
     Joints are matched by their place in the tree. feet: joints that contact the ground. A foot from
     its ankle on turns as in the source from the rest pose, in which soles are flat: its bones slope
-    as much as its ankle is high. Raises SkeletonsDiffer for another number of joints, another
-    parent, or rest poses more than 20 degrees apart.
+    as much as its ankle is high. Matches of the latest pairs are kept. Raises SkeletonsDiffer for
+    another number of joints, another parent, or rest poses more than 20 degrees apart.
     """
+    key = _value(source), _value(target), tuple(feet)
+    return _matches.find(key, lambda: _match(source, target, feet))
+
+
+_matches: ValueCache[Hashable, SkeletonMatch] = ValueCache(KEPT_MATCHES)
+
+
+def _value(own: Skeleton) -> Hashable:
+    """Return what two equal skeletons have in common."""
+    numbers = own.offsets.tobytes(), own.tip_offsets.tobytes()
+    return own.names, own.parents, own.tip_joints, numbers
+
+
+def _match(source: Skeleton, target: Skeleton, feet: Sequence[int]) -> SkeletonMatch:
     _expect_one_tree(source, target)
     turns = np.tile(quat.IDENTITY, (len(source), 1))
     flat = _soles(target, feet)
@@ -80,6 +97,7 @@ def match(source: Skeleton, target: Skeleton, feet: Sequence[int] = ()) -> Skele
         if apart[joint] > LEAST_ANGLE and joint not in flat:
             turns[joint] = _turn(*arms)
     _expect_near(source, target, apart)
+    turns.flags.writeable = False
     return SkeletonMatch(source.parents, turns, tuple(_notes(source, target, apart)))
 
 
