@@ -7,11 +7,11 @@ from posefield.locomotion import floor_plane
 from posefield.performance.acts import act_placement, act_segment
 from posefield.performance.acts.act_segment import Act
 from posefield.performance.acts.staged_act import StagedAct
+from posefield.performance.approach import entry_range
 from posefield.performance.passages.limb_targets import WorldTarget
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script, Source
 from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
-from posefield.performance.walk_steps import entry_range
 from posefield.question import performance_question
 from posefield.question.motion_question import MotionQuestion, Target, replace
 from posefield.question.results import split_results

@@ -5,7 +5,7 @@ there. Below the model's slowest speed the controls stay those of the slowest, a
 feet that stand move no more than in a steady walk, in starts and stops, too.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -72,6 +72,11 @@ class WalkPlan:
     def duration(self) -> float:
         """Duration, s."""
         return (len(self) - 1) / RATE
+
+    def part(self, begin: int, end: int) -> "WalkPlan":
+        """Return the frames from `begin` until before `end`, on the same path."""
+        names = ("distances", "places", "headings", "phases", "controls", "speeds")
+        return replace(self, **{name: getattr(self, name)[begin:end] for name in names})
 
     @property
     def exit_rates(self) -> tuple[float, float]:

@@ -1,0 +1,120 @@
+"""Walks of a script: which walk a segment asks for, and where and in which phase it begins."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posefield.inference.takes import TakeSettings
+from posefield.locomotion import floor_plane
+from posefield.model_file.model_card import PERFORMER
+from posefield.performance.joins.cut_search import Cut
+from posefield.performance.passages.passage import RATE, FloorMotion
+from posefield.performance.script import Script, Source
+from posefield.performance.timeline import Timeline
+from posefield.performance.walks import walk_passage, walker
+from posefield.performance.walks.discs import Disc
+from posefield.performance.walks.walk_passage import Manner
+from posefield.performance.walks.walk_request import WalkRequest
+from posefield.question.performance_question import PerformanceQuestion, Walk
+
+
+@dataclass(frozen=True)
+class WalkEntry:
+    """Begin of a walk.
+
+    request: of the walk. start: of its path. phase: of its cycle. cut: into it; None for the first
+    segment. continues: whether it goes on from a walk of the same walker, without a join.
+    """
+
+    request: WalkRequest
+    start: FloorMotion
+    phase: float
+    cut: Cut | None = None
+    continues: bool = False
+
+
+def manner(question: PerformanceQuestion) -> Manner:
+    """Return the level of detail and the take of a script."""
+    take = TakeSettings(question.take, question.variety, question.detail)
+    return Manner(question.level, take if take.seed or take.detail else None)
+
+
+def walk_of(script: Script, index: int) -> tuple[Walk, Source]:
+    """Return a walk of a script and its source."""
+    own, source = script.segments[index], script.sources[index]
+    if not isinstance(own, Walk) or source is None:
+        raise TypeError(f"segment {index}, expected a walk")
+    return own, source
+
+
+def request_of(script: Script, own: Walk, source: Source) -> WalkRequest:
+    """Return the walk that a segment asks for."""
+    usual = float(source.walks.rates[:, 0].mean())
+    names = {PERFORMER: own.performer} if own.performer is not None else {}
+    discs = tuple(Disc(*disc.position, disc.radius) for disc in script.question.obstacles)
+    along = None if own.along is None else np.array(own.along, dtype=np.float64)
+    return WalkRequest(
+        usual if own.speed is None else own.speed,
+        along=along,
+        to=own.to,
+        seconds=own.seconds,
+        turn=own.turn,
+        speed_over=own.speed_over,
+        labels={**own.labels, **names},
+        controls=own.controls,
+        start=own.start,
+        stop=own.stop,
+        obstacles=discs,
+        detour=bool(discs) and own.along is None and own.seconds is None,
+    )
+
+
+def _continued(timeline: Timeline, source: Source, request: WalkRequest) -> WalkEntry | None:
+    """Return how a walk goes on from one of the same walker; None if it does not."""
+    before = timeline.spans[-1] if timeline.spans else None
+    if before is None or before.plan is None or before.model != source.model.identity:
+        return None
+    plan, rolling = before.plan, request.start == "rolling"
+    same = plan.walker.is_same(walker.find_walker(source.walks, request.labels, request.controls))
+    if not (same and rolling and plan.speeds[-1] > 0.0):
+        return None
+    low, high = source.walks.region.speeds
+    speed, turn = plan.exit_rates
+    own = replace(
+        request,
+        entry_speed=float(np.clip(speed, low, high)),
+        entry_turn=turn if request.seconds is not None else None,
+    )
+    return WalkEntry(own, plan.end, float(plan.phases[-1] % 1.0), continues=True)
+
+
+def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
+    """Return how a walk begins: at the start of the script, or at the phase most like the exit."""
+    own, source = walk_of(script, index)
+    request = request_of(script, own, source)
+    if timeline.motion is None:
+        begun = script.question.start
+        x, z = begun.position
+        return WalkEntry(request, FloorMotion(begun.heading, complex(z, x)), 0.0)
+    continued = _continued(timeline, source, request)
+    if continued is not None:
+        return continued
+    if own.join.cut == "end":
+        timeline.exits = timeline.exits[-1:]
+    who = walker.find_walker(source.walks, request.labels, request.controls)
+    speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]
+    controls = who.controls(np.clip([speed], *source.walks.region.speeds), np.zeros(1))
+    stride = who.strides(controls)
+    frames = max(round(float(stride.durations[0]) * RATE), 8)
+    cycle = walk_passage.cycle_passage(
+        source.model, who, controls[0], frames, manner(script.question)
+    )
+    cut = timeline.find_cut(script.adapted(index, cycle), range(frames))
+    phase = cut.entry / frames
+    turned = phase * float(stride.turns[0])
+    travelled = floor_plane.arc_displacement(phase * stride.travels[0], np.array(turned))
+    offset = who.mean_offsets(controls)[0]
+    # The path of a walk is that of the mean root, and runs the way it travels.
+    place = complex(travelled + np.exp(1j * turned) * offset)
+    local = FloorMotion(turned + float(stride.drifts[0]), place)
+    return WalkEntry(request, cut.motion.after(local), phase, replace(cut, motion=FloorMotion()))
