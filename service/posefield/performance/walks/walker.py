@@ -93,12 +93,9 @@ class Walker:
 
     def mean_offsets(self, controls: PointControls) -> Annotated[FloorVectors, "points"]:
         """Return the mean places (B,) of the root over a cycle, in the frame that travels."""
-        count = len(controls)
-        phases = np.tile(np.arange(AVERAGED_PHASES) / AVERAGED_PHASES, count)
-        rows = np.repeat(controls, AVERAGED_PHASES, axis=0)
-        session, labels = self.gait.session, self.labels(len(rows))
-        posed = stride.synthesize_poses(session, rows, labels, phases)
-        return np.asarray(posed.places.reshape(count, -1).mean(axis=1))
+        phases = np.arange(AVERAGED_PHASES) / AVERAGED_PHASES
+        labels = self.labels(len(controls))
+        return stride.root_places(self.gait.session, controls, labels, phases).mean(axis=1)
 
     @cached_property
     def double_supports(self) -> Annotated[Floats, "phases"]:
