@@ -17,7 +17,7 @@ from posefield.performance import act_steps, hold_steps, reporting, walk_steps
 from posefield.performance.acts.staged_act import StagedAct
 from posefield.performance.joins import join_quality
 from posefield.performance.passages import limb_targets
-from posefield.performance.passages.passage import RATE
+from posefield.performance.passages.passage import RATE, Passage
 from posefield.performance.script import Script, errors_under
 from posefield.performance.timeline import Composed, Timeline, from_poses, resample
 from posefield.question.performance_question import Act, Hold, Segment, Walk
@@ -33,7 +33,7 @@ def plan(script: Script, most: int) -> PerformanceReport:
     """
     composed = compose(script)
     times = frame_times(composed, script.question.fps, most)
-    _judge_joins(script, composed, None)
+    _judge_joins(script, composed, PlacedFrames(composed.motion.rotations, composed.motion.roots))
     return reporting.report(script, composed, len(times), None)
 
 
@@ -44,14 +44,14 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
     """
     composed = compose(script)
     times = frame_times(composed, script.question.fps, most)
-    rotations, roots = resample(composed.motion.rotations, composed.motion.roots, RATE, times)
     told: FeetResult | None = None
     planned: FeetPlan | None = None
     if script.question.feet == "stand" and script.character.feet:
         planned = plan_feet(script, composed)
-        rotations, roots = _placed(planned, times, rotations, roots)
         told = standing_feet.describe(planned, script.character.skeleton.names)
-    _judge_joins(script, composed, planned)
+    every = _place_feet(planned, np.arange(len(composed.motion)) / RATE, composed.motion)
+    _judge_joins(script, composed, every)
+    rotations, roots = _at_times(composed.motion, planned, every, times)
     character = script.character
     joints = joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
     turns = quat.normalize(rotations)
@@ -59,17 +59,13 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
     return PerformanceAnswer(clip, reporting.report(script, composed, len(clip), told))
 
 
-def _judge_joins(script: Script, composed: Composed, planned: FeetPlan | None) -> None:
+def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> None:
     """Judge the joins as they are sent: with targets met, and feet placed where they stand."""
     timeline, motion = composed.timeline, composed.motion
     shift = timeline.begin
 
     def placed(rows: slice) -> PlacedFrames:
-        rotations, roots = motion.rotations[rows], motion.roots[rows]
-        if planned is None:
-            return PlacedFrames(rotations, roots)
-        times = np.arange(rows.start, rows.stop) / RATE
-        return foot_placement.place_feet(planned, times, rotations, roots)
+        return PlacedFrames(every.rotations[rows], every.roots[rows])
 
     joins = [(own.frame - shift, own.facts) for own in timeline.seams]
     found = join_quality.judge_again(script.character.body, len(motion), joins, placed)
@@ -167,8 +163,25 @@ def plan_feet(script: Script, composed: Composed) -> FeetPlan:
     return footsteps.plan_feet(body, motion, character.contacts, composed.motion.contacts)
 
 
-def _placed(
-    planned: FeetPlan, times: Frames, rotations: Rotations, roots: RootPath
+def _place_feet(planned: FeetPlan | None, times: Frames, motion: Passage) -> PlacedFrames:
+    """Return the frames of a motion at times (F,), s, with feet as planned; None as predicted."""
+    if planned is None:
+        return PlacedFrames(motion.rotations, motion.roots)
+    return foot_placement.place_feet(planned, times, motion.rotations, motion.roots)
+
+
+def _at_times(
+    motion: Passage, planned: FeetPlan | None, every: PlacedFrames, times: Frames
 ) -> tuple[Rotations, RootPath]:
+    """Return rotations and roots at times (F,), s, with placed feet.
+
+    every: the motion at `RATE` with placed feet. Times between its frames have feet placed anew.
+    """
+    frames = np.round(times * RATE).astype(np.int64)
+    if np.allclose(times * RATE, frames, rtol=0.0, atol=1e-6):
+        return every.rotations[frames], every.roots[frames]
+    rotations, roots = resample(motion.rotations, motion.roots, RATE, times)
+    if planned is None:
+        return rotations, roots
     placed = foot_placement.place_feet(planned, times, rotations, roots)
     return placed.rotations, placed.roots
