@@ -16,13 +16,12 @@ from posefield.motion import quat_planes
 
 # Poses that are computed at once: their planes take 7 MB for 31 joints.
 POSES_PER_BLOCK = 2000
-FEW_POSES = 64
+FEW_POSES = 128
 """Poses up to which all joints of one depth are computed at once: most of their time is that of
 calling NumPy, and a tree has fewer depths than joints."""
-# Components of b in the terms of a product a b, which are those of w, x, y and z of a in this
-# order, and their signs.
-ORDERS = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
-SIGNS = np.array([[1, 1, 1, 1], [-1, 1, -1, 1], [-1, 1, 1, -1], [-1, -1, 1, 1]], dtype=float)
+# Components of b, and of -b after them, in the terms of a product a b, which are those of w, x, y
+# and z of a in this order.
+TERMS = np.array([[0, 1, 2, 3], [5, 0, 7, 2], [6, 3, 0, 5], [7, 6, 1, 0]])
 
 
 @dataclass(frozen=True)
@@ -246,7 +245,7 @@ def _accumulate_levels(
     own = rotations.transpose(2, 1, 0)[:, tree.order]
     arms = translations.transpose(2, 1, 0)[:, tree.order]
     arms = np.concatenate([arms, arms[:2]])
-    terms = own[ORDERS] * SIGNS[..., None, None]
+    terms = np.concatenate([own, -own])[TERMS]
     places, turns = np.empty((3, len(parents), count)), np.empty((6, len(parents), count))
     places[:, 0], turns[:4, 0], turns[4:, 0] = arms[:3, 0], own[:, 0], own[1:3, 0]
     for level in tree.levels:

@@ -3,13 +3,12 @@
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.locomotion import floor_plane
 from posefield.performance.acts import act_placement, act_segment
 from posefield.performance.acts.act_segment import Act
 from posefield.performance.acts.staged_act import StagedAct
 from posefield.performance.approach import entry_range
 from posefield.performance.passages.limb_targets import WorldTarget
-from posefield.performance.passages.passage import RATE, FloorMotion, Passage
+from posefield.performance.passages.passage import RATE, FloorMotion
 from posefield.performance.script import Script, Source
 from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
 from posefield.question import performance_question
@@ -111,7 +110,7 @@ def add_act(timeline: Timeline, script: Script, staged: StagedAct) -> None:
     """Go on with an act."""
     index, act = staged.segment, staged.act
     own, _ = act_of(script, index)
-    passage = script.adapted(index, act.passage)
+    passage = script.adapted(index, act.passage) if staged.adapted is None else staged.adapted
     if timeline.motion is None:
         by = staged.by or FloorMotion()
         timeline.begin_with(passage.placed(by))
@@ -182,8 +181,3 @@ def _target_frame(act: Act, target: performance_question.PlacedTarget, first: in
     known = {"start": 0, "end": len(act.passage) - 1, "event": act.event}
     found = known.get(when)
     return None if found is None else first + found
-
-
-def place_of(passage: Passage, frame: int) -> complex:
-    """Return the place of the root over the floor in a frame."""
-    return complex(floor_plane.project(passage.roots[frame]))

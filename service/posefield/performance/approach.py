@@ -102,7 +102,7 @@ def lead_to(
         if abs(away.shift) < NEAR and abs(away.turn) < STRAIGHT:
             break
     phase = float(cycle.plan.phases[cut.exit])
-    return _ending_in(plan, phase, free), replace(staged, by=by)
+    return _ending_in(plan, phase, free), replace(staged, by=by, adapted=act)
 
 
 def _turn(plan: WalkPlan, rest: FloorMotion, by: FloorMotion, goal: complex) -> float:

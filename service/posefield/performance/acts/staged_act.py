@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from posefield.performance.acts.act_segment import Act
-from posefield.performance.passages.passage import FloorMotion
+from posefield.performance.passages.passage import FloorMotion, Passage
 
 
 def _nowhere(angle: float) -> FloorMotion:
@@ -16,7 +16,8 @@ class StagedAct:
     """An act and its place.
 
     segment: its index. by: motion that places it; None for any place, or for any heading at its
-    goal. facing: returns the motion for a heading of the first frame, rad, at the goal.
+    goal. facing: returns the motion for a heading of the first frame, rad, at the goal. adapted:
+    its passage as one of the character, if it is known.
     """
 
     segment: int
@@ -24,6 +25,7 @@ class StagedAct:
     by: FloorMotion | None
     goal: complex = 0j
     facing: Callable[[float], FloorMotion] = _nowhere
+    adapted: Passage | None = None
 
     def faced(self, angle: float) -> "StagedAct":
         """Return the act with a heading of its first frame, rad."""
