@@ -183,7 +183,7 @@ def _ending_in(plan: WalkPlan, phase: float, free: bool) -> WalkPlan:
 
     free: whether the walk may begin in any phase; strides are made longer or shorter if not.
     """
-    gap = float(_gaps(np.array(phase), plan))
+    gap = float(_gaps(np.array([phase]), plan)[0])
     if free:
         return replace(plan, phases=plan.phases + gap)
     whole = float(plan.phases[-1] - plan.phases[0])
