@@ -95,7 +95,7 @@ def compose(script: Script) -> Composed:
         ahead = _stage_ahead(script, index)
         with errors_under("segments", index):
             if isinstance(own, Walk):
-                staged = _walk(timeline, script, index, ahead)
+                staged = walk_steps.add_walk(timeline, script, index, ahead)
             elif isinstance(own, Hold):
                 hold_steps.add_hold(timeline, script, index)
             else:
@@ -130,16 +130,6 @@ def _stage_ahead(script: Script, index: int) -> StagedAct | None:
         )
     with errors_under("segments", index + 1):
         return act_steps.stage_after_walk(script, index + 1)
-
-
-def _walk(
-    timeline: Timeline, script: Script, index: int, ahead: StagedAct | None
-) -> StagedAct | None:
-    """Go on with a walk; return the act that it leads to with its place, if there is one."""
-    if ahead is None:
-        walk_steps.add_walk(timeline, script, index)
-        return None
-    return walk_steps.add_walk_to(timeline, script, index, ahead)
 
 
 def frame_times(composed: Composed, fps: float, most: int) -> Frames:

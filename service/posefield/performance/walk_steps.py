@@ -13,23 +13,22 @@ from posefield.performance.walks import walk_passage, walk_segment
 from posefield.performance.walks.walk_segment import WalkPlan
 
 
-def add_walk(timeline: Timeline, script: Script, index: int) -> None:
-    """Go on with a walk that has an end of its own.
+def add_walk(
+    timeline: Timeline, script: Script, index: int, ahead: StagedAct | None
+) -> StagedAct | None:
+    """Go on with a walk; return the act that it leads to with its place, if there is one.
 
-    Raises InvalidField for a walk that the model cannot do.
+    ahead: act that a walk without an end of its own leads to. Raises InvalidField for a walk that
+    the model cannot do.
     """
-    _, source = walk_of(script, index)
     entry = find_entry(timeline, script, index)
-    plan = walk_segment.plan_walk(source.walks, entry.request, entry.start, entry.phase)
+    if ahead is None:
+        _, source = walk_of(script, index)
+        plan = walk_segment.plan_walk(source.walks, entry.request, entry.start, entry.phase)
+    else:
+        plan, ahead = approach.lead_to(timeline, script, index, entry, ahead)
     _add(timeline, script, index, (plan, entry))
-
-
-def add_walk_to(timeline: Timeline, script: Script, index: int, staged: StagedAct) -> StagedAct:
-    """Go on with a walk that leads to an act, and return the act with its place."""
-    entry = find_entry(timeline, script, index)
-    plan, placed = approach.lead_to(timeline, script, index, entry, staged)
-    _add(timeline, script, index, (plan, entry))
-    return placed
+    return ahead
 
 
 def _add(

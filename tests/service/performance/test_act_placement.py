@@ -140,22 +140,6 @@ def test_a_target_in_the_segment_is_met_beside_the_one_that_places(reach):
     assert np.linalg.norm(own - wanted) < EXACT
 
 
-def test_the_straight_way_to_an_act_is_along_its_heading(reach):
-    place = -1.0 + 0.5j
-    found = act_placement.place_by_target(reach, hand_to((2.0, 1.5, -3.0))).straight_from(place)
-    assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
-    first = found.act.passage.placed(found.by)
-    way = floor_plane.project(first.roots[0]) - place
-    heading = act_segment.heading(first.rotations[0])
-    assert np.angle(way * np.exp(-1j * heading)) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_place_too_near_for_a_straight_way_is_refused(reach):
-    found = act_placement.place_by_target(reach, hand_to((2.0, 1.5, -3.0)))
-    with pytest.raises(InvalidField, match=r"^targets: 0\.01 m .*, expected at least 0\.\d+ m"):
-        found.straight_from(-3.0 + 2.01j)
-
-
 @pytest.mark.parametrize("extrapolate", ["warn", "refuse"])
 def test_a_height_out_of_reach_is_refused_with_the_captured_heights(reach, extrapolate):
     asked = hand_to((2.0, 3.5, -3.0), extrapolate=extrapolate)

@@ -56,24 +56,6 @@ class TargetedAct:
             self.act, FloorMotion(turn, complex(self.goal - np.exp(1j * turn) * self.point))
         )
 
-    def straight_from(self, place: complex) -> PlacedAct:
-        """Return the act whose first frame faces along the straight way to it from a place.
-
-        Raises InvalidField for a place that is nearer to the target than the act begins.
-        """
-        start = complex(floor_plane.project(self.act.passage.roots[0]))
-        # Of the joint, seen from the start along its heading: ahead and to the left.
-        arm = complex(np.exp(-1j * self.act.heading) * (self.point - start))
-        away = self.goal - place
-        ahead = abs(away) ** 2 - arm.imag**2
-        if ahead < max(arm.real, 0.0) ** 2:
-            raise InvalidField(
-                "targets",
-                f"{abs(away):.3g} m from where the act is come to, expected at least "
-                f"{abs(complex(max(arm.real, 0.0), arm.imag)):.3g} m, from which it begins",
-            )
-        return self.facing(float(np.angle(away) - np.arctan2(arm.imag, np.sqrt(ahead))))
-
 
 def act_at(
     model: Synthesizer, asked: MotionQuestion, by: FloorMotion, world: Iterable[int] = ()
