@@ -12,17 +12,16 @@ IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 def mul(a: Quaternions, b: Quaternions) -> Quaternions:
     """Return the product a b: the rotation b followed by a."""
-    aw, ax, ay, az = np.moveaxis(a, -1, 0)
-    bw, bx, by, bz = np.moveaxis(b, -1, 0)
-    return np.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
-    )
+    # Of a few quaternions most of the time is that of calling NumPy: these are its fastest calls.
+    aw, ax, ay, az = a[..., 0], a[..., 1], a[..., 2], a[..., 3]
+    bw, bx, by, bz = b[..., 0], b[..., 1], b[..., 2], b[..., 3]
+    real = aw * bw - ax * bx - ay * by - az * bz
+    found = np.empty((*real.shape, 4), real.dtype)
+    found[..., 0] = real
+    found[..., 1] = aw * bx + ax * bw + ay * bz - az * by
+    found[..., 2] = aw * by - ax * bz + ay * bw + az * bx
+    found[..., 3] = aw * bz + ax * by - ay * bx + az * bw
+    return found
 
 
 def conj(q: Quaternions) -> Quaternions:
@@ -49,7 +48,12 @@ def cross(a: Vectors, b: Vectors) -> Vectors:
     """
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+    first = ay * bz - az * by
+    found = np.empty((*first.shape, 3), first.dtype)
+    found[..., 0] = first
+    found[..., 1] = az * bx - ax * bz
+    found[..., 2] = ax * by - ay * bx
+    return found
 
 
 def exp(v: Vectors) -> Quaternions:
