@@ -51,7 +51,7 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
         told = standing_feet.describe(planned, script.character.skeleton.names)
     every = _place_feet(planned, np.arange(len(composed.motion)) / RATE, composed.motion)
     _judge_joins(script, composed, every)
-    rotations, roots = _at_times(composed.motion, planned, every, times)
+    rotations, roots = _at_times(script, composed.motion, planned, every, times)
     character = script.character
     joints = joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
     turns = quat.normalize(rotations)
@@ -161,15 +161,16 @@ def _place_feet(planned: FeetPlan | None, times: Frames, motion: Passage) -> Pla
 
 
 def _at_times(
-    motion: Passage, planned: FeetPlan | None, every: PlacedFrames, times: Frames
+    script: Script, motion: Passage, planned: FeetPlan | None, every: PlacedFrames, times: Frames
 ) -> tuple[Rotations, RootPath]:
-    """Return rotations and roots at times (F,), s, with placed feet.
+    """Return rotations and roots at the times (F,), s, of the clip, with placed feet.
 
     every: the motion at `RATE` with placed feet. Times between its frames have feet placed anew.
     """
-    frames = np.round(times * RATE).astype(np.int64)
-    if np.allclose(times * RATE, frames, rtol=0.0, atol=1e-6):
-        return every.rotations[frames], every.roots[frames]
+    step = round(RATE / script.question.fps)
+    if step * script.question.fps == RATE:
+        rows = slice(0, step * len(times), step)
+        return every.rotations[rows], every.roots[rows]
     rotations, roots = resample(motion.rotations, motion.roots, RATE, times)
     if planned is None:
         return rotations, roots
