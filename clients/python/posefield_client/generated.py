@@ -455,6 +455,16 @@ class ModelCardEvent(Struct, frozen=True, kw_only=True):
     share: float
 
 
+class ModelCardCaptured_acceleration(Struct, frozen=True, kw_only=True):
+    """Accelerations of the joints relative to the root in the captured clips, mean over the
+    joints, at 60 frames a second, in metres a second squared. Joins of performances are
+    compared with them. Absent for models of earlier versions. Since 4.2.0.
+    """
+
+    median: float
+    p99: float
+
+
 class ModelCard(Struct, frozen=True, kw_only=True):
     """Description of a model for clients, without its weights."""
 
@@ -487,6 +497,7 @@ class ModelCard(Struct, frozen=True, kw_only=True):
     presets: tuple[Preset, ...] = ()
     curves: tuple[Curve, ...] = ()
     contacts: tuple[FootContact, ...] = ()
+    captured_acceleration: ModelCardCaptured_acceleration | None = None
 
 
 class TakeFacts(Struct, frozen=True, kw_only=True):
@@ -733,6 +744,7 @@ class JoinReport(Struct, frozen=True, kw_only=True):
     peak: float
     usual: float
     hard: bool
+    reference: str | None = None
 
 
 class ScriptWarning(Struct, frozen=True, kw_only=True):

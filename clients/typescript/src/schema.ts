@@ -1290,10 +1290,12 @@ export interface components {
             seconds: number;
             /** @description Largest acceleration near the join, mean over joints relative to the root, in metres a second squared. */
             peak: number;
-            /** @description Largest acceleration of the motions away from the join. */
+            /** @description Usual largest acceleration of the motions away from the join, 99th percentile over frames, in metres a second squared. */
             usual: number;
             /** @description True if the join is unlike what the motions do; a warning says so. */
             hard: boolean;
+            /** @description `captured` if `usual` is of the captured clips of the models; `synthesised` if it is of the motions without joins, since a model is of an earlier version. Since 4.2.0. */
+            reference?: string;
         };
         ScriptWarning: {
             /**
@@ -1864,6 +1866,13 @@ export interface components {
             curves?: components["schemas"]["Curve"][];
             /** @description Joints whose contacts with the ground, or with a thing, the model predicts. Absent for models without contacts. */
             contacts?: components["schemas"]["FootContact"][];
+            /** @description Accelerations of the joints relative to the root in the captured clips, mean over the joints, at 60 frames a second, in metres a second squared. Joins of performances are compared with them. Absent for models of earlier versions. Since 4.2.0. */
+            captured_acceleration?: {
+                /** @description Median over the frames of all clips. */
+                median: number;
+                /** @description 99th percentile over the frames of all clips. */
+                p99: number;
+            };
         };
         /** @description Joint with contacts, and its swings between them in the captured clips. */
         FootContact: {

@@ -173,7 +173,8 @@ def _card(
 ) -> ModelCard:
     """Return the parent's card updated for the new performer.
 
-    The rest pose of the skeleton stays that of the parent, so bound characters stay valid.
+    The rest pose of the skeleton stays that of the parent, so bound characters stay valid. Captured
+    accelerations stay those of the parent's clips.
     """
     old, bank, clips = reopened.card, adapted.model.bank, adapted.new_clips.examples
     own = tuple(tuple(map(float, clip.controls)) for clip in clips)

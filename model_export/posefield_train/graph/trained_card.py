@@ -7,10 +7,18 @@ from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
+from posefield.common.array_shapes import Frames
 from posefield.common.units import Floats
 from posefield.kriging import typical_clip
 from posefield.kriging.kriging_model import Hyper, LabelKernel, half_ranges
+from posefield.model_file.captured_acceleration import (
+    RATE,
+    USUAL,
+    CapturedAcceleration,
+    mean_accelerations,
+)
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import (
     Control,
@@ -20,6 +28,7 @@ from posefield.model_file.model_card import (
     TrainingParameters,
     rounded,
 )
+from posefield.motion.clip import Clip
 from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph import truncation_cost
 from posefield_train.graph.trained_model import TrainedModel
@@ -75,7 +84,38 @@ def build_card(
         ),
         curves=trained.tensor.curves,
         contacts=trained.contacts.statistics if trained.contacts else (),
+        captured_acceleration=captured_acceleration(examples),
     )
+
+
+def captured_acceleration(examples: Sequence[Example]) -> CapturedAcceleration | None:
+    """Return the accelerations of captured clips; None for clips of less than three frames.
+
+    Cycles count as they were before their seams were closed, which bends their ends.
+    """
+    found = [clip_accelerations(own.captured or own.clip) for own in examples]
+    every = np.concatenate(found)
+    if len(every) == 0:
+        return None
+    return CapturedAcceleration(rounded(np.median(every)), rounded(np.percentile(every, USUAL)))
+
+
+def clip_accelerations(clip: Clip) -> Frames:
+    """Return the accelerations (F,) of a clip in its own time at `RATE`, m/s².
+
+    Between its frames the joints move along cubic splines: straight lines would have all of their
+    acceleration in the frames.
+    """
+    places = clip.positions()
+    places = places - places[:, :1]
+    step = clip.rate / RATE
+    # Tolerance of a millionth of a frame for the rounding of products.
+    times = step * np.arange(int((len(places) - 1) / step + 1e-6) + 1)
+    if step == round(step):
+        found = places[:: round(step)]
+    else:
+        found = CubicSpline(np.arange(len(places)), places, axis=0)(times)
+    return mean_accelerations(found, RATE)
 
 
 def _covariance_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from posefield.model_file.captured_acceleration import CapturedAcceleration
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.report.drawing import significant_digits
 from posefield_train.report.drawing.html_page import Section, Table
@@ -88,6 +89,7 @@ class Provenance:
             ("error of a left-out clip (RMS)", f"{100 * found['leave_one_out_rms_m']:.2f} cm"),
             ("of the motion explained by controls", f"{100 * found['explained']['pose']:.0f} %"),
             *_contact_figures(found),
+            *_acceleration_figures(card.captured_acceleration),
             ("largest difference from the reference", f"{100 * found['parity_m']:.5f} cm"),
             ("training time", f"{self.seconds:.1f} s"),
         ]
@@ -102,6 +104,16 @@ def _contact_figures(found: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("contacts of left-out clips that agree", f"{100 * own['agreement']:.1f} %"),
         ("their Brier score (of the mean clip)", scores),
+    ]
+
+
+def _acceleration_figures(own: CapturedAcceleration | None) -> list[tuple[str, str]]:
+    """Return the accelerations of the captured clips, if the card has them."""
+    if own is None:
+        return []
+    return [
+        ("acceleration of captured joints, median", f"{own.median:.1f} m/s²"),
+        ("the same, 99th percentile", f"{own.p99:.1f} m/s²"),
     ]
 
 

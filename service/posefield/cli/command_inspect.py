@@ -46,6 +46,7 @@ def _summary(plain: dict[str, Any]) -> str:
         *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),
         *map(_curve, plain.get("curves", [])),
         *_contacts(plain),
+        *_accelerations(plain),
         *(f"{own['name']}s: {', '.join(own['names'])}" for own in plain["labels"]),
         f"licence: {plain['provenance']['licence']}",
         *(f"note: {note}" for note in diagnostics["notes"]),
@@ -82,6 +83,17 @@ def _contacts(plain: dict[str, Any]) -> list[str]:
             f"{accuracy['brier']:.3f}, {accuracy['climatology']:.3f} by the mean of the others"
         )
     return found
+
+
+def _accelerations(plain: dict[str, Any]) -> list[str]:
+    """Return a line on the accelerations of the captured clips, if the card has them."""
+    own = plain.get("captured_acceleration")
+    if own is None:
+        return []
+    return [
+        "accelerations of the joints relative to the root in the captured clips: median "
+        f"{own['median']:.1f} m/s², 99th percentile {own['p99']:.1f} m/s²"
+    ]
 
 
 def _control(plain: dict[str, Any], joints: list[str]) -> str:

@@ -55,6 +55,7 @@ def check(card: ModelCard) -> None:
     _check_presets(card)
     _check_curves(card)
     _check_contacts(card)
+    _check_accelerations(card)
 
 
 def check_graph(
@@ -292,6 +293,13 @@ def _check_contacts(card: ModelCard) -> None:
         _expect(right, f"{path}.longest_swing", longest, f"at least its swing, {own.swing} s")
         for name, found in (("height", own.height), ("clearance", own.clearance)):
             _expect(abs(found) <= MAX_LENGTH, f"{path}.{name}", found, f"at most {MAX_LENGTH:g} m")
+
+
+def _check_accelerations(card: ModelCard) -> None:
+    own = card.captured_acceleration
+    if own is not None:
+        path = "captured_acceleration.p99"
+        _expect(own.p99 >= own.median, path, own.p99, f"at least the median, {own.median:g}")
 
 
 def _shapes(card: ModelCard) -> dict[str, tuple[int, ...]]:

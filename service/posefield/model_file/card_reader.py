@@ -103,7 +103,7 @@ class Provenance(TypedDict):
     adapted: NotRequired[tuple[Adaptation, ...]]
 
 
-OPTIONAL = dict.fromkeys(OPTIONAL_ENTRIES, b"[]")
+OPTIONAL = dict.fromkeys(OPTIONAL_ENTRIES, b"[]") | {"captured_acceleration": b"null"}
 """Entries that a file may lack, and the text that stands for them."""
 
 _TYPES = get_type_hints(ModelCard, include_extras=True) | {

@@ -27,6 +27,7 @@ from posefield.common.bounded_types import (
 )
 from posefield.common.units import Floats
 from posefield.kriging.kriging_model import Hyper
+from posefield.model_file.captured_acceleration import CapturedAcceleration
 from posefield.model_file.level_of_detail import Level
 from posefield.motion import measures
 from posefield.motion.curves import Curve
@@ -36,8 +37,8 @@ from posefield.motion.skeleton import Skeleton
 
 FORMAT = 4
 PREFIX = "posefield."
-OPTIONAL_ENTRIES = ("presets", "curves", "contacts")
-"""Entries that a file lacks where they are empty."""
+OPTIONAL_ENTRIES = ("presets", "curves", "contacts", "captured_acceleration")
+"""Entries that a file lacks where they are empty, or None."""
 UNITS = {"length": "m", "time": "s", "rotation": "quaternion wxyz", "up": "+y"}
 
 
@@ -146,7 +147,9 @@ class ModelCard:
     entry if the recipe names none. curves: scalar channels of the family, in the order of the
     graph's output `curves`; the file has no such entry without them. contacts: joints that contact
     the ground or a thing, in the order of the graph's output `contacts`, whose values are the
-    probabilities of their contacts; the file has neither without them.
+    probabilities of their contacts; the file has neither without them. captured_acceleration: of
+    the clips of the training, with which joins of performances are compared; None in files of
+    earlier versions.
     """
 
     name: Slug
@@ -176,6 +179,7 @@ class ModelCard:
     presets: tuple[Preset, ...] = ()
     curves: tuple[Curve, ...] = ()
     contacts: tuple[FootContact, ...] = ()
+    captured_acceleration: CapturedAcceleration | None = None
 
     @property
     def clip_labels(self) -> Floats:
@@ -245,9 +249,9 @@ def _plain_fields(card: ModelCard) -> dict[str, Any]:
     """Return the fields of the card but `making`, as numbers, texts, lists and dicts."""
     plain: dict[str, Any] = msgspec.to_builtins(card, enc_hook=np.ndarray.tolist)
     del plain["making"]
-    for name in ("curves", "contacts"):
+    for name in ("curves", "contacts", "captured_acceleration"):
         if not getattr(card, name):
-            del plain[name]
+            plain.pop(name, None)
     # msgspec leaves out defaults of objects that it decoded.
     for control, own in zip(plain["controls"], card.controls, strict=True):
         control.pop("measure", None)

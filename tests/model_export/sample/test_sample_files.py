@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from posefield.common.errors import FileError
 from posefield.motion import quat, skeleton
+from posefield_train.graph import trained_card
 from posefield_train.sample import (
     noise_free,
     sample_arms,
@@ -157,6 +158,23 @@ def test_file_read_by_another_hand_gives_the_same_positions(folder, rows, sample
     for channel in (3, 91):
         bent = values + np.where(np.arange(94) == channel, 1.0, 0.0)
         assert np.abs(played(head, bent) - expected).max() > 1e-4
+
+
+@pytest.mark.parametrize("number", [1, 60])
+def test_a_files_accelerations_are_those_of_its_own_numbers(folder, rows, samples, number):
+    """Oracle: every second frame at 120 Hz, read by the other hand, and three of its frames."""
+    head, _, values = motion_of(folder / rows[number - 1]["file"])
+    places = played(head, values)[::2, : len(sample_body.NAMES)]
+    places = places - places[:, :1]
+    second = (places[2:] - 2.0 * places[1:-1] + places[:-2]) * 60.0**2
+    expected = np.sqrt(np.square(second).sum(axis=-1)).mean(axis=-1)
+    found = trained_card.clip_accelerations(samples[number - 1].clip)
+    assert np.abs(found - expected).max() < 1e-3 * expected.max()
+    # Negative control: the frames between them are another motion.
+    between = played(head, values)[1::2, : len(sample_body.NAMES)]
+    other = np.linalg.norm(np.diff(between - between[:, :1], 2, axis=0), axis=-1).mean(-1) * 3600.0
+    count = min(len(other), len(found))
+    assert np.abs(found[:count] - other[:count]).max() > 0.01 * expected.max()
 
 
 def test_table_holds_the_controls_of_the_samples(rows, samples):

@@ -1,0 +1,159 @@
+"""Tests of the accelerations of captured clips on the model card."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.inference import session
+from posefield.model_file import card_reader, model_card
+from posefield.model_file.captured_acceleration import RATE, mean_accelerations
+from posefield.motion import quat
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield_train.graph.trained_card import captured_acceleration, clip_accelerations
+from posefield_train.report.provenance import Provenance
+
+ARM = 0.5
+PENDULUM = Skeleton(
+    ("root", "joint"), (-1, 0), np.array([[0.0, 1.0, 0.0], [0.0, -ARM, 0.0]]), (), np.zeros((0, 3))
+)
+SWING, FREQUENCY = 0.4, 2.0 * np.pi
+PRECISION = 0.02
+"""Share of the largest acceleration by which a clip of another rate may differ."""
+MOST_BYTES = 100
+"""Largest number of bytes that the accelerations add to a file."""
+
+
+def swinging(rate, seconds=2.0):
+    """Return a clip of a root that swings, so that its one joint moves on an arc."""
+    times = np.arange(round(seconds * rate) + 1) / rate
+    angles = SWING * np.sin(FREQUENCY * times)
+    rotations = np.tile([1.0, 0.0, 0.0, 0.0], (len(times), 2, 1))
+    rotations[:, 0] = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), angles)
+    places = np.tile(PENDULUM.offsets, (len(times), 1, 1))
+    places[:, 0] = [0.0, 1.0, 0.0]
+    return Clip(PENDULUM, rotations, places, rate)
+
+
+def expected(count):
+    """Return half the acceleration (count,) of a point on the arc, by its two parts."""
+    times = np.arange(1, count + 1) / RATE
+    speeds = SWING * FREQUENCY * np.cos(FREQUENCY * times)
+    gains = -SWING * FREQUENCY**2 * np.sin(FREQUENCY * times)
+    return ARM * np.hypot(gains, speeds**2) / 2.0
+
+
+@pytest.mark.parametrize("rate", [30.0, 50.0, 60.0, 100.0, 119.88, 120.0])
+def test_clips_of_every_rate_have_the_acceleration_of_their_motion(rate):
+    found = clip_accelerations(swinging(rate))
+    assert len(found) == int(2.0 * RATE * (1.0 + 1e-9)) - 1
+    right = expected(len(found))
+    assert np.abs(found - right).max() < PRECISION * right.max()
+
+
+def test_straight_lines_between_frames_would_double_the_acceleration():
+    """Negative control: lines between the frames of a clip of half the rate."""
+    places = swinging(30.0).positions()
+    steps = np.arange(2 * len(places) - 1) / 2.0
+    lines = np.stack(
+        [
+            np.interp(steps, np.arange(len(places)), each)
+            for each in places.reshape(len(places), -1).T
+        ],
+        axis=1,
+    ).reshape(-1, 2, 3)
+    found = mean_accelerations(lines, RATE)
+    right = expected(len(found))
+    assert np.abs(found - right).max() > 25.0 * PRECISION * right.max()
+
+
+def test_the_card_has_the_percentiles_over_all_frames(exported, trained):
+    found = exported.card.captured_acceleration
+    every = np.sort(np.concatenate([clip_accelerations(own.clip) for own in trained.examples]))
+    assert found.median == pytest.approx(np.interp(0.5, np.linspace(0, 1, len(every)), every), 1e-3)
+    assert found.p99 == pytest.approx(np.interp(0.99, np.linspace(0, 1, len(every)), every), 1e-3)
+    # Negative control: the mean over the clips of their own percentiles is another number.
+    own = np.mean([np.percentile(clip_accelerations(e.clip), 99) for e in trained.examples])
+    assert found.p99 != pytest.approx(own, 1e-3)
+    assert 0.0 < found.median < found.p99
+
+
+def test_a_cycle_counts_as_it_was_before_its_seam_was_closed(strides):
+    captured = [own for own in strides if own.captured is not None]
+    assert captured
+    bare = [replace(own, captured=None) for own in captured]
+    swung = [replace(own, captured=swinging(60.0)) for own in captured]
+    assert captured_acceleration(swung).p99 == pytest.approx(expected(119).max(), PRECISION)
+    assert captured_acceleration(bare).p99 != captured_acceleration(swung).p99
+
+
+def test_clips_of_two_frames_have_none(strides):
+    clip = swinging(RATE, 1.0 / RATE)
+    assert captured_acceleration([replace(strides[0], clip=clip, captured=None)]) is None
+
+
+def test_the_file_grows_by_less_than_a_hundred_bytes(exported):
+    with_it, without = (
+        model_card.dump(card)
+        for card in (exported.card, replace(exported.card, captured_acceleration=None))
+    )
+    (name,) = with_it.keys() - without.keys()
+    assert name == "posefield.captured_acceleration"
+    assert len(name) + len(with_it[name]) < MOST_BYTES - 20
+
+
+def earlier_file(exported, folder):
+    """Return the path of the model as a file of an earlier version."""
+    old = replace(exported.card, captured_acceleration=None)
+    path = folder / "old.onnx"
+    path.write_bytes(exported.model.onnx(model_card.dump(old), {"producer_name": "posefield"}))
+    return path
+
+
+def test_a_file_of_an_earlier_version_has_none(exported, tmp_path):
+    opened = session.load(earlier_file(exported, tmp_path))
+    assert opened.card.captured_acceleration is None
+    assert "captured_acceleration" not in model_card.plain_values(opened.card)
+
+
+def test_what_is_written_is_read(exported):
+    entries = {name: text.encode() for name, text in model_card.dump(exported.card).items()}
+    found = card_reader.decode(entries)
+    assert found.captured_acceleration == exported.card.captured_acceleration
+    plain = model_card.plain_values(found)["captured_acceleration"]
+    assert plain.keys() == {"median", "p99"}
+
+
+def test_inspect_tells_of_the_accelerations(model_path, exported, tmp_path, posefield):
+    own = exported.card.captured_acceleration
+    code, out, _ = posefield("inspect", model_path)
+    assert code == 0
+    assert f"median {own.median:.1f} m/s², 99th percentile {own.p99:.1f} m/s²" in out
+    code, out, _ = posefield("inspect", earlier_file(exported, tmp_path))
+    assert code == 0 and "accelerations" not in out
+
+
+def test_the_training_report_has_the_accelerations(exported):
+    own = exported.card.captured_acceleration
+    told = dict(Provenance(exported, ()).figures())
+    assert told["acceleration of captured joints, median"] == f"{own.median:.1f} m/s²"
+    assert told["the same, 99th percentile"] == f"{own.p99:.1f} m/s²"
+    old = replace(exported, card=replace(exported.card, captured_acceleration=None))
+    assert len(Provenance(old, ()).figures()) == len(told) - 2
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"median": 3.0, "p99": 2.0}', "p99 is 2.0, expected at least the median, 3"),
+        ('{"median": -1.0, "p99": 2.0}', "captured_acceleration"),
+        ('{"median": 1.0}', "p99"),
+        ("[]", "captured_acceleration"),
+    ],
+)
+def test_other_accelerations_are_refused(exported, text, said):
+    entries = {name: own.encode() for name, own in model_card.dump(exported.card).items()}
+    entries["posefield.captured_acceleration"] = text.encode()
+    with pytest.raises(ValueError, match=said):
+        card_reader.decode(entries)
