@@ -84,7 +84,7 @@ TAKE_ROWS: tuple[tuple[str, Callable[[Found], str], str], ...] = (
     ),
     (
         "acceleration of a take with detail over captured",
-        _of_takes("acceleration", "lively", ""),
+        _of_takes("acceleration", "detailed_take", ""),
         "0.8 to 1.2, 0.9 to 1.1",
     ),
     (

@@ -11,8 +11,9 @@ from posefield_train.source.recipe import Recipe
 
 RATE = 60.0
 RAISED = {"a": 0.0, "b": 0.1, "d": 0.2, "cy": 0.25}
-"""What each performer adds to the curves OWN of `face_motion`."""
+"""Value that is added to the curves in `OWN`, by performer."""
 OWN = ("mouthFunnel", "browInnerUp")
+"""Curves of `face_motion` by which the performers differ."""
 HEADING = "file,curves,smile,openness,who"
 POINTS = [(0.1 + 0.8 * i / 14, 0.1 + 0.8 * ((4 * i) % 15) / 14) for i in range(15)]
 """Controls of the clips, spread over the square."""

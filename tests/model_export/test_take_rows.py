@@ -74,7 +74,7 @@ def test_takes_of_held_out_clips_are_measured_at_the_default_rate(found):
         assert own.take != own.predicted and own.sliding != own.predicted
         assert own.take.weighted_skate < own.sliding.weighted_skate + 1e-3
         # All time functions of a cycle vary, and this model has no detail.
-        assert own.unlimited is own.detailed is own.lively is None
+        assert own.unlimited is own.detailed is own.detailed_take is None
 
 
 def test_a_take_of_a_motion_without_cycle_varies_few_time_functions(labelled_path, examples):
@@ -101,8 +101,8 @@ def test_the_table_has_values_beside_negative_controls(found):
     listed = take_summary.rows(merged)
     assert len(listed) == 6 and all(len(row) == len(take_summary.HEADER) for row in listed)
     # With detail there is a row of it.
-    one = replace(found.clips[0], detailed=found.clips[0].take, lively=found.clips[0].take)
-    lively = replace(merged, clips=[one, *found.clips[1:]])
-    rows = [row for row in take_summary.rows(lively) if "detail" in row[0]]
+    one = replace(found.clips[0], detailed=found.clips[0].take, detailed_take=found.clips[0].take)
+    detailed = replace(merged, clips=[one, *found.clips[1:]])
+    rows = [row for row in take_summary.rows(detailed) if "detail" in row[0]]
     assert len(rows) == 1 and "without detail" in rows[0][2]
     assert "variance over kriging variance" in take_summary.table(merged)

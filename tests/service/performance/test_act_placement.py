@@ -22,12 +22,12 @@ def reach(model_path):
 
 
 def hand_to(place, **more):
-    """A question whose right hand is at a place at the event."""
+    """Return a question with a target for the right hand at the event. place: m."""
     return MotionQuestion(controls={}, targets=(Target("RightHand", place, at="event"),), **more)
 
 
 def hand(reach, placed):
-    """Where the hand is in the world at the event."""
+    """Return the position of the right hand in the world at the event, m."""
     return acting.joint_path(reach, placed.act, "RightHand", placed.by)[placed.act.event]
 
 

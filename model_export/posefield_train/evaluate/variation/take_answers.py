@@ -35,8 +35,8 @@ class TakeAnswer:
 
     predicted: with feet as predicted. take, sliding: with standing feet, and with feet as
     predicted. unlimited: `sliding` with all time functions varied, a negative control; None for
-    cycles, of which all are. detailed, lively: the prediction and the take with detail, the latter
-    with standing feet; None for models without.
+    cycles, of which all are. detailed: the prediction with detail. detailed_take: the take with
+    detail, with standing feet. Both are None for models without detail.
     """
 
     captured: FootQuality
@@ -45,7 +45,7 @@ class TakeAnswer:
     sliding: FootQuality
     unlimited: FootQuality | None
     detailed: FootQuality | None
-    lively: FootQuality | None
+    detailed_take: FootQuality | None
 
 
 @dataclass(frozen=True)

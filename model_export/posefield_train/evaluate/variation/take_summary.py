@@ -18,7 +18,7 @@ MEASURES: dict[str, Callable[[FootQuality], float]] = {
     "weighted_skate": lambda own: own.weighted_skate,
 }
 """Measures that are told as a ratio of means over clips."""
-ANSWERS = ("predicted", "take", "sliding", "unlimited", "detailed", "lively")
+ANSWERS = ("predicted", "take", "sliding", "unlimited", "detailed", "detailed_take")
 """Answers that are compared with the captured clips, as `TakeAnswer` names them."""
 
 
@@ -88,7 +88,7 @@ def _ratio(clips: Sequence[TakeAnswer], name: str, value: Callable[[FootQuality]
     """Return the mean of a measure of an answer over that of the captured clips."""
     captured = float(np.mean([value(own.captured) for own in clips]))
     # A fold whose model has no detail answers without it: the prediction and the take.
-    plain = {"detailed": "predicted", "lively": "take"}
+    plain = {"detailed": "predicted", "detailed_take": "take"}
     answers = [getattr(own, name) or getattr(own, plain.get(name, name)) for own in clips]
     return _rounded(np.mean([value(own) for own in answers]) / max(captured, 1e-9))
 
@@ -135,7 +135,7 @@ def _clip_rows(told: dict[str, Any]) -> list[tuple[str, str, str]]:
     words = "acceleration over captured: predicted → take"
     found = [(words, f"{faster['predicted']:.2f} → {faster['take']:.2f}", control)]
     if "detailed" in faster:
-        both = f"{faster['detailed']:.2f}; {faster['lively']:.2f}"
+        both = f"{faster['detailed']:.2f}; {faster['detailed_take']:.2f}"
         words = "acceleration with detail over captured: predicted; take"
         found.append((words, both, f"{faster['predicted']:.2f} without detail"))
     for key, name in (("skate", "planted"), ("weighted_skate", "low")):
