@@ -24,8 +24,9 @@ from posefield.motion.foot_contacts import FootContact
 from posefield.performance.joins import blends, cut_search, join_quality, join_steps
 from posefield.performance.joins.blends import Blend
 from posefield.performance.joins.cut_search import Cut
-from posefield.performance.joins.join_quality import JoinFacts
+from posefield.performance.joins.join_quality import JoinFacts, UsualMotion
 from posefield.performance.passages.passage import RATE, Passage
+from posefield_train.graph import trained_card
 from posefield_train.source import clip_table, ingest, recipe, shipped_recipes
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -60,11 +61,15 @@ class Take:
 
 @dataclass(frozen=True)
 class Join:
-    """What is measured of a join: peaks of acceleration, m/s², and of feet, m and m/s."""
+    """What is measured of a join, of feet in m.
+
+    facts: with placed feet. real, blended: peaks of acceleration of the real continuation, and
+    before feet are placed, m/s².
+    """
 
     facts: JoinFacts
     real: float
-    placed: float
+    blended: float
     slides: tuple[float, ...]
     lowered: float
     height: tuple[float, float]
@@ -82,6 +87,16 @@ def takes(name: str, data: Path) -> list[Take]:
         if row.last_frame is not None and row.last_frame + round(LEAST * clip.rate) < len(clip):
             found.append(_take(row, clip, own.motion.feet))
     return found
+
+
+def captured(name: str, data: Path) -> UsualMotion:
+    """Return the accelerations of a recipe's clips, as the card of its model has them."""
+    path = next(Path(shipped_recipes.__file__).parents[1].glob(f"recipes/{name}.toml"))
+    examples, _ = ingest.ingest(recipe.read(path), data)
+    found = trained_card.captured_acceleration(examples)
+    if found is None:
+        raise ValueError(f"{name} has no clip of three frames, expected longer ones")
+    return UsualMotion(found.p99, "captured")
 
 
 def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
@@ -122,8 +137,8 @@ def pairs(found: Sequence[Take], every: bool = False) -> Iterator[tuple[Take, Ta
             yield from ((take, other) for other in (others if every else others[:1]))
 
 
-def join(own: Take, other: Take, cyclic: bool, kind: Blend) -> Join:
-    """Return what a join of two takes measures."""
+def join(own: Take, other: Take, cyclic: bool, kind: Blend, usual: UsualMotion) -> Join:
+    """Return what a join of two takes measures. usual: what it is compared with."""
     body, rest = own.character, len(other.passage)
     before = own.passage.part(0, own.event + 1)
     if cyclic:
@@ -138,13 +153,12 @@ def join(own: Take, other: Take, cyclic: bool, kind: Blend) -> Join:
     cut = cut_search.find_cut(body, before, after, window, range(entries))
     after = after.placed(cut.motion)
     joined = blends.join(before, after, cut, kind)
-    usual = join_quality.usual_acceleration(body, [own.passage, other.passage])
-    facts = join_quality.judge(body, (before, after), cut, kind, joined, usual)
     stepped, _ = join_steps.add_steps(body, before, after, cut, joined)
     placed, slides, lowered = _placed(own, stepped, cut)
-    real = _peak(body, own.passage, cut.exit)
+    found = join_quality.describe_cut((before, after), cut, kind, usual)
+    real, blended, peak = (_peak(body, each, cut.exit) for each in (own.passage, joined, placed))
     high, low = (float(side.passage.roots[side.event, 1]) for side in (own, other))
-    return Join(facts, real, _peak(body, placed, cut.exit), slides, lowered, (high, low))
+    return Join(JoinFacts(found, peak), real, blended, slides, lowered, (high, low))
 
 
 def _placed(own: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float, ...], float]:
@@ -181,10 +195,12 @@ def rows(data: Path) -> list[Row]:
     """Return the figures of joins of reaches and of strides."""
     found = []
     for name, cyclic, kind, goal in FAMILIES:
-        joins = [join(*pair, cyclic, kind) for pair in pairs(takes(name, data))]
+        usual = captured(name, data)
+        joins = [join(*pair, cyclic, kind, usual) for pair in pairs(takes(name, data))]
         found += _rows(f"{name}, {len(joins)} joins", joins, goal)
     deposits = takes("hdm05_deposit_floor", data)
-    joins = [join(*pair, False, "dead") for pair in pairs(deposits, True)]
+    usual = captured("hdm05_deposit_floor", data)
+    joins = [join(*pair, False, "dead", usual) for pair in pairs(deposits, True)]
     other = [own for own in joins if min(own.height) < SQUAT and max(own.height) > STOOP]
     share = 100.0 * float(np.mean([own.facts.hard for own in other]))
     same = [own for own in joins if own not in other]
@@ -198,9 +214,9 @@ def _rows(title: str, joins: Sequence[Join], goal: float | None) -> list[Row]:
     real = float(np.median([own.real for own in joins]))
     plain, placed = (
         float(np.median(peaks))
-        for peaks in ([own.facts.peak for own in joins], [own.placed for own in joins])
+        for peaks in ([own.blended for own in joins], [own.facts.peak for own in joins])
     )
-    distance = 100.0 * float(np.median([own.facts.distance for own in joins]))
+    distance = 100.0 * float(np.median([own.facts.cut.distance for own in joins]))
     slides = [round(100.0 * one, 3) for own in joins for one in own.slides]
     slide, worst = float(np.percentile(slides, 90)), max(slides)
     lowered = 100.0 * float(np.mean([own.lowered for own in joins]))

@@ -1,5 +1,6 @@
 """Performances: one motion of all segments of a script, its feet, and the report about it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from posefield.motion.clip import assemble
 from posefield.performance import act_steps, hold_steps, reporting, walk_steps
 from posefield.performance.acts.staged_act import StagedAct
 from posefield.performance.joins import join_quality
+from posefield.performance.joins.join_quality import JoinFacts
 from posefield.performance.passages import limb_targets
 from posefield.performance.passages.passage import RATE, Passage
 from posefield.performance.script import Script, errors_under
@@ -33,8 +35,9 @@ def plan(script: Script, most: int) -> PerformanceReport:
     """
     composed = compose(script)
     times = frame_times(composed, script.question.fps, most)
-    _judge_joins(script, composed, PlacedFrames(composed.motion.rotations, composed.motion.roots))
-    return reporting.report(script, composed, len(times), None)
+    every = PlacedFrames(composed.motion.rotations, composed.motion.roots)
+    joins = _judge_joins(script, composed, every)
+    return reporting.report(script, composed, joins, len(times), None)
 
 
 def perform(script: Script, most: int) -> PerformanceAnswer:
@@ -50,30 +53,27 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
         planned = plan_feet(script, composed)
         told = standing_feet.describe(planned, script.character.skeleton.names)
     every = _place_feet(planned, np.arange(len(composed.motion)) / RATE, composed.motion)
-    _judge_joins(script, composed, every)
+    judged = _judge_joins(script, composed, every)
     rotations, roots = _at_times(script, composed.motion, planned, every, times)
     character = script.character
     joints = joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
     turns = quat.normalize(rotations)
     clip = assemble(joints, turns, roots, character.bones, script.question.fps)
-    return PerformanceAnswer(clip, reporting.report(script, composed, len(clip), told))
+    return PerformanceAnswer(clip, reporting.report(script, composed, judged, len(clip), told))
 
 
-def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> None:
-    """Judge the joins as they are sent: with targets met, and feet placed where they stand."""
-    timeline, motion = composed.timeline, composed.motion
-    shift = timeline.begin
+def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> Sequence[JoinFacts]:
+    """Judge the joins as they are sent: with targets met, and feet placed where they stand.
 
-    def placed(rows: slice) -> PlacedFrames:
-        return PlacedFrames(every.rotations[rows], every.roots[rows])
-
-    joins = [(own.frame - shift, own.facts) for own in timeline.seams]
-    found = join_quality.judge_again(script.character.body, len(motion), joins, placed)
-    for index, facts in enumerate(found):
-        seam = timeline.seams[index]
-        timeline.seams[index] = replace(seam, facts=facts)
-        if facts.hard and not seam.facts.hard:
+    Each hard one has a warning.
+    """
+    timeline = composed.timeline
+    joins = [(own.frame - timeline.begin, own.cut) for own in timeline.seams]
+    found = join_quality.judge(script.character.body, joins, every)
+    for seam, facts in zip(timeline.seams, found, strict=True):
+        if facts.hard:
             timeline.warn(f"/segments/{seam.segment}", "; ".join(facts.reasons))
+    return found
 
 
 def plan_document(report: PerformanceReport) -> bytes:
@@ -83,12 +83,10 @@ def plan_document(report: PerformanceReport) -> bytes:
 
 def compose(script: Script) -> Composed:
     """Return the motion of all segments, joined one after another."""
-    timeline = Timeline(script.character)
+    timeline = Timeline(script.character, _captured_accelerations(script))
     if script.question.start.poses:
         poses = script.question.start.poses
-        timeline.begin_with(from_poses(poses, script.question.fps, script.character))
-        timeline.begin = len(timeline.done) - 1
-        timeline.exits = range(timeline.begin, timeline.begin + 1)
+        timeline.begin_with_given(from_poses(poses, script.question.fps, script.character))
     staged: StagedAct | None = None
     for index, own in enumerate(script.segments):
         cancellation.check()
@@ -107,6 +105,17 @@ def compose(script: Script) -> Composed:
         script.character.body, timeline.done, timeline.targets
     )
     return Composed(motion.part(timeline.begin, len(motion)), timeline, missed)
+
+
+def _captured_accelerations(script: Script) -> tuple[float, ...]:
+    """Return `Timeline.captured`, zero for holds."""
+    found = []
+    for own in script.sources:
+        known = None if own is None else own.model.session.card.captured_acceleration
+        if own is not None and known is None:
+            return ()
+        found.append(0.0 if known is None else known.p99)
+    return tuple(found)
 
 
 def _is_open(own: Segment) -> bool:

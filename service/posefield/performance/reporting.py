@@ -1,10 +1,12 @@
 """Report of a performance from its timeline."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from posefield.locomotion import floor_plane
+from posefield.performance.joins.join_quality import JoinFacts
 from posefield.performance.passages.passage import RATE
 from posefield.performance.script import Script
 from posefield.performance.timeline import Composed, Seam, Span, heading
@@ -24,9 +26,16 @@ MET = 1e-3
 
 
 def report(
-    script: Script, composed: Composed, frames: int, feet: FeetResult | None
+    script: Script,
+    composed: Composed,
+    joins: Sequence[JoinFacts],
+    frames: int,
+    feet: FeetResult | None,
 ) -> PerformanceReport:
-    """Return the report of a performance. frames: of its clip. feet: None as predicted."""
+    """Return the report of a performance.
+
+    joins: judged, in order. frames: of its clip. feet: None as predicted.
+    """
     timeline = composed.timeline
     sigma = float(np.sqrt(np.mean(np.square(composed.motion.sigmas))))
     warnings = [*timeline.warnings, *_missed(composed)]
@@ -38,7 +47,7 @@ def report(
         _rounded(sigma),
         all(span.supported for span in timeline.spans),
         _segments(composed),
-        tuple(_join(composed, seam) for seam in timeline.seams),
+        tuple(_join(composed, *pair) for pair in zip(timeline.seams, joins, strict=True)),
         feet,
         tuple(warnings),
     )
@@ -86,17 +95,18 @@ def _path(composed: Composed, span: Span) -> PathReport | None:
     return PathReport(*map(_rounded, numbers))
 
 
-def _join(composed: Composed, seam: Seam) -> JoinReport:
-    shift, facts = composed.timeline.begin, seam.facts
+def _join(composed: Composed, seam: Seam, facts: JoinFacts) -> JoinReport:
+    shift, cut = composed.timeline.begin, seam.cut
     return JoinReport(
         seam.segment,
         _rounded((seam.frame - shift) / RATE),
-        _rounded(facts.distance),
-        facts.blend,
+        _rounded(cut.distance),
+        cut.blend,
         _rounded(seam.seconds),
         _rounded(facts.peak),
-        _rounded(facts.usual),
+        _rounded(cut.usual.acceleration),
         facts.hard,
+        cut.usual.reference,
     )
 
 

@@ -13,14 +13,14 @@ from posefield.motion import quat
 from posefield.performance.joins import blends, cut_search, join_quality, join_steps
 from posefield.performance.joins.blends import Blend
 from posefield.performance.joins.cut_search import Cut
-from posefield.performance.joins.join_quality import JoinFacts
+from posefield.performance.joins.join_quality import CutFacts, UsualMotion
 from posefield.performance.passages.limb_targets import WorldTarget
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Protagonist
 from posefield.performance.script_bounds import MAX_SECONDS
 from posefield.performance.walks.walk_segment import WalkPlan
 from posefield.question.performance_question import GivenPose, Join
-from posefield.question.performance_report import ScriptWarning, SegmentKind
+from posefield.question.performance_report import Reference, ScriptWarning, SegmentKind
 from posefield.question.results import ConstraintResult
 
 
@@ -53,7 +53,7 @@ class Seam:
     segment: int
     frame: int
     seconds: float
-    facts: JoinFacts
+    cut: CutFacts
 
 
 @dataclass
@@ -62,10 +62,12 @@ class Timeline:
 
     motion: so far; None before the first segment. exits: frames from which the next segment may go
     on. begin: first frame that belongs to the performance; earlier ones are of the given poses.
-    usual: largest usual acceleration of the last segment's motion, m/s².
+    captured: 99th percentile of the captured accelerations of each segment's model, m/s²; empty if
+    a card lacks it. usual: largest usual acceleration of the last segment's motion, m/s².
     """
 
     character: Protagonist
+    captured: tuple[float, ...] = ()
     motion: Passage | None = None
     exits: range = range(0)
     begin: int = 0
@@ -101,8 +103,20 @@ class Timeline:
 
     def begin_with(self, passage: Passage) -> None:
         """Make a placed passage the beginning of the motion."""
-        self.motion = passage
-        self.usual = join_quality.usual_acceleration(self.character.body, [passage])
+        self.motion, self.usual = passage, self._usual(passage)
+
+    def begin_with_given(self, poses: Passage) -> None:
+        """Make given poses what the performance goes on from; they have no model."""
+        self.motion = poses
+        self.usual = join_quality.usual_acceleration(self.character.body, [poses])
+        self.begin = len(poses) - 1
+        self.exits = range(self.begin, self.begin + 1)
+
+    def _usual(self, passage: Passage) -> float:
+        """Return the usual largest acceleration of the next segment, m/s²."""
+        if self.captured:
+            return self.captured[len(self.spans)]
+        return join_quality.usual_acceleration(self.character.body, [passage])
 
     def go_on(self, placed: Passage) -> int:
         """Go on with a passage whose first frame is the last one; return its frame.
@@ -111,7 +125,7 @@ class Timeline:
         """
         last = len(self.done) - 1
         cut = Cut(last, 0, FloorMotion(), 0.0, 0.0)
-        own = join_quality.usual_acceleration(self.character.body, [placed])
+        own = self._usual(placed)
         self.motion, self.usual = blends.join(self.done, placed, cut, "hermite"), own
         return last
 
@@ -121,12 +135,12 @@ class Timeline:
         fits = min(seconds, max(len(placed) - 1 - cut.entry, 0) / RATE)
         joined = blends.join(before, placed, cut, kind, fits)
         self.motion, _ = join_steps.add_steps(body, before, placed, cut, joined)
-        own = join_quality.usual_acceleration(body, [placed])
-        usual, self.usual = max(self.usual, own), own
-        facts = join_quality.judge(body, (before, placed), cut, kind, joined, usual)
+        own = self._usual(placed)
+        reference: Reference = "captured" if self.captured else "synthesised"
+        usual = UsualMotion(max(self.usual, own), reference)
+        facts = join_quality.describe_cut((before, placed), cut, kind, usual)
         self.seams.append(Seam(segment, cut.exit, fits, facts))
-        if facts.hard:
-            self.warn(f"/segments/{segment}", "; ".join(facts.reasons))
+        self.usual = own
         return cut.exit - cut.entry
 
     def check_duration(self) -> None:

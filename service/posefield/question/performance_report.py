@@ -7,6 +7,9 @@ from typing import Any, Literal
 from posefield.question.results import ConstraintResult, FeetResult, SampledClip
 
 SegmentKind = Literal["walk", "act", "hold"]
+Reference = Literal["captured", "synthesised"]
+"""Motions whose accelerations a join is compared with: captured clips of the models, or motions as
+they were synthesised."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +71,9 @@ class JoinReport:
 
     segment: index of the segment that begins. time: s. distance: of the two motions at the cut, m.
     blend: its kind. seconds: of it. peak: largest acceleration near the join, mean over joints
-    relative to the root, m/s². usual: the same of the motions away from the join. hard: whether the
-    join is unlike anything that the motions do.
+    relative to the root, m/s². usual: 99th percentile of the same in the motions away from the
+    join. hard: whether the join is unlike anything that the motions do. reference: motions that
+    `usual` is measured on.
     """
 
     segment: int
@@ -80,6 +84,7 @@ class JoinReport:
     peak: float
     usual: float
     hard: bool
+    reference: Reference
 
 
 @dataclass(frozen=True)

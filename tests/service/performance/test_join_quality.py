@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from passages import PARENTS, character, smooth
 
+from posefield.feet.foot_placement import PlacedFrames
 from posefield.motion import skeleton
 from posefield.performance.joins import blends, cut_search, join_quality
-from posefield.performance.joins.join_quality import JoinFacts
+from posefield.performance.joins.join_quality import CutFacts, JoinFacts, UsualMotion
 from posefield.performance.passages.passage import RATE, FloorMotion
 
-EASY = JoinFacts(3.0, 0.05, "dead", 8.0, 4.0, 0.02)
+CUT = CutFacts(0.05, 0.02, "dead", UsualMotion(4.0, "captured"))
+EASY = JoinFacts(CUT, 8.0)
 
 
 def test_accelerations_are_second_differences_relative_to_the_root():
@@ -31,10 +33,10 @@ def test_accelerations_are_second_differences_relative_to_the_root():
     assert len(join_quality.accelerations(character(), passage.part(0, 2), 0, 2)) == 0
 
 
-def test_the_usual_acceleration_is_that_of_the_livelier_passage():
-    calm, lively = smooth(1, size=0.1), smooth(1)
-    both = join_quality.usual_acceleration(character(), [calm, lively])
-    assert both == join_quality.usual_acceleration(character(), [lively])
+def test_the_usual_acceleration_is_that_of_the_faster_passage():
+    calm, fast = smooth(1, size=0.1), smooth(1)
+    both = join_quality.usual_acceleration(character(), [calm, fast])
+    assert both == join_quality.usual_acceleration(character(), [fast])
     assert both > 2.0 * join_quality.usual_acceleration(character(), [calm])
     assert join_quality.usual_acceleration(character(), []) == 0.0
 
@@ -43,45 +45,82 @@ def judged(before, after, kind, motion=None):
     cut = cut_search.find_cut(character(), before, after, range(30, 50), range(8), motion)
     after = after.placed(cut.motion)
     joined = blends.join(before, after, cut, kind)
-    usual = join_quality.usual_acceleration(character(), [before, after])
-    return join_quality.judge(character(), (before, after), cut, kind, joined, usual), cut
+    found = join_quality.usual_acceleration(character(), [before, after])
+    usual = UsualMotion(found, "synthesised")
+    facts = join_quality.describe_cut((before, after), cut, kind, usual)
+    sent = PlacedFrames(joined.rotations, joined.roots)
+    (judgement,) = join_quality.judge(character(), [(cut.exit, facts)], sent)
+    return judgement, cut
 
 
 def test_a_motion_that_goes_on_is_an_easy_join():
     whole = smooth(2, 120)
     facts, cut = judged(whole, whole.part(30, 120), "dead")
     assert not facts.hard
-    assert facts.sentence == ""
-    assert facts.time == cut.exit / RATE
-    assert facts.distance == cut.distance
-    assert facts.drop == pytest.approx(0.0, abs=1e-9)
+    assert facts.cut.distance == cut.distance
+    assert facts.cut.drop == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_plain_cut_is_hard():
     facts, _ = judged(smooth(3), smooth(4), "cut")
     assert facts.hard
-    assert facts.peak > 10.0 * facts.usual
+    assert facts.peak > 10.0 * facts.cut.usual.acceleration
     blended, _ = judged(smooth(3), smooth(4), "dead")
     assert blended.peak < 0.3 * facts.peak
 
 
+def test_the_peak_is_that_of_the_frames_near_the_join():
+    passage = smooth(1, 120)
+
+    def peak(frames, frame):
+        sent = PlacedFrames(passage.rotations[:frames], passage.roots[:frames])
+        (found,) = join_quality.judge(character(), [(frame, CUT)], sent)
+        return found.peak
+
+    every = join_quality.accelerations(character(), passage, 0, 120)
+    # The first acceleration is that of the second frame.
+    assert peak(120, 50) == pytest.approx(every[43:86].max())
+    assert peak(120, 0) == pytest.approx(every[:36].max())
+    # Negative control: the largest one of all is not near every frame.
+    assert peak(120, 0) != pytest.approx(every.max())
+    assert peak(2, 0) == 0.0
+
+
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("facts", "said"),
     [
-        ({"distance": 0.3}, "the poses are 30 cm apart, expected at most 25"),
-        ({"drop": 0.2}, "the root is 20 cm higher on one side, expected at most 12"),
         (
-            {"peak": 13.0},
+            replace(EASY, cut=replace(CUT, distance=0.3)),
+            "the poses are 30 cm apart, expected at most 25",
+        ),
+        (
+            replace(EASY, cut=replace(CUT, drop=0.2)),
+            "the root is 20 cm higher on one side, expected at most 12",
+        ),
+        (
+            replace(EASY, peak=10.1),
+            "joints accelerate by 10 m/s2, expected at most 2.5 times the 4.0 m/s2 of the captured"
+            " clips of the models that are joined",
+        ),
+        (
+            JoinFacts(replace(CUT, usual=UsualMotion(4.0, "synthesised")), 13.0),
             "joints accelerate by 13 m/s2, expected at most 3 times the 4.0 m/s2 of the motions"
             " that are joined",
         ),
     ],
 )
-def test_a_hard_join_is_told_with_found_and_expected(change, said):
-    facts = replace(EASY, **change)
+def test_a_hard_join_is_told_with_found_and_expected(facts, said):
     assert facts.hard
-    assert facts.sentence == f"hard join at 3.00 s: {said}"
+    assert facts.reasons == (said,)
     assert not EASY.hard
+
+
+def test_the_limit_depends_on_what_was_measured():
+    """Between 2.5 and 3 times the usual acceleration only captured motion makes a join hard."""
+    own = JoinFacts(replace(CUT, usual=UsualMotion(4.0, "synthesised")), 11.0)
+    assert not own.hard
+    assert replace(EASY, peak=11.0).hard
+    assert not replace(EASY, peak=9.9).hard
 
 
 def test_a_squat_does_not_go_on_into_a_stoop():

@@ -1,7 +1,10 @@
-"""Facts about joins: how far the poses are apart, and how fast they change against usual motion."""
+"""Facts about joins: how far the poses are apart, and how fast they change against usual motion.
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+A join is judged once, when its feet are placed: before that its peak is not known.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -9,41 +12,71 @@ from posefield.common.array_shapes import Frames
 from posefield.common.units import UP
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import Character
+from posefield.model_file.captured_acceleration import USUAL, mean_accelerations
 from posefield.performance.joins import cut_search
 from posefield.performance.joins.blends import Blend
 from posefield.performance.joins.cut_search import Cut
 from posefield.performance.passages.passage import RATE, Passage
+from posefield.question.performance_report import Reference
 
-Placement = Callable[[slice], PlacedFrames]
-"""Returns some frames of a performance at `RATE` as they are sent."""
 MOST_DISTANCE = 0.25
 """Distance of the poses at a cut from which on a join is hard, m."""
-MOST_PEAK = 3.0
-"""Peak acceleration of a join over the usual one from which on it is hard."""
+MOST_PEAK: Mapping[Reference, float] = {"captured": 2.5, "synthesised": 3.0}
+"""Peak acceleration of a join over the usual one from which on it is hard, by where that was
+measured (decision 0093).
+"""
 MOST_DROP = 0.12
 """Difference of the roots' heights at a cut from which on a join is hard, m."""
 # The peak is looked for from this time before a join to this one after it, s.
 BEFORE, AFTER = 0.1, 0.6
-# Percentile of the accelerations of a motion that is its usual largest one.
-USUAL = 99.0
+MOTIONS: Mapping[Reference, str] = {
+    "captured": "captured clips of the models that are joined",
+    "synthesised": "motions that are joined",
+}
+"""Motions that a join is compared with, in words."""
+
+
+@dataclass(frozen=True)
+class UsualMotion:
+    """Usual largest acceleration of the motions of a join, and where it was measured.
+
+    acceleration: 99th percentile of the frames' accelerations, m/s². reference: of the models'
+    captured clips, or of the motions as they were synthesised.
+    """
+
+    acceleration: float
+    reference: Reference
+
+    @property
+    def most(self) -> float:
+        """Return the acceleration from which on a join is hard, m/s²."""
+        return MOST_PEAK[self.reference] * self.acceleration
+
+
+@dataclass(frozen=True)
+class CutFacts:
+    """Facts about a join that stay when targets are met and feet are placed.
+
+    distance: RMS distance of the joints at the cut, m. drop: difference of the roots' heights
+    there, m. blend: its kind. usual: of the motions on both sides.
+    """
+
+    distance: float
+    drop: float
+    blend: Blend
+    usual: UsualMotion
 
 
 @dataclass(frozen=True)
 class JoinFacts:
-    """Facts about a join.
+    """Facts about a join in the motion that is sent.
 
-    time: s. distance: RMS distance of the joints at the cut, m. blend: its kind. peak: largest mean
-    over the joints of the acceleration relative to the root, m/s², from 0.1 s before to 0.6 s after
-    the cut. usual: 99th percentile of the passages' own accelerations, m/s². drop: difference of
-    the roots' heights at the cut, m.
+    peak: largest mean over the joints of the acceleration relative to the root, m/s², from 0.1 s
+    before to 0.6 s after the cut.
     """
 
-    time: float
-    distance: float
-    blend: Blend
+    cut: CutFacts
     peak: float
-    usual: float
-    drop: float
 
     @property
     def hard(self) -> bool:
@@ -53,29 +86,25 @@ class JoinFacts:
     @property
     def reasons(self) -> tuple[str, ...]:
         """Return why a join is hard, in words; empty if it is not."""
-        found = []
-        if self.distance > MOST_DISTANCE:
+        cut, found = self.cut, []
+        if cut.distance > MOST_DISTANCE:
             found.append(
-                f"the poses are {100 * self.distance:.0f} cm apart, expected at most"
+                f"the poses are {100 * cut.distance:.0f} cm apart, expected at most"
                 f" {100 * MOST_DISTANCE:.0f}"
             )
-        if self.drop > MOST_DROP:
+        if cut.drop > MOST_DROP:
             found.append(
-                f"the root is {100 * self.drop:.0f} cm higher on one side, expected at most"
+                f"the root is {100 * cut.drop:.0f} cm higher on one side, expected at most"
                 f" {100 * MOST_DROP:.0f}"
             )
-        if self.peak > MOST_PEAK * self.usual:
+        usual = cut.usual
+        if self.peak > usual.most:
             found.append(
-                f"joints accelerate by {self.peak:.0f} m/s2, expected at most {MOST_PEAK:g} times"
-                f" the {self.usual:.1f} m/s2 of the motions that are joined"
+                f"joints accelerate by {self.peak:.0f} m/s2, expected at most"
+                f" {MOST_PEAK[usual.reference]:g} times the {usual.acceleration:.1f} m/s2 of the"
+                f" {MOTIONS[usual.reference]}"
             )
         return tuple(found)
-
-    @property
-    def sentence(self) -> str:
-        """Return a warning about a hard join; empty if it is not."""
-        said = " and ".join(self.reasons)
-        return f"hard join at {self.time:.2f} s: {said}" if said else ""
 
 
 def accelerations(character: Character, passage: Passage, begin: int, end: int) -> Frames:
@@ -87,11 +116,7 @@ def accelerations(character: Character, passage: Passage, begin: int, end: int) 
     first, last = max(begin - 1, 0), min(end + 1, len(passage))
     if last - first < 3:
         return np.zeros(0)
-    found = cut_search.positions(character, passage, first, last)
-    found = found - passage.roots[first:last, None]
-    second = np.diff(found, n=2, axis=0) * RATE**2
-    means: Frames = np.linalg.norm(second, axis=-1).mean(axis=-1)
-    return means
+    return mean_accelerations(cut_search.positions(character, passage, first, last), RATE)
 
 
 def usual_acceleration(character: Character, passages: Sequence[Passage]) -> float:
@@ -103,43 +128,29 @@ def usual_acceleration(character: Character, passages: Sequence[Passage]) -> flo
     return max((float(np.percentile(own, USUAL)) for own in found if len(own)), default=0.0)
 
 
-def judge(
-    character: Character,
-    sides: tuple[Passage, Passage],
-    cut: Cut,
-    blend: Blend,
-    joined: Passage,
-    usual: float,
-) -> JoinFacts:
-    """Return the facts about a join.
-
-    sides: passages before and after the cut. joined: passage with the join at frame `cut.exit`; it
-    may be with placed feet. usual: `usual_acceleration` of the models' motions.
-    """
-    frame = cut.exit
-    begin, end = frame - round(BEFORE * RATE), frame + round(AFTER * RATE) + 1
-    found = accelerations(character, joined, begin, end)
-    peak = float(found.max()) if len(found) else 0.0
+def describe_cut(
+    sides: tuple[Passage, Passage], cut: Cut, blend: Blend, usual: UsualMotion
+) -> CutFacts:
+    """Return the facts about a cut. sides: passages before and after it."""
     apart = (sides[0].roots[cut.exit] - sides[1].roots[cut.entry]) @ UP
-    return JoinFacts(frame / RATE, cut.distance, blend, peak, usual, abs(float(apart)))
+    return CutFacts(cut.distance, abs(float(apart)), blend, usual)
 
 
-def judge_again(
-    character: Character, frames: int, joins: list[tuple[int, JoinFacts]], placed: Placement
+def judge(
+    character: Character, joins: Sequence[tuple[int, CutFacts]], sent: PlacedFrames
 ) -> list[JoinFacts]:
-    """Return the facts of joins with the peaks of placed frames.
+    """Return the facts about joins in the motion that is sent.
 
-    frames: of the whole performance. joins: frame and facts of each.
+    joins: frame and cut of each. sent: all frames of the performance, at `RATE`.
     """
-    return [replace(facts, peak=_peak(character, frames, frame, placed)) for frame, facts in joins]
+    return [JoinFacts(cut, _peak(character, sent, frame)) for frame, cut in joins]
 
 
-def _peak(character: Character, frames: int, frame: int, placed: Placement) -> float:
+def _peak(character: Character, sent: PlacedFrames, frame: int) -> float:
     """Return the largest acceleration near a frame, m/s², as `JoinFacts.peak` is."""
     first = max(frame - round(BEFORE * RATE) - 1, 0)
-    last = min(frame + round(AFTER * RATE) + 2, frames)
-    found = placed(slice(first, last))
-    count = len(found.roots)
-    passage = Passage(found.rotations, found.roots, np.zeros((count, 0)), np.zeros(count))
-    peaks = accelerations(character, passage, 0, count)
-    return float(peaks.max()) if len(peaks) else 0.0
+    rows = slice(first, frame + round(AFTER * RATE) + 2)
+    rotations, roots = sent.rotations[rows], sent.roots[rows]
+    count = len(roots)
+    passage = Passage(rotations, roots, np.zeros((count, 0)), np.zeros(count))
+    return float(accelerations(character, passage, 0, count).max(initial=0.0))

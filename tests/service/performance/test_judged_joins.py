@@ -1,0 +1,125 @@
+"""Tests of joins in the report of a performance: one judgement, and what it compares with."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.inference import session
+from posefield.model_file.captured_acceleration import CapturedAcceleration
+from posefield.performance import composition
+from posefield.performance.script import resolve_script
+from posefield.question.json_decoding import decode_question
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.synthesis.synthesizer import Synthesizer
+
+MAX_FRAMES = 2000
+WALK = {"kind": "walk", "model": "walk", "seconds": 2.0}
+HOLD = {"kind": "hold", "seconds": 0.5}
+CUT = {"kind": "walk", "model": "walk", "seconds": 2.0, "join": {"blend": "cut"}}
+
+
+@pytest.fixture(scope="module")
+def walk(walk_path):
+    return Synthesizer("walk", session.load(walk_path))
+
+
+def resolved(segments, models, **fields):
+    question = {"segments": segments, "fps": 60, **fields}
+    asked = decode_question(PerformanceQuestion, json.dumps(question).encode())
+    return resolve_script(asked, models.__getitem__)
+
+
+def performed(segments, models, **fields):
+    return composition.perform(resolved(segments, models, **fields), MAX_FRAMES).trust
+
+
+def with_captured(model, own, name="walk"):
+    """The model with other accelerations on its card, under a name of its own."""
+    card = replace(model.session.card, captured_acceleration=own)
+    return Synthesizer(name, replace(model.session, card=card))
+
+
+def known(model, p99, name="walk"):
+    """The model with another 99th percentile on its card."""
+    return with_captured(model, CapturedAcceleration(1.0, p99), name)
+
+
+def without(model, name="walk"):
+    """The model as a file of an earlier version has it."""
+    return with_captured(model, None, name)
+
+
+def test_joins_are_compared_with_captured_clips(walk):
+    (join,) = performed([WALK, HOLD, WALK], {"walk": walk}).joins
+    assert join.reference == "captured"
+    assert join.usual == walk.session.card.captured_acceleration.p99
+
+
+def test_joins_of_earlier_files_are_compared_with_their_motions(walk):
+    (join,) = performed([WALK, HOLD, WALK], {"walk": without(walk)}).joins
+    (known,) = performed([WALK, HOLD, WALK], {"walk": walk}).joins
+    assert join.reference == "synthesised"
+    assert 0.0 < join.usual != known.usual
+    assert join.peak == known.peak
+
+
+def test_one_earlier_file_decides_for_all_joins(walk):
+    models = {"walk": walk, "old": without(walk, "old")}
+    old = {**WALK, "model": "old"}
+    found = performed([WALK, HOLD, WALK, HOLD, old], models).joins
+    assert [join.reference for join in found] == ["synthesised"] * 2
+
+
+def test_the_larger_of_two_models_counts(walk):
+    models = {"walk": known(walk, 7.0), "fast": known(walk, 11.0, "fast")}
+    fast = {**WALK, "model": "fast"}
+    found = performed([WALK, HOLD, fast, HOLD, WALK, HOLD, WALK], models).joins
+    assert [join.usual for join in found] == [11.0, 11.0, 7.0]
+
+
+def test_a_hard_join_has_one_warning_of_the_answer_itself(walk):
+    found = performed([WALK, HOLD, CUT], {"walk": known(walk, 10.0)})
+    (join,) = found.joins
+    assert join.hard
+    told = [each.message for each in found.script_warnings if each.pointer == "/segments/2"]
+    (hard,) = [message for message in told if "accelerate" in message or "apart" in message]
+    assert f"joints accelerate by {join.peak:.0f} m/s2" in hard
+
+
+def test_a_join_that_is_not_hard_has_no_warning(walk):
+    """Control: the same script whose limit is higher."""
+    found = performed([WALK, HOLD, CUT], {"walk": known(walk, 1e4)})
+    assert not found.joins[0].hard
+    assert not any("accelerate" in each for each in found.warnings)
+
+
+def test_only_feet_as_they_are_sent_count(walk):
+    """What the plan of a performance finds hard is no warning of the answer, nor the reverse."""
+    script = resolved([WALK, HOLD, CUT], {"walk": known(walk, 10.0)})
+    planned = composition.plan(script, MAX_FRAMES)
+    sent = composition.perform(script, MAX_FRAMES).trust
+    assert planned.joins[0].peak != sent.joins[0].peak
+    for report in (planned, sent):
+        said = [each for each in report.warnings if "accelerate" in each]
+        assert said == [each for each in said if f"{report.joins[0].peak:.0f} m/s2" in each]
+        assert len(said) == 1
+
+
+def test_a_join_beyond_its_largest_distance_is_refused(walk):
+    near = {**WALK, "join": {"most": 1e-5}}
+    with pytest.raises(InvalidField, match="m apart at the cut") as caught:
+        performed([WALK, HOLD, near], {"walk": walk})
+    assert caught.value.field == "segments/2/join/most"
+
+
+def test_given_poses_count_by_their_own_accelerations(walk):
+    names = walk.session.card.skeleton.names
+    still = {"rotations": [[1.0, 0.0, 0.0, 0.0]] * len(names), "root_position": [0.0, 1.0, 0.0]}
+    p99 = walk.session.card.captured_acceleration.p99
+    found = performed([WALK], {"walk": walk}, start={"poses": [still] * 10}).joins
+    assert [(join.reference, join.usual) for join in found] == [("captured", p99)]
+    bent = {**still, "rotations": [[0.8, 0.6, 0.0, 0.0]] * len(names)}
+    jumping = performed([WALK], {"walk": walk}, start={"poses": [still, bent] * 5}).joins
+    assert jumping[0].usual > 10.0 * p99
