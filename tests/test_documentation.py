@@ -264,3 +264,5 @@ def test_the_limits_of_performances_are_those_of_the_code():
     assert MAX_SECONDS == 600.0 and "a performance ten minutes" in text
     assert f"poses more than {100 * join_quality.MOST_DISTANCE:.0f} cm apart" in text
     assert f"heights differ by {100 * join_quality.MOST_DROP:.0f} cm" in text
+    assert join_quality.MOST_PEAK == 3.0 and "more than three times" in text
+    assert all(f"`{reference}`" in text for reference in join_quality.MOTIONS)

@@ -21,10 +21,8 @@ from posefield.question.performance_report import Reference
 
 MOST_DISTANCE = 0.25
 """Distance of the poses at a cut from which on a join is hard, m."""
-MOST_PEAK: Mapping[Reference, float] = {"captured": 2.5, "synthesised": 3.0}
-"""Peak acceleration of a join over the usual one from which on it is hard, by where that was
-measured (decision 0093).
-"""
+MOST_PEAK = 3.0
+"""Peak acceleration of a join over the usual one from which on it is hard (decision 0093)."""
 MOST_DROP = 0.12
 """Difference of the roots' heights at a cut from which on a join is hard, m."""
 # The peak is looked for from this time before a join to this one after it, s.
@@ -46,11 +44,6 @@ class UsualMotion:
 
     acceleration: float
     reference: Reference
-
-    @property
-    def most(self) -> float:
-        """Return the acceleration from which on a join is hard, m/s²."""
-        return MOST_PEAK[self.reference] * self.acceleration
 
 
 @dataclass(frozen=True)
@@ -98,11 +91,10 @@ class JoinFacts:
                 f" {100 * MOST_DROP:.0f}"
             )
         usual = cut.usual
-        if self.peak > usual.most:
+        if self.peak > MOST_PEAK * usual.acceleration:
             found.append(
-                f"joints accelerate by {self.peak:.0f} m/s2, expected at most"
-                f" {MOST_PEAK[usual.reference]:g} times the {usual.acceleration:.1f} m/s2 of the"
-                f" {MOTIONS[usual.reference]}"
+                f"joints accelerate by {self.peak:.0f} m/s2, expected at most {MOST_PEAK:g} times"
+                f" the {usual.acceleration:.1f} m/s2 of the {MOTIONS[usual.reference]}"
             )
         return tuple(found)
 
