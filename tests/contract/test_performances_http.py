@@ -6,6 +6,9 @@ import bad_scripts
 import pytest
 from bad_scripts import ABSENT, REFUSED, UNREADABLE
 
+from posefield.encode import performance_files
+from posefield.encode.formats import CLIP_ENCODERS
+
 ADDRESS = "/v1/performances.json"
 JSON = {"content-type": "application/json"}
 
@@ -77,3 +80,34 @@ def test_a_script_that_is_deep_inside_is_a_problem(ask):
     deep = "[" * 50_000 + "]" * 50_000
     content = json.dumps(bad_scripts.walk(speed="deep")).replace('"deep"', deep)
     assert_problem(ask("POST", ADDRESS, content=content.encode(), headers=JSON), 400)
+
+
+def test_segments_are_a_layout_of_usd(ask):
+    script = bad_scripts.walk()
+    for form in performance_files.SEGMENTED:
+        whole, parts = (
+            ask("POST", f"/v1/performances.{form}?layout={layout}", json=script)
+            for layout in ("whole", "segments")
+        )
+        assert whole.status_code == parts.status_code == 200
+        assert (b"Segments" in parts.content) is (form == "usda")
+        assert b"Segments" not in whole.content and parts.content != whole.content
+        assert whole.content == ask("POST", f"/v1/performances.{form}", json=script).content
+
+
+@pytest.mark.parametrize("form", sorted(set(CLIP_ENCODERS) - set(performance_files.SEGMENTED)))
+def test_other_formats_refuse_a_layout(ask, form):
+    script = bad_scripts.walk()
+    answer = ask("POST", f"/v1/performances.{form}?layout=segments", json=script)
+    found = assert_problem(answer, 422)
+    assert found["type"] == "urn:posefield:problem:invalid-field"
+    assert found["errors"][0]["parameter"] == "layout"
+    assert f"{form} files have no layouts, usda, usdc and usdz do" in found["detail"]
+    assert ask("POST", f"/v1/performances.{form}?layout=whole", json=script).status_code == 200
+
+
+def test_an_unknown_layout_is_a_problem(ask):
+    answer = ask("POST", "/v1/performances.usdc?layout=parts", json=bad_scripts.walk())
+    found = assert_problem(answer, 400)
+    assert found["errors"][0]["parameter"] == "layout"
+    assert "'parts', expected one of whole, segments" in found["detail"]

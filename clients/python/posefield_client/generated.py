@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "4.1.0"
+CONTRACT = "4.2.0"
 """Version of the contract that this client was made for."""
 
 

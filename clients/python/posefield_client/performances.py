@@ -2,7 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack, get_type_hints
+from urllib.parse import quote_plus
 
 import msgspec
 from msgspec import Struct, structs
@@ -24,65 +25,64 @@ from posefield_client.wire import Call, Reply, Request
 
 AnyScript = Script | PerformanceQuestion | Mapping[str, Any]
 """A script, or a document of one as the contract has it."""
+Layout = Literal["whole", "segments"]
+"""Animations in USD files: one of the whole performance, or besides it one of each segment."""
 PERFORMANCE = tuple(OPERATIONS["queryPerformanceInFormat"].formats)
 
 
+class ScriptOptions(TypedDict, total=False):
+    """Options of a script besides its segments."""
+
+    character: CharacterChoice | Mapping[str, Any] | None
+    start: PerformanceStart | Mapping[str, Any] | None
+    obstacles: Iterable[Obstacle | Mapping[str, Any]] | None
+    fps: float | None
+    take: int | None
+    variety: float | None
+    detail: bool | None
+    level: int | None
+    feet: Feet | None
+    extrapolate: Extrapolate | None
+
+
+class FileOptions(ScriptOptions, total=False):
+    """Options of a script and of its file."""
+
+    names: Names | None
+    unit: Literal["m", "cm"] | None
+    up: Literal["y", "z"] | None
+    body: Body | None
+
+
 def performance(
-    script: AnyScript,
-    /,
-    *,
-    character: CharacterChoice | Mapping[str, Any] | None = None,
-    start: PerformanceStart | Mapping[str, Any] | None = None,
-    obstacles: Iterable[Obstacle | Mapping[str, Any]] | None = None,
-    fps: float | None = None,
-    take: int | None = None,
-    variety: float | None = None,
-    detail: bool | None = None,
-    level: int | None = None,
-    feet: Feet | None = None,
-    extrapolate: Extrapolate | None = None,
-    names: Names | None = None,
-    unit: Literal["m", "cm"] | None = None,
-    up: Literal["y", "z"] | None = None,
-    body: Body | None = None,
+    script: AnyScript, /, *, layout: Layout | None = None, **options: Unpack[FileOptions]
 ) -> Files:
-    """Return a performance; the request is sent when it is saved or its numbers are read."""
-    discs = None if obstacles is None else tuple(obstacles)
-    options = {
-        **asking.said(character=character, start=start, obstacles=discs, fps=fps),
-        **asking.said(take=take, variety=variety, detail=detail, level=level, feet=feet),
-        **asking.said(extrapolate=extrapolate, names=names, unit=unit, up=up, body=body),
-    }
-    question = read_script(script, options)
-    ask = partial(_request, question)
+    """Return a performance; the request is sent when it is saved or its numbers are read.
+
+    layout: "segments" adds an animation of each segment to USD files.
+    """
+    question = read_script(script, _said(options, FileOptions))
+    query = "" if layout is None else f"?layout={quote_plus(layout)}"
+    ask = partial(_request, question, query)
     return Files(PERFORMANCE, ask, about=repr(Script(question.segments)))
 
 
-def plan(
-    script: AnyScript,
-    /,
-    *,
-    character: CharacterChoice | Mapping[str, Any] | None = None,
-    start: PerformanceStart | Mapping[str, Any] | None = None,
-    obstacles: Iterable[Obstacle | Mapping[str, Any]] | None = None,
-    fps: float | None = None,
-    take: int | None = None,
-    variety: float | None = None,
-    detail: bool | None = None,
-    level: int | None = None,
-    feet: Feet | None = None,
-    extrapolate: Extrapolate | None = None,
-) -> Call[PerformanceReport]:
+def plan(script: AnyScript, /, **options: Unpack[ScriptOptions]) -> Call[PerformanceReport]:
     """Return the plan of a performance: timeline, joins, targets and warnings, without poses."""
-    discs = None if obstacles is None else tuple(obstacles)
-    options = {
-        **asking.said(character=character, start=start, obstacles=discs, fps=fps),
-        **asking.said(take=take, variety=variety, detail=detail, level=level, feet=feet),
-        **asking.said(extrapolate=extrapolate),
-    }
     operation = OPERATIONS["queryPerformance"]
-    content = _content(read_script(script, options))
+    content = _content(read_script(script, _said(options, ScriptOptions)))
     return Call(Request(operation, f"{operation.path}?plan=true", content), _plan)
+
+
+def _said(options: Mapping[str, Any], known: type[ScriptOptions]) -> dict[str, Any]:
+    """Return the options that are given, as JSON values; WrongQuestion for an unknown one."""
+    names = get_type_hints(known)
+    if unknown := next((name for name in options if name not in names), None):
+        hint = asking.did_you_mean(unknown, names)
+        raise WrongQuestion(f"option {unknown!r}{hint}, expected some of {', '.join(names)}")
+    discs = options.get("obstacles")
+    listed = {} if discs is None else {"obstacles": tuple(discs)}
+    return asking.said(**{**options, **listed})
 
 
 def read_script(script: AnyScript, options: Mapping[str, Any]) -> PerformanceQuestion:
@@ -116,9 +116,9 @@ def _known_keys(given: Mapping[str, Any]) -> str:
     return asking.did_you_mean(str(unknown[0]), known) if unknown else ""
 
 
-def _request(question: PerformanceQuestion, form: str) -> Request:
+def _request(question: PerformanceQuestion, query: str, form: str) -> Request:
     operation = OPERATIONS["queryPerformanceInFormat"].in_format(form)
-    return Request(operation, operation.path, _content(question))
+    return Request(operation, operation.path + query, _content(question))
 
 
 def _content(question: PerformanceQuestion) -> bytes:

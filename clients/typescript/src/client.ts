@@ -31,6 +31,7 @@ import type {
   ModelSummary,
   Motion,
   NamedClipQuestion,
+  PerformanceFileOptions,
   PerformanceMotion,
   PerformanceQuestion,
   PerformanceReport,
@@ -168,10 +169,11 @@ export class Client {
   async performanceFile(
     format: ClipFormat,
     script: Script | PerformanceQuestion,
-    options: TransferOptions = {},
+    { layout, ...options }: PerformanceFileOptions = {},
   ): Promise<Download> {
     checkTransferOptions(options);
-    const asked = asFile(post(`/v1/performances.${format}`, scriptQuestion(script)), format);
+    const path = link(`/v1/performances.${format}`, { layout });
+    const asked = asFile(post(path, scriptQuestion(script)), format);
     return this.#file(asked, `performance.${format}`, options);
   }
 

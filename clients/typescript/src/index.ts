@@ -41,6 +41,7 @@ export type {
   Motion,
   NamedClipQuestion,
   OnProgress,
+  PerformanceFileOptions,
   PerformanceMotion,
   PerformanceQuestion,
   PerformanceReport,

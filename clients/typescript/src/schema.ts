@@ -1198,6 +1198,12 @@ export interface components {
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
         };
+        /**
+         * @description One animation of the whole performance, or besides it one of each segment.
+         * @default whole
+         * @enum {string}
+         */
+        PerformanceLayout: "whole" | "segments";
         /** @description A performance with its report; with `plan=true` the report alone. */
         PerformanceDocument: {
             trust: components["schemas"]["PerformanceReport"];
@@ -2648,6 +2654,8 @@ export interface components {
         };
         /** @description True for the plan of a performance: the JSON response without the poses. */
         plan: boolean;
+        /** @description Animations in USD files; other formats refuse `segments`. With `segments`, each segment has a SkelAnimation under `/Performance/Segments` beside the whole one, which alone is bound. Since 4.2.0. */
+        layout: components["schemas"]["PerformanceLayout"];
         /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
         ifNoneMatch: string;
         /**
@@ -4292,6 +4300,8 @@ export interface operations {
             query?: {
                 /** @description True for the plan of a performance: the JSON response without the poses. */
                 plan?: components["parameters"]["plan"];
+                /** @description Animations in USD files; other formats refuse `segments`. With `segments`, each segment has a SkelAnimation under `/Performance/Segments` beside the whole one, which alone is bound. Since 4.2.0. */
+                layout?: components["parameters"]["layout"];
             };
             header?: never;
             path?: never;
@@ -4321,6 +4331,8 @@ export interface operations {
             query?: {
                 /** @description True for the plan of a performance: the JSON response without the poses. */
                 plan?: components["parameters"]["plan"];
+                /** @description Animations in USD files; other formats refuse `segments`. With `segments`, each segment has a SkelAnimation under `/Performance/Segments` beside the whole one, which alone is bound. Since 4.2.0. */
+                layout?: components["parameters"]["layout"];
             };
             header?: never;
             path: {
@@ -4549,7 +4561,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "4.1.0";
+export const CONTRACT = "4.2.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {

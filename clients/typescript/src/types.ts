@@ -177,3 +177,8 @@ export interface TransferOptions {
   readonly signal?: AbortSignal | undefined;
   readonly onProgress?: OnProgress | undefined;
 }
+
+/** Animations in USD files: of the whole performance, or besides it of each segment. */
+export interface PerformanceFileOptions extends TransferOptions {
+  readonly layout?: Schemas["PerformanceLayout"] | undefined;
+}

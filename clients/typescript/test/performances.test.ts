@@ -76,6 +76,14 @@ test("a performance as a file", async () => {
   assert.ok((found.duration ?? 0) > 1 && found.sigma !== null && found.supported);
 });
 
+test("segments are a layout of USD", async () => {
+  const { client, sent } = observed();
+  const found = await client.performanceFile("usda", walks, { layout: "segments" });
+  assert.equal(sent[0]?.path, "/v1/performances.usda?layout=segments");
+  assert.ok(new TextDecoder().decode(found.content).includes('def Scope "Segments"'));
+  await assert.rejects(client.performanceFile("glb", walks, { layout: "segments" }), Problem);
+});
+
 test("the service points at the part of a script", async () => {
   const wrong = new Script().walk("walk", { seconds: 1 }).act("reech");
   await assert.rejects(client.plan(wrong), (fault) => {

@@ -11,7 +11,9 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.console.arguments import Json, encoder_for
 from posefield.console.output import as_json
 from posefield.console.question_options import with_option_groups
+from posefield.encode import performance_files
 from posefield.question import json_decoding
+from posefield.question.performance_batch_question import PerformanceLayout
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.performance_report import PerformanceReport
 from posefield.registry import shipped_models
@@ -33,16 +35,10 @@ class ManyArguments:
     ] = None
 
 
-@with_option_groups
-def perform(
-    script: Annotated[
-        Path,
-        typer.Argument(
-            help="JSON file with the script; for many scripts a folder of them, or JSON Lines",
-            metavar="SCRIPT",
-        ),
-    ],
-    many: ManyArguments,
+@dataclass(frozen=True)
+class OneArguments:
+    """Options for what is written of each script."""
+
     output: Annotated[
         str | None,
         typer.Option(
@@ -52,7 +48,29 @@ def perform(
             "the URL of an object store",
             metavar="PATH",
         ),
-    ] = None,
+    ] = None
+    layout: Annotated[
+        PerformanceLayout,
+        typer.Option(
+            help="animations in USD files: one of the whole, or besides it one of each segment"
+        ),
+    ] = "whole"
+    plan: Annotated[
+        bool, typer.Option("--plan", help="print the timeline and the warnings, and no poses")
+    ] = False
+
+
+@with_option_groups
+def perform(
+    script: Annotated[
+        Path,
+        typer.Argument(
+            help="JSON file with the script; for many scripts a folder of them, or JSON Lines",
+            metavar="SCRIPT",
+        ),
+    ],
+    one: OneArguments,
+    many: ManyArguments,
     model: Annotated[
         list[Path] | None,
         typer.Option(
@@ -60,9 +78,6 @@ def perform(
             metavar="MODEL",
         ),
     ] = None,
-    plan: Annotated[
-        bool, typer.Option("--plan", help="print the timeline and the warnings, and no poses")
-    ] = False,
     json: Json = False,
 ) -> None:
     """Write the motion of a script: walks, acts and holds as one.
@@ -76,49 +91,52 @@ def perform(
     from posefield.performance.script import resolve_script
 
     if script_rows.are_many(script):
-        if plan:
-            raise InvalidField("plan", "given for many scripts, expected one script in JSON")
-        _perform_many(script, output, tuple(model or ()), many, json)
+        _perform_many(script, one, tuple(model or ()), many, json)
         return
     if many.format is not None or many.workers is not None:
         option = "workers" if many.format is None else "format"
         raise InvalidField(option, "given for one script, expected a folder or a .jsonl file")
-    if (output is None) != plan:
-        found = "neither --output nor --plan" if output is None else "--output and --plan"
+    if one.plan == (one.output is not None):
+        found = "neither --output nor --plan" if one.output is None else "--output and --plan"
         raise InvalidField("output", f"{found}, expected one of them")
+    if one.plan and one.layout != "whole":
+        raise InvalidField("layout", f"{one.layout!r} with --plan, expected with an output file")
     question = json_decoding.decode_question(PerformanceQuestion, _read(script))
-    resolved = resolve_script(question, shipped_models.with_shipped(model or []).find)
-    if output is None:
-        report = composition.plan(resolved, MAX_FRAMES)
+    find = shipped_models.with_shipped(model or []).find
+    if one.output is None:
+        report = composition.plan(resolve_script(question, find), MAX_FRAMES)
         typer.echo(as_json(report.document()) if json else report_text(report))
         return
-    path = Path(output)
+    path = Path(one.output)
     encoder = encoder_for(path)
+    encode = performance_files.encoder(encoder, one.layout)
     convention = encoder.convention(question.unit, question.up, question.body)
-    answer = composition.perform(resolved, MAX_FRAMES)
-    atomic_files.write(encoder.encode(answer, convention), path)
+    answer = composition.perform(resolve_script(question, find), MAX_FRAMES)
+    atomic_files.write(encode(answer, convention), path)
     facts = {"file": str(path), **answer.trust.document()}
     typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
 
 
 def _perform_many(
-    scripts: Path, output: str | None, models: tuple[Path, ...], many: ManyArguments, json: bool
+    scripts: Path, one: OneArguments, models: tuple[Path, ...], many: ManyArguments, json: bool
 ) -> None:
     from posefield.batch import process_pool
     from posefield.batch.scripts import performance_batch, script_rows
     from posefield.console.progress import ProgressBar
 
-    if output is None:
+    if one.plan:
+        raise InvalidField("plan", "given for many scripts, expected one script in JSON")
+    if one.output is None:
         raise InvalidField("output", "none, expected a folder for the files of many scripts")
     form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
     workers = process_pool.usable_cores() if many.workers is None else many.workers
     if workers < 1:
         raise InvalidField("workers", f"{workers}, expected 1 or more")
     rows = script_rows.read_scripts(scripts)
-    batch = performance_batch.PerformanceBatch(models, output, form)
+    batch = performance_batch.PerformanceBatch(models, one.output, form, one.layout)
     with ProgressBar("performances", len(rows), 0) as bar:
         outcome = performance_batch.run(batch, rows, workers, bar.advance)
-    typer.echo(as_json(outcome.facts(output)) if json else f"{output}: {outcome.sentence}")
+    typer.echo(as_json(outcome.facts(one.output)) if json else f"{one.output}: {outcome.sentence}")
 
 
 def _read(script: Path) -> bytes:

@@ -2,13 +2,18 @@
 
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
+from typing import get_args
 
 from starlette.requests import Request
 from starlette.responses import Response
 
+from posefield.common.errors import InvalidField
+from posefield.encode import performance_files
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
+from posefield.encode.performance_files import PerformanceEncoder
 from posefield.http import responses
+from posefield.http.api import problems
 from posefield.http.api.problems import BAD_PARAMETER, RequestError
 from posefield.http.concurrency import worker_threads
 from posefield.http.decoding import request_body
@@ -16,6 +21,7 @@ from posefield.http.steps import Context, Steps, query_pairs
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question import json_decoding
+from posefield.question.performance_batch_question import PerformanceLayout
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 
@@ -27,30 +33,34 @@ Performances = Context[ClipEncoder]
 
 @dataclass(frozen=True)
 class ScriptRequest:
-    """A decoded script. plan: whether the answer is the plan alone."""
+    """A decoded script. plan: whether the answer is the plan alone. layout: of USD files."""
 
     question: PerformanceQuestion
     plan: bool
+    layout: PerformanceLayout
 
 
 @dataclass(frozen=True)
 class PerformanceTask:
     """A script whose models are known, and the limits of its format.
 
-    most: largest number of frames. convention: unit and up axis of the file.
+    most: largest number of frames. convention: unit and up axis of the file. encode: writes it.
     """
 
     script: Script
     plan: bool
     most: int
     convention: Convention
+    encode: PerformanceEncoder
 
 
 async def decode(context: Performances, request: Request) -> ScriptRequest:
     """Return the script of a body; raises RequestError for a plan in another format than JSON."""
-    plan = _wants_plan(context, dict(query_pairs(request.scope["query_string"])))
+    query = dict(query_pairs(request.scope["query_string"]))
+    plan, layout = _wants_plan(context, query), _layout(query)
     content = await request_body.read_body(request, MAX_SCRIPT_BYTES, context.service.bodies)
-    return ScriptRequest(json_decoding.decode_question(PerformanceQuestion, content), plan)
+    question = json_decoding.decode_question(PerformanceQuestion, content)
+    return ScriptRequest(question, plan, layout)
 
 
 def _wants_plan(context: Performances, query: dict[str, str]) -> bool:
@@ -65,14 +75,31 @@ def _wants_plan(context: Performances, query: dict[str, str]) -> bool:
     return given == "true"
 
 
+def _layout(query: dict[str, str]) -> PerformanceLayout:
+    given, known = query.get("layout", "whole"), get_args(PerformanceLayout)
+    found: PerformanceLayout | None = next((each for each in known if each == given), None)
+    if found is None:
+        detail = f"layout: {given!r}, expected one of {', '.join(known)}"
+        raise RequestError(BAD_PARAMETER, detail, {"parameter": "layout"})
+    return found
+
+
 async def validate(context: Performances, asked: ScriptRequest) -> PerformanceTask:
     """Return the script with its models; raises QueryError with a pointer into the script."""
     question, encoder = asked.question, context.form
+    write = _encoder(encoder, asked.layout)
     convention = encoder.convention(question.unit, question.up, question.body)
     script = resolve_script(question, context.library.find)
     joints = len(script.character.skeleton)
     most = max_poses(context.service.settings.output_limit, joints, encoder.bytes_per_joint)
-    return PerformanceTask(script, asked.plan, most, convention)
+    return PerformanceTask(script, asked.plan, most, convention, write)
+
+
+def _encoder(form: ClipEncoder, layout: PerformanceLayout) -> PerformanceEncoder:
+    try:
+        return performance_files.encoder(form, layout)
+    except InvalidField as fault:
+        raise problems.parameter_error(fault) from None
 
 
 def places(context: Performances, task: PerformanceTask) -> AbstractAsyncContextManager[None]:
@@ -95,7 +122,7 @@ async def encode(
     """Return the performance as a file, or its plan as JSON."""
     if isinstance(answer, PerformanceReport):
         return composition.plan_document(answer)
-    return await worker_threads.within(context.form.encode, answer, task.convention)
+    return await worker_threads.within(task.encode, answer, task.convention)
 
 
 def respond(

@@ -174,3 +174,18 @@ def test_the_service_points_at_the_part_of_a_script(address):
     with Client(address) as client, pytest.raises(errors.Unanswerable) as caught:
         client.plan(script)
     assert caught.value.errors[0].pointer == "/segments/1/model"
+
+
+def test_a_layout_is_a_parameter():
+    script = Script().walk("a", seconds=1)
+    asked = performances.performance(script, layout="segments").request("usdc")
+    assert asked.target == "/v1/performances.usdc?layout=segments"
+    assert asked.body == performances.performance(script).request("usdc").body
+
+
+def test_an_unknown_option_is_refused():
+    script = Script().walk("a", seconds=1)
+    with pytest.raises(WrongQuestion, match=r"option 'fpss' \(did you mean 'fps'\?\), expected"):
+        performances.performance(script, fpss=30)
+    with pytest.raises(WrongQuestion, match="option 'unit', expected some of character, start"):
+        performances.plan(script, unit="cm")

@@ -186,6 +186,26 @@ def test_the_command_performs_many(posefield, scripts, models, tmp_path):
     assert (tmp_path / "out/performances/slow.glb").read_bytes().startswith(b"glTF")
 
 
+def test_a_layout_holds_for_all_files(posefield, scripts, models, tmp_path):
+    words = ("perform", scripts, "--model", models, "--workers", 1, "--format", "usda")
+    for layout, count in (("whole", 0), ("segments", 1)):
+        out = tmp_path / layout
+        assert posefield(*words, "-o", out, "--layout", layout)[0] == 0
+        for path in (out / "performances").iterdir():
+            assert path.read_text().count('def Scope "Segments"') == count
+    assert posefield(*words, "-o", tmp_path / "whole", "--layout", "segments", "--json")[0] == 0
+    text = (tmp_path / "whole/performances/slow.usda").read_text()
+    assert text == (tmp_path / "segments/performances/slow.usda").read_text()
+
+
+def test_the_command_writes_a_layout(posefield, models, tmp_path):
+    script, out = tmp_path / "one.json", tmp_path / "one.usda"
+    script.write_text(json.dumps(walk()))
+    words = ("perform", script, "--model", models, "-o", out)
+    assert posefield(*words, "--layout", "segments")[0] == 0
+    assert 'def SkelAnimation "s000"' in out.read_text()
+
+
 def test_the_command_writes_to_a_url(posefield, scripts, models, tmp_path):
     url = f"file://{tmp_path}/out"
     code, said, _ = posefield("perform", scripts, "--model", models, "-o", url, "--workers", 1)
@@ -202,6 +222,9 @@ def test_the_command_writes_to_a_url(posefield, scripts, models, tmp_path):
         (("scripts.jsonl", "-o", "out", "--format", "usd"), "'performance.usd' ends in none of"),
         (("one.json", "-o", "a.glb", "--format", "glb"), "format: given for one script, expected"),
         (("one.json", "-o", "a.glb", "--workers", 2), "workers: given for one script, expected a"),
+        (("scripts.jsonl", "-o", "out", "--format", "glb", "--layout", "segments"), "no layouts"),
+        (("one.json", "-o", "a.bvh", "--layout", "segments"), "bvh files have no layouts, usda"),
+        (("one.json", "--plan", "--layout", "segments"), "layout: 'segments' with --plan"),
         (("gone.jsonl", "-o", "out"), "gone.jsonl: No such file or directory, expected scripts"),
     ],
 )

@@ -35,9 +35,12 @@ from posefield.batch.target import (
     read_lines,
 )
 from posefield.common.errors import FileError, QueryError, WorkerDied
+from posefield.encode import performance_files
 from posefield.encode.formats import CLIP_ENCODERS
+from posefield.encode.performance_files import PerformanceEncoder
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
+from posefield.question.performance_batch_question import PerformanceLayout
 from posefield.registry import shipped_models
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.frame_times import MAX_POSES
@@ -54,12 +57,21 @@ class PerformanceBatch:
     """Many performances of one format.
 
     models: files and folders of models besides the shipped ones. place: folder or URL. form:
-    extension of the files.
+    extension of the files. layout: of USD files; InvalidField for a form without layouts.
     """
 
     models: tuple[Path, ...]
     place: str
     form: str
+    layout: PerformanceLayout = "whole"
+
+    def __post_init__(self) -> None:
+        performance_files.encoder(CLIP_ENCODERS[self.form], self.layout)
+
+    @property
+    def encode(self) -> PerformanceEncoder:
+        """Return the function that encodes a performance."""
+        return performance_files.encoder(CLIP_ENCODERS[self.form], self.layout)
 
 
 @dataclass(frozen=True)
@@ -126,7 +138,7 @@ def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, st
         try:
             encoder.convention(row.script.unit, row.script.up, row.script.body)
             script = resolve_script(row.script, registry.find)
-            digests[row.name] = _digest(batch.form, script, registry)
+            digests[row.name] = _digest(batch, script, registry)
         except QueryError as fault:
             faults.append(f"{row.place}: {fault}")
     if faults:
@@ -134,11 +146,12 @@ def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, st
     return digests
 
 
-def _digest(form: str, script: Script, registry: ModelRegistry) -> str:
+def _digest(batch: PerformanceBatch, script: Script, registry: ModelRegistry) -> str:
     """Return a digest of all that determines the bytes of a performance."""
     chosen = script.question.character
     facts = [
-        form,
+        batch.form,
+        batch.layout,
         __version__,
         *(version(name) for name in VERSIONED_PACKAGES),
         *script.identities,
@@ -218,7 +231,7 @@ def make_one(batch: PerformanceBatch, row: ScriptRow, digest: str) -> Entry:
         raise script_rows.faulty_scripts([f"{row.place}: {fault}"]) from fault
     path = f"performances/{row.name}.{batch.form}"
     target = open_target(batch.place)
-    written = put_file(target, path, [encoder.encode(answer, convention)])
+    written = put_file(target, path, [batch.encode(answer, convention)])
     entry = {
         "name": row.name,
         "file": written.file,

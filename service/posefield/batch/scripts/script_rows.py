@@ -6,18 +6,11 @@ from pathlib import Path
 
 from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.question import json_decoding
-from posefield.question.motion_question import Name
-from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_batch_question import NamedScript
 
 LINES = ".jsonl"
 MAX_LINE_BYTES = 256 * 1024
 MAX_SHOWN_FAULTS = 10
-
-
-class NamedScript(PerformanceQuestion, frozen=True, kw_only=True):
-    """Script with the name of its file."""
-
-    name: Name | None = None
 
 
 @dataclass(frozen=True)

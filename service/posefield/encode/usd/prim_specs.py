@@ -53,17 +53,18 @@ def float3_array(values: Floats) -> Any:
     return Vt.Vec3fArray.FromNumpy(values.astype(np.float32))
 
 
-def set_time_samples(prim: Any, values: Samples) -> None:
-    """Set the time samples of translations, rotations and weights, if any, of a SkelAnimation."""
-    _set_attribute_samples(
-        prim, "translations", map(Vt.Vec3fArray.FromNumpy, values["translations"])
-    )
-    _set_attribute_samples(prim, "rotations", map(Vt.QuatfArray.FromNumpy, values["rotations"]))
-    if WEIGHTS in values:
-        _set_attribute_samples(prim, WEIGHTS, map(Vt.FloatArray.FromNumpy, values[WEIGHTS]))
+def set_time_samples(prim: Any, values: Samples, first: int = 0) -> None:
+    """Set the time samples of translations, rotations and weights, if any, of a SkelAnimation.
+
+    first: time code of the first sample.
+    """
+    kinds = {"translations": Vt.Vec3fArray, "rotations": Vt.QuatfArray, WEIGHTS: Vt.FloatArray}
+    for name, kind in kinds.items():
+        if name in values:
+            _set_attribute_samples(prim, name, map(kind.FromNumpy, values[name]), first)
 
 
-def _set_attribute_samples(prim: Any, name: str, values: Iterable[Any]) -> None:
+def _set_attribute_samples(prim: Any, name: str, values: Iterable[Any], first: int) -> None:
     layer, path = prim.layer, prim.path.AppendProperty(name)
-    for frame, value in enumerate(values):
+    for frame, value in enumerate(values, first):
         layer.SetTimeSample(path, frame, value)

@@ -159,6 +159,12 @@ def nested_error(error: QueryError, where: str) -> RequestError:
     return RequestError(QUERY_ERROR_PROBLEMS[type(error)], detail, {"pointer": place})
 
 
+def parameter_error(error: QueryError) -> RequestError:
+    """Return the fault of a query parameter of a request with a body; error: names it."""
+    detail = f"{error.field}: {error.message}"
+    return RequestError(QUERY_ERROR_PROBLEMS[type(error)], detail, {"parameter": error.field})
+
+
 def internal_error_response(request: Request) -> Response:
     """Return the response to an unexpected exception: the request id and no details."""
     return _problem_response(

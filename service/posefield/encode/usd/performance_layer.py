@@ -1,0 +1,129 @@
+"""USD layers of performances with an animation for each segment beside the whole one.
+
+    /Character                SkelRoot, the default prim, as in a layer of the whole alone
+      Anim                    SkelAnimation of all frames, the only one that is bound
+    /Performance              Scope: report without segments, and contacts of the feet
+      Segments
+        s000                  SkelAnimation of a segment's frames: report of the segment
+
+A segment has the time samples of the whole from the frame at or before its begin to the frame at or
+after its end, so at each time of its own both have the same value. The binary form stores equal
+samples once.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pxr import Sdf, Vt
+
+from posefield.common.units import Booleans
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.usd import (
+    character_prims,
+    clip_arrays,
+    custom_data,
+    layer_metadata,
+    prim_specs,
+    usd_clip,
+)
+from posefield.encode.usd.clip_arrays import ClipArrays
+from posefield.encode.usd.prim_specs import ValueTypes
+from posefield.encode.usd.usd_clip import ClipLayerBuilder
+from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
+
+PERFORMANCE = Sdf.Path("/Performance")
+SEGMENTS = PERFORMANCE.AppendChild("Segments")
+CONTACT, CONTACT_JOINTS = "posefield:contact", "posefield:contactJoints"
+"""Attributes of the scope: whether each foot stands, with a time sample at each change, and the
+names of the joints of the feet in the report."""
+ROUNDING = 1e-6
+"""Largest rounding of a time in the report, s."""
+
+
+def segment_name(index: int) -> str:
+    """Return the name of a segment's prim."""
+    return f"s{index:03}"
+
+
+def usda(answer: PerformanceAnswer, convention: Convention) -> bytes:
+    """Return the layer as text."""
+    text: str = _layer(answer, convention).ExportToString()
+    return text.encode()
+
+
+def usdc(answer: PerformanceAnswer, convention: Convention) -> bytes:
+    """Return the layer in binary form."""
+    return layer_metadata.crate_bytes(_layer(answer, convention))
+
+
+def usdz(answer: PerformanceAnswer, convention: Convention) -> bytes:
+    """Return a USDZ file of the binary layer."""
+    return usd_clip.usdz_package(usdc(answer, convention))
+
+
+def segment_frames(begins: float, ends: float, rate: float, frames: int) -> range:
+    """Return the frames of a segment: from the one at or before its begin to the one at its end.
+
+    begins, ends: s. rate: frames a second. frames: of the performance; an end after the last one
+    has none of its own.
+    """
+    slack = ROUNDING * rate
+    first = min(math.floor(begins * rate + slack), frames - 1)
+    last = min(math.ceil(ends * rate - slack), frames - 1)
+    return range(first, max(first, last) + 1)
+
+
+def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
+    """Return the layer; its prims are valid while the caller holds it."""
+    (arrays,) = clip_arrays.arrays_with_character([answer], convention)
+    author = ClipLayerBuilder(arrays.rate, convention, arrays.rig, arrays.curves)
+    made = author.layer(arrays.content)
+    with Sdf.ChangeBlock():
+        scope = prim_specs.prim(made, PERFORMANCE.name, "Scope")
+        facts = answer.trust.facts()
+        segments = facts.pop("segments")
+        scope.customData = {"posefield": custom_data.usd_dictionary(facts)}
+        group = prim_specs.prim(scope, SEGMENTS.name, "Scope")
+        for index, own in enumerate(segments):
+            _add_segment(group, index, own, arrays)
+    _add_contacts(made, answer.trust, arrays)
+    return made
+
+
+def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArrays) -> None:
+    paths = arrays.rig.paths
+    prim = character_prims.animation(group, segment_name(index), paths, arrays.curves)
+    prim.customData = {"posefield": custom_data.usd_dictionary(facts)}
+    frames = segment_frames(facts["begins"], facts["ends"], arrays.rate, arrays.content.frames)
+    rows = slice(frames.start, frames.stop)
+    samples = {name: whole[rows] for name, whole in arrays.content.samples.items()}
+    prim_specs.set_time_samples(prim, samples, frames.start)
+
+
+def _add_contacts(made: Any, report: PerformanceReport, arrays: ClipArrays) -> None:
+    """Add the contacts of the feet that were made to stand; nothing for feet as predicted."""
+    stances = () if report.feet is None else report.feet.stances
+    joints = list(dict.fromkeys(stance.joint for stance in stances))
+    if not joints:
+        return
+    times = np.arange(arrays.content.frames) / arrays.rate
+    found = np.zeros((len(times), len(joints)), dtype=bool)
+    for stance in stances:
+        during = (times >= stance.begin - ROUNDING) & (times <= stance.end + ROUNDING)
+        found[:, joints.index(stance.joint)] |= during
+    scope = made.GetPrimAtPath(PERFORMANCE)
+    names = Vt.TokenArray(joints)
+    prim_specs.uniform_attribute(scope, CONTACT_JOINTS, ValueTypes.TokenArray, names)
+    attribute = prim_specs.varying_attribute(scope, CONTACT, ValueTypes.BoolArray)
+    scope.attributes[CONTACT_JOINTS].custom = attribute.custom = True
+    for frame in _changes(found):
+        values = Vt.BoolArray([bool(value) for value in found[frame]])
+        made.SetTimeSample(attribute.path, frame, values)
+
+
+def _changes(rows: Booleans) -> Sequence[int]:
+    """Return the first row (F, K), and each that differs from the one before it."""
+    changed = np.any(rows[1:] != rows[:-1], axis=1)
+    return [0, *(np.flatnonzero(changed) + 1).tolist()]
