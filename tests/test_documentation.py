@@ -22,6 +22,7 @@ from posefield.http.performance_operations import MAX_SCRIPT_BYTES
 from posefield.performance.joins import join_quality
 from posefield.performance.script_bounds import MAX_SECONDS
 from posefield.question import json_decoding
+from posefield.question.performance_batch_question import PerformancesQuestion
 from posefield.question.performance_question import MAX_SEGMENTS, PerformanceQuestion
 from posefield.question.performance_report import JoinReport, PerformanceReport
 from posefield_train.cli import commands
@@ -233,22 +234,41 @@ def test_whole_recipes_in_the_documents_are_valid():
 
 
 def scripts_of_performances():
-    """Return the scripts of the guide: files that its examples write, and JSON blocks."""
+    """Return the scripts of the guide: files that its examples write, and JSON blocks; and the
+    requests for many performances."""
     text = page("guide/performances.md")
     written = re.findall(r"<<'END'\n(.*?)\nEND\n", text, re.DOTALL)
     shown = [each.text for each in document_pages.blocks(text) if each.language == "json"]
-    return [*written, *shown]
+    many = [each for each in written if '"scripts":' in each]
+    return [each for each in (*written, *shown) if each not in many], many
 
 
 def test_scripts_of_performances_in_the_guide_are_valid():
     found = [
         json_decoding.decode_question(PerformanceQuestion, text.encode())
-        for text in scripts_of_performances()
+        for text in scripts_of_performances()[0]
     ]
     # The fifth script for the shipped models is a Python example.
     assert len(found) == 5
     kinds = [type(each).__name__ for each in found[-1].segments]
     assert kinds == ["Walk", "Act", "Hold", "Act", "Walk"]
+
+
+def test_requests_for_many_performances_in_the_guide_are_valid():
+    (text,) = scripts_of_performances()[1]
+    asked = json_decoding.decode_question(PerformancesQuestion, text.encode())
+    assert [each.name for each in asked.scripts] == ["left", "right"]
+
+
+def test_the_limits_of_archives_of_performances_are_those_of_the_settings():
+    limits = Settings()
+    said = f"at most {limits.performances_limit} performances, with\n"
+    said += f"{limits.performances_segments:,} segments and {limits.performances_seconds:,} seconds"
+    assert said in page("guide/performances.md")
+    said = f"{limits.clips_body_limit >> 20} MiB, {limits.performances_limit} scripts, "
+    said += f"{limits.performances_segments:,} segments in all, and "
+    contract = (ROOT / "api/openapi.yaml").read_text()
+    assert f"{said}{limits.performances_seconds:,} seconds in all." in contract
 
 
 def test_every_field_of_a_performance_report_is_described():

@@ -36,6 +36,8 @@ QUESTIONS = (
     "Target",
     "Floor",
     "PerformanceQuestion",
+    "NamedScript",
+    "PerformancesQuestion",
     "CharacterChoice",
     "PerformanceStart",
     "GivenPose",
@@ -56,6 +58,7 @@ ANSWERS = (
     "Liveness",
     "Readiness",
     "PerformanceReport",
+    "PerformanceEntry",
     "Problem",
 )
 PLAIN = {"string": "str", "integer": "int", "number": "float", "boolean": "bool", "null": "None"}

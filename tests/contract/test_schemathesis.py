@@ -259,7 +259,8 @@ def narrowed(spec, card):
         parts["parameters"][name]["schema"] = {"type": "array", "maxItems": 0}
     parts["schemas"]["Labels"] = {"type": "object", "additionalProperties": False}
     # Which segments follow one another, and which fields exclude each other, no schema can say.
-    for path in ("performances", "performances.{format}"):
+    endings = ("", ".{format}", "/batch", "/batch.{format}")
+    for path in (f"performances{ending}" for ending in endings):
         del narrow["paths"][f"/v1/{path}"]
     crowd = parts["schemas"]["CrowdQuestion"]["properties"]
     crowd["labels"] = {"type": "object", "additionalProperties": False}

@@ -71,6 +71,18 @@ def _perform(
     return method
 
 
+def _pack(
+    question: Callable[P, Files],
+) -> Callable[Concatenate["AsyncClient", P], "AsyncSaving"]:
+    """Return a method of the client that sends its request when the archive is saved."""
+
+    @wraps(question)
+    def method(self: "AsyncClient", /, *args: P.args, **kwargs: P.kwargs) -> "AsyncSaving":
+        return AsyncSaving(self, question(*args, **kwargs))
+
+    return method
+
+
 def _lazy(
     kind: Callable[["AsyncClient", Files], F], question: Callable[Concatenate[str, P], Files]
 ) -> Callable[Concatenate["AsyncModel", P], F]:
@@ -112,6 +124,7 @@ class AsyncClient:
     ready = _ask(questions.ready)
     plan = _ask(performances.plan)
     performance = _perform(performances.performance)
+    performances = _pack(performances.performances)
 
     def model(self, name: str) -> "AsyncModel":
         """Return a model by name or name@hash, without a request."""

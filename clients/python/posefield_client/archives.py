@@ -1,4 +1,4 @@
-"""Archives of clips: count of files received, and check for completeness."""
+"""Archives of clips or performances: count of files received, and check for completeness."""
 
 import tarfile
 import zipfile
@@ -7,14 +7,15 @@ from typing import BinaryIO
 import msgspec
 
 from posefield_client.errors import IncompleteAnswer
-from posefield_client.generated import ManifestEntry
+from posefield_client.generated import ManifestEntry, PerformanceEntry
 
 MANIFEST = "manifest.jsonl"
 ZIP_HEAD, TAR_BLOCK = 30, 512
 STREAMED = 0x8
 """Flag of a zip member with its size after the data; the service writes the size before."""
 
-_ENTRY = msgspec.json.Decoder(ManifestEntry)
+Entry = ManifestEntry | PerformanceEntry
+"""Line of a manifest: of an archive of clips, or of one of performances."""
 
 
 class Counter:
@@ -63,11 +64,15 @@ def _tar(head: bytes) -> tuple[int, bool]:
     return size + -size % TAR_BLOCK, head[156:157] == b"0"
 
 
-def check(file: BinaryIO, ending: str, count: int) -> tuple[ManifestEntry, ...]:
-    """Return the manifest's entries; IncompleteAnswer if the archive does not match them."""
+def check(file: BinaryIO, ending: str, count: int, form: type[Entry]) -> tuple[Entry, ...]:
+    """Return the manifest's entries; IncompleteAnswer if the archive does not match them.
+
+    form: of the entries.
+    """
+    decoder = msgspec.json.Decoder(form)
     try:
         sizes, manifest = {"zip": _of_zip, "tar": _of_tar}[ending](file)
-        entries = tuple(map(_ENTRY.decode, manifest.splitlines()))
+        entries = tuple(map(decoder.decode, manifest.splitlines()))
     except (zipfile.BadZipFile, tarfile.TarError, KeyError, msgspec.DecodeError, EOFError) as fault:
         raise IncompleteAnswer(f"the archive broke off: {fault}") from None
     said = {entry.file: entry.bytes for entry in entries}

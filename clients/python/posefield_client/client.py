@@ -72,6 +72,18 @@ def _perform(
     return method
 
 
+def _pack(
+    question: Callable[P, Files],
+) -> Callable[Concatenate["Client", P], "Saving"]:
+    """Return a method of the client that sends its request when the archive is saved."""
+
+    @wraps(question)
+    def method(self: "Client", /, *args: P.args, **kwargs: P.kwargs) -> "Saving":
+        return Saving(self, question(*args, **kwargs))
+
+    return method
+
+
 def _lazy(
     kind: Callable[["Client", Files], F], question: Callable[Concatenate[str, P], Files]
 ) -> Callable[Concatenate["Model", P], F]:
@@ -115,6 +127,7 @@ class Client:
     ready = _ask(questions.ready)
     plan = _ask(performances.plan)
     performance = _perform(performances.performance)
+    performances = _pack(performances.performances)
 
     def model(self, name: str) -> "Model":
         """Return a model by name or name@hash, without a request."""

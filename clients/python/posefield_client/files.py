@@ -9,6 +9,7 @@ from typing import Any, Literal
 import msgspec
 
 from posefield_client import asking, holding
+from posefield_client.archives import Entry
 from posefield_client.errors import WrongQuestion
 from posefield_client.generated import (
     OPERATIONS,
@@ -16,6 +17,7 @@ from posefield_client.generated import (
     ClipQuestion,
     ClipsQuestion,
     CrowdQuestion,
+    ManifestEntry,
     NamedClipQuestion,
 )
 from posefield_client.holding import Exact, FloorValue, Targets
@@ -42,13 +44,15 @@ CLIP, CLIPS, CROWD, WALK = (
 class Files:
     """Request with a file as result.
 
-    count: number of clips of an archive, else None. about: model and question, for people.
+    count: number of clips of an archive, else None. about: model and question, for people. entry:
+    form of the lines of an archive's manifest.
     """
 
     formats: tuple[str, ...]
     ask: Callable[[str], Request]
     count: int | None = None
     about: str = ""
+    entry: type[Entry] = ManifestEntry
 
     def request(self, ending: str) -> Request:
         """Return the request for a format; WrongQuestion for an unknown one."""

@@ -323,6 +323,37 @@ class PerformanceQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
 
 
+class NamedScript(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A PerformanceQuestion with the name of its file."""
+
+    name: str | UnsetType | None = UNSET
+    segments: tuple[Walk | Act | Hold, ...]
+    character: CharacterChoice | UnsetType | None = UNSET
+    start: PerformanceStart | UnsetType = UNSET
+    obstacles: tuple[Obstacle, ...] | UnsetType = UNSET
+    fps: float | UnsetType = UNSET
+    take: int | UnsetType = UNSET
+    variety: float | UnsetType = UNSET
+    detail: bool | UnsetType = UNSET
+    level: int | UnsetType = UNSET
+    feet: Literal["stand", "as_predicted"] | UnsetType = UNSET
+    extrapolate: Literal["ok", "warn", "refuse"] | UnsetType = UNSET
+    names: Literal["own", "mixamo", "ue5", "vrm", "humanik"] | UnsetType = UNSET
+    unit: Literal["m", "cm"] | UnsetType | None = UNSET
+    up: Literal["y", "z"] | UnsetType | None = UNSET
+    body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
+
+
+class PerformancesQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Request for many performances in one format. All scripts are planned before the response
+    begins; one that cannot be performed refuses the whole request.
+    """
+
+    format: Literal["usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack"]
+    layout: Literal["whole", "segments"] | UnsetType = UNSET
+    scripts: tuple[NamedScript, ...]
+
+
 class ModelSummary(Struct, frozen=True, kw_only=True):
     """Schema ModelSummary of the contract."""
 
@@ -769,6 +800,25 @@ class PerformanceReport(Struct, frozen=True, kw_only=True):
     warnings: tuple[ScriptWarning, ...]
 
 
+class PerformanceEntry(Struct, frozen=True, kw_only=True):
+    """One performance of an archive, with its report."""
+
+    name: str
+    file: str
+    bytes: int
+    sha256: str
+    models: tuple[str, ...]
+    character: str
+    duration: float
+    frames: int
+    sigma: float
+    supported: bool
+    segments: tuple[SegmentReport, ...]
+    joins: tuple[JoinReport, ...]
+    feet: FeetResult | None = None
+    warnings: tuple[ScriptWarning, ...]
+
+
 class ProblemErrors(Struct, frozen=True, kw_only=True):
     """Schema ProblemErrors of the contract."""
 
@@ -1105,6 +1155,20 @@ OPERATIONS = {
                 "arrow": "application/vnd.apache.arrow.stream",
                 "msgpack": "application/vnd.msgpack",
             },
+        ),
+        Operation(
+            "queryPerformances",
+            "POST",
+            "/v1/performances/batch",
+            ("application/zip", "application/x-tar"),
+            {},
+        ),
+        Operation(
+            "queryPerformancesInFormat",
+            "POST",
+            "/v1/performances/batch.{format}",
+            ("application/zip", "application/x-tar"),
+            {"zip": "application/zip", "tar": "application/x-tar"},
         ),
         Operation("getMetrics", "GET", "/metrics", ("text/plain",), {}),
         Operation("getLiveness", "GET", "/livez", ("application/json",), {}),

@@ -1,8 +1,8 @@
-"""Requests for performances: one motion through the segments of a script, and its plan."""
+"""Requests for performances: one motion through a script, its plan, and archives of many."""
 
 from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import Any, Literal, TypedDict, Unpack, get_type_hints
+from typing import Any, Literal, TypedDict, TypeVar, Unpack, get_type_hints
 from urllib.parse import quote_plus
 
 import msgspec
@@ -10,13 +10,16 @@ from msgspec import Struct, structs
 
 from posefield_client import asking, scripts
 from posefield_client.errors import WrongQuestion
-from posefield_client.files import Body, Feet, Files, Names
+from posefield_client.files import Body, ClipFormat, Feet, Files, Names
 from posefield_client.generated import (
     OPERATIONS,
     CharacterChoice,
+    NamedScript,
     Obstacle,
+    PerformanceEntry,
     PerformanceQuestion,
     PerformanceReport,
+    PerformancesQuestion,
     PerformanceStart,
 )
 from posefield_client.questions import Extrapolate
@@ -27,7 +30,10 @@ AnyScript = Script | PerformanceQuestion | Mapping[str, Any]
 """A script, or a document of one as the contract has it."""
 Layout = Literal["whole", "segments"]
 """Animations in USD files: one of the whole performance, or besides it one of each segment."""
-PERFORMANCE = tuple(OPERATIONS["queryPerformanceInFormat"].formats)
+PERFORMANCE, ARCHIVES = (
+    tuple(OPERATIONS[f"query{name}InFormat"].formats) for name in ("Performance", "Performances")
+)
+Form = TypeVar("Form", PerformanceQuestion, NamedScript)
 
 
 class ScriptOptions(TypedDict, total=False):
@@ -85,8 +91,43 @@ def _said(options: Mapping[str, Any], known: type[ScriptOptions]) -> dict[str, A
     return asking.said(**{**options, **listed})
 
 
+def performances(
+    scripts: Iterable[AnyScript | NamedScript],
+    format: ClipFormat,  # noqa: A002  # the contract's own word
+    *,
+    layout: Layout | None = None,
+) -> Files:
+    """Return an archive of many performances of one format, with a manifest.
+
+    A script may have a `name`, that of its file. layout: as for `performance`.
+    """
+    if format not in PERFORMANCE:
+        hint = asking.did_you_mean(format, PERFORMANCE)
+        raise WrongQuestion(f"format {format!r}{hint}, expected one of {', '.join(PERFORMANCE)}")
+    listed = tuple(_named(place, script) for place, script in enumerate(scripts))
+    question = PerformancesQuestion(format=format, scripts=listed, **asking.said(layout=layout))
+    about = f"{len(listed)} performances as {format}"
+    return Files(ARCHIVES, partial(_archive, question), len(listed), about, PerformanceEntry)
+
+
+def _named(place: int, script: AnyScript | NamedScript) -> NamedScript:
+    try:
+        return _read(script, {}, NamedScript)
+    except WrongQuestion as fault:
+        raise WrongQuestion(f"script {place}: {fault}") from None
+
+
+def _archive(question: PerformancesQuestion, form: str) -> Request:
+    operation = OPERATIONS["queryPerformancesInFormat"].in_format(form)
+    return Request(operation, operation.path, _content(question))
+
+
 def read_script(script: AnyScript, options: Mapping[str, Any]) -> PerformanceQuestion:
     """Return the question of a script with options; WrongQuestion if it is invalid."""
+    return _read(script, options, PerformanceQuestion)
+
+
+def _read(script: AnyScript | NamedScript, options: Mapping[str, Any], form: type[Form]) -> Form:
     given = _document(script)
     listed = given.get("segments")
     if not isinstance(listed, list) or not listed:
@@ -94,24 +135,24 @@ def read_script(script: AnyScript, options: Mapping[str, Any]) -> PerformanceQue
     for place, each in enumerate(listed):
         scripts.read_segment(f"segment {place}", each)
     try:
-        return msgspec.convert(asking.together(given, options), PerformanceQuestion)
+        return msgspec.convert(asking.together(given, options), form)
     except msgspec.ValidationError as fault:
-        raise WrongQuestion(f"script: {fault}{_known_keys(given)}") from None
+        raise WrongQuestion(f"script: {fault}{_known_keys(given, form)}") from None
 
 
-def _document(script: AnyScript) -> dict[str, Any]:
+def _document(script: AnyScript | NamedScript) -> dict[str, Any]:
     if isinstance(script, Script):
         return script.document()
-    if not isinstance(script, Mapping | PerformanceQuestion):
+    if not isinstance(script, Mapping | PerformanceQuestion | NamedScript):
         found = type(script).__name__
         raise WrongQuestion(f"script is a {found}, expected a Script or a mapping with segments")
     plain: dict[str, Any] = asking.sayable("script", script)
     return plain
 
 
-def _known_keys(given: Mapping[str, Any]) -> str:
+def _known_keys(given: Mapping[str, Any], form: type[Struct]) -> str:
     """Return the name that is most like an unknown key of a script, or ""."""
-    known = [field.name for field in structs.fields(PerformanceQuestion)]
+    known = [field.name for field in structs.fields(form)]
     unknown = [key for key in given if key not in known]
     return asking.did_you_mean(str(unknown[0]), known) if unknown else ""
 
@@ -121,7 +162,7 @@ def _request(question: PerformanceQuestion, query: str, form: str) -> Request:
     return Request(operation, operation.path + query, _content(question))
 
 
-def _content(question: PerformanceQuestion) -> bytes:
+def _content(question: PerformanceQuestion | PerformancesQuestion) -> bytes:
     return msgspec.json.encode(asking.sayable("script", question))
 
 

@@ -14,10 +14,9 @@ from typing import BinaryIO, TypeVar
 import msgspec
 
 from posefield_client import archives
-from posefield_client.archives import Counter
+from posefield_client.archives import Counter, Entry
 from posefield_client.exchange import Core
 from posefield_client.files import Files
-from posefield_client.generated import ManifestEntry
 from posefield_client.wire import Call, Reply, Steps
 
 
@@ -51,8 +50,8 @@ class Saved:
     """A written file and the service's metadata of it.
 
     model: name@hash. sigma: m. duration: s. supported: True near captured clips. inferred: values
-    chosen for omitted controls. missed: constraints that are not met. entries: one per clip of an
-    archive.
+    chosen for omitted controls. missed: constraints that are not met. entries: one per clip or
+    performance of an archive.
     """
 
     path: Path
@@ -61,7 +60,7 @@ class Saved:
     sigma: float | None
     duration: float | None
     warnings: tuple[str, ...]
-    entries: tuple[ManifestEntry, ...]
+    entries: tuple[Entry, ...]
     supported: bool | None = None
     inferred: Mapping[str, float] = field(default_factory=dict, hash=False)
     missed: tuple[Missed, ...] = ()
@@ -155,7 +154,7 @@ def save(core: Core, files: Files, path: Path, watch: Watch | None) -> Steps[Sav
     with Part(path) as part:
 
         def look(reply: Reply) -> Saved:
-            return _saved(path, reply, _entries(part.file, ending, files.count))
+            return _saved(path, reply, _entries(part.file, ending, files))
 
         sink = Into(part.file, ending, files.count, watch)
         saved = yield from core.answer(Call(request, look), sink)
@@ -167,21 +166,21 @@ def content(core: Core, files: Files, ending: str) -> Steps[bytes]:
     """Return a response in a format, as bytes."""
 
     def look(reply: Reply) -> bytes:
-        _entries(io.BytesIO(reply.content), ending, files.count)
+        _entries(io.BytesIO(reply.content), ending, files)
         return reply.content
 
     return (yield from core.answer(Call(files.request(ending), look)))
 
 
-def _entries(file: BinaryIO, ending: str, count: int | None) -> tuple[ManifestEntry, ...]:
+def _entries(file: BinaryIO, ending: str, files: Files) -> tuple[Entry, ...]:
     """Return the manifest of a complete archive; empty for other files."""
-    if count is None:
+    if files.count is None:
         return ()
     file.seek(0)
-    return archives.check(file, ending, count)
+    return archives.check(file, ending, files.count, files.entry)
 
 
-def _saved(path: Path, reply: Reply, entries: tuple[ManifestEntry, ...]) -> Saved:
+def _saved(path: Path, reply: Reply, entries: tuple[Entry, ...]) -> Saved:
     """Return the metadata from a response's headers; ValueError if they are invalid."""
     headers = reply.headers
     return Saved(

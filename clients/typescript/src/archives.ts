@@ -1,9 +1,9 @@
-/** Archives of many clips: tar and zip of stored files, whose last file is a manifest of the others. */
+/** Archives of many clips or performances: tar and zip of stored files, whose last file is a manifest of the others. */
 
 import { lines } from "./documents.ts";
 import { Broken } from "./errors.ts";
 import { isEnd, members as tarMembers } from "./tar.ts";
-import type { Archive, ArchiveFormat, Download, ManifestEntry } from "./types.ts";
+import type { ArchiveFormat, Download, ManifestEntry, PerformanceEntry } from "./types.ts";
 import { members as zipMembers } from "./zip.ts";
 
 export type Member = readonly [path: string, content: Uint8Array<ArrayBuffer>];
@@ -14,17 +14,34 @@ export const END = 1024;
 const MANIFEST = "manifest.jsonl";
 const MEMBERS = { zip: zipMembers, tar: tarMembers };
 
-/** The files of an archive that was asked for so many clips; Broken where not all are there. */
-export function opened(download: Download, format: ArchiveFormat, clips: number): Archive {
+/** Lines of manifests, by their names in the contract. */
+interface Entries {
+  ManifestEntry: ManifestEntry;
+  PerformanceEntry: PerformanceEntry;
+}
+
+/** A file whose members are there as its manifest says. */
+interface Opened<Entry> extends Download {
+  readonly entries: readonly Entry[];
+  readonly files: ReadonlyMap<string, Uint8Array<ArrayBuffer>>;
+}
+
+/** The files of an archive that was asked for so many; Broken where not all are there. */
+export function opened<Name extends keyof Entries>(
+  download: Download,
+  format: ArchiveFormat,
+  count: number,
+  form: Name,
+): Opened<Entries[Name]> {
   const members = [...MEMBERS[format](download.content)];
   const [name, manifest] = members.pop() ?? [];
   if (name !== MANIFEST || !manifest) {
     throw new Broken(`the archive ends with ${name ?? "nothing"}, expected ${MANIFEST}`);
   }
   const files = new Map(members);
-  const entries = lines("ManifestEntry", manifest);
-  if (entries.length !== clips) {
-    throw new Broken(`the archive holds ${entries.length} clips, expected ${clips}`);
+  const entries = lines(form, manifest);
+  if (entries.length !== count) {
+    throw new Broken(`the archive holds ${entries.length} clips, expected ${count}`);
   }
   for (const entry of entries) expectFile(files, entry);
   const named = new Set(entries.map(({ file }) => file));
@@ -46,7 +63,10 @@ const ENDS = {
   tar: (end: Uint8Array, bytes: number) => bytes % 512 === 0 && isEnd(end),
 };
 
-function expectFile(files: ReadonlyMap<string, Uint8Array>, { file, bytes }: ManifestEntry): void {
+function expectFile(
+  files: ReadonlyMap<string, Uint8Array>,
+  { file, bytes }: Pick<ManifestEntry, "file" | "bytes">,
+): void {
   const found = files.get(file)?.length;
   if (found === bytes) return;
   throw new Broken(`${file} has ${found ?? "no"} bytes in the archive, expected ${bytes}`);

@@ -31,6 +31,9 @@ import type {
   ModelSummary,
   Motion,
   NamedClipQuestion,
+  NamedScript,
+  PerformanceArchive,
+  PerformanceArchiveOptions,
   PerformanceFileOptions,
   PerformanceMotion,
   PerformanceQuestion,
@@ -177,6 +180,23 @@ export class Client {
     return this.#file(asked, `performance.${format}`, options);
   }
 
+  /** Many performances in one file, looked through: all are there, and as long as they should be. */
+  async performanceArchive(
+    format: ClipFormat,
+    scripts: readonly (Script | NamedScript)[],
+    { as = "zip", layout, ...options }: PerformanceArchiveOptions = {},
+  ): Promise<PerformanceArchive> {
+    checkTransferOptions(options);
+    const question = {
+      format,
+      layout,
+      scripts: scripts.map((script) => scriptQuestion(script, "NamedScript")),
+    };
+    const asked = asFile(post(`/v1/performances/batch.${as}`, question), as);
+    const download = await this.#file(asked, `performances.${as}`, options);
+    return this.#explained(async () => opened(download, as, scripts.length, "PerformanceEntry"));
+  }
+
   /** Timeline, joins and warnings of a performance, without its poses. */
   async plan(
     script: Script | PerformanceQuestion,
@@ -196,7 +216,7 @@ export class Client {
     checkArchive(clips, options);
     const asked = asFile(post(under(model, `/clips.${as}`), { format, clips }), as);
     const download = await this.#file(asked, `${model}.${as}`, options);
-    return this.#explained(async () => opened(download, as, clips.length));
+    return this.#explained(async () => opened(download, as, clips.length, "ManifestEntry"));
   }
 
   /** The same while it comes, for what is too large to be held. */

@@ -483,6 +483,52 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/performances/batch": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Query many performances as an archive
+         * @description The response is a zip archive, or the format that `Accept` prefers. Every script is planned before the response begins, and one that cannot be performed refuses the whole request; the archive is sent while the performances are computed. It contains one file per script, under the script's name, in the order of the request; each file equals the response of the performance path in that format and layout. The last file is `manifest.jsonl`; a response without it is incomplete. Since 4.2.0.
+         */
+        post: operations["queryPerformances"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/performances/batch.{format}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description A zip or tar archive.
+                 * @example zip
+                 */
+                format: components["parameters"]["archiveFormat"];
+            };
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Query many performances as an archive in a format
+         * @description The response is `zip` or `tar`. Every script is planned before the response begins, and one that cannot be performed refuses the whole request; the archive is sent while the performances are computed. It contains one file per script, under the script's name, in the order of the request; each file equals the response of the performance path in that format and layout. The last file is `manifest.jsonl`; a response without it is incomplete. Since 4.2.0.
+         */
+        post: operations["queryPerformancesInFormat"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/metrics": {
         parameters: {
             query?: never;
@@ -1197,6 +1243,83 @@ export interface components {
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
+        };
+        /** @description A PerformanceQuestion with the name of its file. */
+        NamedScript: {
+            /**
+             * @description File name without extension, unique without regard to case. Null: `performance-` and the index of the script, six digits from 000000.
+             * @default null
+             * @example left
+             */
+            name: string | null;
+            /**
+             * @example [
+             *       {
+             *         "kind": "walk",
+             *         "model": "cmu_walk",
+             *         "seconds": 2
+             *       }
+             *     ]
+             */
+            segments: components["schemas"]["Segment"][];
+            /** @default null */
+            character: components["schemas"]["CharacterChoice"] | null;
+            start?: components["schemas"]["PerformanceStart"];
+            /** @default [] */
+            obstacles: components["schemas"]["Obstacle"][];
+            /**
+             * @description Frame rate in frames a second.
+             * @default 30
+             */
+            fps: number;
+            take?: components["schemas"]["Take"];
+            variety?: components["schemas"]["Variety"];
+            detail?: components["schemas"]["Detail"];
+            level?: components["schemas"]["LevelNumber"];
+            /**
+             * @description Whether feet stand where they contact the ground.
+             * @default stand
+             * @enum {string}
+             */
+            feet: "stand" | "as_predicted";
+            extrapolate?: components["schemas"]["Extrapolate"];
+            names?: components["schemas"]["Names"];
+            unit?: components["schemas"]["Unit"];
+            up?: components["schemas"]["Up"];
+            body?: components["schemas"]["Body"];
+        };
+        /** @description Request for many performances in one format. All scripts are planned before the response begins; one that cannot be performed refuses the whole request. */
+        PerformancesQuestion: {
+            /**
+             * @description File format of all performances, as a file extension.
+             * @enum {string}
+             */
+            format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
+            layout?: components["schemas"]["PerformanceLayout"];
+            scripts: components["schemas"]["NamedScript"][];
+        };
+        /** @description One performance of an archive, with its report. */
+        PerformanceEntry: {
+            name: string;
+            /** @description Path in the archive. */
+            file: string;
+            bytes: number;
+            /** @description SHA-256 of the file's content. */
+            sha256: string;
+            /** @description Models of the script, in order. */
+            models: components["schemas"]["Identity"][];
+            character: components["schemas"]["Identity"];
+            /** @description In seconds. */
+            duration: number;
+            frames: number;
+            /** @description Expected distance from captured motion in metres, root mean square over joints and frames. */
+            sigma: number;
+            /** @description True if clips with similar controls were captured for every segment. */
+            supported: boolean;
+            segments: components["schemas"]["SegmentReport"][];
+            joins: components["schemas"]["JoinReport"][];
+            feet?: components["schemas"]["FeetResult"];
+            warnings: components["schemas"]["ScriptWarning"][];
         };
         /**
          * @description One animation of the whole performance, or besides it one of each segment.
@@ -2307,6 +2430,22 @@ export interface components {
                 "application/vnd.apache.arrow.stream": string;
             };
         };
+        /** @description The archive. Default format: zip. */
+        Performances: {
+            headers: {
+                "X-Request-Id": components["headers"]["RequestId"];
+                "Cache-Control": components["headers"]["CacheControl"];
+                ETag: components["headers"]["ETag"];
+                Vary: components["headers"]["Vary"];
+                "Content-Disposition": components["headers"]["Disposition"];
+                "Posefield-Warning": components["headers"]["Warning"];
+                [name: string]: unknown;
+            };
+            content: {
+                "application/zip": string;
+                "application/x-tar": string;
+            };
+        };
         /** @description The performance as a clip, or its plan. Default format: JSON. */
         Performance: {
             headers: {
@@ -2818,6 +2957,12 @@ export interface components {
         PerformanceQuestion: {
             content: {
                 "application/json": components["schemas"]["PerformanceQuestion"];
+            };
+        };
+        /** @description Default limits: 8 MiB, 256 scripts, 1,024 segments in all, and 7,200 seconds in all. */
+        PerformancesQuestion: {
+            content: {
+                "application/json": components["schemas"]["PerformancesQuestion"];
             };
         };
         /** @description Default limits: 32 MiB and 100,000 characters. */
@@ -4362,6 +4507,63 @@ export interface operations {
             503: components["responses"]["Overloaded"];
         };
     };
+    queryPerformances: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: components["requestBodies"]["PerformancesQuestion"];
+        responses: {
+            200: components["responses"]["Performances"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
+            406: components["responses"]["NotAcceptable"];
+            413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
+            415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
+            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
+    queryPerformancesInFormat: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /**
+                 * @description A zip or tar archive.
+                 * @example zip
+                 */
+                format: components["parameters"]["archiveFormat"];
+            };
+            cookie?: never;
+        };
+        requestBody: components["requestBodies"]["PerformancesQuestion"];
+        responses: {
+            200: components["responses"]["Performances"];
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            405: components["responses"]["MethodNotAllowed"];
+            413: components["responses"]["BodyTooLarge"];
+            414: components["responses"]["UrlTooLong"];
+            415: components["responses"]["UnsupportedMediaType"];
+            421: components["responses"]["UnknownHost"];
+            422: components["responses"]["Unanswerable"];
+            431: components["responses"]["HeadTooLarge"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
     getMetrics: {
         parameters: {
             query?: never;
@@ -4608,6 +4810,21 @@ export const REQUIRED = {
   "ModelList": [
     "models"
   ],
+  "PerformanceEntry": [
+    "name",
+    "file",
+    "bytes",
+    "sha256",
+    "models",
+    "character",
+    "duration",
+    "frames",
+    "sigma",
+    "supported",
+    "segments",
+    "joins",
+    "warnings"
+  ],
   "PerformanceReport": [
     "models",
     "character",
@@ -4687,6 +4904,12 @@ export const LISTS = {
   ],
   "ModelList": [
     "models"
+  ],
+  "PerformanceEntry": [
+    "models",
+    "segments",
+    "joins",
+    "warnings"
   ],
   "PerformanceReport": [
     "models",
@@ -4827,6 +5050,24 @@ export const KEYS = {
     "height",
     "slope_x",
     "slope_z"
+  ],
+  "NamedScript": [
+    "name",
+    "segments",
+    "character",
+    "start",
+    "obstacles",
+    "fps",
+    "take",
+    "variety",
+    "detail",
+    "level",
+    "feet",
+    "extrapolate",
+    "names",
+    "unit",
+    "up",
+    "body"
   ],
   "PerformanceQuestion": [
     "segments",

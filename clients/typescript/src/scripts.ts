@@ -6,6 +6,7 @@ import { KEYS } from "./schema.ts";
 import type {
   ActSegment,
   HoldSegment,
+  NamedScript,
   PerformanceQuestion,
   Segment,
   WalkSegment,
@@ -70,9 +71,12 @@ export class Script {
 }
 
 /** The question of a script; WrongQuestion for one that the contract does not have. */
-export function scriptQuestion(script: Script | PerformanceQuestion): PerformanceQuestion {
+export function scriptQuestion(
+  script: Script | NamedScript,
+  kind: "PerformanceQuestion" | "NamedScript" = "PerformanceQuestion",
+): NamedScript {
   const question = script instanceof Script ? script.question() : script;
-  checkQuestion("PerformanceQuestion", question);
+  checkQuestion(kind, question);
   if (!Array.isArray(question.segments) || question.segments.length === 0) {
     throw new WrongQuestion("a script without segments, expected at least one");
   }

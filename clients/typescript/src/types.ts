@@ -11,6 +11,8 @@ export type ModelCard = Schemas["ModelCard"];
 export type ModelSummary = Schemas["ModelSummary"];
 /** Timeline, joins and warnings of a performance. */
 export type PerformanceReport = Schemas["PerformanceReport"];
+/** One performance of an archive, with its report. */
+export type PerformanceEntry = Schemas["PerformanceEntry"];
 export type Readiness = Schemas["Readiness"];
 export type Reasons = Schemas["Reasons"];
 export type Suggestions = Schemas["Suggestions"];
@@ -45,6 +47,9 @@ export type PerformanceQuestion = Omit<
   readonly character?: Part<"CharacterChoice", "model"> | null;
   readonly start?: Partial<Schemas["PerformanceStart"]>;
 };
+
+/** A script with the name of its file. */
+export type NamedScript = PerformanceQuestion & { readonly name?: string | null };
 
 type Part<Name extends keyof Schemas, Needed extends keyof Schemas[Name]> = Omit<
   Asked<Schemas[Name], Needed>,
@@ -159,6 +164,12 @@ export interface Archive extends Download {
   readonly files: ReadonlyMap<string, Uint8Array<ArrayBuffer>>;
 }
 
+/** Many performances, all there: what an archive's manifest says of each, and its files. */
+export interface PerformanceArchive extends Download {
+  readonly entries: readonly PerformanceEntry[];
+  readonly files: ReadonlyMap<string, Uint8Array<ArrayBuffer>>;
+}
+
 /** A file that is still coming. It ends with an error where it does not come whole. */
 export interface Transfer extends Named {
   readonly body: ReadableStream<Uint8Array<ArrayBuffer>>;
@@ -181,4 +192,9 @@ export interface TransferOptions {
 /** Animations in USD files: of the whole performance, or besides it of each segment. */
 export interface PerformanceFileOptions extends TransferOptions {
   readonly layout?: Schemas["PerformanceLayout"] | undefined;
+}
+
+/** What may be said of an archive of performances; `as` zip, unless another is said. */
+export interface PerformanceArchiveOptions extends PerformanceFileOptions {
+  readonly as?: ArchiveFormat;
 }

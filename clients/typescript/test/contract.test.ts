@@ -12,6 +12,7 @@ import type {
   CrowdFormat,
   CrowdQuestion,
   NamedClipQuestion,
+  NamedScript,
   PerformanceQuestion,
   PoseQuestion,
   SigmaQuestion,
@@ -50,9 +51,21 @@ const performance: Ask = (client, _, question) =>
 const performanceFile = (format: ClipFormat): Ask => {
   return (client, _, question) => client.performanceFile(format, question as PerformanceQuestion);
 };
+const performances = (as: "zip" | "tar"): Ask => {
+  return (client, _, question) => {
+    const { format, layout, scripts } = question as PerformancesQuestion;
+    return client.performanceArchive(format, scripts, { as, layout });
+  };
+};
 const plan: Ask = async (client, _, question) => ({
   trust: await client.plan(question as PerformanceQuestion),
 });
+
+interface PerformancesQuestion {
+  readonly format: ClipFormat;
+  readonly layout?: "whole" | "segments";
+  readonly scripts: readonly NamedScript[];
+}
 
 /** Call by format; a text says why the client does not ask for it. */
 type ByFormat = Readonly<Record<string, Ask | string>>;
@@ -100,6 +113,8 @@ const ASKED: Record<string, Ask | string | ByFormat> = {
     ...Object.fromEntries(FILES.map((format) => [format, performanceFile(format)])),
     msgpack: performance,
   },
+  queryPerformances: NEGOTIATED,
+  queryPerformancesInFormat: { zip: performances("zip"), tar: performances("tar") },
   getReadiness: (client) => client.ready(),
   getLiveness: (client) => client.contract(),
   getMetrics: "read by Prometheus",

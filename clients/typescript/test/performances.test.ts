@@ -84,6 +84,29 @@ test("segments are a layout of USD", async () => {
   await assert.rejects(client.performanceFile("glb", walks, { layout: "segments" }), Problem);
 });
 
+test("an archive has every performance under its name", async () => {
+  const { client, sent } = observed();
+  const scripts = [{ name: "first", ...walks.question({ fps: 24 }) }, walks];
+  const found = await client.performanceArchive("bvh", scripts, { as: "tar" });
+  assert.equal(sent[0]?.path, "/v1/performances/batch.tar");
+  assert.deepEqual([...found.files.keys()], ["first.bvh", "performance-000001.bvh"]);
+  const alone = await client.performanceFile("bvh", walks);
+  assert.deepEqual(found.files.get("performance-000001.bvh"), alone.content);
+  const planned = await client.plan(walks);
+  assert.deepEqual(found.entries[1]?.segments, planned.segments);
+  assert.ok((found.entries[0]?.frames ?? 0) < planned.frames);
+  const parts = await client.performanceArchive("usda", [walks], { layout: "segments" });
+  assert.ok(new TextDecoder().decode(parts.files.get("performance-000000.usda")).includes("s001"));
+});
+
+test("the service points at a script of an archive", async () => {
+  const wrong = new Script().walk("walk", { seconds: 1 }).act("reech");
+  await assert.rejects(client.performanceArchive("bvh", [walks, wrong]), (fault) => {
+    assert.ok(fault instanceof Problem);
+    return fault.places[0]?.pointer === "/scripts/1/segments/1/model";
+  });
+});
+
 test("the service points at the part of a script", async () => {
   const wrong = new Script().walk("walk", { seconds: 1 }).act("reech");
   await assert.rejects(client.plan(wrong), (fault) => {
@@ -130,6 +153,14 @@ const WRONG: Readonly<Record<string, [() => unknown, string]>> = {
   option: [
     () => client.performance(walks.question({ take: 1, ...{ fsp: 30 } })),
     "PerformanceQuestion: found fsp (did you mean fps?)",
+  ],
+  named: [
+    () => client.performanceArchive("usdc", [{ ...walks.question(), ...{ nam: "a" } }]),
+    "NamedScript: found nam (did you mean name?)",
+  ],
+  as: [
+    () => client.performanceArchive("usdc", [walks], { as: "zip", ...{ ass: "tar" } }),
+    "TransferOptions: found ass",
   ],
   number: [
     () => client.performanceFile("glb", new Script().hold(Number.NaN)),

@@ -77,6 +77,7 @@ _FORMATTED: dict[str, Handler] = {
     "getCrowd": crowd_operations.GET_CROWD,
     "queryCrowd": crowd_operations.QUERY_CROWD,
     "queryPerformance": performance_operations.QUERY_PERFORMANCE,
+    "queryPerformances": performance_operations.QUERY_PERFORMANCES,
     "getSigma": trust_operations.GET_SIGMA,
     "querySigma": trust_operations.QUERY_SIGMA,
 }

@@ -1,5 +1,6 @@
-"""Steps of requests for performances: one motion through the segments of a script."""
+"""Steps of requests for performances: one motion through a script, and an archive of many."""
 
+from collections.abc import Iterator
 from contextlib import AbstractAsyncContextManager
 from dataclasses import dataclass
 from typing import get_args
@@ -7,8 +8,11 @@ from typing import get_args
 from starlette.requests import Request
 from starlette.responses import Response
 
+from posefield.batch.scripts import performance_archive
+from posefield.batch.scripts.performance_archive import PerformanceOrder
 from posefield.common.errors import InvalidField
 from posefield.encode import performance_files
+from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
 from posefield.encode.performance_files import PerformanceEncoder
@@ -16,8 +20,8 @@ from posefield.http import responses
 from posefield.http.api import problems
 from posefield.http.api.problems import BAD_PARAMETER, RequestError
 from posefield.http.concurrency import worker_threads
-from posefield.http.decoding import request_body
-from posefield.http.steps import Context, Steps, query_pairs
+from posefield.http.decoding import performances_query, request_body
+from posefield.http.steps import Context, Steps, query_pairs, unlimited
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question import json_decoding
@@ -29,6 +33,7 @@ MAX_SCRIPT_BYTES = 256 * 1024
 PLAN_FORMAT = "json"
 
 Performances = Context[ClipEncoder]
+Packs = Context[ArchiveWriter]
 
 
 @dataclass(frozen=True)
@@ -141,4 +146,53 @@ QUERY_PERFORMANCE = Steps(
     synthesise,
     encode,
     respond,
+)
+
+
+async def read_scripts(context: Packs, request: Request) -> bytes:
+    """Return the body of a request for many performances."""
+    service = context.service
+    return await request_body.read_body(request, service.settings.clips_body_limit, service.bodies)
+
+
+async def plan_scripts(context: Packs, content: bytes) -> PerformanceOrder:
+    """Return the planned scripts of a body, which later steps do not refuse."""
+    return await worker_threads.run_in_thread(
+        performances_query.decode_order,
+        context.library,
+        content,
+        context.service.settings,
+        places=worker_threads.ARCHIVE_LIMITER,
+    )
+
+
+async def perform_scripts(context: Packs, order: PerformanceOrder) -> Iterator[tuple[str, bytes]]:
+    """Return an iterator over the names and files of the performances, made as they are sent."""
+    return performance_archive.archive_members(order)
+
+
+async def pack_performances(
+    context: Packs, order: PerformanceOrder, members: Iterator[tuple[str, bytes]]
+) -> tuple[Iterator[bytes], list[str]]:
+    """Return the pieces of the archive, and its warnings."""
+    return responses.merged_chunks(context.form.write(members)), order.warnings
+
+
+def send_performances(
+    context: Packs, members: object, content: tuple[Iterator[bytes], list[str]]
+) -> Response:
+    """Return the response that streams the archive."""
+    pieces, warnings = content
+    sent = responses.sent(pieces, worker_threads.ARCHIVE_LIMITER)
+    return responses.performance_archive(sent, context.form, warnings)
+
+
+QUERY_PERFORMANCES = Steps(
+    ARCHIVE_WRITERS,
+    read_scripts,
+    plan_scripts,
+    unlimited,
+    perform_scripts,
+    pack_performances,
+    send_performances,
 )

@@ -96,6 +96,16 @@ def performance_file(content: bytes, form: Format, report: PerformanceReport) ->
     return _add_warnings(made, report.warnings)
 
 
+def performance_archive(
+    pieces: AsyncIterator[bytes], form: Format, warnings: Sequence[str]
+) -> Response:
+    """Return a response that streams an archive of performances; warnings: sent as headers."""
+    headers = _disposition(form, "performances")
+    return _add_warnings(
+        StreamingResponse(pieces, headers=headers, media_type=form.media_type), warnings
+    )
+
+
 def _add_warnings(response: Response, warnings: Sequence[str]) -> Response:
     for warning in warnings:
         # A JSON string is ASCII, and its quotes protect commas, which separate joined headers.

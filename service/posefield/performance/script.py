@@ -16,6 +16,7 @@ from posefield.feet.footsteps import Character
 from posefield.locomotion import stride
 from posefield.locomotion.gait import Gait
 from posefield.model_file.model_card import ModelCard
+from posefield.motion import joint_roles
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.skeleton import Skeleton
 from posefield.performance import script_bounds
@@ -143,6 +144,8 @@ def resolve_script(question: PerformanceQuestion, find: Callable[[str], Synthesi
     models = [_model(index, own, find) for index, own in enumerate(question.segments)]
     script_bounds.check_level(question.level, models)
     character = _character(question, models, find)
+    # Refused here, as a plan refuses what its performance would.
+    joint_roles.rename_joints(character.skeleton, character.roles, question.names)
     return Script(question, tuple(_sources(question, models, character)), character)
 
 

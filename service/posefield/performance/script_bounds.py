@@ -35,6 +35,8 @@ def check_bounds(question: PerformanceQuestion) -> None:
         if not value > 0.0:
             raise InvalidField(field, f"{value:.9g} {unit}, expected more than 0 {unit}")
     check_take(question.take, question.variety)
+    if isinstance(question.segments[0], Hold) and not question.start.poses:
+        raise InvalidField("segments/0", "a hold, expected a walk or an act before it")
 
 
 def check_level(level: int, models: Sequence[Synthesizer | None]) -> None:

@@ -4,7 +4,6 @@ from typing import Annotated, Literal
 
 from msgspec import UNSET, Meta, Struct, UnsetType
 
-from posefield.common.errors import InvalidField
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import Body
@@ -197,7 +196,3 @@ class PerformanceQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_on
     unit: LengthUnit | None = None
     up: UpAxis | None = None
     body: Body = None
-
-    def __post_init__(self) -> None:
-        if isinstance(self.segments[0], Hold) and not self.start.poses:
-            raise InvalidField("segments/0", "a hold, expected a walk or an act before it")

@@ -13,7 +13,7 @@ from asking import contains, listening
 from contract_examples import CASES
 from posefield_client import NOTHING, AsyncClient, Client
 from posefield_client.files import CLIP, CLIPS, CROWD, WALK
-from posefield_client.performances import PERFORMANCE
+from posefield_client.performances import ARCHIVES, PERFORMANCE
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
@@ -29,6 +29,7 @@ NOT_ASKED = {
         for noun in ("Pose", "Clip", "Crowd", "Sigma")
     },
     ("queryClips", None): ANY_FORMAT,
+    ("queryPerformances", None): ANY_FORMAT,
     **{
         (f"{ask}{noun}InFormat", form): WRAPPED
         for ask in ("get", "query")
@@ -114,6 +115,10 @@ def performance(ending):
     return lambda client, r: client.performance(r["body"]).content(ending)
 
 
+def performances(ending):
+    return lambda client, r: client.performances(**r["body"]).content(ending)
+
+
 CALLS = {
     ("listModels", None): lambda client, r: client.models(),
     ("getLiveness", None): lambda client, r: client.live(),
@@ -134,6 +139,7 @@ CALLS = {
     **{("queryClipsInFormat", form): clips(form) for form in CLIPS},
     ("queryPerformance", None): lambda client, r: client.plan(r["body"]),
     **{("queryPerformanceInFormat", form): performance(form) for form in PERFORMANCE},
+    **{("queryPerformancesInFormat", form): performances(form) for form in ARCHIVES},
     ("queryPerformanceInFormat", "msgpack"): (
         lambda client, r: client.performance(r["body"]).numbers
     ),

@@ -33,6 +33,7 @@ def test_every_example_runs(address, tmp_path, monkeypatch, capsys):
             "clip.usdc",
             "clip.glb",
             "performance.usdc",
+            "performances.zip",
             "crowd.usdz",
             "clips.zip",
             "later.usdc",

@@ -1,5 +1,8 @@
 """Tests of scripts and performances: what the builders make, what is refused before it is sent."""
 
+import zipfile
+from pathlib import Path
+
 import msgspec
 import numpy as np
 import pytest
@@ -8,6 +11,7 @@ from posefield_client.errors import WrongQuestion
 from posefield_client.generated import Hold, Join, PlacedTarget, Walk
 
 from posefield.question import json_decoding
+from posefield.question.performance_batch_question import PerformancesQuestion
 from posefield.question.performance_question import PerformanceQuestion
 
 HAND = {"joint": "rhand", "position": np.array([0.4, 1.6, 4.6]), "at": "event"}
@@ -189,3 +193,46 @@ def test_an_unknown_option_is_refused():
         performances.performance(script, fpss=30)
     with pytest.raises(WrongQuestion, match="option 'unit', expected some of character, start"):
         performances.plan(script, unit="cm")
+
+
+def test_an_archive_has_named_scripts():
+    script = Script().walk("a", seconds=1)
+    named = {"name": "left", "fps": 24, **script.document()}
+    asked = performances.performances([script, named], "usdc", layout="segments").request("tar")
+    assert asked.target == "/v1/performances/batch.tar"
+    body = msgspec.json.decode(asked.body)
+    assert body == {
+        "format": "usdc",
+        "layout": "segments",
+        "scripts": [script.document(), named],
+    }
+    question = json_decoding.decode_question(PerformancesQuestion, asked.body)
+    assert [each.name for each in question.scripts] == [None, "left"]
+
+
+def test_archives_that_cannot_be_are_refused():
+    script = Script().walk("a", seconds=1)
+    with pytest.raises(WrongQuestion, match=r"format 'usd' \(did you mean 'usdz'\?\), expected"):
+        performances.performances([script], "usd")
+    with pytest.raises(WrongQuestion, match=r"script 1: script: .*did you mean 'name'"):
+        performances.performances([script, {"nam": "b", **script.document()}], "usdc")
+    with pytest.raises(WrongQuestion, match="script 0: a script without segments"):
+        performances.performances([{"name": "b"}], "usdc")
+    with pytest.raises(WrongQuestion, match=r"ends in none of \.zip, \.tar"):
+        performances.performances([script], "usdc").ending(Path("many.usdc"))
+
+
+def test_many_performances_are_saved_with_their_reports(address, tmp_path):
+    script = Script().walk("walk", seconds=1)
+    told = []
+    with Client(address) as client:
+        planned = client.plan(script)
+        packed = client.performances([script, {"name": "b", **script.document()}], "bvh")
+        saved = packed.save(tmp_path / "many.zip", progress=told.append)
+        alone = client.performance(script).content("bvh")
+    assert repr(packed) == "Saving(2 performances as bvh)"
+    assert [entry.file for entry in saved.entries] == ["performance-000000.bvh", "b.bvh"]
+    assert saved.entries[1].segments == planned.segments
+    assert (told[-1].files, told[-1].count) == (2, 2)
+    with zipfile.ZipFile(saved.path) as found:
+        assert found.read("b.bvh") == alone

@@ -28,8 +28,6 @@ def performed(document, find, answer=composition.perform):
 @pytest.mark.parametrize("answer", [composition.perform, composition.plan])
 def test_a_bad_script_is_refused_where_it_is_bad(find, name, answer):
     document, pointer, words = (UNREADABLE | REFUSED)[name]
-    if name == "names without roles" and answer is composition.plan:
-        pytest.skip("a plan has no names of joints")
     with pytest.raises(QueryError) as refused:
         performed(document, find, answer)
     assert f"/{refused.value.field}" == pointer

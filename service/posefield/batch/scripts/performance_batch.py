@@ -23,7 +23,7 @@ import orjson
 from posefield import __version__
 from posefield.batch import checkpoint, manifest, process_pool
 from posefield.batch.job import VERSIONED_PACKAGES
-from posefield.batch.scripts import script_rows
+from posefield.batch.scripts import performance_archive, script_rows
 from posefield.batch.scripts.script_rows import ScriptRow
 from posefield.batch.target import (
     STATE_FOLDER,
@@ -231,14 +231,11 @@ def make_one(batch: PerformanceBatch, row: ScriptRow, digest: str) -> Entry:
         raise script_rows.faulty_scripts([f"{row.place}: {fault}"]) from fault
     path = f"performances/{row.name}.{batch.form}"
     target = open_target(batch.place)
-    written = put_file(target, path, [batch.encode(answer, convention)])
+    content = batch.encode(answer, convention)
+    put_file(target, path, [content])
     entry = {
-        "name": row.name,
-        "file": written.file,
-        "bytes": written.bytes,
-        "sha256": written.sha256,
+        **performance_archive.entry(row.name, path, content, answer),
         "made_of": digest,
-        **answer.trust.document(),
     }
     target.write([(f"{PARTS}/{row.name}.json", manifest.line(entry))])
     return entry

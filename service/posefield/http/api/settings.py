@@ -25,17 +25,19 @@ class Settings:
     never.
 
     body_limit: size of a request body. crowd_body_limit: size of the body of a crowd request.
-    clips_body_limit: size of the body of a request for many clips. bodies_memory: memory of the
-    bodies of all open requests, beyond 64 KiB of each; 503 above it. url_limit: size of a URL.
-    head_limit: size of all header lines, at most 100 of them. idle_time: time until an idle
-    connection is closed. output_limit: size of a clip, of a crowd's poses and of a walking crowd,
-    estimated before it is made.
+    clips_body_limit: size of the body of a request for many clips or performances. bodies_memory:
+    memory of the bodies of all open requests, beyond 64 KiB of each; 503 above it. url_limit: size
+    of a URL. head_limit: size of all header lines, at most 100 of them. idle_time: time until an
+    idle connection is closed. output_limit: size of a clip, of a performance, of a crowd's poses
+    and of a walking crowd, estimated before it is made.
 
     crowd_limit: characters of a crowd. crowd_poses: poses of all motions of a walking crowd.
     crowd_frames: frames of each motion of a walking crowd. clips_limit: clips of an archive.
     clips_poses: frames of all clips of an archive. clips_targets: targets of all clips of an
-    archive; one of a clip with open controls counts as four.
-    grid_limit: points of a grid of sigma.
+    archive; one of a clip with open controls counts as four. performances_limit: performances of an
+    archive. performances_segments: segments of all performances of an archive.
+    performances_seconds: duration of all of them, in seconds. grid_limit: points of a grid of
+    sigma.
 
     reload: time between two checks for new models; 0 for never. versions: older versions of a model
     that stay available by hash. versions_memory: memory of all older versions, roughly.
@@ -72,6 +74,11 @@ class Settings:
     clips_poses: int = 1_000_000
     # A target takes 3 to 12 ms of CPU time: at most 25 s in all, within the default deadline.
     clips_targets: int = 2000
+    # A segment takes about 10 ms of CPU time to plan and a second of motion 2 ms: at most 25 s in
+    # all, within the default deadline.
+    performances_limit: int = 256
+    performances_segments: int = 1024
+    performances_seconds: int = 7200
     # 50 ms of CPU time.
     grid_limit: int = 65_536
     output_limit: int = 256 * 1024 * 1024
@@ -119,6 +126,9 @@ class Settings:
         _check_range("clips_limit", self.clips_limit, 1, 1_000_000)
         _check_range("clips_poses", self.clips_poses, 1, 1_000_000_000)
         _check_range("clips_targets", self.clips_targets, 1, 1_000_000)
+        _check_range("performances_limit", self.performances_limit, 1, 100_000)
+        _check_range("performances_segments", self.performances_segments, 1, 1_000_000)
+        _check_range("performances_seconds", self.performances_seconds, 1, 1_000_000)
         _check_range("output_limit", self.output_limit, 64 * 1024, 1 << 34)
         _check_range("grid_limit", self.grid_limit, 4, 1024 * 1024)
         _check_range("grace", self.grace, 0, 600)

@@ -1,0 +1,215 @@
+"""Many performances over HTTP: archives equal to single performances, limits, and errors."""
+
+import hashlib
+import json
+
+import bad_scripts
+import jsonschema
+import pytest
+from asking import asker, unpacked
+from bad_scripts import ABSENT, REFUSED, UNREADABLE
+
+from posefield.batch.scripts import performance_archive
+from posefield.encode.archives import ARCHIVE_WRITERS
+from posefield.encode.formats import CLIP_ENCODERS
+from posefield.http.api.settings import Settings
+from posefield.http.app import create_app
+from posefield.http.decoding import performances_query
+
+BATCH = "/v1/performances/batch"
+JSON = "application/json"
+FIRST = bad_scripts.walk(seconds=1.0, speed=1.0)
+SCRIPTS = [
+    {**FIRST, "name": "as.it-is_1"},
+    {**bad_scripts.walk(seconds=1.0), "start": {"position": [1, 2], "heading": 0.5}, "fps": 20},
+    {**bad_scripts.walk(seconds=1.0), "feet": "as_predicted", "take": 3},
+]
+NAMES = ["as.it-is_1", "performance-000001", "performance-000002"]
+FAR_MODEL = {"segments": [{"kind": "walk", "model": "gone", "seconds": 1.0}]}
+
+
+def asked(extension, scripts, **more):
+    return {"format": extension, "scripts": scripts, **more}
+
+
+def alone(script):
+    return {key: value for key, value in script.items() if key != "name"}
+
+
+@pytest.mark.parametrize("extension", CLIP_ENCODERS)
+def test_each_file_is_what_its_own_path_answers(extension, ask):
+    answer = ask("POST", f"{BATCH}.zip", json=asked(extension, SCRIPTS))
+    assert answer.status_code == 200, answer.text
+    found = unpacked("zip", answer.content)
+    assert list(found) == [*(f"{name}.{extension}" for name in NAMES), "manifest.jsonl"]
+    for script, content in zip(SCRIPTS, found.values(), strict=False):
+        path = f"/v1/performances.{extension}"
+        assert ask("POST", path, json=alone(script)).content == content
+    assert len(set(found.values())) == len(found)
+
+
+def test_a_layout_holds_for_all_files(ask):
+    answer = ask("POST", f"{BATCH}.tar", json=asked("usdc", SCRIPTS[:2], layout="segments"))
+    contents = [*unpacked("tar", answer.content).values()][:2]
+    path = "/v1/performances.usdc?layout=segments"
+    assert contents == [ask("POST", path, json=alone(own)).content for own in SCRIPTS[:2]]
+
+
+def test_scripts_have_conventions_of_their_own(ask):
+    scripts = [{**FIRST, "unit": "m"}, {**FIRST, "up": "z"}]
+    answer = ask("POST", f"{BATCH}.tar", json=asked("bvh", scripts))
+    contents = [*unpacked("tar", answer.content).values()][:2]
+    assert contents == [ask("POST", "/v1/performances.bvh", json=own).content for own in scripts]
+
+
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
+def test_the_manifest_says_what_each_file_is(kind, ask, spec):
+    answer = ask("POST", f"{BATCH}.{kind}", json=asked("json", SCRIPTS))
+    found = unpacked(kind, answer.content)
+    lines = [json.loads(line) for line in found.pop("manifest.jsonl").splitlines()]
+    schema = spec["components"]["schemas"]["PerformanceEntry"]
+    schema = {**schema, "components": spec["components"]}
+    assert [line["file"] for line in lines] == list(found)
+    assert [line["name"] for line in lines] == NAMES
+    for line, content in zip(lines, found.values(), strict=True):
+        jsonschema.validate(line, schema, jsonschema.Draft202012Validator)
+        assert set(schema["required"]) <= line.keys() <= schema["properties"].keys()
+        assert line["sha256"] == hashlib.sha256(content).hexdigest()
+        assert line["bytes"] == len(content)
+        report = json.loads(content)["trust"]
+        assert {key: line[key] for key in report} == report
+    assert answer.headers["content-disposition"] == f'attachment; filename="performances.{kind}"'
+
+
+def test_the_format_is_negotiated_and_bytes_are_the_same(ask):
+    body = asked("bvh", SCRIPTS)
+    zipped, again = (ask("POST", BATCH, json=body) for _ in range(2))
+    assert zipped.headers["content-type"] == "application/zip"
+    assert zipped.content == again.content == ask("POST", f"{BATCH}.zip", json=body).content
+    tarred = ask("POST", BATCH, json=body, headers={"accept": "application/x-tar"})
+    assert tarred.content == ask("POST", f"{BATCH}.tar", json=body).content
+
+
+def test_warnings_are_counted(ask):
+    stop = {**bad_scripts.WALK, "stop": "standing"}
+    standing = {"segments": [stop, bad_scripts.HOLD, {**bad_scripts.WALK, "start": "standing"}]}
+    plan = ask("POST", "/v1/performances.json?plan=true", json=standing).json()
+    assert plan["trust"]["warnings"]
+    quiet = ask("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST]))
+    assert "posefield-warning" not in quiet.headers
+    answer = ask("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST, standing, FIRST]))
+    said = json.loads(answer.headers["posefield-warning"])
+    assert said == "1 of 3 performances have warnings"
+
+
+def assert_refused(answer, status, pointer, words=""):
+    problem = answer.json()
+    assert answer.status_code == problem["status"] == status, problem
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert [own["pointer"] for own in problem["errors"]] == [pointer], problem
+    assert words in problem["detail"], problem
+
+
+@pytest.mark.parametrize("name", UNREADABLE | REFUSED | ABSENT)
+def test_a_script_at_fault_is_named(ask, name):
+    document, pointer, *words = (UNREADABLE | REFUSED | ABSENT)[name]
+    answer = ask("POST", f"{BATCH}.zip", json=asked("npz", [FIRST, document]))
+    status = 400 if name in UNREADABLE else 404 if name in ABSENT else 422
+    assert_refused(answer, status, f"/scripts/1{pointer}", words[0] if words else "")
+
+
+WRONG = {
+    "no scripts": (asked("usdc", []), 422, "/scripts"),
+    "an unknown format": (asked("fbx", [FIRST]), 400, "/format"),
+    "no format": ({"scripts": [FIRST]}, 400, "/format"),
+    "an unknown field": (asked("usdc", [FIRST], unit="m"), 400, "/unit"),
+    "an unknown layout": (asked("usdc", [FIRST], layout="parts"), 400, "/layout"),
+    "no such layout": (asked("glb", [FIRST], layout="segments"), 422, "/layout"),
+    "a unit of glTF": (asked("glb", [FIRST, {**FIRST, "unit": "cm"}]), 422, "/scripts/1/unit"),
+    "a script that is none": (asked("usdc", [5]), 400, "/scripts/0"),
+    "one script": (asked("usdc", FIRST), 400, "/scripts"),
+    "a path for a name": (asked("usdc", [{**FIRST, "name": "../up"}]), 400, "/scripts/0/name"),
+    "a name twice": (
+        asked("usdc", [{**FIRST, "name": "Performance-000001"}, FIRST]),
+        422,
+        "/scripts/1/name",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_body_that_is_none_is_refused(name, ask):
+    body, status, pointer = WRONG[name]
+    assert_refused(ask("POST", f"{BATCH}.tar", json=body), status, pointer)
+
+
+def test_counts_are_limited_before_any_work(loaded):
+    limits = Settings(performances_limit=3, performances_segments=4, clips_body_limit=2000)
+    small = asker(create_app(loaded, limits))
+    many = small("POST", f"{BATCH}.zip", json=asked("bvh", [FAR_MODEL] * 4))
+    assert_refused(many, 422, "/scripts", "4 scripts, expected 1 to 3")
+    long = {"segments": FAR_MODEL["segments"] * 3}
+    segments = small("POST", f"{BATCH}.zip", json=asked("bvh", [long, FAR_MODEL, FAR_MODEL]))
+    assert_refused(segments, 422, "/scripts", "5 segments in all, expected at most 4")
+    absent = small("POST", f"{BATCH}.zip", json=asked("bvh", [FAR_MODEL] * 3))
+    assert_refused(absent, 404, "/scripts/0/segments/0/model")
+    large = small("POST", f"{BATCH}.zip", content=b" " * 2001, headers={"content-type": JSON})
+    assert large.status_code == 413
+    assert small("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST] * 3)).status_code == 200
+
+
+def test_the_duration_of_all_is_limited(loaded):
+    small = asker(create_app(loaded, Settings(performances_seconds=3)))
+    assert small("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST] * 2)).status_code == 200
+    # The last script would be refused, but is not reached.
+    answer = small("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST] * 4 + [FAR_MODEL]))
+    assert_refused(answer, 422, "/scripts", "s with script 3, expected at most 3 s in all")
+
+
+def test_a_performance_of_an_archive_is_as_large_as_one_alone_may_be(loaded):
+    small = asker(create_app(loaded, Settings(output_limit=70_000)))
+    script = bad_scripts.walk(seconds=20.0)
+    single = small("POST", "/v1/performances.json", json=script)
+    within = small("POST", f"{BATCH}.tar", json=asked("json", [script]))
+    assert single.status_code == within.status_code == 422
+    assert within.json()["detail"].endswith(single.json()["detail"].partition(": ")[2])
+
+
+def test_performances_are_made_as_they_are_requested(loaded):
+    """One at a time is in memory: the next is made when its file is requested."""
+    body = json.dumps(asked("npz", SCRIPTS)).encode()
+    order = performances_query.decode_order(loaded, body, Settings())
+    made = []
+
+    def encode(answer, convention):
+        made.append(answer.trust.frames)
+        return order.encode(answer, convention)
+
+    watched = performance_archive.PerformanceOrder(order.scripts, encode)
+    members = performance_archive.archive_members(watched)
+    for count in range(1, 4):
+        next(members)
+        assert len(made) == count
+    name, _ = next(members)
+    assert name == "manifest.jsonl" and len(made) == 3
+
+
+@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
+def test_other_methods_media_types_and_archives_are_refused(kind, ask):
+    for method in ("GET", "HEAD", "PUT"):
+        answer = ask(method, f"{BATCH}.{kind}")
+        assert (answer.status_code, answer.headers["allow"]) == (405, "OPTIONS, POST")
+    assert ask("POST", f"{BATCH}.{kind}", content=b"{}").status_code == 415
+    unknown = ask("POST", f"{BATCH}.rar", json={})
+    assert unknown.status_code == 404 and "there are zip, tar" in unknown.json()["detail"]
+
+
+def test_a_named_script_is_a_script_with_a_name(spec):
+    schemas = spec["components"]["schemas"]
+    named, plain = (schemas[name] for name in ("NamedScript", "PerformanceQuestion"))
+    assert named["required"] == plain["required"]
+    question = {k: v for k, v in named["properties"].items() if k != "name"}
+    assert question == plain["properties"]
+    assert schemas["PerformancesQuestion"]["properties"]["format"]["enum"] == [*CLIP_ENCODERS]
+    entry = schemas["PerformanceEntry"]["properties"]
+    assert entry.items() >= schemas["PerformanceReport"]["properties"].items()
