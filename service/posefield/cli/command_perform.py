@@ -10,10 +10,10 @@ from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
 from posefield.console.arguments import Json, encoder_for
 from posefield.console.output import as_json
-from posefield.console.question_options import with_option_groups
+from posefield.console.question_options import with_option_groups, with_question_options
 from posefield.encode import performance_files
 from posefield.question import json_decoding
-from posefield.question.performance_batch_question import PerformanceLayout
+from posefield.question.performance_batch_question import CrowdStageQuestion, PerformanceLayout
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.performance_report import PerformanceReport
 from posefield.registry import shipped_models
@@ -26,6 +26,14 @@ MAX_FRAMES = 10 * MAX_POSES
 class ManyArguments:
     """Options for many scripts."""
 
+    crowd: Annotated[
+        bool,
+        typer.Option(
+            "--crowd",
+            help="write many scripts as one stage with a character for each: usd, usda, usdc or "
+            "usdz",
+        ),
+    ] = False
     format: Annotated[
         str | None, typer.Option(help="format of the files of many scripts; default: usdc")
     ] = None
@@ -60,6 +68,7 @@ class OneArguments:
     ] = False
 
 
+@with_question_options(CrowdStageQuestion)
 @with_option_groups
 def perform(
     script: Annotated[
@@ -71,6 +80,7 @@ def perform(
     ],
     one: OneArguments,
     many: ManyArguments,
+    question: CrowdStageQuestion,
     model: Annotated[
         list[Path] | None,
         typer.Option(
@@ -84,59 +94,103 @@ def perform(
 
     The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack. Of many
     scripts, each has a file in the folder performances and a line in manifest.jsonl; the same
-    command resumes, and makes again what changed.
+    command resumes, and makes again what changed. With --crowd they are one stage.
     """
     from posefield.batch.scripts import script_rows
     from posefield.performance import composition
     from posefield.performance.script import resolve_script
 
+    _check_stage(question, many)
     if script_rows.are_many(script):
-        _perform_many(script, one, tuple(model or ()), many, json)
+        perform_them = _perform_crowd if many.crowd else _perform_many
+        perform_them(script, one, many, _Stage(tuple(model or ()), question, json))
         return
-    if many.format is not None or many.workers is not None:
-        option = "workers" if many.format is None else "format"
-        raise InvalidField(option, "given for one script, expected a folder or a .jsonl file")
+    for option in ("crowd", "format", "workers"):
+        if getattr(many, option) not in (None, False):
+            raise InvalidField(option, "given for one script, expected a folder or a .jsonl file")
     if one.plan == (one.output is not None):
         found = "neither --output nor --plan" if one.output is None else "--output and --plan"
         raise InvalidField("output", f"{found}, expected one of them")
     if one.plan and one.layout != "whole":
         raise InvalidField("layout", f"{one.layout!r} with --plan, expected with an output file")
-    question = json_decoding.decode_question(PerformanceQuestion, _read(script))
+    asked = json_decoding.decode_question(PerformanceQuestion, _read(script))
     find = shipped_models.with_shipped(model or []).find
     if one.output is None:
-        report = composition.plan(resolve_script(question, find), MAX_FRAMES)
+        report = composition.plan(resolve_script(asked, find), MAX_FRAMES)
         typer.echo(as_json(report.document()) if json else report_text(report))
         return
     path = Path(one.output)
     encoder = encoder_for(path)
     encode = performance_files.encoder(encoder, one.layout)
-    convention = encoder.convention(question.unit, question.up, question.body)
-    answer = composition.perform(resolve_script(question, find), MAX_FRAMES)
+    convention = encoder.convention(asked.unit, asked.up, asked.body)
+    answer = composition.perform(resolve_script(asked, find), MAX_FRAMES)
     atomic_files.write(encode(answer, convention), path)
     facts = {"file": str(path), **answer.trust.document()}
     typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
 
 
-def _perform_many(
-    scripts: Path, one: OneArguments, models: tuple[Path, ...], many: ManyArguments, json: bool
-) -> None:
-    from posefield.batch import process_pool
-    from posefield.batch.scripts import performance_batch, script_rows
-    from posefield.console.progress import ProgressBar
+@dataclass(frozen=True)
+class _Stage:
+    """Models of many scripts, the stage of a crowd, and whether the result is told as JSON."""
 
+    models: tuple[Path, ...]
+    question: CrowdStageQuestion
+    json: bool
+
+
+def _check_stage(question: CrowdStageQuestion, many: ManyArguments) -> None:
+    """Raise InvalidField for options of a crowd without one, and of files with one."""
+    usual = CrowdStageQuestion()
+    for name in question.__struct_fields__:
+        if not many.crowd and getattr(question, name) != getattr(usual, name):
+            raise InvalidField(name, "given without --crowd, expected only with it")
+    if many.crowd and many.format is not None:
+        raise InvalidField("format", "given with --crowd, expected the output's extension")
+
+
+def _output(one: OneArguments, expected: str) -> str:
+    """Return the output of many scripts; InvalidField without one, or for a plan."""
     if one.plan:
         raise InvalidField("plan", "given for many scripts, expected one script in JSON")
     if one.output is None:
-        raise InvalidField("output", "none, expected a folder for the files of many scripts")
-    form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
+        raise InvalidField("output", f"none, expected {expected}")
+    return one.output
+
+
+def _workers(many: ManyArguments) -> int:
+    from posefield.batch import process_pool
+
     workers = process_pool.usable_cores() if many.workers is None else many.workers
     if workers < 1:
         raise InvalidField("workers", f"{workers}, expected 1 or more")
-    rows = script_rows.read_scripts(scripts)
-    batch = performance_batch.PerformanceBatch(models, one.output, form, one.layout)
+    return workers
+
+
+def _perform_many(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
+    from posefield.batch.scripts import performance_batch, script_rows
+    from posefield.console.progress import ProgressBar
+
+    output = _output(one, "a folder for the files of many scripts")
+    form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
+    workers, rows = _workers(many), script_rows.read_scripts(scripts)
+    batch = performance_batch.PerformanceBatch(stage.models, output, form, one.layout)
     with ProgressBar("performances", len(rows), 0) as bar:
         outcome = performance_batch.run(batch, rows, workers, bar.advance)
-    typer.echo(as_json(outcome.facts(one.output)) if json else f"{one.output}: {outcome.sentence}")
+    typer.echo(as_json(outcome.facts(output)) if stage.json else f"{output}: {outcome.sentence}")
+
+
+def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
+    from posefield.batch.scripts import performance_crowd, script_rows
+    from posefield.console.progress import ProgressBar
+
+    output = Path(_output(one, "a file for the crowd"))
+    if one.layout != "whole":
+        raise InvalidField("layout", f"{one.layout!r} with --crowd, expected 'whole'")
+    crowd = performance_crowd.from_question(stage.models, output, stage.question)
+    workers, rows = _workers(many), script_rows.read_scripts(scripts)
+    with ProgressBar("performances", len(rows), 0) as bar:
+        facts = performance_crowd.write(crowd, rows, workers, bar.advance)
+    typer.echo(as_json(facts) if stage.json else performance_crowd.report_text(facts))
 
 
 def _read(script: Path) -> bytes:

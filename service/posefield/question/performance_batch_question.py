@@ -1,11 +1,13 @@
-"""Many scripts of performances in one request, and the layout of their files."""
+"""Many scripts of performances in one request or one crowd, and the layout of their files."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from msgspec import Struct
+from msgspec import Meta, Struct
 
+from posefield.question.body_kind import Body
 from posefield.question.motion_question import Name
 from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.walk_question import Instancing
 
 PerformanceLayout = Literal["whole", "segments"]
 """Animations in a file: one of the whole performance, or besides it one of each segment."""
@@ -23,3 +25,35 @@ class PerformancesQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_o
     format: str
     scripts: list[NamedScript]
     layout: PerformanceLayout = "whole"
+
+
+class CrowdStageQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Stage on which the performances of many scripts are written as one crowd.
+
+    camera (m), fov (rad), height (pixels of the image): select levels of detail whose projected
+    error is at most `pixels`.
+    """
+
+    camera: Annotated[
+        tuple[float, float, float] | None,
+        Meta(
+            description="of a crowd: camera position, m, which selects each character's level",
+            extra={"metavar": "X,Y,Z"},
+        ),
+    ] = None
+    fov: Annotated[
+        float | None,
+        Meta(description="vertical field of view, rad; default: 60 degrees; requires a camera"),
+    ] = None
+    height: Annotated[
+        float | None,
+        Meta(description="height of the image, pixels; default: 1080; requires a camera"),
+    ] = None
+    pixels: Annotated[
+        float | None,
+        Meta(description="limit of a level's error, pixels; default: 1; requires a camera"),
+    ] = None
+    instancing: Annotated[
+        Instancing, Meta(description="of a crowd: sharing of data between characters in USD")
+    ] = "references"
+    body: Body = None

@@ -7,12 +7,9 @@ a model or a version changed.
 """
 
 import hashlib
-import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,9 +18,9 @@ import msgspec
 import orjson
 
 from posefield import __version__
-from posefield.batch import checkpoint, manifest, process_pool
+from posefield.batch import checkpoint, manifest
 from posefield.batch.job import VERSIONED_PACKAGES
-from posefield.batch.scripts import performance_archive, script_rows
+from posefield.batch.scripts import performance_archive, script_pool, script_rows
 from posefield.batch.scripts.script_rows import ScriptRow
 from posefield.batch.target import (
     STATE_FOLDER,
@@ -34,7 +31,7 @@ from posefield.batch.target import (
     put_file,
     read_lines,
 )
-from posefield.common.errors import FileError, QueryError, WorkerDied
+from posefield.common.errors import FileError, QueryError
 from posefield.encode import performance_files
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.performance_files import PerformanceEncoder
@@ -120,7 +117,7 @@ def run(
     target.create(MARK, b"{}\n")
     advance(len(found))
     left = [(row, digests[row.name]) for row in rows if row.name not in found]
-    for entry in _made(batch, left, workers):
+    for entry in script_pool.results(partial(make_one, batch), left, workers):
         found[entry["name"]] = entry
         advance(1)
     entries = tuple(found[row.name] for row in rows)
@@ -199,28 +196,12 @@ def _written(entry: Entry) -> tuple[str, int, str]:
     return entry["file"], entry["bytes"], entry["sha256"]
 
 
-def _made(
-    batch: PerformanceBatch, left: list[tuple[ScriptRow, str]], workers: int
-) -> Iterator[Entry]:
-    """Make files in this process or in several; yield their entries in the order of the scripts."""
-    if min(workers, len(left)) < 2:
-        yield from (make_one(batch, row, digest) for row, digest in left)
-        return
-    context = multiprocessing.get_context("spawn")
-    with process_pool.worker_environment():
-        pool = ProcessPoolExecutor(min(workers, len(left)), context)
-        futures = [pool.submit(make_one, batch, row, digest) for row, digest in left]
-    try:
-        for future in futures:
-            yield future.result()
-    except BrokenProcessPool as fault:
-        raise WorkerDied("a worker process has died; the same command resumes") from fault
-    finally:
-        pool.shutdown(cancel_futures=True)
+def make_one(batch: PerformanceBatch, job: tuple[ScriptRow, str]) -> Entry:
+    """Write the file of a script and return its entry; QueryError names the script.
 
-
-def make_one(batch: PerformanceBatch, row: ScriptRow, digest: str) -> Entry:
-    """Write the file of a script and return its entry; QueryError names the script."""
+    job: the script and the digest of what makes its performance.
+    """
+    row, digest = job
     script = row.script
     encoder = CLIP_ENCODERS[batch.form]
     try:

@@ -1,0 +1,269 @@
+"""Crowds of performances: a stage with a character for each script, as of walking crowds.
+
+Each performance is a motion in the frame in which its script begins, and its character stands
+there. A performance that ends before the longest one keeps its last pose. Motions wait in files of
+a temporary folder, so that the crowd is never in memory as a whole.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from msgspec import structs
+
+from posefield.batch.scripts import performance_levels, script_pool, script_rows
+from posefield.batch.scripts.performance_batch import MAX_FRAMES, open_models
+from posefield.batch.scripts.performance_levels import View
+from posefield.batch.scripts.script_rows import ScriptRow
+from posefield.common.errors import InvalidField, QueryError
+from posefield.common.units import UP, Singles
+from posefield.encode.usd_crowd import FILES
+from posefield.locomotion import crowd_order, floor_plane
+from posefield.motion import joint_roles, quat
+from posefield.motion.clip import Clip
+from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+from posefield.motion.skeleton import Skeleton
+from posefield.performance.script import Script, resolve_script
+from posefield.question.body_kind import DEFAULT_BODY, BodyKind
+from posefield.question.performance_batch_question import CrowdStageQuestion
+from posefield.question.performance_question import Start
+from posefield.question.performance_report import PerformanceReport
+from posefield.question.walk_question import WalkQuestion
+
+Place = tuple[tuple[float, float], float]
+"""Point on the floor, x and z, m, and heading, rad."""
+
+
+@dataclass(frozen=True)
+class PerformanceCrowd:
+    """Crowd of performances: its models, its file and its stage.
+
+    models: files and folders of models besides the shipped ones. path: file to write. view: chooses
+    the levels of detail; None for those of the scripts. instancing, body: as of walking crowds.
+    """
+
+    models: tuple[Path, ...]
+    path: Path
+    view: View | None = None
+    instancing: str = "references"
+    body: BodyKind = DEFAULT_BODY
+
+
+def from_question(
+    models: tuple[Path, ...], path: Path, stage: CrowdStageQuestion
+) -> PerformanceCrowd:
+    """Return a crowd with the stage of a question; InvalidField as for walking crowds."""
+    order = crowd_order.from_question(WalkQuestion(**structs.asdict(stage)))
+    view = None if order.camera is None else View(order.camera, order.pixels)
+    return PerformanceCrowd(models, path, view, stage.instancing, stage.body or DEFAULT_BODY)
+
+
+@dataclass(frozen=True)
+class StagedMotion:
+    """A performance as a motion in a file, and where its character stands."""
+
+    file: Path
+    level: int
+    place: Place
+    report: PerformanceReport
+
+
+@dataclass(frozen=True)
+class _Cast:
+    """Facts that all characters of a crowd share, and the number of levels of any script."""
+
+    skeleton: Skeleton
+    rate: float
+    levels: int
+
+
+def write(
+    crowd: PerformanceCrowd,
+    rows: Sequence[ScriptRow],
+    workers: int = 1,
+    advance: Callable[[int], None] = lambda count: None,
+) -> dict[str, Any]:
+    """Write a crowd to a file, and return its report as plain values.
+
+    advance: called with the number of performances that were made. Raises InvalidField, which lists
+    all scripts at fault before one is performed or names one whose performance failed; FileError if
+    the file cannot be written; WorkerDied.
+    """
+    from posefield.encode.usd_crowd import crowd_writer  # usd-core: 0.12 CPU seconds of the start
+
+    if crowd.path.suffix.removeprefix(".") not in FILES:
+        name = crowd.path.name
+        raise InvalidField("output", f"{name!r} ends in none of {', '.join(FILES)}")
+    cast = _check(crowd, rows)
+    with TemporaryDirectory() as folder:
+        work = partial(stage_motion, crowd, Path(folder))
+        staged = []
+        for motion in script_pool.results(work, list(enumerate(rows)), workers):
+            staged.append(motion)
+            advance(1)
+        made = _crowd_clip(cast, rows, staged)
+        crowd_writer.write(made, crowd.path, crowd.instancing, crowd.body)
+    return {"file": str(crowd.path), **_facts(made, cast, staged)}
+
+
+def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> _Cast:
+    """Return what all scripts share; InvalidField lists those that do not, or have no answer."""
+    find = open_models(crowd.models).find
+    cast: _Cast | None = None
+    faults: list[str] = []
+    for row in rows:
+        try:
+            script = resolve_script(row.script, find)
+            own = _Cast(
+                _skeleton(script), row.script.fps, len(performance_levels.level_errors(script))
+            )
+            cast = own if cast is None else _joined(cast, own, rows[0].place)
+            _check_convention(row)
+        except QueryError as fault:
+            faults.append(f"{row.place}: {fault}")
+    if faults or cast is None:
+        raise script_rows.faulty_scripts(faults)
+    return cast
+
+
+def _skeleton(script: Script) -> Skeleton:
+    """Return the skeleton of a performance's clip."""
+    character = script.character
+    return joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
+
+
+def _joined(cast: _Cast, own: _Cast, first: str) -> _Cast:
+    if own.rate != cast.rate:
+        raise InvalidField("fps", f"{own.rate:g}, expected {cast.rate:g} as in {first}")
+    same = own.skeleton.same_tree(cast.skeleton)
+    if not (same and np.array_equal(own.skeleton.offsets, cast.skeleton.offsets)):
+        raise InvalidField(
+            "character",
+            f"another skeleton than in {first}, expected the same: name one model as the "
+            "`character` of all scripts",
+        )
+    return _Cast(cast.skeleton, cast.rate, max(cast.levels, own.levels))
+
+
+def _check_convention(row: ScriptRow) -> None:
+    """Raise InvalidField for a script with a unit, axis or body of its own."""
+    script = row.script
+    for field, value, usual in (("unit", script.unit, "m"), ("up", script.up, "y")):
+        if value not in (None, usual):
+            raise InvalidField(field, f"{value!r}, expected {usual!r} for a crowd")
+    if script.body is not None:
+        raise InvalidField("body", f"{script.body!r}, expected none: --body is that of a crowd")
+
+
+def stage_motion(crowd: PerformanceCrowd, folder: Path, job: tuple[int, ScriptRow]) -> StagedMotion:
+    """Perform a script, and write its motion to a folder; QueryError names the script.
+
+    job: index and script.
+    """
+    index, row = job
+    find = open_models(crowd.models).find
+    try:
+        answer, level = performance_levels.perform(row.script, find, crowd.view, MAX_FRAMES)
+    except QueryError as fault:
+        raise script_rows.faulty_scripts([f"{row.place}: {fault}"]) from fault
+    place = _place(row.script.start, answer.clip)
+    rotations, roots = _from_place(place, answer.clip)
+    file = folder / f"{index}.npz"
+    bones = answer.clip.translations[0].astype(np.float32)
+    np.savez(file, rotations=rotations, roots=roots, bones=bones)
+    return StagedMotion(file, level, place, answer.trust)
+
+
+def _place(start: Start, clip: Clip) -> Place:
+    """Return where a script begins: its start, or the root of the first frame after given poses."""
+    if not start.poses:
+        return start.position, start.heading
+    first = floor_plane.project(clip.root_path[0])
+    return (float(first.imag), float(first.real)), float(quat.twist(clip.rotations[0, 0], UP))
+
+
+def _from_place(place: Place, clip: Clip) -> tuple[Singles, Singles]:
+    """Return rotations (F, J, 4) and root positions (F, 3), m, of a clip seen from a place."""
+    (left, forward), heading = place
+    back = floor_plane.unit_vectors(np.full(len(clip), -heading))
+    roots = clip.root_path
+    floor = (floor_plane.project(roots) - complex(forward, left)) * back
+    seen = floor_plane.at_height(floor, roots[:, 1])
+    turned = floor_plane.turn_roots(clip.rotations, np.full(len(clip), -heading))
+    return turned.astype(np.float32), seen.astype(np.float32)
+
+
+def _crowd_clip(
+    cast: _Cast, rows: Sequence[ScriptRow], staged: Sequence[StagedMotion]
+) -> CrowdClip:
+    frames = max(motion.report.frames for motion in staged)
+    places = np.array([motion.place[0] for motion in staged], dtype=np.float64)
+    placement = Placement(
+        np.stack([places[:, 0], np.zeros(len(places)), places[:, 1]], axis=1),
+        np.array([motion.place[1] for motion in staged], dtype=np.float64),
+    )
+    models = dict.fromkeys(name for motion in staged for name in motion.report.models)
+    return CrowdClip(
+        cast.skeleton,
+        cast.rate,
+        frames,
+        placement,
+        np.arange(len(staged)),
+        _batches(frames, staged),
+        {
+            "models": list(models),
+            "scripts": [row.name for row in rows],
+            "durations": [motion.report.duration for motion in staged],
+            "level_shares": _level_shares(cast, staged),
+        },
+    )
+
+
+def _batches(frames: int, staged: Sequence[StagedMotion]) -> Iterator[Motions]:
+    """Yield the motions one at a time, each of this number of frames: the last pose is kept."""
+    for motion in staged:
+        with np.load(motion.file) as own:
+            shown = np.minimum(np.arange(frames), len(own["roots"]) - 1)
+            yield Motions(
+                own["rotations"][None, shown],
+                own["roots"][None, shown],
+                own["bones"][None],
+                np.full((1, frames), motion.level),
+            )
+
+
+def _level_shares(cast: _Cast, staged: Sequence[StagedMotion]) -> list[float]:
+    """Return the share of the poses that has each level, without those that are kept."""
+    frames = np.zeros(cast.levels)
+    for motion in staged:
+        frames[motion.level] += motion.report.frames
+    return [float(f"{share:.4g}") for share in frames / frames.sum()]
+
+
+def _facts(made: CrowdClip, cast: _Cast, staged: Sequence[StagedMotion]) -> dict[str, Any]:
+    levels = [motion.level for motion in staged]
+    return {
+        "models": made.facts["models"],
+        "characters": len(staged),
+        "frames": made.frames,
+        "rate": made.rate,
+        "level_counts": np.bincount(levels, minlength=cast.levels).tolist(),
+        "level_shares": made.facts["level_shares"],
+        "warned": sum(bool(motion.report.warnings) for motion in staged),
+    }
+
+
+def report_text(facts: dict[str, Any]) -> str:
+    """Return the report of a crowd as text."""
+    levels = ", ".join(
+        f"{count} at level {level}" for level, count in enumerate(facts["level_counts"]) if count
+    )
+    text = (
+        f"{facts['file']}: {facts['characters']} characters, {facts['frames']} frames at "
+        f"{facts['rate']:g} a second; {levels}"
+    )
+    return f"{text}\nwith a warning: {facts['warned']}" if facts["warned"] else text
