@@ -14,7 +14,7 @@ from posefield_train.adapt import model_reconstruction, new_clips
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_files
 from posefield_train.sample.figures import quadruped_walk
-from posefield_train.source import bvh, ingest, recipe
+from posefield_train.source import ingest, motion_readers, recipe
 
 WOLF = {"performer": "wolf"}
 
@@ -53,7 +53,7 @@ def test_new_clips_are_turned_and_collapsed_as_the_family_was(family, tmp_path, 
     paths = [e.row.place for e in wanted]
     if dummy:
         for path in list(paths):
-            clip = ingest.clip_of_file(bvh.read(path), own.source)
+            clip = ingest.clip_of_file(motion_readers.read(path), own.source)
             content = bvh_writer.dumps(below_a_dummy(clip), metres_per_unit=1.0)
             (tmp_path / path.name).write_bytes(content)
         paths = [tmp_path / path.name for path in paths]

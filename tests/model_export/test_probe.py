@@ -198,7 +198,7 @@ def test_probe_tells_people_and_answers_as_json(posefield, clip, written):
     path = written(clip)
     code, out, err = posefield("probe", path)
     assert (code, err) == (0, "")
-    assert out.startswith("1 file, ")
+    assert out.startswith("1 BVH file, ")
     assert re.search(r"^metres_per_unit 0.01 m \(confidence: high\)$", out, re.MULTILINE)
     assert re.search(r"^licence +unknown \(confidence: none\)$", out, re.MULTILINE)
     said = json.loads(posefield("probe", path, "--json")[1])
@@ -278,8 +278,8 @@ def test_init_takes_a_table_that_is_there(posefield, folder):
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (["{}/none"], 3, "not a folder, expected one with BVH files"),
-        (["{}"], 2, "has no BVH files, expected one or more"),
+        (["{}/none"], 3, "not a folder, expected one with motion files"),
+        (["{}"], 2, "has no motion files, expected one or more"),
         (["{}", "--table", "none.csv"], 3, "none.csv: cannot be read"),
     ],
 )

@@ -57,7 +57,7 @@ def examples_of_files(
     alone.
 
     Raises RecipeError for a control that cannot be measured, a file given twice, and a clip of
-    another skeleton; BvhError for a file that cannot be read.
+    another skeleton; MotionFileError for a file that cannot be read.
     """
     typed = [control.name for control in reopened.card.controls if control.measure is None]
     needed = [*typed, *_open_sets(reopened, labels), *_landmark_columns(reopened)]
@@ -176,7 +176,8 @@ def _examples(
     conventions: NewFiles,
     given: Sequence[Mapping[str, float]],
 ) -> tuple[list[Example], list[str]]:
-    files = {} if new_curves.are_alone(reopened.card) else ingest.read_files(rows)
+    alone = new_curves.are_alone(reopened.card)
+    files = {} if alone else ingest.read_files(rows, conventions.source)
     examples, notes, stretches = [], list[str](), []
     for row, values in zip(rows, given, strict=True):
         whole, left_out = new_curves.whole_clip(reopened.card, row, files, conventions)
@@ -187,6 +188,7 @@ def _examples(
         stretches.append(stretch)
     if conventions.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
+    notes += clip_notes.reader_notes(files)
     return examples, notes + clip_notes.stretch_notes(rows, stretches)
 
 

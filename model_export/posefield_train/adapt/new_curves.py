@@ -7,8 +7,9 @@ from pathlib import Path
 from posefield.common.errors import RecipeError
 from posefield.model_file.model_card import ModelCard
 from posefield.motion.clip import Clip
-from posefield_train.source import bvh, curve_files, ingest
+from posefield_train.source import curve_files, ingest
 from posefield_train.source.clip_table import ClipRow
+from posefield_train.source.motion_files.motion_file import MotionFile
 from posefield_train.source.recipe_sections.data_sections import Source
 
 COLUMN, SUFFIX = "curves", ".curves.csv"
@@ -54,7 +55,7 @@ def place_beside(card: ModelCard, motion: Path) -> Path | None:
 
 
 def whole_clip(
-    card: ModelCard, row: ClipRow, files: Mapping[str, bvh.BvhFile], conventions: NewFiles
+    card: ModelCard, row: ClipRow, files: Mapping[str, MotionFile], conventions: NewFiles
 ) -> tuple[Clip, list[str]]:
     """Return the clip of all frames of a row with the model's curves, and notes.
 
@@ -62,12 +63,12 @@ def whole_clip(
     motion, and without a rate where files have none.
     """
     if not card.curves:
-        return ingest.clip_of_file(files[str(row.place)], conventions.source), []
+        return ingest.clip_of_file(files[row.motion], conventions.source), []
     values, others = curve_files.read_known(row.curve_file, card.curves)
     said = f"{row.curve_file}: curves {others}, which the model does not have, were left out"
     notes = [said] if others else []
     if not are_alone(card):
-        clip = ingest.clip_of_file(files[str(row.place)], conventions.source)
+        clip = ingest.clip_of_file(files[row.motion], conventions.source)
         return curve_files.with_curves(clip, values, row), notes
     if conventions.rate is None:
         raise row.error("nothing says the frames a second of its curves, expected --rate")

@@ -29,8 +29,8 @@ class ClipArguments:
     clips: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="BVH files of one new performer: one or more, typically up to five; for a model "
-            "with curves with a file NAME.curves.csv beside each; CSV files for curves alone",
+            help="motion files of one new performer: one or more, typically up to five; for a "
+            "model with curves with a file NAME.curves.csv beside each; CSV files for curves alone",
             metavar="CLIP",
         ),
     ] = None
@@ -49,7 +49,8 @@ class ClipArguments:
     rate: Annotated[
         float | None,
         typer.Option(
-            help="frames a second of CSV files, for a model of curves without a skeleton",
+            help="frames a second of CSV files, for a model of curves without a skeleton, and of "
+            "motion files that state none",
             metavar="FPS",
         ),
     ] = None
@@ -101,7 +102,12 @@ def adapt(
         labels = _labels(files.label or [])
         adapted_file.check_labels(known.card, labels)
         labels[PERFORMER] = performer
-        source = Source(metres_per_unit=files.unit, up=files.up, root_offset=files.root_offset)
+        source = Source(
+            metres_per_unit=files.unit,
+            up=files.up,
+            root_offset=files.root_offset,
+            rate=files.rate,
+        )
         progress("reading clips")
         if files.table:
             found = new_clips.examples_of_table(known, files.table, source, labels, files.rate)

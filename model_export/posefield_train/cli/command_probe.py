@@ -20,7 +20,9 @@ INIT_EXAMPLES = ["init motion", "init motion --table clips.csv"]
 def probe(
     files: Annotated[
         list[Path],
-        typer.Argument(help="BVH files, one or more", metavar="FILE", show_default=False),
+        typer.Argument(
+            help="BVH, AMC, GLB, glTF or USD files, one or more", metavar="FILE", show_default=False
+        ),
     ],
     json: Json = False,
 ) -> None:
@@ -35,7 +37,7 @@ def probe(
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="folder with BVH files", metavar="FOLDER")],
+    folder: Annotated[Path, typer.Argument(help="folder with motion files", metavar="FOLDER")],
     table: Annotated[
         str | None,
         typer.Option(
@@ -50,19 +52,20 @@ def init(
     Complete recipe.toml where it says TODO, then train it. No file is overwritten.
     """
     from posefield_train.probe import recipe_draft
+    from posefield_train.source import motion_readers
 
     if not folder.is_dir():
-        raise FileError(folder, "not a folder, expected one with BVH files")
+        raise FileError(folder, "not a folder, expected one with motion files")
     recipe = folder / recipe_draft.RECIPE
     _refuse_existing(recipe)
     known = None if table is None else recipe_draft.read_table(folder / table)
     if known is None:
         _refuse_existing(folder / recipe_draft.TABLE)
-        files = sorted(folder.rglob("*.bvh"))
+        files = motion_readers.find_files(folder)
     else:
         files = recipe_draft.files_of(known, folder)
     if not files:
-        raise InvalidField("FOLDER", f"{folder} has no BVH files, expected one or more")
+        raise InvalidField("FOLDER", f"{folder} has no motion files, expected one or more")
     report = _probe(files)
     written = [recipe]
     if known is None:

@@ -6,8 +6,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import skeleton
-from posefield_train.source import bvh
-from posefield_train.source.bvh import bvh_conversion
+from posefield_train.source.motion_files.motion_file import MotionFile
 from posefield_train.source.rigs import joint_recognition
 
 MAX_FRAMES = 200
@@ -23,7 +22,7 @@ class Figure:
     position channels of each joint (J,) change.
     """
 
-    file: bvh.BvhFile
+    file: MotionFile
     roles: dict[str, str]
     positions: Floats
     bones: Floats
@@ -33,7 +32,7 @@ class Figure:
     @property
     def names(self) -> list[str]:
         """Return the names of the joints."""
-        return [joint.name for joint in self.file.joints]
+        return list(self.file.skeleton.names)
 
     def role(self, role: str) -> Floats | None:
         """Return the positions (F, 3) of the joint with a role, or None."""
@@ -54,7 +53,7 @@ class Figure:
     def _chain(self, upper: str, lower: str) -> float | None:
         if not {upper, lower} <= self.roles.keys():
             return None
-        parents = [joint.parent for joint in self.file.joints]
+        parents = self.file.skeleton.parents
         top, joint = (self.names.index(self.roles[role]) for role in (upper, lower))
         length = 0.0
         while joint > top:
@@ -68,18 +67,16 @@ class Figure:
         return float(np.median(np.ptp(self.positions, axis=1).max(axis=-1)))
 
 
-def measure(file: bvh.BvhFile) -> Figure:
+def measure(file: MotionFile) -> Figure:
     """Return the measurements of a file."""
-    rotations, translations = bvh_conversion.local_motion(file)
-    picked = np.linspace(0, len(file.values) - 1, min(len(file.values), MAX_FRAMES)).round()
+    rotations, translations, joints = file.rotations, file.translations, file.skeleton
+    picked = np.linspace(0, len(file) - 1, min(len(file), MAX_FRAMES)).round()
     frames = np.unique(picked.astype(int))
-    parents = tuple(joint.parent for joint in file.joints)
-    names = [joint.name for joint in file.joints]
     moves = np.ptp(translations, axis=0).max(axis=-1) > 0.0
     return Figure(
         file,
-        joint_recognition.roles_of(names, parents),
-        skeleton.positions(parents, rotations[frames], translations[frames]),
+        joint_recognition.roles_of(joints.names, joints.parents),
+        skeleton.positions(joints.parents, rotations[frames], translations[frames]),
         np.linalg.norm(np.median(translations, axis=0), axis=-1),
         rotations[frames, 0],
         tuple(moves.tolist()),

@@ -9,7 +9,7 @@ from typing import Any
 from posefield_train.probe import figure, proposals
 from posefield_train.probe.figure import Figure
 from posefield_train.probe.proposals import Proposal
-from posefield_train.source import bvh
+from posefield_train.source import motion_readers
 
 LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))
 SHOWN_JOINTS = 40
@@ -17,16 +17,17 @@ SHOWN_JOINTS = 40
 
 @dataclass(frozen=True)
 class FileFacts:
-    """Frames and rate of a motion file."""
+    """Format, frames and rate of a motion file; rate None if it states none."""
 
     path: str
+    format: str
     frames: int
-    fps: float
+    fps: float | None
 
     @property
-    def seconds(self) -> float:
-        """Return the duration of the motion, s."""
-        return (self.frames - 1) / self.fps
+    def seconds(self) -> float | None:
+        """Return the duration of the motion, s; None without a rate."""
+        return None if self.fps is None else (self.frames - 1) / self.fps
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,13 @@ class ProbeReport:
         """Return the report as JSON values."""
         return {
             "files": [
-                {"file": one.path, "frames": one.frames, "fps": one.fps, "seconds": one.seconds}
+                {
+                    "file": one.path,
+                    "format": one.format,
+                    "frames": one.frames,
+                    "fps": one.fps,
+                    "seconds": one.seconds,
+                }
                 for one in self.files
             ],
             "joints": list(self.joints),
@@ -56,18 +63,18 @@ class ProbeReport:
 def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None) -> ProbeReport:
     """Return the report on motion files.
 
-    report: called with the number of files that are read. Raises BvhError for a file that cannot be
-    read.
+    report: called with the number of files that are read. Raises MotionFileError for a file that
+    cannot be read.
     """
     figures = []
     for count, path in enumerate(paths, 1):
-        figures.append(figure.measure(bvh.read(path)))
+        figures.append(figure.measure(motion_readers.read(path)))
         report(count)
     common, _ = Counter(tuple(each.names) for each in figures).most_common(1)[0]
     usual = [each for each in figures if tuple(each.names) == common]
     up = proposals.propose_up(usual)
     files = tuple(
-        FileFacts(str(path), len(each.file.values), each.file.rate)
+        FileFacts(str(path), each.file.format, len(each.file), each.file.rate)
         for path, each in zip(paths, figures, strict=True)
     )
     proposed = {
@@ -82,13 +89,15 @@ def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None)
 
 
 def _propose_rate(figures: Sequence[Figure]) -> Proposal:
-    rates = Counter(each.file.rate for each in figures)
-    times = sorted({each.file.frame_time for each in figures})
-    evidence = f"frame time {', '.join(f'{time:g}' for time in times[:5])} s in the files"
-    ((rate, _),) = rates.most_common(1)
-    if len(rates) > 1:
-        said = ", ".join(f"{count} files at {each:g}" for each, count in rates.most_common(5))
-        return Proposal(rate, "medium", (evidence, said))
+    rates = Counter(each.file.rate for each in figures if each.file.rate is not None)
+    if not rates:
+        return Proposal(None, "none", ("the files state no rate: ask who captured them",))
+    said = sorted({each.file.evidence for each in figures if each.file.rate is not None})
+    evidence = f"{', '.join(said[:5])} in the files"
+    rate, count = rates.most_common(1)[0]
+    if count < len(figures):
+        counted = ", ".join(f"{count} files at {each:g}" for each, count in rates.most_common(5))
+        return Proposal(rate, "medium", (evidence, counted))
     return Proposal(rate, "certain", (evidence,))
 
 
@@ -125,12 +134,13 @@ UNITS = {"metres_per_unit": " m", "fps": " frames a second", "facing": " degrees
 def text(report: ProbeReport) -> str:
     """Return the report for people."""
     frames = sorted(one.frames for one in report.files)
-    seconds = sorted(one.seconds for one in report.files)
+    seconds = sorted(one.seconds for one in report.files if one.seconds is not None)
+    formats = ", ".join(sorted({one.format for one in report.files}))
     joints = ", ".join(report.joints[:SHOWN_JOINTS])
     more = f" and {len(report.joints) - SHOWN_JOINTS} more"
     lines = [
-        f"{len(report.files)} {'file' if len(report.files) == 1 else 'files'}, "
-        f"{_span(frames, 'd')} frames, {_span(seconds, '.2f')} s",
+        f"{len(report.files)} {formats} {'file' if len(report.files) == 1 else 'files'}, "
+        f"{_span(frames, 'd')} frames, {_span(seconds, '.2f') if seconds else 'unknown'} s",
         f"joints ({len(report.joints)}): {joints}"
         f"{more if len(report.joints) > SHOWN_JOINTS else ''}",
         f"roles by name: {_roles(report) or 'none recognised'}",

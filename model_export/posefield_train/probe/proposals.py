@@ -10,7 +10,7 @@ from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat
 from posefield_train.probe.figure import Figure
 from posefield_train.source.bone_lengths import UNITS
-from posefield_train.source.bvh import bvh_conversion
+from posefield_train.source.motion_files import clip_conversion
 
 Confidence = Literal["certain", "high", "medium", "low", "none"]
 
@@ -40,6 +40,30 @@ class Proposal:
 
 
 def propose_unit(figures: Sequence[Figure]) -> Proposal:
+    """Return the length of the files' unit in metres: as they state, else from the legs."""
+    measured = _measured_unit(figures)
+    return _stated([figure.file.metres_per_unit for figure in figures], measured, " m") or measured
+
+
+def _stated(values: Sequence[Any], measured: Proposal, unit: str = "") -> Proposal | None:
+    """Return what all files state, with the measured evidence beside it; None if one states none.
+
+    A measurement that contradicts it with a high confidence makes it doubtful.
+    """
+    if None in values:
+        return None
+    if len(set(values)) > 1:
+        said = f"the files state different values: {', '.join(map(str, sorted(set(values))))}"
+        return Proposal(None, "none", (said, *measured.evidence))
+    doubtful = measured.confidence == "high" and measured.value != values[0]
+    evidence = f"stated by the files: {values[0]}{unit}"
+    if doubtful:
+        evidence += f", which the motion contradicts: {measured.value}{unit} fits it"
+    confidence: Confidence = "low" if doubtful else "certain"
+    return Proposal(values[0], confidence, (evidence, *measured.evidence))
+
+
+def _measured_unit(figures: Sequence[Figure]) -> Proposal:
     """Return the length of the files' unit in metres, from the length of the legs."""
     legs = [leg for figure in figures if (leg := figure.leg_length())]
     length = float(np.median(legs or [figure.size for figure in figures]))
@@ -64,6 +88,12 @@ def propose_unit(figures: Sequence[Figure]) -> Proposal:
 
 
 def propose_up(figures: Sequence[Figure]) -> Proposal:
+    """Return the up axis: as the files state, else from the motion."""
+    measured = _measured_up(figures)
+    return _stated([figure.file.up for figure in figures], measured) or measured
+
+
+def _measured_up(figures: Sequence[Figure]) -> Proposal:
     """Return the up axis, from the bodies in motion, the floor under their feet, and at rest."""
     votes = [_body_axis(figures), _floor_axis(figures), _rest_axis(figures)]
     found = [(axis, said) for axis, said in votes if axis is not None]
@@ -92,7 +122,7 @@ def _rest_axis(figures: Sequence[Figure]) -> Vote:
     """Return the axis from the feet to the head of the figure at rest."""
     found = []
     for figure in figures:
-        joints = bvh_conversion.skeleton(figure.file, metres_per_unit=1.0, up="y")
+        joints = figure.file.skeleton
         found.append(_upward(figure, joints.at_rest(joints.offsets)[None]))
     known = [each for each in found if each is not None]
     return _main_axis(known, "from the feet to the head at rest")
@@ -192,11 +222,11 @@ def _facing(figure: Figure, up: UpAxis) -> float | None:
     pair = figure.pair("UpperLeg") or figure.pair("UpperArm")
     if pair is None:
         return None
-    left, right = (bvh_conversion.to_y_up(points, up) for points in pair)
+    left, right = (clip_conversion.to_y_up(points, up) for points in pair)
     across = left - right
     # Forward is left turned by a quarter: x to z, and z to -x.
     body = np.arctan2(-across[:, 2], across[:, 0])
     turns = figure.turns.copy()
-    turns[:, 1:] = bvh_conversion.to_y_up(turns[:, 1:], up)
+    turns[:, 1:] = clip_conversion.to_y_up(turns[:, 1:], up)
     heading = quat.twist(turns, np.array([0.0, 1.0, 0.0]))
     return float(np.angle(np.mean(np.exp(1j * (body - heading)))))

@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from posefield_train.source import bvh
 from posefield_train.source.clip_table import ClipRow
+from posefield_train.source.motion_files.motion_file import MotionFile
 
+BVH = "BVH"
 RIGID_TOLERANCE = 1e-4
 """Bones that stretch by less than this are taken as rigid without a note, m."""
 
@@ -28,17 +29,36 @@ def stretch_notes(rows: Sequence[ClipRow], stretches: Sequence[float]) -> list[s
     ]
 
 
-def offset_notes(files: Mapping[str, bvh.BvhFile]) -> list[str]:
+def offset_notes(files: Mapping[str, MotionFile]) -> list[str]:
     """Return the note on the interpretation of root OFFSETs that are not zero; none if all are.
+
+    files: motion files by place; those of other formats than BVH have no OFFSET.
+    """
+    moved = {
+        place: tuple(file.skeleton.offsets[0].tolist())
+        for place, file in files.items()
+        if file.format == BVH and file.skeleton.offsets[0].any()
+    }
+    if not moved:
+        return []
+    place, offset = next(iter(moved.items()))
+    which = "" if len(moved) == 1 else f"{len(moved)} of {len(files)} files, the first of them "
+    return [
+        f"{which}{place}: the root's OFFSET is {offset} and has position channels, which were "
+        "taken to replace it; say so as source.root_offset"
+    ]
+
+
+def reader_notes(files: Mapping[str, MotionFile]) -> list[str]:
+    """Return the notes of readers on what they assumed, each of several files once.
 
     files: motion files by place.
     """
-    moved = {place: file.joints[0] for place, file in files.items() if any(file.joints[0].offset)}
-    if not moved:
-        return []
-    place, root = next(iter(moved.items()))
-    which = "" if len(moved) == 1 else f"{len(moved)} of {len(files)} files, the first of them "
+    found: dict[str, list[str]] = {}
+    for place, file in files.items():
+        for note in file.notes:
+            found.setdefault(note, []).append(place)
     return [
-        f"{which}{place}: the root's OFFSET is {root.offset} and has position channels, which were "
-        "taken to replace it; say so as source.root_offset"
+        note if len(places) == 1 else f"{len(places)} of {len(files)} files: {note}"
+        for note, places in found.items()
     ]

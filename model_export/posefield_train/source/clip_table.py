@@ -24,7 +24,8 @@ class ClipRow:
     landmarks: frames of the file. other_labels: name of the clip in each further label set. take:
     name of the take, unique among the performer's; None if the table has no such column.
     curve_place: file of the clip's curves; None without them, and where the clip has curves alone.
-    contacts: first and last frame in the file of each contact, by column.
+    contacts: first and last frame in the file of each contact, by column. animation: name of one
+    of several in the file; None for the only one.
     """
 
     place: FileLocation
@@ -40,6 +41,12 @@ class ClipRow:
 
     curve_place: FileLocation | None = None
     contacts: Mapping[str, FrameSpans] = field(default_factory=dict)
+    animation: str | None = None
+
+    @property
+    def motion(self) -> str:
+        """Return the name of the motion that the clip is a part of: its file and animation."""
+        return str(self.place) if self.animation is None else f"{self.place}[{self.animation}]"
 
     @property
     def labels(self) -> dict[str, str]:
@@ -60,9 +67,14 @@ class ClipRow:
     def source(self) -> str:
         """Return the file's name, with frames if the clip is a part of it."""
         if self.first_frame == 0 and self.last_frame is None:
-            return self.place.name
+            return self._motion_name
         last = "the end" if self.last_frame is None else self.last_frame
-        return f"{self.place.name}, frames {self.first_frame} to {last}"
+        return f"{self._motion_name}, frames {self.first_frame} to {last}"
+
+    @property
+    def _motion_name(self) -> str:
+        """Return the name of the file, with the animation if it holds several."""
+        return self.place.name if self.animation is None else f"{self.place.name}[{self.animation}]"
 
     def error(self, message: str) -> RecipeError:
         """Return an error that names this row."""
@@ -100,7 +112,7 @@ def _columns(recipe: Recipe) -> dict[str, str]:
         **{control.column: f"control {control.name}" for control in recipe.column_controls},
     }
     named |= {column: f"contacts.columns.{j}" for j, column in recipe.contacts.columns.items()}
-    for key in ("performer", "take", "first_frame", "last_frame"):
+    for key in ("animation", "performer", "take", "first_frame", "last_frame"):
         column = getattr(clips, key)
         if column is not None:
             named[column] = f"clips.{key}"
@@ -135,6 +147,7 @@ def _row(
         contacts={
             column: cells.spans(line, record, column) for column in recipe.contacts.columns.values()
         },
+        animation=(record[clips.animation].strip() or None) if clips.animation else None,
     )
 
 
@@ -194,7 +207,7 @@ def refuse_repeats(rows: Sequence[ClipRow]) -> None:
     """Raise RecipeError for two rows with the same frames of the same file."""
     seen: dict[tuple[str, int, int | None], ClipRow] = {}
     for row in rows:
-        key = (str(row.place), row.first_frame, row.last_frame)
+        key = (row.motion, row.first_frame, row.last_frame)
         if key in seen:
             line = seen[key].line
             again = "as before" if line is None else f"as line {line}"
@@ -211,7 +224,7 @@ def stated_takes(rows: Sequence[ClipRow]) -> list[str] | None:
         return None
     seen: dict[str, ClipRow] = {}
     for row in rows:
-        other = seen.setdefault(str(row.place), row)
+        other = seen.setdefault(row.motion, row)
         if _named_take(other) != _named_take(row):
             raise row.error(
                 f"{row.place.name} is of take {row.take!r} here and of take {other.take!r} in line "

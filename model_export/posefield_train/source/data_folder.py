@@ -130,6 +130,32 @@ def read(place: FileLocation, most: int, what: str) -> bytes:
     return content
 
 
+def names_beside(place: FileLocation) -> list[str]:
+    """Return the names of the files in the folder of a file, in order."""
+    if isinstance(place, Path):
+        return sorted(path.name for path in place.parent.iterdir() if path.is_file())
+    folder = PurePosixPath(place.entry).parent
+    entries = map(PurePosixPath, _open_zip(place.archive).namelist())
+    return sorted(entry.name for entry in entries if entry.parent == folder)
+
+
+def beside(place: FileLocation, name: str) -> FileLocation:
+    """Return the file with a relative name such as "data/walk.bin" seen from the folder of a file.
+
+    Raises RecipeError for a name that leads out of this folder, and if there is no such file.
+    """
+    parts = PurePosixPath(name).parts
+    if not parts or parts[0] == "/" or ".." in parts:
+        raise RecipeError(str(place), f"file {name!r}, expected a path below its folder")
+    if isinstance(place, Path):
+        found: FileLocation = place.parent / name
+    else:
+        found = ZipMember(place.archive, str(PurePosixPath(place.entry).parent / name))
+    if not _is_file(found):
+        raise RecipeError(str(place), f"no file {name!r} beside it, expected one")
+    return found
+
+
 def find(folder: Path, name: str) -> FileLocation:
     """Return the file with a relative name such as "takes/bvh/walk.bvh" below the data folder.
 

@@ -8,7 +8,6 @@ from posefield.common.array_shapes import Positions
 from posefield.common.units import Floats
 from posefield.motion.clip import Clip
 from posefield_train.source import (
-    bvh,
     clip_joints,
     clip_landmarks,
     clip_notes,
@@ -22,6 +21,9 @@ from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.clip_landmarks import Spans
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.curve_files import CurveReader
+from posefield_train.source.motion_files import clip_conversion
+from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
+from posefield_train.source.motion_readers import MotionFiles
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections.data_sections import Source
 from posefield_train.source.rigs import rig_normalization
@@ -66,13 +68,16 @@ class Example:
 def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     """Return the examples of a recipe, and notes on assumptions and corrections.
 
-    Raises RecipeError for an invalid row, BvhError for a file that cannot be read.
+    Raises RecipeError for an invalid row, MotionFileError for a file that cannot be read or that
+    states another unit, up axis or rate.
     """
     rows = clip_table.read(recipe, folder)
     alone = recipe.curves is not None and recipe.curves.alone
-    files = {} if alone else read_files(rows)
+    files = {} if alone else read_files(rows, recipe.source)
     curves = curve_files.reader(recipe.curves, rows) if recipe.curves else None
-    cuts = [_cut(recipe, _whole_clip(recipe, files, curves, row), row) for row in rows]
+    # Converted once for all rows: a long file may have hundreds.
+    wholes = {motion: clip_of_file(file, recipe.source) for motion, file in files.items()}
+    cuts = [_cut(recipe, _whole_clip(recipe, wholes, curves, row), row) for row in rows]
     clip_joints.expect_same_skeleton(rows, [clip for clip, _ in cuts])
     rigged = _normalize_rigs(recipe, rows, [clip for clip, _ in cuts])
     found = [
@@ -83,7 +88,7 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     clip_landmarks.expect_same_order(
         recipe.landmark_names, rows, [own.landmarks for own in examples]
     )
-    notes = shipped_recipes.table_notes(rows[0].table)
+    notes = [*shipped_recipes.table_notes(rows[0].table), *clip_notes.reader_notes(files)]
     if recipe.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
     notes += [*rigged.notes, *clip_notes.stretch_notes(rows, [own.stretch for own in found])]
@@ -100,25 +105,25 @@ def _takes(
     if stated is not None:
         return stated, []
     return take_groups.find_takes(
-        [str(row.place) for row in rows],
+        [row.motion for row in rows],
         [row.named for row in rows],
         [own.positions for own in found],
         found[0].example.clip.skeleton.names,
     )
 
 
-def read_files(rows: Sequence[ClipRow]) -> dict[str, bvh.BvhFile]:
-    """Return the motion files of rows by their places, each read once.
+def read_files(rows: Sequence[ClipRow], source: Source) -> dict[str, MotionFile]:
+    """Return the motions of rows by their names, each content read once.
 
-    Raises BvhError for a file that cannot be read and RecipeError for more than MAX_POSES in all.
+    Raises MotionFileError for a file that cannot be read and RecipeError for more than MAX_POSES in
+    all.
     """
-    files: dict[str, bvh.BvhFile] = {}
+    known, files = MotionFiles(), dict[str, MotionFile]()
     poses = 0
     for row in rows:
-        key = str(row.place)
-        if key not in files:
-            files[key] = bvh.read(row.place)
-            poses += len(files[key].values) * len(files[key].joints)
+        if row.motion not in files:
+            files[row.motion] = known.read(row.place, ReadOptions(source.rate, row.animation))
+            poses += files[row.motion].poses
         if poses > MAX_POSES:
             raise row.error(
                 f"found {poses} poses of a joint in the files up to {row.place}, expected at most "
@@ -141,13 +146,13 @@ class _FoundExample:
 
 
 def _whole_clip(
-    recipe: Recipe, files: Mapping[str, bvh.BvhFile], curves: CurveReader | None, row: ClipRow
+    recipe: Recipe, wholes: Mapping[str, Clip], curves: CurveReader | None, row: ClipRow
 ) -> Clip:
-    """Return the clip of all frames of a row's file, with its curves."""
+    """Return the clip of all frames of a row's file, with its curves. wholes: clips by motion."""
     values = curves.read(row.curve_file) if curves else None
     if values and recipe.curves and recipe.curves.rate:
         return curve_files.resting_clip(values, recipe.curves.rate)
-    clip = clip_of_file(files[str(row.place)], recipe.source)
+    clip = wholes[row.motion]
     return curve_files.with_curves(clip, values, row) if values else clip
 
 
@@ -198,16 +203,17 @@ def _example(
     return _FoundExample(example, placement.largest_stretch(captured), captured.positions())
 
 
-def clip_of_file(file: bvh.BvhFile, source: Source) -> Clip:
+def clip_of_file(file: MotionFile, source: Source) -> Clip:
     """Return the clip of all frames of a file.
 
     By default position channels replace the root's OFFSET.
     """
-    return bvh.to_clip(
+    return clip_conversion.to_clip(
         file,
         metres_per_unit=source.metres_per_unit,
         up=source.up,
         root_offset=source.root_offset or "replace",
+        rate=source.rate,
     )
 
 

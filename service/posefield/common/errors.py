@@ -2,8 +2,9 @@
 
 MotionError
 ├── FileError            a file that cannot be used, with its path and, where known, its line
-│   ├── BvhError         a motion file that breaks the BVH grammar or contradicts itself
-│   ├── AcclaimError     a skeleton (ASF) or motion (AMC) file that breaks its grammar
+│   ├── MotionFileError  a motion file that cannot be read or contradicts its recipe
+│   │   ├── BvhError     a motion file that breaks the BVH grammar or contradicts itself
+│   │   └── AcclaimError a skeleton (ASF) or motion (AMC) file that breaks its grammar
 │   ├── RecipeError      a recipe or its table of clips
 │   ├── ModelError       an .onnx file that is corrupt, foreign or of an unknown format
 │   └── UsdError         a USD file that does not open
@@ -52,11 +53,15 @@ class FileError(MotionError):
         return type(self), (self.path, self.message, self.line, self.column)
 
 
-class BvhError(FileError):
+class MotionFileError(FileError):
+    """A motion file that cannot be read, or whose unit, axes or rate contradict the recipe."""
+
+
+class BvhError(MotionFileError):
     """A motion file that breaks the BVH grammar or contradicts itself."""
 
 
-class AcclaimError(FileError):
+class AcclaimError(MotionFileError):
     """A skeleton (ASF) or motion (AMC) file that breaks its grammar or contradicts itself."""
 
 

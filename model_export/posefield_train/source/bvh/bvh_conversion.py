@@ -1,6 +1,4 @@
-"""Conversion of a BVH file to a clip, given its unit, up axis and root offset."""
-
-from typing import Literal
+"""Conversion of a BVH file to joints and their motion, and to a clip."""
 
 import numpy as np
 
@@ -9,53 +7,52 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.source.bvh.bvh_content import BvhFile, BvhJoint
-
-RootOffset = Literal["replace", "add"]
+from posefield_train.source.motion_files import clip_conversion
+from posefield_train.source.motion_files.clip_conversion import RootOffset
+from posefield_train.source.motion_files.motion_file import MotionFile
 
 BLOCK_JOINTS = 50_000
 """Rotations per block."""
 
 
-def to_clip(file: BvhFile, *, metres_per_unit: float, up: UpAxis, root_offset: RootOffset) -> Clip:
-    """Return the file's motion in metres with Y up.
+def motion_file(file: BvhFile) -> MotionFile:
+    """Return the file's joints and their motion in its own unit and axes.
 
-    A position channel replaces its component of the OFFSET; without a channel the OFFSET stays.
-    With root_offset="add" the root's channels are added to its OFFSET instead, as in three.js. The
-    rest pose is the file's OFFSETs with identity rotations. up="z" turns the basis of every offset
-    and local rotation, (x, y, z) to (x, z, -y), so the rest pose stands upright. Raises ValueError
-    for an invalid argument.
+    A position channel replaces its component of the OFFSET; without a channel the OFFSET stays. The
+    rest pose is the file's OFFSETs with identity rotations.
     """
-    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
-        raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
-    if up not in ("y", "z") or root_offset not in ("replace", "add"):
-        raise ValueError(
-            f"up {up!r}, root_offset {root_offset!r}; expected 'y' or 'z', 'replace' or 'add'"
-        )
+    root = file.joints[0]
+    moved = [f"{axis}position" in root.channels for axis in "XYZ"]
+    x, y, z = (own if has else 0.0 for own, has in zip(root.offset, moved, strict=True))
     rotations, translations = local_motion(file)
-    if root_offset == "add":
-        root = file.joints[0]
-        moved = [f"{axis}position" in root.channels for axis in "XYZ"]
-        translations[:, 0] += np.where(moved, root.offset, 0.0)
-    rotations[..., 1:] = to_y_up(rotations[..., 1:], up)
-    lengths = metres_per_unit * to_y_up(translations, up)
-    return Clip(skeleton(file, metres_per_unit, up), rotations, lengths, file.rate)
+    evidence = f"frame time {file.frame_time:g} s"
+    return MotionFile(
+        file.source,
+        "BVH",
+        skeleton(file),
+        rotations,
+        translations,
+        file.rate,
+        evidence,
+        added_offset=(x, y, z),
+    )
 
 
-def to_y_up(vectors: Floats, up: UpAxis) -> Floats:
-    """Return vectors (..., 3) with Y up; the last three components of a quaternion turn alike."""
-    return vectors if up == "y" else vectors[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
+def to_clip(file: BvhFile, *, metres_per_unit: float, up: UpAxis, root_offset: RootOffset) -> Clip:
+    """Return the file's motion in metres with Y up, as `clip_conversion.to_clip`."""
+    return clip_conversion.to_clip(
+        motion_file(file), metres_per_unit=metres_per_unit, up=up, root_offset=root_offset
+    )
 
 
-def skeleton(file: BvhFile, metres_per_unit: float, up: UpAxis) -> Skeleton:
-    """Return the joints and end sites at rest, m."""
-    offsets = np.array([joint.offset for joint in file.joints])
-    tips = np.array([offset for _, offset in file.tips]).reshape(-1, 3)
+def skeleton(file: BvhFile) -> Skeleton:
+    """Return the joints and end sites at rest in the file's unit and axes."""
     return Skeleton(
         tuple(joint.name for joint in file.joints),
         tuple(joint.parent for joint in file.joints),
-        metres_per_unit * to_y_up(offsets, up),
+        np.array([joint.offset for joint in file.joints]),
         tuple(joint for joint, _ in file.tips),
-        metres_per_unit * to_y_up(tips, up),
+        np.array([offset for _, offset in file.tips]).reshape(-1, 3),
     )
 
 

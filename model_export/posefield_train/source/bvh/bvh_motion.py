@@ -16,18 +16,7 @@ FRAME_TIME = re.compile(rf"\s*Frame\s+Time\s*:\s*({NUMBER.pattern})\s*", re.ASCI
 MIN_FRAME_TIME, LONGEST = 1e-6, 1e6
 """Bounds of a frame time, s."""
 
-BROADCAST_RATES = tuple(1000.0 * base / 1001.0 for base in (24, 30, 60, 120))
-RATE_TOLERANCE = 1e-4
-"""Relative error of a frame time cut to few digits, such as .008333 or 0.0333333."""
-
 NOT_IN_NUMBERS = bytes(set(range(256)) - set(b"0123456789+-.eE \t\n\r\v\f"))
-
-
-def snapped_rate(frame_time: float) -> float:
-    """Return frames per second: the nearest whole or broadcast rate within SNAP, or the inverse."""
-    rate = 1.0 / frame_time
-    nearest = min((max(1.0, float(round(rate))), *BROADCAST_RATES), key=lambda c: abs(c - rate))
-    return nearest if abs(nearest - rate) <= RATE_TOLERANCE * nearest else rate
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,10 @@ from typing import IO, Literal, Protocol
 from posefield.common.errors import BvhError
 from posefield_train.source.bvh.bvh_content import BvhFile, BvhJoint, Vector, decode
 from posefield_train.source.bvh.bvh_hierarchy import HierarchyReader
-from posefield_train.source.bvh.bvh_motion import MotionReader, snapped_rate
+from posefield_train.source.bvh.bvh_motion import MotionReader
 from posefield_train.source.bvh.bvh_text import BLOCK, TextCursor
 from posefield_train.source.bvh.bvh_tokens import TokenCursor
+from posefield_train.source.motion_files.frame_rate import snapped_rate
 
 # A joint can be named MOTION_head, so the section begins at a line of the keyword alone.
 MOTION_LINE = re.compile(r"^[ \t]*MOTION[ \t]*$", re.MULTILINE | re.IGNORECASE)

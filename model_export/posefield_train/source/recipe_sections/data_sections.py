@@ -14,7 +14,10 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class Source(RecipePart):
-    """Unit and axes of the motion files; a BVH file states neither its unit nor its up axis."""
+    """Unit, axes and rate of the motion files.
+
+    A file that states another one, as USD and glTF do, is an error.
+    """
 
     metres_per_unit: Positive = Field(description="length of one unit of the files, m")
     up: UpAxis = Field(description="the files' up axis; their frame is right-handed")
@@ -22,6 +25,12 @@ class Source(RecipePart):
         default=None,
         description="whether root position channels replace the root's OFFSET or add to it; "
         "default: replace, with a note if the OFFSET is not zero",
+    )
+    rate: Annotated[float, Field(ge=1, le=10_000, allow_inf_nan=False)] | None = Field(
+        default=None,
+        description="frames a second: needed for AMC files, which state none, and for USD and glTF "
+        "files whose keys are not one a frame: their curves are sampled at it; a BVH file of "
+        "another rate is an error",
     )
 
 
@@ -43,6 +52,11 @@ class Clips(RecipePart):
 
     table: Text = Field(description="CSV file, relative to the data folder")
     file: Text = Field(description="column: motion file, relative to the table")
+    animation: Text | None = Field(
+        default=None,
+        description="column: animation of a USD or glTF file that holds several, by name or path; "
+        "an empty cell for a file with one",
+    )
     performer: Text | None = Field(default=None, description="column: performer")
     labels: dict[Name, Text] = Field(
         default={},

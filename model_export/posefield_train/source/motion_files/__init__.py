@@ -1,0 +1,1 @@
+"""Motion files of any format after reading: one type, and its conversion to a clip."""

@@ -1,0 +1,213 @@
+"""Readers of motion files by suffix, and the files of a run, each content read once."""
+
+import hashlib
+import shutil
+import tempfile
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+from posefield.common.errors import AcclaimError, MotionFileError
+from posefield_train.source import acclaim, bvh, data_folder
+from posefield_train.source.data_folder import FileLocation
+from posefield_train.source.motion_files.motion_file import AS_STATED, MotionFile, ReadOptions
+
+MAX_GLTF_BYTES = 1_000_000_000
+"""Limit of a glTF file or buffer: the project's own take 0.5 MB for a minute."""
+CHUNK_BYTES = 1_000_000
+
+Read = Callable[[FileLocation, ReadOptions], MotionFile]
+
+
+@dataclass(frozen=True)
+class MotionFormat:
+    """Format of motion files.
+
+    suffixes: of file names, in lower case. states: what its files say of unit, up axis and rate.
+    several: whether a file may hold several animations.
+    """
+
+    name: str
+    suffixes: tuple[str, ...]
+    read: Read
+    states: str
+    several: bool = False
+
+
+def _read_bvh(place: FileLocation, options: ReadOptions) -> MotionFile:
+    return bvh.motion_file(bvh.read(place))
+
+
+def _read_acclaim(place: FileLocation, options: ReadOptions) -> MotionFile:
+    """Return the motion of an AMC file with the ASF file beside it."""
+    beside = [name for name in data_folder.names_beside(place) if _suffix(name) == ".asf"]
+    stem = PurePosixPath(place.name).stem.lower()
+    own = [name for name in beside if stem.startswith(PurePosixPath(name).stem.lower())]
+    found = sorted(own, key=len)[-1:] or (beside if len(beside) == 1 else [])
+    if not found:
+        listed = ", ".join(beside[:10]) or "none"
+        raise AcclaimError(
+            str(place),
+            f"found the skeletons {listed} beside it, expected one .asf file, or one whose name "
+            "begins that of the motion",
+        )
+    skeleton = acclaim.read_asf(data_folder.beside(place, found[0]))
+    clip = acclaim.to_clip(skeleton, acclaim.read_amc(place, skeleton), metres_per_unit=1.0, rate=1)
+    note = f"{place.name}: read with the skeleton {found[0]}"
+    return MotionFile(
+        str(place),
+        "Acclaim",
+        clip.skeleton,
+        clip.rotations,
+        clip.translations,
+        options.rate,
+        "source.rate",
+        notes=(note,),
+    )
+
+
+def _read_gltf(place: FileLocation, options: ReadOptions) -> MotionFile:
+    # pygltflib takes 0.1 s to import, and most folders hold no glTF.
+    from posefield_train.source import gltf
+
+    def beside(name: str) -> bytes:
+        return data_folder.read(data_folder.beside(place, name), MAX_GLTF_BYTES, "a buffer")
+
+    content = data_folder.read(place, MAX_GLTF_BYTES, "a glTF file")
+    return gltf.read(content, str(place), beside, options)
+
+
+def _read_usd(place: FileLocation, options: ReadOptions) -> MotionFile:
+    from posefield_train.source import usd_skel
+
+    if isinstance(place, Path):
+        _check_readable(place)
+        return usd_skel.read(place, str(place), options)
+    # USD opens files by name only; references to other files of the archive are not found.
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder, place.name)
+        with place.open("rb") as packed, copy.open("wb") as plain:
+            shutil.copyfileobj(packed, plain)
+        return usd_skel.read(copy, str(place), options)
+
+
+def _check_readable(place: Path) -> None:
+    try:
+        place.open("rb").close()
+    except OSError as fault:
+        raise MotionFileError(str(place), f"cannot be read: {fault.strerror}") from fault
+
+
+FORMATS = (
+    MotionFormat("BVH", (".bvh",), _read_bvh, "the rate; neither unit nor up axis"),
+    MotionFormat("Acclaim", (".amc",), _read_acclaim, "neither unit, up axis nor rate"),
+    MotionFormat(
+        "glTF", (".glb", ".gltf"), _read_gltf, "metres, y up, times of keys", several=True
+    ),
+    MotionFormat(
+        "USD",
+        (".usd", ".usda", ".usdc", ".usdz"),
+        _read_usd,
+        "unit, up axis and time codes a second",
+        several=True,
+    ),
+)
+"""Formats that are read, by the suffix of the file's name."""
+SUFFIXES = {suffix: own for own in FORMATS for suffix in own.suffixes}
+
+REFUSED = {
+    ".fbx": "FBX is read through Blender: posefield convert FILE.fbx -o FILE.bvh",
+    ".c3d": "C3D holds markers, not a skeleton: solve them in the capture software and export BVH",
+    ".npy": "numpy arrays of features, such as those of HumanML3D, hold no joint rotations of a "
+    "capture: use the BVH, AMC or SMPL source of the data set",
+    ".npz": "SMPL parameters, such as those of AMASS, need a body model for the bones' lengths: "
+    "export them with it as BVH or GLB",
+    ".asf": "ASF holds a skeleton alone: name the .amc file, which is read with it",
+    ".blend": "a Blender scene: export its armature as BVH or GLB",
+    ".trc": "TRC holds markers, not a skeleton: solve them and export BVH",
+    ".mvnx": "MVNX is not read: export BVH or FBX from the capture software",
+}
+"""Formats that are refused, with the way out."""
+
+
+def read(place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
+    """Return the motion of a file by the suffix of its name.
+
+    Raises MotionFileError for a format that is not read, with the way out, for an animation chosen
+    in a format with one motion a file, and for a file that cannot be read.
+    """
+    suffix = _suffix(place.name)
+    own = SUFFIXES.get(suffix)
+    if own is None:
+        known = ", ".join(SUFFIXES)
+        said = REFUSED.get(suffix, f"found the suffix {suffix!r}, expected one of {known}")
+        raise MotionFileError(str(place), said)
+    if options.animation is not None and not own.several:
+        raise MotionFileError(
+            str(place),
+            f"found animation {options.animation!r}, but {own.name} files hold one motion: "
+            "expected an empty cell",
+        )
+    return own.read(place, options)
+
+
+def _suffix(name: str) -> str:
+    return PurePosixPath(name).suffix.lower()
+
+
+def find_files(folder: Path) -> list[Path]:
+    """Return the motion files in a folder and its subfolders, in order of their paths."""
+    return sorted(path for path in folder.rglob("*") if _suffix(path.name) in SUFFIXES)
+
+
+@dataclass
+class MotionFiles:
+    """Motion files of a run by place and content, each content read once.
+
+    most_poses: frames times joints that are kept, the files asked for last; None keeps all files. A
+    file that was dropped is read again.
+    """
+
+    most_poses: int | None = None
+    _kept: "OrderedDict[tuple[str, ...], MotionFile]" = field(default_factory=OrderedDict)
+    _digests: dict[str, str] = field(default_factory=dict)
+
+    def read(self, place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
+        """Return the motion of a file, as `read`."""
+        key = self._key(place, options)
+        found = self._kept.pop(key, None)
+        if found is None:
+            found = read(place, options)
+        self._kept[key] = found
+        self._drop_oldest()
+        return found
+
+    def _key(self, place: FileLocation, options: ReadOptions) -> tuple[str, ...]:
+        """Return a key of the content and of all that the reading depends on."""
+        named = str(place)
+        if named not in self._digests:
+            self._digests[named] = _digest(place)
+        told = (str(options.rate), str(options.animation))
+        suffix = _suffix(place.name)
+        # Other formats refer to files beside them, and are known by their place too.
+        alone = suffix in (".bvh", ".glb", ".usdz")
+        return (suffix, self._digests[named], *told, *([] if alone else [named]))
+
+    def _drop_oldest(self) -> None:
+        if self.most_poses is None:
+            return
+        while len(self._kept) > 1 and sum(f.poses for f in self._kept.values()) > self.most_poses:
+            self._kept.popitem(last=False)
+
+
+def _digest(place: FileLocation) -> str:
+    """Return the SHA-256 of a file's content; MotionFileError if it cannot be read."""
+    found = hashlib.sha256()
+    try:
+        with place.open("rb") as file:
+            while piece := file.read(CHUNK_BYTES):
+                found.update(piece)
+    except OSError as fault:
+        raise MotionFileError(str(place), f"cannot be read: {fault.strerror}") from fault
+    return found.hexdigest()

@@ -1,0 +1,168 @@
+"""USD stage: its one skeleton, the animation to read, and its unit, up axis and rate."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pxr import Tf, Usd, UsdGeom, UsdSkel
+
+from posefield.common.errors import MotionFileError
+from posefield.common.units import UpAxis
+from posefield_train.source.motion_files import key_times, posed_joints
+from posefield_train.source.motion_files.key_times import UnevenKeys
+from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
+from posefield_train.source.usd_skel.skel_samples import SkelMotion
+
+MAX_POSES = 10_000_000
+"""Limit of frames times joints, as for BVH."""
+MAX_JOINTS = 1000
+SHOWN = 20
+"""Animations that a message lists."""
+
+
+@dataclass(frozen=True)
+class SkelStage:
+    """An open stage. cache: of UsdSkel, with the bindings of all its skeletons."""
+
+    source: str
+    stage: Any
+    cache: Any
+
+    def error(self, message: str) -> MotionFileError:
+        """Return an error that names the file."""
+        return MotionFileError(self.source, message)
+
+    def prims(self, schema: Any) -> list[Any]:
+        """Return the prims of a schema, those within instances too."""
+        seen = Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies())
+        return [prim for prim in seen if prim.IsA(schema)]
+
+
+def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
+    """Return the motion of a .usd, .usda, .usdc or .usdz file, with the unit and axis it states.
+
+    source: name of the file in messages. Raises MotionFileError for a file that does not open
+    whole, that has no skeleton, no animation or several without one chosen, and for samples that
+    are no frames.
+    """
+    opened = _open(path, source)
+    motion = _chosen(opened, options.animation)
+    codes = motion.sample_codes()
+    pace, notes = _codes_per_second(opened)
+    if not len(codes):
+        raise opened.error(f"{motion.path} has no samples over time, expected an animation")
+    try:
+        found = key_times.sample_times(codes / pace, options.rate)
+    except UnevenKeys as fault:
+        raise opened.error(f"{motion.path}: {fault}") from fault
+    joints = len(motion.query.GetJointOrder())
+    if joints > MAX_JOINTS or len(found.times) * joints > MAX_POSES:
+        raise opened.error(
+            f"found {len(found.times)} frames of {joints} joints, expected at most {MAX_JOINTS} "
+            f"joints and {MAX_POSES} poses of a joint"
+        )
+    # The samples themselves, where the rate is theirs.
+    exact = codes if options.rate is None else found.times * pace
+    plain = posed_joints.plain_motion(motion.posed_joints(exact))
+    stage = opened.stage
+    has_unit = UsdGeom.StageHasAuthoredMetersPerUnit(stage)
+    return MotionFile(
+        source,
+        "USD",
+        plain.skeleton,
+        plain.rotations,
+        plain.translations,
+        found.rate,
+        found.evidence,
+        metres_per_unit=float(UsdGeom.GetStageMetersPerUnit(stage)) if has_unit else None,
+        up=_up(opened),
+        notes=notes,
+    )
+
+
+def _open(path: Path, source: str) -> SkelStage:
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as fault:
+        said = str(fault).rpartition(" : ")[2].strip().strip("'")[:200]
+        raise MotionFileError(source, f"does not open as USD: {said}") from fault
+    faults = stage.GetCompositionErrors()
+    if faults:
+        said = " ".join(str(faults[0]).split())[:200]
+        raise MotionFileError(source, f"refers to what cannot be read: {said}")
+    cache = UsdSkel.Cache()
+    opened = SkelStage(source, stage, cache)
+    for prim in opened.prims(UsdSkel.Root):
+        cache.Populate(UsdSkel.Root(prim), Usd.TraverseInstanceProxies())
+    return opened
+
+
+def _chosen(opened: SkelStage, wanted: str | None) -> SkelMotion:
+    """Return the skeleton with the animation that is wanted, or with its only one."""
+    skeletons = opened.prims(UsdSkel.Skeleton)
+    animations = opened.prims(UsdSkel.Animation)
+    if not skeletons:
+        has = f"{len(animations)} animations and " if animations else ""
+        raise opened.error(f"found {has}no Skeleton, expected a SkelRoot with one")
+    if not animations:
+        raise opened.error(
+            f"found the skeleton {skeletons[0].GetPath()} without a SkelAnimation, expected one"
+        )
+    animation = _animation(opened, animations, wanted)
+    bound = [prim for prim in skeletons if _bound_animation(opened, prim) == animation.GetPath()]
+    if len(bound) != 1 and len(skeletons) > 1:
+        paths = ", ".join(str(prim.GetPath()) for prim in skeletons[:SHOWN])
+        raise opened.error(
+            f"found {len(skeletons)} skeletons ({paths}), expected one that is bound to "
+            f"{animation.GetPath()}: export each character alone"
+        )
+    prim = (bound or skeletons)[0]
+    query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(prim))
+    if not query:
+        raise opened.error(f"skeleton {prim.GetPath()} is not valid, expected it below a SkelRoot")
+    own = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
+    if not own:
+        raise opened.error(f"{animation.GetPath()} names no joints, expected those of a skeleton")
+    return SkelMotion(opened.source, prim, query, own)
+
+
+def _animation(opened: SkelStage, animations: list[Any], wanted: str | None) -> Any:
+    """Return the animation with a path or name, or the only one."""
+    paths = ", ".join(str(prim.GetPath()) for prim in animations[:SHOWN])
+    if wanted is None:
+        if len(animations) > 1:
+            raise opened.error(
+                f"found {len(animations)} animations ({paths}), expected one, or the path of "
+                "one in the column clips.animation"
+            )
+        return animations[0]
+    found = [prim for prim in animations if wanted in (str(prim.GetPath()), prim.GetName())]
+    if len(found) != 1:
+        raise opened.error(f"found the animations {paths}, expected one {wanted!r}")
+    return found[0]
+
+
+def _bound_animation(opened: SkelStage, skeleton: Any) -> Any:
+    """Return the path of the animation that a skeleton is bound to, or None."""
+    query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(skeleton))
+    own = query.GetAnimQuery() if query else None
+    return own.GetPrim().GetPath() if own else None
+
+
+def _codes_per_second(opened: SkelStage) -> tuple[float, tuple[str, ...]]:
+    """Return the time codes per second, and a note if it is the format's default."""
+    stage = opened.stage
+    pace = float(stage.GetTimeCodesPerSecond())
+    if not 0.0 < pace < 1e6:
+        raise opened.error(f"states {pace:g} time codes a second, expected a positive number")
+    authored = any(map(stage.HasAuthoredMetadata, ("timeCodesPerSecond", "framesPerSecond")))
+    if authored:
+        return pace, ()
+    return pace, (f"{opened.source}: states no timeCodesPerSecond, {pace:g} is USD's default",)
+
+
+def _up(opened: SkelStage) -> UpAxis | None:
+    """Return the stated up axis; None if the file states none."""
+    if not opened.stage.HasAuthoredMetadata("upAxis"):
+        return None
+    return "z" if UsdGeom.GetStageUpAxis(opened.stage) == UsdGeom.Tokens.z else "y"
