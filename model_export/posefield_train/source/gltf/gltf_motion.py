@@ -11,7 +11,7 @@ from posefield.motion import quat
 from posefield_train.source.gltf import gltf_accessors, gltf_document, gltf_skeleton
 from posefield_train.source.gltf.gltf_document import Beside, GltfDocument
 from posefield_train.source.gltf.gltf_skeleton import GltfJoints
-from posefield_train.source.motion_files import key_times, posed_joints
+from posefield_train.source.motion_files import key_times, motion_file, posed_joints
 from posefield_train.source.motion_files.key_times import UnevenKeys
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_files.posed_joints import PosedJoints
@@ -47,6 +47,12 @@ def read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> M
     Raises MotionFileError for a file that is none, that has no skeleton, no animation or several
     without a name chosen, and for keys that are no frames.
     """
+    # pygltflib checks no types, so that wrong ones are found where they are used.
+    with motion_file.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
+        return _read(content, source, beside, options)
+
+
+def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> MotionFile:
     document = gltf_document.load(content, source, beside)
     name, animation = _chosen(document, options.animation)
     tracks = _tracks(document, animation)

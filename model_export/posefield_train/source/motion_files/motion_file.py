@@ -67,9 +67,9 @@ AS_STATED = ReadOptions()
 
 @contextmanager
 def naming_faults(source: str, *faults: type[Exception]) -> Iterator[None]:
-    """Raise the faults of a library as MotionFileError with the file's name."""
+    """Raise faults of values of wrong types as MotionFileError with the file's name."""
     try:
         yield
     except faults as fault:
-        said = " ".join(str(fault).split())[:200]
-        raise MotionFileError(source, f"cannot be read: {said}") from fault
+        said = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
+        raise MotionFileError(source, f"breaks its format: {said}") from fault
