@@ -149,7 +149,7 @@ def test_a_turned_and_scaled_armature_above_the_root_counts(read):
 
 
 def test_the_bind_pose_becomes_the_rest_pose_with_identity_rotations(read):
-    """A bone along its own y, as Blender writes them: the joint is turned, the bone points along x."""
+    """A bone along its own y, as Blender writes them: the joint is turned, the bone along x."""
     turn = [0, 0, -QUARTER, QUARTER]
     nodes = [
         {"name": "upper", "children": [1], "rotation": turn},

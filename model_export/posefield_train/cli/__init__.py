@@ -7,6 +7,7 @@ import typer
 from posefield.console.registration import MAKE, register
 from posefield_train.cli import (
     command_adapt,
+    command_convert,
     command_evaluate,
     command_fetch,
     command_probe,
@@ -17,6 +18,7 @@ from posefield_train.cli import (
 COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "probe": (command_probe.probe, command_probe.PROBE_EXAMPLES),
     "init": (command_probe.init, command_probe.INIT_EXAMPLES),
+    "convert": (command_convert.convert, command_convert.CONVERT_EXAMPLES),
     "fetch": (
         command_fetch.fetch,
         ["fetch cmu downloads -o motion", "fetch hdm05 downloads -o motion"],

@@ -87,9 +87,9 @@ def _read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> 
 
 def _chosen(document: GltfDocument, wanted: str | None) -> tuple[str, Any]:
     """Return the one animation, or that of a name."""
-    animations = document.parts.animations
+    animations = _of_skeletons(document)
     names = [own.name or f"animation_{index}" for index, own in enumerate(animations)]
-    if not animations:
+    if not document.parts.animations:
         raise document.error("found no animation, a skeleton or mesh without motion, expected one")
     listed = ", ".join(map(repr, names[:20]))
     if wanted is None and len(animations) > 1:
@@ -101,6 +101,19 @@ def _chosen(document: GltfDocument, wanted: str | None) -> tuple[str, Any]:
         raise document.error(f"found the animations {listed}, expected one {wanted!r}")
     index = 0 if wanted is None else names.index(wanted)
     return names[index], animations[index]
+
+
+def _of_skeletons(document: GltfDocument) -> list[Any]:
+    """Return the animations that move joints of skins, without skins those of several nodes.
+
+    All animations if there is none: Blender exports those of cameras and helpers alike.
+    """
+    joints = {node for skin in document.parts.skins for node in skin.joints}
+    found = []
+    for own in document.parts.animations:
+        moved = {channel.target.node for channel in own.channels}
+        found += [own] if moved & joints or (not joints and len(moved) > 1) else []
+    return found or document.parts.animations
 
 
 def _tracks(document: GltfDocument, animation: Any) -> Tracks:

@@ -1,0 +1,86 @@
+"""Command `posefield convert`: a motion file of any format to BVH."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField
+from posefield.common.units import UpAxis
+from posefield.console.arguments import Json
+from posefield.console.output import as_json
+
+CONVERT_EXAMPLES = [
+    "convert kick.fbx -o kick.bvh",
+    'convert pack.glb --animation "kick left" -o kick_left.bvh',
+]
+
+
+def convert(
+    file: Annotated[
+        Path,
+        typer.Argument(help="FBX, GLB, glTF, USD, AMC or BVH file", metavar="FILE"),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="output .bvh file")],
+    animation: Annotated[
+        str | None,
+        typer.Option(help="animation of a file that holds several, by name or USD path"),
+    ] = None,
+    unit: Annotated[
+        float | None,
+        typer.Option(
+            help="length of the file's unit in metres, for files that state none", metavar="METRES"
+        ),
+    ] = None,
+    up: Annotated[
+        UpAxis | None, typer.Option(help="up axis of the file, for files that state none")
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            help="frames a second: of AMC files, and to sample curves without even keys",
+            metavar="FPS",
+        ),
+    ] = None,
+    blender: Annotated[
+        Path | None,
+        typer.Option(
+            help="Blender, or a Python with the module bpy, for FBX files; default: blender on the "
+            "PATH"
+        ),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Convert a motion file to BVH, in centimetres with y up.
+
+    FBX files are read by an installed Blender, 4.2 or later.
+    """
+    from posefield_train.convert import converted_file
+    from posefield_train.convert.converted_file import Conventions
+    from posefield_train.source.motion_files.motion_file import ReadOptions
+
+    if output.suffix.lower() != ".bvh":
+        raise InvalidField("output", f"{output.name!r}, expected a name that ends in .bvh")
+    for name, value in (("unit", unit), ("rate", rate)):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InvalidField(name, f"{value}, expected a positive number")
+    said = Conventions(unit, up, ReadOptions(rate, animation), blender)
+    found = converted_file.convert(file, said)
+    atomic_files.write(found.content, output)
+    facts = {
+        "file": str(output),
+        "frames": len(found.clip),
+        "fps": found.clip.rate,
+        "joints": len(found.clip.skeleton),
+        "notes": list(found.notes),
+    }
+    if json:
+        typer.echo(as_json(facts))
+        return
+    for note in found.notes:
+        typer.echo(f"note: {note}")
+    typer.echo(
+        f"{output}: {len(found.clip)} frames at {found.clip.rate:g} a second, "
+        f"{len(found.clip.skeleton)} joints, in centimetres with y up"
+    )

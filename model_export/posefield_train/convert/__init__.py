@@ -1,0 +1,1 @@
+"""Conversion of motion files to BVH, of FBX files through an installed Blender."""
