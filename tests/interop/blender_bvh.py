@@ -19,7 +19,7 @@ FURTHEST = 1e-4
 
 def faults(python: Path) -> list[str]:
     """Differences of a clip in Blender, with and without its scale; the latter must differ."""
-    answer = _plain_names(cases.answers_by_hand()[1][1])
+    answer = plain_names(cases.answers_by_hand()[1][1])
     with tempfile.TemporaryDirectory() as name:
         joints, places, rate = _read(python, answer, Path(name))
     clip = answer.clip
@@ -35,7 +35,7 @@ def faults(python: Path) -> list[str]:
     return []
 
 
-def _plain_names(answer: ClipAnswer) -> ClipAnswer:
+def plain_names(answer: ClipAnswer) -> ClipAnswer:
     """Return the clip with names that Blender keeps as they are."""
     own = answer.clip.skeleton
     names = tuple(f"joint{number}" for number in range(len(own)))

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import addon
 import blender_bvh
+import blender_motion
 import cache
 import cases
 import container
@@ -89,7 +90,7 @@ def main() -> int:
     print("\n".join(faults) or f"no fault in {exports.CLIPS} exported files")
     wrong = _report(rows)
     others = blender_bvh.faults(python) + lint.faults(node) + container.faults() + cache.faults()
-    others += slow_clients.faults()
+    others += blender_motion.faults(python) + slow_clients.faults()
     others += faces.faults(python, node)
     others += engines.faults(*environment.node()) + page.faults(node) + addon.faults()
     others += godot.faults()

@@ -213,6 +213,14 @@ def two_roots(made):
     usd_files.skeleton(made, "/Root/Skel", joints=["upper", "lower"])
 
 
+def misordered(made):
+    usd_files.skeleton(made, "/Root/Skel", joints=["upper/lower", "upper"])
+
+
+def few_transforms(made):
+    usd_files.skeleton(made, "/Root/Skel", rest=usd_files.REST[:1], bind=usd_files.REST[:1])
+
+
 def growing(made):
     sizes = np.ones((FRAMES, 2, 3)) * (1.0 + 0.01 * CODES)[:, None, None]
     usd_files.animation(made, "/Root/Anim", CODES, swing(), sizes=sizes)
@@ -243,6 +251,8 @@ def dropped(made):
         (no_animation, "the skeleton /Root/Skel without a SkelAnimation"),
         (second_skeleton, r"2 skeletons \(/Root/Skel, /Two/Skel\).*export each character alone"),
         (two_roots, "the root joints upper, lower, expected one"),
+        (misordered, "is not valid: Joint 0 has mis-ordered parent 1"),
+        (few_transforms, "is not valid: its transforms are not one for each joint|restTransforms"),
         (growing, "'upper' has scales from 1 to 1.12"),
         (mirrored, "skews or mirrors"),
         (missing, "refers to what cannot be read.*none.usda"),

@@ -119,11 +119,20 @@ def _chosen(opened: SkelStage, wanted: str | None) -> SkelMotion:
     prim = (bound or skeletons)[0]
     query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(prim))
     if not query:
-        raise opened.error(f"skeleton {prim.GetPath()} is not valid, expected it below a SkelRoot")
+        raise opened.error(f"skeleton {prim.GetPath()} is not valid: {_invalid(prim)}")
     own = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
     if not own:
         raise opened.error(f"{animation.GetPath()} names no joints, expected those of a skeleton")
     return SkelMotion(opened.source, prim, query, own)
+
+
+def _invalid(skeleton: Any) -> str:
+    """Return why a skeleton has no query."""
+    joints = UsdSkel.Skeleton(skeleton).GetJointsAttr().Get()
+    if not joints:
+        return "it names no joints"
+    valid, reason = UsdSkel.Topology(joints).Validate()
+    return "its transforms are not one for each joint" if valid else reason
 
 
 def _animation(opened: SkelStage, animations: list[Any], wanted: str | None) -> Any:
