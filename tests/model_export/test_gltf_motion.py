@@ -280,7 +280,7 @@ def test_a_constant_scale_is_baked_into_the_bones(read):
     assert np.abs(places(found)[:, 1] - 2.0 * hand()).max() < 1e-5
 
 
-def read_or_refused(read, content, name):
+def assert_read_or_refused(read, content, name):
     """Read a file; any other error than one that names the file is raised."""
     try:
         found = read(content, name)
@@ -295,7 +295,7 @@ def test_a_damaged_file_is_refused_or_read_but_never_crashes(read, seed):
     rng = np.random.default_rng(seed)
     for place in rng.integers(0, len(content), 4):
         content[place] = rng.integers(0, 256)
-    read_or_refused(read, bytes(content), "a.glb")
+    assert_read_or_refused(read, bytes(content), "a.glb")
 
 
 @pytest.mark.parametrize("seed", range(120))
@@ -303,7 +303,7 @@ def test_wrong_values_of_any_key_are_refused_or_read(read, seed):
     facts = json.loads(edited().text())
     owner, key = _any_place(facts, np.random.default_rng(seed))
     owner[key] = [None, -1, 99, 1.5, "x", [], {}, True][seed % 8]
-    read_or_refused(read, json.dumps(facts).encode(), "a.gltf")
+    assert_read_or_refused(read, json.dumps(facts).encode(), "a.gltf")
 
 
 def _any_place(facts, rng):

@@ -1,5 +1,6 @@
 """Command `posefield convert`: a motion file of any format to BVH."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -10,6 +11,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import UpAxis
 from posefield.console.arguments import Json
 from posefield.console.output import as_json
+from posefield.console.question_options import with_option_groups
 
 CONVERT_EXAMPLES = [
     "convert kick.fbx -o kick.bvh",
@@ -17,39 +19,49 @@ CONVERT_EXAMPLES = [
 ]
 
 
-def convert(
+@dataclass(frozen=True)
+class SourceArguments:
+    """The file, and its conventions where it does not state them."""
+
     file: Annotated[
         Path,
-        typer.Argument(help="FBX, GLB, glTF, USD, AMC or BVH file", metavar="FILE"),
-    ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="output .bvh file")],
+        typer.Argument(
+            help="FBX, GLB, glTF, USD, AMC or BVH file", metavar="FILE", show_default=False
+        ),
+    ]
     animation: Annotated[
         str | None,
         typer.Option(help="animation of a file that holds several, by name or USD path"),
-    ] = None,
+    ] = None
     unit: Annotated[
         float | None,
         typer.Option(
             help="length of the file's unit in metres, for files that state none", metavar="METRES"
         ),
-    ] = None,
+    ] = None
     up: Annotated[
         UpAxis | None, typer.Option(help="up axis of the file, for files that state none")
-    ] = None,
+    ] = None
     rate: Annotated[
         float | None,
         typer.Option(
             help="frames a second: of AMC files, and to sample curves without even keys",
             metavar="FPS",
         ),
-    ] = None,
+    ] = None
     blender: Annotated[
         Path | None,
         typer.Option(
             help="Blender, or a Python with the module bpy, for FBX files; default: blender on the "
             "PATH"
         ),
-    ] = None,
+    ] = None
+
+
+@with_option_groups
+def convert(
+    source: SourceArguments,
+    output: Annotated[Path, typer.Option("--output", "-o", help="output .bvh file")],
     json: Json = False,
 ) -> None:
     """Convert a motion file to BVH, in centimetres with y up.
@@ -62,11 +74,12 @@ def convert(
 
     if output.suffix.lower() != ".bvh":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .bvh")
-    for name, value in (("unit", unit), ("rate", rate)):
+    for name, value in (("unit", source.unit), ("rate", source.rate)):
         if value is not None and not 0.0 < value < float("inf"):
             raise InvalidField(name, f"{value}, expected a positive number")
-    said = Conventions(unit, up, ReadOptions(rate, animation), blender)
-    found = converted_file.convert(file, said)
+    options = ReadOptions(source.rate, source.animation)
+    said = Conventions(source.unit, source.up, options, source.blender)
+    found = converted_file.convert(source.file, said)
     atomic_files.write(found.content, output)
     facts = {
         "file": str(output),

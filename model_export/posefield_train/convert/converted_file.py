@@ -24,7 +24,7 @@ ROUNDING = 1e-5
 
 @dataclass(frozen=True)
 class Conventions:
-    """What a user says of a file; None for what the file states or what is not needed.
+    """Conventions of a file as a user gives them; None for those that the file states.
 
     metres_per_unit, up: of the file. options: rate and animation. blender: program for FBX files.
     """

@@ -77,6 +77,10 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     curves = curve_files.reader(recipe.curves, rows) if recipe.curves else None
     # Converted once for all rows: a long file may have hundreds.
     wholes = {motion: clip_of_file(file, recipe.source) for motion, file in files.items()}
+    notes = [*shipped_recipes.table_notes(rows[0].table), *clip_notes.reader_notes(files)]
+    if recipe.source.root_offset is None:
+        notes += clip_notes.offset_notes(files)
+    files.clear()
     cuts = [_cut(recipe, _whole_clip(recipe, wholes, curves, row), row) for row in rows]
     clip_joints.expect_same_skeleton(rows, [clip for clip, _ in cuts])
     rigged = _normalize_rigs(recipe, rows, [clip for clip, _ in cuts])
@@ -88,9 +92,6 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     clip_landmarks.expect_same_order(
         recipe.landmark_names, rows, [own.landmarks for own in examples]
     )
-    notes = [*shipped_recipes.table_notes(rows[0].table), *clip_notes.reader_notes(files)]
-    if recipe.source.root_offset is None:
-        notes += clip_notes.offset_notes(files)
     notes += [*rigged.notes, *clip_notes.stretch_notes(rows, [own.stretch for own in found])]
     takes, said = _takes(rows, found)
     examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]

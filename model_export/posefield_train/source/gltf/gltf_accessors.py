@@ -18,8 +18,8 @@ COMPONENTS: dict[int, npt.DTypeLike] = {
 }
 """Types of numbers by their code, little endian."""
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-MAX_NUMBERS = 100_000_000
-"""Limit of an accessor's numbers: 1 million frames of 25 joints."""
+MAX_NUMBERS = 20_000_000
+"""Limit of an accessor's numbers: 11 hours of a joint's rotations at 120 frames a second."""
 
 
 def numbers(document: GltfDocument, index: int, kind: str) -> Floats:

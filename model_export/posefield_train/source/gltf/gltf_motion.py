@@ -18,6 +18,8 @@ from posefield_train.source.motion_files.posed_joints import PosedJoints
 
 MAX_POSES = 10_000_000
 """Limit of frames times joints, as for BVH."""
+MAX_KEYS = 2 * MAX_POSES
+"""Limit of all keys of an animation; an accessor without a buffer takes no bytes of the file."""
 KINDS = {"rotation": "VEC4", "translation": "VEC3", "scale": "VEC3"}
 SAME_TIME = 1e-5
 """Largest difference of keys, s, that are of one frame: float32 holds 100 s to 8e-6."""
@@ -119,6 +121,7 @@ def _of_skeletons(document: GltfDocument) -> list[Any]:
 def _tracks(document: GltfDocument, animation: Any) -> Tracks:
     """Return the curves of rotations, translations and scales of an animation."""
     found: Tracks = {}
+    keys = 0
     for channel in animation.channels:
         node, part = channel.target.node, channel.target.path
         if node is None or part not in KINDS:
@@ -128,6 +131,9 @@ def _tracks(document: GltfDocument, animation: Any) -> Tracks:
         if not 0 <= channel.sampler < len(animation.samplers):
             raise document.error(f"names sampler {channel.sampler}, expected one of its own")
         found[node, part] = _track(document, animation.samplers[channel.sampler], part)
+        keys += len(found[node, part].times)
+        if keys > MAX_KEYS:
+            raise document.error(f"found {keys} keys or more, expected at most {MAX_KEYS}")
     return found
 
 
