@@ -14,7 +14,7 @@ from posefield.motion.clip import Clip
 from posefield_train.probe import probe_report, recipe_draft
 from posefield_train.sample import noise_free
 from posefield_train.source import bvh, clip_table, recipe, table_cells
-from posefield_train.source.rigs import joint_recognition
+from posefield_train.roles import joint_recognition
 
 POINT = {"stature": 1.75, "hip_height": 0.94, "turn": 10.0, "target_height": 1.1}
 UNITS = {"metres": 1.0, "centimetres": 0.01, "inches": 0.0254, "ASF units": 0.0564444}

@@ -6,8 +6,8 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import skeleton
+from posefield_train.roles import joint_recognition
 from posefield_train.source.motion_files.motion_file import MotionFile
-from posefield_train.source.rigs import joint_recognition
 
 MAX_FRAMES = 200
 """Frames of a file that are measured, spread evenly."""
