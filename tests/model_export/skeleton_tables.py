@@ -10,7 +10,7 @@ CHOICE = re.compile(r"\{([^,}]*),([^}]*)\}")
 
 @dataclass(frozen=True)
 class NamedSkeleton:
-    """A skeleton of a naming convention; expected: role by joint, "?" for one that is not scored."""
+    """A skeleton of a naming convention. expected: role by joint, "?" for one not scored."""
 
     convention: str
     names: tuple[str, ...]
@@ -35,8 +35,7 @@ def read(name):
     """Return the skeletons of a table by convention."""
     parts = re.split(r"(?m)^\[(.+)\]$", (FOLDER / f"{name}.txt").read_text())
     return {
-        title: skeleton(title, text)
-        for title, text in zip(parts[1::2], parts[2::2], strict=True)
+        title: skeleton(title, text) for title, text in zip(parts[1::2], parts[2::2], strict=True)
     }
 
 

@@ -14,7 +14,6 @@ from posefield.motion.clip import Clip
 from posefield_train.probe import probe_report, recipe_draft
 from posefield_train.sample import noise_free
 from posefield_train.source import bvh, clip_table, recipe, table_cells
-from posefield_train.roles import joint_recognition
 
 POINT = {"stature": 1.75, "hip_height": 0.94, "turn": 10.0, "target_height": 1.1}
 UNITS = {"metres": 1.0, "centimetres": 0.01, "inches": 0.0254, "ASF units": 0.0564444}
@@ -165,30 +164,34 @@ def test_files_of_other_skeletons_are_told(clip, written):
     assert said.startswith("1 of 3 files have other joints, such as ") and "LeftPaw" in said
 
 
-SKELETONS = {
-    "HumanIK": ["Hips", "Spine", "Neck", "LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase"],
-    "Mixamo": [f"mixamorig:{n}" for n in ("Hips", "Spine", "Neck", "LeftUpLeg", "LeftLeg")],
-    "ASF": ["root", "lowerback", "lowerneck", "lfemur", "ltibia", "lfoot", "ltoes"],
-    "Bandai": ["Hips", "Spine", "Neck", "UpperLeg_L", "LowerLeg_L", "Foot_L", "Toes_L"],
-    "Unreal": ["pelvis", "spine_01", "neck_01", "thigh_l", "calf_l", "foot_l", "ball_l"],
-    "Biped": [f"Bip01 {n}" for n in ("Pelvis", "Spine", "Neck", "L Thigh", "L Calf", "L Foot")],
-}
-WANTED = ("hips", "spine", "neck", "leftUpperLeg", "leftLowerLeg", "leftFoot", "leftToes")
+def swapped_sides(text):
+    """A BVH file's text with left and right exchanged in the names."""
+    return text.replace("Left", "?").replace("Right", "Left").replace("?", "Right")
 
 
-@pytest.mark.parametrize("tool", SKELETONS)
-def test_joints_are_recognised_by_the_names_of_a_tool(tool):
-    names = SKELETONS[tool]
-    parents = [-1, 0, 1, 0, *range(3, len(names) - 1)]
-    found = joint_recognition.roles_of(names, parents)
-    expected = dict(zip(WANTED, names, strict=False))
-    if tool == "Unreal":
-        del expected["neck"], expected["spine"]
-    assert found == expected
-
-
-def test_names_without_a_meaning_have_no_role():
-    assert joint_recognition.roles_of(["a", "lever", "rail"], [-1, 0, 0]) == {}
+def test_roles_that_the_body_contradicts_are_asked(posefield, clip, written, tmp_path):
+    sure = probe_report.probe([written(clip)])
+    assert sure.asked == {} and sure.roles["leftHand"] == "LeftHand"
+    path = tmp_path / "swapped.bvh"
+    path.write_text(swapped_sides(written(clip).read_text()))
+    report = probe_report.probe([path])
+    assert "leftFoot" in report.asked and "leftFoot" not in report.roles
+    assert report.roles["hips"] == "Hips"
+    lines = posefield("probe", path)[1].splitlines()
+    reason = "the joints named left lie on the right of the feet"
+    assert f"role to confirm: leftFoot = LeftFoot (confidence 0.50: {reason})" in lines
+    said = json.loads(posefield("probe", path, "--json")[1])
+    assert said["role_confidence"]["leftFoot"] == {
+        "joint": "LeftFoot",
+        "confidence": 0.5,
+        "reasons": [reason],
+    }
+    draft = recipe_draft.recipe_text(report, "x", None).splitlines()
+    assert (
+        '# leftFoot = "LeftFoot"' in draft
+        and f"# TODO confirm (confidence 0.50: {reason})" in draft
+    )
+    assert 'hips = "Hips"' in draft
 
 
 # --- the commands ---------------------------------------------------------------------------------

@@ -6,7 +6,8 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import skeleton
-from posefield_train.roles import joint_recognition
+from posefield_train.roles import body_shape, joint_recognition
+from posefield_train.roles.joint_recognition import RoleGuess
 from posefield_train.source.motion_files.motion_file import MotionFile
 
 MAX_FRAMES = 200
@@ -17,13 +18,13 @@ MAX_FRAMES = 200
 class Figure:
     """A file's figure.
 
-    roles: joints by role. positions: of the joints (F, J, 3), in some of the frames. bones: length
-    (J,) of the bone that leads to each joint. turns: rotations (F, 4) of the root. moves: whether
-    position channels of each joint (J,) change.
+    guesses: joints by role, with confidence. positions: of the joints (F, J, 3), in some of the
+    frames. bones: length (J,) of the bone that leads to each joint. turns: rotations (F, 4) of the
+    root. moves: whether position channels of each joint (J,) change.
     """
 
     file: MotionFile
-    roles: dict[str, str]
+    guesses: dict[str, RoleGuess]
     positions: Floats
     bones: Floats
     turns: Floats
@@ -33,6 +34,16 @@ class Figure:
     def names(self) -> list[str]:
         """Return the names of the joints."""
         return list(self.file.skeleton.names)
+
+    @property
+    def roles(self) -> dict[str, str]:
+        """Return the joint of each role that seems right, however surely."""
+        return {role: guess.joint for role, guess in self.guesses.items()}
+
+    @property
+    def sure_roles(self) -> dict[str, str]:
+        """Return the joint of each role that needs no confirmation."""
+        return joint_recognition.sure_roles(self.guesses)
 
     def role(self, role: str) -> Floats | None:
         """Return the positions (F, 3) of the joint with a role, or None."""
@@ -72,11 +83,13 @@ def measure(file: MotionFile) -> Figure:
     rotations, translations, joints = file.rotations, file.translations, file.skeleton
     picked = np.linspace(0, len(file) - 1, min(len(file), MAX_FRAMES)).round()
     frames = np.unique(picked.astype(int))
+    positions = skeleton.positions(joints.parents, rotations[frames], translations[frames])
+    guesses = joint_recognition.recognise(joints.names, joints.parents)
     moves = np.ptp(translations, axis=0).max(axis=-1) > 0.0
     return Figure(
         file,
-        joint_recognition.roles_of(joints.names, joints.parents),
-        skeleton.positions(joints.parents, rotations[frames], translations[frames]),
+        body_shape.check_shape(guesses, joints.names, positions),
+        positions,
         np.linalg.norm(np.median(translations, axis=0), axis=-1),
         rotations[frames, 0],
         tuple(moves.tolist()),

@@ -9,6 +9,8 @@ from typing import Any
 from posefield_train.probe import figure, proposals
 from posefield_train.probe.figure import Figure
 from posefield_train.probe.proposals import Proposal
+from posefield_train.roles import joint_recognition
+from posefield_train.roles.joint_recognition import RoleGuess
 from posefield_train.source import motion_readers
 
 LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))
@@ -32,13 +34,26 @@ class FileFacts:
 
 @dataclass(frozen=True)
 class ProbeReport:
-    """Findings about motion files. joints: those of most files. proposed: by name."""
+    """Findings about motion files.
+
+    joints: those of most files. guesses: joints by role with confidence. proposed: by name.
+    """
 
     files: tuple[FileFacts, ...]
     joints: tuple[str, ...]
-    roles: dict[str, str]
+    guesses: dict[str, RoleGuess]
     proposed: dict[str, Proposal]
     warnings: tuple[str, ...]
+
+    @property
+    def roles(self) -> dict[str, str]:
+        """Return the joint of each role that needs no confirmation."""
+        return joint_recognition.sure_roles(self.guesses)
+
+    @property
+    def asked(self) -> dict[str, RoleGuess]:
+        """Return the guesses that have to be confirmed in the recipe, by role."""
+        return {role: guess for role, guess in self.guesses.items() if not guess.is_sure}
 
     def facts(self) -> dict[str, Any]:
         """Return the report as JSON values."""
@@ -55,6 +70,14 @@ class ProbeReport:
             ],
             "joints": list(self.joints),
             "roles": self.roles,
+            "role_confidence": {
+                role: {
+                    "joint": guess.joint,
+                    "confidence": guess.confidence,
+                    "reasons": guess.reasons,
+                }
+                for role, guess in self.guesses.items()
+            },
             "proposed": {name: found.facts() for name, found in self.proposed.items()},
             "warnings": list(self.warnings),
         }
@@ -85,7 +108,7 @@ def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None)
         "facing": proposals.propose_facing(usual, up.value),
         "licence": LICENCE,
     }
-    return ProbeReport(files, common, usual[0].roles, proposed, tuple(_warnings(figures, usual)))
+    return ProbeReport(files, common, usual[0].guesses, proposed, tuple(_warnings(figures, usual)))
 
 
 def _propose_rate(figures: Sequence[Figure]) -> Proposal:
@@ -144,6 +167,7 @@ def text(report: ProbeReport) -> str:
         f"joints ({len(report.joints)}): {joints}"
         f"{more if len(report.joints) > SHOWN_JOINTS else ''}",
         f"roles by name: {_roles(report) or 'none recognised'}",
+        *_asked_roles(report),
     ]
     return "\n".join([*lines, *summary(report, with_evidence=True)])
 
@@ -158,7 +182,19 @@ def summary(report: ProbeReport, with_evidence: bool = False) -> list[str]:
 
 
 def _roles(report: ProbeReport) -> str:
-    return ", ".join(f"{role} = {joint}" for role, joint in report.roles.items())
+    sure = {role: guess for role, guess in report.guesses.items() if guess.is_sure}
+    return ", ".join(
+        f"{role} = {guess.joint} ({guess.confidence:.2f})" for role, guess in sure.items()
+    )
+
+
+def _asked_roles(report: ProbeReport) -> list[str]:
+    """Return a line for each role that has to be confirmed."""
+    return [
+        f"role to confirm: {role} = {guess.joint} (confidence {guess.confidence:.2f}: "
+        f"{'; '.join(guess.reasons)})"
+        for role, guess in report.asked.items()
+    ]
 
 
 def _value(name: str, found: Proposal) -> str:

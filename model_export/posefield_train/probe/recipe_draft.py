@@ -225,7 +225,12 @@ def _event(report: ProbeReport, table: ClipTable | None) -> list[str]:
 
 
 def _roles(report: ProbeReport) -> list[str]:
-    if not report.roles:
+    if not report.guesses:
         return ["# No joints were recognised by their names: [roles] tells other tools who is who."]
     lines = [f"{role} = {_quote(joint)}" for role, joint in report.roles.items()]
+    for role, guess in report.asked.items():
+        lines += [
+            f"# TODO confirm (confidence {guess.confidence:.2f}: {'; '.join(guess.reasons)})",
+            f"# {role} = {_quote(guess.joint)}",
+        ]
     return ["# By the joints' names; check them, or delete the table.", "[roles]", *lines, ""]

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from posefield.motion.joint_roles import ROLES
 from posefield_train.roles.joint_words import joint_words
 from posefield_train.roles.limb_alignment import ARM, LEG, LimbJoint, align_limb
 from posefield_train.roles.trunk_roles import Tree, trunk_roles
@@ -49,7 +50,7 @@ def sure_roles(guesses: Mapping[str, RoleGuess]) -> dict[str, str]:
 
 
 def recognise(names: Sequence[str], parents: Sequence[int]) -> dict[str, RoleGuess]:
-    """Return the joints that seem to have a role, by role, trunk first.
+    """Return the joints that seem to have a role, by role, in the order of ROLES.
 
     names, parents: of the joints; the parent of the root is -1. Joints of a limb have their role by
     words and order, those of the trunk by the place of the limbs.
@@ -64,7 +65,7 @@ def recognise(names: Sequence[str], parents: Sequence[int]) -> dict[str, RoleGue
     ]
     trunk = trunk_roles(tree, legs, arms)
     guesses = {role: _guess(names, one) for role, one in (trunk | limbs).items()}
-    return {role: _compared(role, guess, limbs, tree) for role, guess in guesses.items()}
+    return {role: _compared(role, guesses[role], limbs, tree) for role in ROLES if role in guesses}
 
 
 def _limbs(tree: Tree, side: str) -> dict[str, LimbJoint]:
@@ -84,9 +85,7 @@ def _guess(names: Sequence[str], one: LimbJoint) -> RoleGuess:
     return RoleGuess(names[one.joint], one.confidence, reasons)
 
 
-def _compared(
-    role: str, guess: RoleGuess, limbs: Mapping[str, LimbJoint], tree: Tree
-) -> RoleGuess:
+def _compared(role: str, guess: RoleGuess, limbs: Mapping[str, LimbJoint], tree: Tree) -> RoleGuess:
     """Return the guess with the confidence that the other side leaves it."""
     if role not in limbs:
         return guess

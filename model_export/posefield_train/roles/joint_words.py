@@ -11,8 +11,7 @@ SIDES = {
     **dict.fromkeys(("right", "r", "rt", "rgt"), "right"),
 }
 SIDE_WORD = re.compile(r"^(left|right)(.+)$|^(.+)(left|right)$")
-MIDDLE = frozenset({"c", "m", "x", "mid", "center", "centre"})
-"""Marks of joints on neither side, as the first or the last word of a name."""
+REMARK = re.compile(r"\[.*?\]|\(.*?\)")
 BEFORE = ("upper", "up", "lower", "low", "fore")
 """Words that stand before the limb, whichever order a name has."""
 HELPERS = frozenset(
@@ -32,20 +31,23 @@ PREFIX_SHARE = 0.6
 LIMB_WORDS: dict[str, dict[str, float]] = {
     "Shoulder": {
         **dict.fromkeys(("clavicle", "collar", "collarbone"), 1.0),
-        **{"scapula": 0.9, "shoulder": 0.8, "shldr": 0.6},
+        "scapula": 0.9,
+        "shoulder": 0.8,
+        "shldr": 0.6,
     },
     "UpperArm": {
         **dict.fromkeys(("upperarm", "uparm", "uarm", "humerus"), 1.0),
-        **{"arm": 0.9, "shoulder": 0.7, "shldr": 0.75},
+        "arm": 0.9,
+        "shoulder": 0.7,
+        "shldr": 0.75,
     },
-    "LowerArm": dict.fromkeys(
-        ("lowerarm", "lowarm", "forearm", "farm", "radius", "elbow"), 1.0
-    ),
+    "LowerArm": dict.fromkeys(("lowerarm", "lowarm", "forearm", "farm", "radius", "elbow"), 1.0),
     "Hand": {"hand": 1.0, "wrist": 0.8, "palm": 0.8},
     "Fingers": {"hand": 0.2, "palm": 0.2},
     "UpperLeg": {
         **dict.fromkeys(("upperleg", "upleg", "uleg", "thigh", "femur"), 1.0),
-        **{"hip": 0.7, "leg": 0.5},
+        "hip": 0.7,
+        "leg": 0.5,
     },
     "LowerLeg": {
         **dict.fromkeys(("lowerleg", "lowleg", "calf", "shin", "tibia", "knee"), 1.0),
@@ -58,7 +60,9 @@ LIMB_WORDS: dict[str, dict[str, float]] = {
 
 Fingers are no role: they tell whether a joint before them is the hand.
 """
-KNOWN = frozenset(word for words in LIMB_WORDS.values() for word in words)
+HIPS = frozenset({"hips", "hip", "pelvis"})
+TRUNK_WORDS = HIPS | {"neck", "head", "chest", "spine", "thorax", "ribcage", "root"}
+KNOWN = TRUNK_WORDS | {word for words in LIMB_WORDS.values() for word in words}
 LONGEST_NAME = 60
 """Letters of a name that are looked at."""
 
@@ -84,31 +88,45 @@ class JointWord:
             return 0.0
         if self.is_digit:
             return 0.3 if role == "Fingers" else 0.0
+        if (role, self.key) == ("Toes", "foot") and not self.is_exact:
+            return 0.0
         return LIMB_WORDS[role].get(self.key, 0.0) * (1.0 if self.is_exact else 0.85)
 
 
 def joint_words(names: Sequence[str]) -> tuple[JointWord, ...]:
-    """Return the meaning of each name; words with which most names begin are left out."""
+    """Return the meaning of each name; words with which most names begin or end are left out."""
     split = [_tokens(name) for name in names]
-    while (first := _common_first(split)) is not None:
-        split = [words[1:] if words[:1] == [first] else words for words in split]
+    for end in (0, -1):
+        while (word := _common(split, end)) is not None:
+            split = [_without(words, word, end) for words in split]
     return tuple(_word(words) for words in split)
 
 
+def _without(words: list[str], word: str, end: int) -> list[str]:
+    """Return words without a word at one end, 0 or -1, if it stands there and others remain."""
+    if len(words) < 2 or words[end] != word:
+        return words
+    return words[1:] if end == 0 else words[:-1]
+
+
 def _tokens(name: str) -> list[str]:
-    """Return the words of a name in small letters, without numbers and name space."""
-    bare = name.rpartition(":")[2][-LONGEST_NAME:]
+    """Return the words of a name in small letters, without numbers, name space and remarks.
+
+    Single letters count where they tell the side.
+    """
+    whole = name.rpartition(":")[2][-LONGEST_NAME:]
+    bare = REMARK.sub("", whole) or whole
     found: list[str] = []
     for token in TOKEN.findall(bare):
         word = token.lower()
         parts = SIDE_WORD.match(word)
         found += [part for part in parts.groups() if part] if parts else [word]
-    return [word for word in found if not word.isdigit()]
+    return [word for word in found if word in SIDES or (len(word) > 1 and not word.isdigit())]
 
 
-def _common_first(split: Sequence[Sequence[str]]) -> str | None:
-    """Return the word of a tool with which most names begin; None without one."""
-    counts = Counter(words[0] for words in split if len(words) > 1)
+def _common(split: Sequence[Sequence[str]], end: int) -> str | None:
+    """Return the word of a tool with which most names begin (0) or end (-1); None without one."""
+    counts = Counter(words[end] for words in split if len(words) > 1)
     for word, count in counts.most_common(1):
         is_meaning = word in SIDES or word in KNOWN or word in BEFORE or word in DIGITS
         if count >= PREFIX_SHARE * len(split) and len(split) > 2 and not is_meaning:
@@ -118,9 +136,6 @@ def _common_first(split: Sequence[Sequence[str]]) -> str | None:
 
 def _word(words: Sequence[str]) -> JointWord:
     side, rest = _take_side(list(words))
-    if rest and len(rest) > 1:
-        rest = rest[1:] if rest[0] in MIDDLE else rest
-        rest = rest[:-1] if rest[-1] in MIDDLE and len(rest) > 1 else rest
     is_helper = not HELPERS.isdisjoint(rest)
     is_digit = not DIGITS.isdisjoint(rest)
     rest = sorted(rest, key=lambda word: word not in BEFORE)

@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from posefield_train.roles.joint_words import JointWord
+from posefield_train.roles.joint_words import HIPS, JointWord
 from posefield_train.roles.limb_alignment import LimbJoint
 
-HIPS = frozenset({"hips", "hip", "pelvis"})
 ROOTS = frozenset({"root", "spinebase"})
 CHESTS = frozenset({"chest", "thorax", "ribcage", "ribs", "rib"})
 NAMED, BY_TREE, ONE_OF_MANY, UNCLEAR = 1.0, 0.85, 0.8, 0.6
@@ -40,16 +39,19 @@ class Tree:
         return shared
 
     def first(self, keys: frozenset[str]) -> int | None:
-        """Return the first joint on no side with one of the names; None without one."""
-        for joint, word in enumerate(self.words):
-            if not word.side and not word.is_helper and word.key in keys:
-                return joint
-        return None
+        """Return the first joint on no side with one of the names; None without one.
+
+        A name of other words too counts if no name is exact.
+        """
+        found = [
+            joint
+            for joint, word in enumerate(self.words)
+            if not (word.side or word.is_helper or word.is_digit) and word.key in keys
+        ]
+        return min(found, key=lambda joint: not self.words[joint].is_exact, default=None)
 
 
-def trunk_roles(
-    tree: Tree, upper_legs: Sequence[int], arms: Sequence[int]
-) -> dict[str, LimbJoint]:
+def trunk_roles(tree: Tree, upper_legs: Sequence[int], arms: Sequence[int]) -> dict[str, LimbJoint]:
     """Return the joints of the trunk by role.
 
     upper_legs, arms: the first joints of the legs and of the arms; fewer than two of each tell
@@ -90,7 +92,8 @@ def _unnamed_neck(tree: Tree, chest: int) -> tuple[int | None, int | None]:
         following = [
             joint
             for joint, parent in enumerate(tree.parents)
-            if parent == chain[-1] and tree.words[joint].key == tree.words[chest].key
+            if parent == chain[-1]
+            and tree.words[joint].key == tree.words[chest].key
             and not tree.words[joint].side
         ]
         if len(following) != 1:
@@ -111,17 +114,23 @@ def _hips(tree: Tree, upper_legs: Sequence[int], top: int | None) -> LimbJoint |
     for joint in reversed(tree.path(parting)):
         if tree.words[joint].key in HIPS and not tree.words[joint].side:
             return LimbJoint(joint, NAMED)
-    if tree.words[parting].key in ROOTS:
+    below = tree.words[tree.common(upper_legs)]
+    if below.key in HIPS and not below.side:
+        return LimbJoint(parting, UNCLEAR)
+    if tree.words[parting].key in ROOTS and tree.words[parting].is_exact:
         return LimbJoint(parting, NAMED)
+    between = [
+        joint
+        for leg in upper_legs
+        for joint in tree.path(leg)[:-1]
+        if joint != parting and parting in tree.path(joint)
+    ]
     # Between the parting and a leg only joints of the leg's side may stand.
-    between = [j for leg in upper_legs for j in tree.path(leg) if j > parting and j not in upper_legs]
-    sides = [tree.words[joint].side for joint in between if parting in tree.path(joint)]
-    return LimbJoint(parting, BY_TREE if all(sides) and top is not None else UNCLEAR)
+    is_clear = all(tree.words[joint].side for joint in between) and top is not None
+    return LimbJoint(parting, BY_TREE if is_clear else UNCLEAR)
 
 
-def _spine(
-    tree: Tree, hips: LimbJoint, top: int | None, last: int | None
-) -> dict[str, LimbJoint]:
+def _spine(tree: Tree, hips: LimbJoint, top: int | None, last: int | None) -> dict[str, LimbJoint]:
     """Return spine, chest and upperChest: joints between the hips and the top, or up to `last`."""
     if top is None or hips.joint not in tree.path(top):
         return {}

@@ -5,11 +5,11 @@ import pytest
 
 from posefield.common.errors import FileError
 from posefield.motion import foot_skate
+from posefield_train.roles import joint_recognition
 from posefield_train.sample import sample_files
 from posefield_train.sample.figures import hand_grip, quadruped_walk
 from posefield_train.source import ingest, recipe
 from posefield_train.source.canonical import placement
-from posefield_train.roles import joint_recognition
 from posefield_train.source.rigs import facing
 
 PAWS = [quadruped_walk.NAMES.index(paw) for paw in quadruped_walk.PAWS]

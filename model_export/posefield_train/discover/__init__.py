@@ -1,0 +1,1 @@
+"""Clips found in long takes: strides, and motions like an example."""

@@ -1,0 +1,87 @@
+"""Strides of walks and runs: from a left foot most forward to the next.
+
+The distance of the feet along the heading of the hips swings once a stride. Its extrema are the
+cuts, so that a stride begins and ends in the same pose.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield_train.discover.take_reading import Take
+
+SMOOTHING = 0.1
+"""Duration of the moving mean, s."""
+HYSTERESIS, LEAST = 0.25, 0.08
+"""Least swing between two extrema, and least distance of the feet at one, leg lengths."""
+SHORTEST, LONGEST = 0.5, 2.6
+"""Durations of a stride, s."""
+EARLIEST, LATEST = 0.25, 0.75
+"""Share of a stride within which the right foot is most forward."""
+
+
+@dataclass(frozen=True)
+class Stride:
+    """Frames of a stride; both show the left foot most forward."""
+
+    first: int
+    last: int
+
+
+def find_strides(take: Take) -> list[Stride]:
+    """Return the strides of a take, in order; two in a row share a frame."""
+    signal = feet_distance(take)
+    found = []
+    for (first, kind), (middle, _), (last, _) in _triples(alternating_extrema(signal)):
+        share = (middle - first) / (last - first)
+        is_far = min(signal[first], -signal[middle], signal[last]) > LEAST
+        lasts = SHORTEST <= (last - first) / take.rate <= LONGEST
+        if kind > 0 and is_far and lasts and EARLIEST <= share <= LATEST:
+            found.append(Stride(first, last))
+    return found
+
+
+def feet_distance(take: Take) -> Floats:
+    """Return the distance (F,) by which the left foot is before the right, leg lengths, smooth."""
+    angles = take.headings()
+    across = take.across("Foot")
+    ahead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
+    return moving_mean(ahead, round(SMOOTHING * take.rate))
+
+
+def moving_mean(values: Floats, frames: int) -> Floats:
+    """Return the mean (F,) of a window of an odd number of frames; the ends are held."""
+    half = max(frames, 1) // 2
+    padded = np.concatenate([[0.0], np.cumsum(np.pad(values, half, mode="edge"))])
+    return np.asarray((padded[2 * half + 1 :] - padded[: -2 * half - 1]) / (2 * half + 1))
+
+
+def alternating_extrema(values: Floats) -> list[tuple[int, int]]:
+    """Return the extrema of a signal (F,): index and sign, 1 of a maximum, -1 of a minimum.
+
+    An extremum counts once the signal left it by HYSTERESIS; then the search for the opposite one
+    begins. The first and the last frame are no extrema.
+    """
+    found: list[tuple[int, int]] = []
+    low = high = 0
+    sign = 0
+    for at, value in enumerate(values):
+        high = at if value > values[high] else high
+        low = at if value < values[low] else low
+        if sign >= 0 and value < values[high] - HYSTERESIS:
+            found += [(high, 1)] if high > 0 else []
+            sign, low = -1, at
+        elif sign <= 0 and value > values[low] + HYSTERESIS:
+            found += [(low, -1)] if low > 0 else []
+            sign, high = 1, at
+    return found
+
+
+def _triples(
+    extrema: list[tuple[int, int]],
+) -> Iterator[tuple[tuple[int, int], tuple[int, int], tuple[int, int]]]:
+    for (first, second), (_, third) in pairwise(pairwise(extrema)):
+        yield first, second, third
