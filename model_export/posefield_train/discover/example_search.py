@@ -1,0 +1,97 @@
+"""Search for motions like an example: a ranked list of clips of all takes."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield_train.discover import subsequence_dtw
+from posefield_train.discover.motion_features import SEARCH_RATE, Corpus
+
+GAP = 2
+"""Frames between two takes, so that no match leads from one to the next."""
+LARGEST_OVERLAP = 0.2
+"""Largest share of the shorter of two clips that they may have in common."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Part of a take. take: index. start, end: s."""
+
+    take: int
+    start: float
+    end: float
+
+    def overlap(self, other: "Span") -> float:
+        """Return the common time as a share of the shorter one."""
+        if self.take != other.take:
+            return 0.0
+        common = min(self.end, other.end) - max(self.start, other.start)
+        return max(common, 0.0) / min(self.end - self.start, other.end - other.start)
+
+
+@dataclass(frozen=True)
+class Match:
+    """A clip like the example. cost: distance as a share of that of any clip of the takes."""
+
+    span: Span
+    cost: float
+
+
+def find_like(corpus: Corpus, example: Span, most: int) -> list[Match]:
+    """Return the clips that are most like an example, the best first, without the example.
+
+    Clips overlap neither the example nor each other by more than LARGEST_OVERLAP. Costs are
+    relative to the median over all places where a clip may end.
+    """
+    first, last = round(example.start * SEARCH_RATE), round(example.end * SEARCH_RATE)
+    query = corpus.features[example.take][first : last + 1]
+    joined, owners, offsets = _joined(corpus.features)
+    ends = subsequence_dtw.match_ends(_distances(query, joined))
+    usual = float(np.median(ends.costs[np.isfinite(ends.costs)]))
+    kept = [example]
+    found: list[Match] = []
+    for end in _by_cost(ends.costs):
+        if len(found) == most:
+            break
+        take = int(owners[end])
+        start, stop = ((frame - offsets[take]) / SEARCH_RATE for frame in (ends.starts[end], end))
+        span = Span(take, float(start), float(stop))
+        if all(span.overlap(other) <= LARGEST_OVERLAP for other in kept):
+            kept.append(span)
+            found.append(Match(span, float(ends.costs[end]) / usual))
+    return found
+
+
+def _by_cost(costs: Floats) -> Iterator[int]:
+    """Yield the frames with a finite cost, the lowest first."""
+    for end in np.argsort(costs, kind="stable"):
+        if not np.isfinite(costs[end]):
+            return
+        yield int(end)
+
+
+def _joined(features: Sequence[Floats]) -> tuple[Floats, Floats, list[int]]:
+    """Return the features of all takes (F, k) with gaps, each frame's take, and each take's begin.
+
+    Gaps are NaN, and of take -1.
+    """
+    pieces, owners, offsets, count = [], [], [], 0
+    for take, own in enumerate(features):
+        offsets.append(count)
+        pieces += [own, np.full((GAP, own.shape[1]), np.nan)]
+        owners += [np.full(len(own), take), np.full(GAP, -1)]
+        count += len(own) + GAP
+    return np.concatenate(pieces), np.concatenate(owners), offsets
+
+
+def _distances(query: Floats, joined: Floats) -> Floats:
+    """Return the distances (L, F) of the frames of a query; inf in gaps."""
+    known = np.nan_to_num(joined)
+    square = (
+        np.sum(np.square(query), axis=1)[:, None]
+        + np.sum(np.square(known), axis=1)
+        - 2.0 * query @ known.T
+    )
+    return np.where(np.isnan(joined[:, 0]), np.inf, np.sqrt(np.maximum(square, 0.0)))

@@ -1,0 +1,56 @@
+"""Subsequence dynamic time warping: where in a corpus a short motion is found.
+
+Steps advance by (1, 1), (1, 2) or (2, 1) frames of query and corpus, so that a match lasts half as
+long as the query to twice as long (Müller, Information Retrieval for Music and Motion, 2007,
+section 4.4). No step stays in a frame of the query, so that a row depends on earlier rows only.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posefield.common.units import Floats
+
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Best match for each last frame of the corpus.
+
+    costs (F,): mean distance over the frames of the query; inf without a match. starts (F,): first
+    frame of the match.
+    """
+
+    costs: Floats
+    starts: Indices
+
+
+def match_ends(distances: Floats) -> Ends:
+    """Return the best match that ends at each frame of the corpus.
+
+    distances (L, F): of the query's frames from the corpus's; inf at frames between two takes.
+    """
+    length, frames = distances.shape
+    starts = np.arange(frames)
+    rows = [(distances[0], starts)]
+    for at in range(1, length):
+        own = distances[at]
+        choices = [_before(rows[-1], 1, own), _before(rows[-1], 2, own)]
+        if at > 1:
+            choices.append(_before(rows[-2], 1, own + distances[at - 1]))
+        costs = np.stack([cost for cost, _ in choices])
+        best = np.argmin(costs, axis=0)
+        columns = np.arange(frames)
+        origin = np.stack([start for _, start in choices])[best, columns]
+        rows = [rows[-1], (costs[best, columns], origin)]
+    costs, starts = rows[-1]
+    return Ends(costs / length, starts)
+
+
+def _before(row: tuple[Floats, Indices], step: int, added: Floats) -> tuple[Floats, Indices]:
+    """Return costs and starts of a row, `step` frames of the corpus later, with a cost added."""
+    costs, starts = np.full(len(added), np.inf), np.zeros(len(added), dtype=np.int64)
+    costs[step:], starts[step:] = row[0][:-step], row[1][:-step]
+    return costs + added, starts
