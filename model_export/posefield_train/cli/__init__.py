@@ -1,4 +1,4 @@
-"""Training commands: `probe`, `init`, `fetch`, `sample`, `train`, `adapt`, `evaluate`."""
+"""Training commands: `probe`, `init`, `discover`, `fetch`, `sample`, `train` and others."""
 
 from collections.abc import Callable
 
@@ -8,6 +8,7 @@ from posefield.console.registration import MAKE, register
 from posefield_train.cli import (
     command_adapt,
     command_convert,
+    command_discover,
     command_evaluate,
     command_fetch,
     command_probe,
@@ -19,6 +20,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "probe": (command_probe.probe, command_probe.PROBE_EXAMPLES),
     "init": (command_probe.init, command_probe.INIT_EXAMPLES),
     "convert": (command_convert.convert, command_convert.CONVERT_EXAMPLES),
+    "discover": (command_discover.discover, command_discover.EXAMPLES),
     "fetch": (
         command_fetch.fetch,
         ["fetch cmu downloads -o motion", "fetch hdm05 downloads -o motion"],

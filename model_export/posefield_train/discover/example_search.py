@@ -48,7 +48,7 @@ def find_like(corpus: Corpus, example: Span, most: int) -> list[Match]:
     first, last = round(example.start * SEARCH_RATE), round(example.end * SEARCH_RATE)
     query = corpus.features[example.take][first : last + 1]
     joined, owners, offsets = _joined(corpus.features)
-    ends = subsequence_dtw.match_ends(_distances(query, joined))
+    ends = subsequence_dtw.match_ends(subsequence_dtw.distances(query, joined))
     usual = float(np.median(ends.costs[np.isfinite(ends.costs)]))
     kept = [example]
     found: list[Match] = []
@@ -84,14 +84,3 @@ def _joined(features: Sequence[Floats]) -> tuple[Floats, Floats, list[int]]:
         owners += [np.full(len(own), take), np.full(GAP, -1)]
         count += len(own) + GAP
     return np.concatenate(pieces), np.concatenate(owners), offsets
-
-
-def _distances(query: Floats, joined: Floats) -> Floats:
-    """Return the distances (L, F) of the frames of a query; inf in gaps."""
-    known = np.nan_to_num(joined)
-    square = (
-        np.sum(np.square(query), axis=1)[:, None]
-        + np.sum(np.square(known), axis=1)
-        - 2.0 * query @ known.T
-    )
-    return np.where(np.isnan(joined[:, 0]), np.inf, np.sqrt(np.maximum(square, 0.0)))

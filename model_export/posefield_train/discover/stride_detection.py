@@ -21,18 +21,32 @@ SHORTEST, LONGEST = 0.5, 2.6
 """Durations of a stride, s."""
 EARLIEST, LATEST = 0.25, 0.75
 """Share of a stride within which the right foot is most forward."""
+LEAST_TRAVEL = 0.4
+"""Least way of the hips as a share of the swing of the feet."""
+WAY_STEP = 0.1
+"""Time between two places of which the way of the hips is measured, s."""
 
 
 @dataclass(frozen=True)
 class Stride:
-    """Frames of a stride; both show the left foot most forward."""
+    """Frames of a stride; both show the left foot most forward.
+
+    travel: way of the hips as a share of the swing of the feet, half of it where feet that stand
+    carry the body.
+    """
 
     first: int
     last: int
+    travel: float
+
+    @property
+    def travels(self) -> bool:
+        """Return whether the body goes on; a kick or a step in place swings the feet too."""
+        return self.travel >= LEAST_TRAVEL
 
 
 def find_strides(take: Take) -> list[Stride]:
-    """Return the strides of a take, in order; two in a row share a frame."""
+    """Return the strides of a take, in order, those in place too; two in a row share a frame."""
     signal = feet_distance(take)
     found = []
     for (first, kind), (middle, _), (last, _) in _triples(alternating_extrema(signal)):
@@ -40,8 +54,16 @@ def find_strides(take: Take) -> list[Stride]:
         is_far = min(signal[first], -signal[middle], signal[last]) > LEAST
         lasts = SHORTEST <= (last - first) / take.rate <= LONGEST
         if kind > 0 and is_far and lasts and EARLIEST <= share <= LATEST:
-            found.append(Stride(first, last))
+            swing = signal[first] + signal[last] - 2.0 * signal[middle]
+            found.append(Stride(first, last, _way(take, first, last) / swing))
     return found
+
+
+def _way(take: Take, first: int, last: int) -> float:
+    """Return the horizontal way of the hips between two frames, leg lengths."""
+    step = max(1, round(WAY_STEP * take.rate))
+    places = take.places["hips"][first : last + 1 : step, [0, 2]]
+    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
 
 
 def feet_distance(take: Take) -> Floats:

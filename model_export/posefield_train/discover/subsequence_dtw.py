@@ -27,19 +27,33 @@ class Ends:
     starts: Indices
 
 
-def match_ends(distances: Floats) -> Ends:
+def distances(query: Floats, corpus: Floats) -> Floats:
+    """Return the distances (L, F) of features (L, k) of a query from those (F, k) of a corpus.
+
+    A frame of the corpus whose features are NaN stands between two takes; its distance is inf.
+    """
+    known = np.nan_to_num(corpus)
+    square = (
+        np.sum(np.square(query), axis=1)[:, None]
+        + np.sum(np.square(known), axis=1)
+        - 2.0 * query @ known.T
+    )
+    return np.where(np.isnan(corpus[:, 0]), np.inf, np.sqrt(np.maximum(square, 0.0)))
+
+
+def match_ends(apart: Floats) -> Ends:
     """Return the best match that ends at each frame of the corpus.
 
-    distances (L, F): of the query's frames from the corpus's; inf at frames between two takes.
+    apart (L, F): distances of the query's frames from the corpus's; inf between two takes.
     """
-    length, frames = distances.shape
+    length, frames = apart.shape
     starts = np.arange(frames)
-    rows = [(distances[0], starts)]
+    rows = [(apart[0], starts)]
     for at in range(1, length):
-        own = distances[at]
+        own = apart[at]
         choices = [_before(rows[-1], 1, own), _before(rows[-1], 2, own)]
         if at > 1:
-            choices.append(_before(rows[-2], 1, own + distances[at - 1]))
+            choices.append(_before(rows[-2], 1, own + apart[at - 1]))
         costs = np.stack([cost for cost, _ in choices])
         best = np.argmin(costs, axis=0)
         columns = np.arange(frames)

@@ -1,7 +1,7 @@
 """Long takes of a folder: joints with a role, in leg lengths, with Y up."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +10,26 @@ from posefield.common.errors import BvhError, FileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
 from posefield_train.probe import figure, proposals
+from posefield_train.roles.joint_recognition import RoleGuess
 from posefield_train.source import bvh
 from posefield_train.source.bvh import bvh_conversion
 
-
 LEG = ("UpperLeg", "LowerLeg", "Foot")
+SEARCHED = frozenset(
+    {"hips", "neck", "head"}
+    | {
+        side + role
+        for side in ("left", "right")
+        for role in (*LEG, "Toes", "UpperArm", "LowerArm", "Hand")
+    }
+)
+"""Roles whose places are kept."""
 NEEDED = ("hips", *(side + role for side in ("left", "right") for role in LEG))
 """Roles without which a take cannot be searched."""
+MOST_FRAMES = 5_000_000
+"""Frames of all takes together, which take 2 GB: eleven hours at 120 frames a second."""
+MOST_FIGURES = 50
+"""Bodies of one kind that tell the up axis."""
 
 
 @dataclass(frozen=True)
@@ -56,26 +69,42 @@ class ReadTakes:
     refused: dict[str, str]
 
 
+@dataclass(frozen=True)
+class Stated:
+    """Statements about all files. up: axis; None for that which each body tells. roles: joints by
+    role, which count more than those that are recognised.
+    """
+
+    up: UpAxis | None = None
+    roles: Mapping[str, str] = field(default_factory=dict)
+
+
 def read_takes(
-    folder: Path, up: UpAxis | None = None, report: Callable[[int], None] = lambda _: None
+    folder: Path, stated: Stated | None = None, report: Callable[[int], None] = lambda _: None
 ) -> ReadTakes:
     """Return the takes of all BVH files below a folder.
 
-    up: axis of all files; None for that which each file's body tells. report: called with the
-    number of files that are read. A file that cannot be read or searched is refused with its
-    reason; FileError if none is left.
+    report: called with the number of files that are read. A file that cannot be read or searched is
+    refused with its reason; FileError if none is left.
     """
     if not folder.is_dir():
         raise FileError(folder, "not a folder, expected one with BVH files")
-    takes, refused = [], dict[str, str]()
+    bodies, refused, frames = [], dict[str, str](), 0
     files = motion_files(folder)
     for count, path in enumerate(files, 1):
         name = path.relative_to(folder).as_posix()
         try:
-            takes.append(_take(name, bvh.read(path), up))
+            bodies.append(_body(name, bvh.read(path), stated or Stated()))
+            frames += len(bodies[-1].take)
         except (BvhError, UnusableTake) as fault:
             refused[name] = str(fault)
+        if frames > MOST_FRAMES:
+            raise FileError(
+                folder,
+                f"found more than {MOST_FRAMES} frames, expected a smaller part of the files",
+            )
         report(count)
+    takes = _turned(bodies, None if stated is None else stated.up, refused)
     if not takes:
         first = next(iter(refused.items()), None)
         said = f"such as {first[0]}: {first[1]}" if first else "it has no BVH files"
@@ -92,12 +121,24 @@ class UnusableTake(ValueError):
     """A take that is read, but cannot be searched."""
 
 
-def _take(name: str, file: bvh.BvhFile, up: UpAxis | None) -> Take:
-    measured = figure.measure(file)
+@dataclass(frozen=True)
+class Body:
+    """A take before its up axis is known. joints: names of all, which bodies of one kind share.
+    figure: its measurements, without the frames of the file.
+    """
+
+    take: Take
+    joints: tuple[str, ...]
+    figure: figure.Figure
+
+
+def _body(name: str, file: bvh.BvhFile, stated: Stated) -> Body:
+    measured = _with_roles(figure.measure(file), stated.roles)
     lacking = _lacking(measured)
     if lacking:
-        raise UnusableTake(f"no joint for {', '.join(lacking)}, expected a body with two legs")
-    axis = up or _up(measured)
+        raise UnusableTake(
+            f"no joint for {', '.join(lacking)}, expected a body with two legs; roles can be stated"
+        )
     leg = measured.leg_length()
     if not leg:
         raise UnusableTake("the legs have no length, expected bones from hip to foot")
@@ -106,10 +147,47 @@ def _take(name: str, file: bvh.BvhFile, up: UpAxis | None) -> Take:
     positions = skeleton.positions(parents, rotations, translations)
     index = {joint.name: at for at, joint in enumerate(file.joints)}
     places = {
-        role: bvh_conversion.to_y_up(positions[:, index[joint]], axis) / leg
+        role: positions[:, index[joint]] / leg
         for role, joint in measured.sure_roles.items()
+        if role in SEARCHED
     }
-    return Take(name, file.rate, places)
+    light = replace(measured, file=replace(file, values=file.values[:1]))
+    return Body(Take(name, file.rate, places), tuple(measured.names), light)
+
+
+def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> list[Take]:
+    """Return the takes with Y up, which those of one kind of body have in common.
+
+    Takes whose up axis is unclear are added to those that were refused.
+    """
+    axes: dict[tuple[str, ...], UpAxis | None] = {}
+    reasons: dict[tuple[str, ...], str] = {}
+    found = []
+    for body in bodies:
+        if body.joints not in axes:
+            alike = [other.figure for other in bodies if other.joints == body.joints]
+            proposal = proposals.propose_up(alike[:MOST_FIGURES])
+            clear = proposal.confidence != "low"
+            axes[body.joints] = up or (proposal.value if clear else None)
+            reasons[body.joints] = "; ".join(proposal.evidence)
+        axis = axes[body.joints]
+        if axis is None:
+            said = f"its up axis is unclear ({reasons[body.joints]}): say it with --up"
+            refused[body.take.file] = said
+            continue
+        places = {r: bvh_conversion.to_y_up(own, axis) for r, own in body.take.places.items()}
+        found.append(replace(body.take, places=places))
+    return found
+
+
+def _with_roles(measured: figure.Figure, roles: Mapping[str, str]) -> figure.Figure:
+    """Return the figure with stated roles in place of those that were recognised."""
+    unknown = sorted(set(roles.values()) - set(measured.names))
+    if unknown:
+        raise UnusableTake(f"no joint {', '.join(map(repr, unknown))}, which the roles name")
+    certain = {role: RoleGuess(joint, 1.0) for role, joint in roles.items()}
+    others = {r: g for r, g in measured.guesses.items() if g.joint not in roles.values()}
+    return replace(measured, guesses=others | certain)
 
 
 def _lacking(measured: figure.Figure) -> list[str]:
@@ -122,13 +200,3 @@ def _lacking(measured: figure.Figure) -> list[str]:
         elif not guess.is_sure:
             found.append(f"{role} ({guess.joint}? {'; '.join(guess.reasons)})")
     return found
-
-
-def _up(measured: figure.Figure) -> UpAxis:
-    proposal = proposals.propose_up([measured])
-    if proposal.value is None or proposal.confidence == "low":
-        evidence = "; ".join(proposal.evidence)
-        raise UnusableTake(f"its up axis is unclear ({evidence}): say it with --up")
-    axis: UpAxis = proposal.value
-    return axis
-

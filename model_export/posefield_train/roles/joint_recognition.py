@@ -79,7 +79,7 @@ def _limbs(tree: Tree, side: str) -> dict[str, LimbJoint]:
 
 
 def _guess(names: Sequence[str], one: LimbJoint) -> RoleGuess:
-    reasons = ()
+    reasons: tuple[str, ...] = ()
     if one.confidence < LOWEST_CONFIDENCE:
         reasons = ("other joints fit as well, or the tree contradicts the name",)
     return RoleGuess(names[one.joint], one.confidence, reasons)

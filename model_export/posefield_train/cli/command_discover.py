@@ -1,0 +1,121 @@
+"""Command `posefield discover`: clips found in long takes."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posefield.common import atomic_files
+from posefield.common.errors import InvalidField
+from posefield.common.units import UpAxis
+from posefield.console.arguments import Json
+from posefield.console.output import as_json
+from posefield.console.question_options import with_option_groups
+from posefield_train.cli.output_files import MAX_NOTES
+
+if TYPE_CHECKING:
+    from posefield_train.discover.take_reading import ReadTakes
+
+EXAMPLES = [
+    "discover takes --strides -o takes/strides.csv",
+    "discover takes --like day1/bd_0.bvh:12.1-14.6 --name grab -o takes/grab.csv",
+]
+
+
+@dataclass(frozen=True)
+class SearchOptions:
+    """Motions to find: strides, or those like an example."""
+
+    strides: Annotated[bool, typer.Option("--strides", help="find strides of walks and runs")] = (
+        False
+    )
+    like: Annotated[
+        str | None,
+        typer.Option(
+            help="find motions like this part of a take: its file below the folder, and seconds",
+            metavar="FILE:START-END",
+        ),
+    ] = None
+    name: Annotated[str, typer.Option(help="name of the motions that are like the example")] = (
+        "found"
+    )
+    most: Annotated[
+        int, typer.Option(help="largest number of motions like the example", min=1, max=10_000)
+    ] = 50
+
+
+@dataclass(frozen=True)
+class StatementOptions:
+    """Statements about the files, where their bodies do not tell them."""
+
+    up: Annotated[
+        UpAxis | None, typer.Option(help="up axis of all files; default: by each file's body")
+    ] = None
+    roles: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file with a table [roles], such as a recipe: joints that the names do not "
+            "tell",
+            metavar="FILE",
+        ),
+    ] = None
+
+
+@with_option_groups
+def discover(
+    folder: Annotated[
+        Path, typer.Argument(help="folder with BVH files, in any subfolders", metavar="FOLDER")
+    ],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="table to write, CSV; best in the folder")
+    ],
+    search: SearchOptions,
+    stated: StatementOptions,
+    json: Json = False,
+) -> None:
+    """Find clips in long takes, and write a table of them for a recipe.
+
+    Each row has `accepted` false until a person changes it: a recipe takes the accepted rows with
+    [clips.where] accepted = { among = ["true"] }. Files that cannot be searched are named with the
+    reason.
+    """
+    from posefield_train.discover import found_clips
+
+    if output.suffix != ".csv":
+        raise InvalidField("output", f"{output.name!r}, expected a name that ends in .csv")
+    if search.strides == (search.like is not None):
+        raise InvalidField("strides", "expected either --strides or --like FILE:START-END")
+    read = _read(folder, stated)
+    in_place = 0
+    if search.like is None:
+        found, in_place = found_clips.strides(read.takes)
+    else:
+        found = found_clips.like(read.takes, search.like, search.name, search.most)
+    atomic_files.write(found_clips.table(found), output)
+    if json:
+        facts = {"table": str(output), "clips": len(found), "takes": len(read.takes)}
+        typer.echo(as_json({**facts, "in_place": in_place, "refused": read.refused}))
+        return
+    if in_place:
+        typer.echo(f"left out: {in_place} swings of the legs that do not travel", err=True)
+    kind = "strides" if search.like is None else f"{search.name}, the example first"
+    typer.echo(
+        f"{output}: {len(found)} clips ({kind}) of {len(read.takes)} takes; set accepted to true "
+        "in the rows to train from"
+    )
+
+
+def _read(folder: Path, stated: StatementOptions) -> "ReadTakes":
+    """Return the takes of a folder; files that were refused are named on standard error."""
+    from posefield.console.progress import ProgressBar
+    from posefield_train.discover import found_clips, take_reading
+
+    roles = {} if stated.roles is None else found_clips.read_roles(stated.roles)
+    with ProgressBar("files", len(take_reading.motion_files(folder))) as bar:
+        read = take_reading.read_takes(folder, take_reading.Stated(stated.up, roles), bar.update)
+    for file, reason in list(read.refused.items())[:MAX_NOTES]:
+        typer.echo(f"left out: {file}: {reason}", err=True)
+    if len(read.refused) > MAX_NOTES:
+        typer.echo(f"left out: {len(read.refused) - MAX_NOTES} further files: see --json", err=True)
+    return read

@@ -1,0 +1,240 @@
+"""Tests of `posefield discover`: tables for recipes, what is refused, and reruns."""
+
+import csv
+import json
+
+import discover_takes
+import numpy as np
+import pytest
+
+from posefield.common.errors import RecipeError
+from posefield.motion import bvh_writer
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield_train.source import clip_table, recipe
+
+WALK = {"speed": 1.0, "swing": 0.6, "period": 1.2}
+NAMES = {
+    "hips": "Hips",
+    "neck": "Neck",
+    "head": "Head",
+    **{
+        side + role: side.title() + name
+        for side in ("left", "right")
+        for role, name in (
+            ("UpperLeg", "UpLeg"),
+            ("LowerLeg", "Leg"),
+            ("Foot", "Foot"),
+            ("Toes", "ToeBase"),
+            ("UpperArm", "Arm"),
+            ("LowerArm", "ForeArm"),
+            ("Hand", "Hand"),
+        )
+    },
+}
+PARENTS = {"neck": "hips", "head": "neck"} | {
+    side + role: side + parent if parent not in ("hips", "neck") else parent
+    for side in ("left", "right")
+    for role, parent in (
+        ("UpperLeg", "hips"),
+        ("LowerLeg", "UpperLeg"),
+        ("Foot", "LowerLeg"),
+        ("Toes", "Foot"),
+        ("UpperArm", "neck"),
+        ("LowerArm", "UpperArm"),
+        ("Hand", "LowerArm"),
+    )
+}
+
+
+def clip_of(take):
+    """A clip whose joints move by translation alone, so that their places are the take's."""
+    roles = list(take.places)
+    order = ["hips", *(role for role in roles if role != "hips")]
+    parents = (-1, *(order.index(PARENTS[role]) for role in order[1:]))
+    places = np.stack([take.places[role] for role in order], axis=1)
+    local = places.copy()
+    local[:, 1:] -= places[:, parents[1:]]
+    tips = tuple(sorted(set(range(len(order))) - set(parents)))
+    joints = Skeleton(
+        tuple(NAMES[role] for role in order), parents, local[0], tips, np.full((len(tips), 3), 0.01)
+    )
+    turns = np.zeros((len(places), len(order), 4))
+    turns[..., 0] = 1.0
+    return Clip(joints, turns, local, take.rate)
+
+
+def write(path, take):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(bvh_writer.dumps(clip_of(take), metres_per_unit=1.0))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder of two takes, one of them in a subfolder, and a broken file."""
+    write(tmp_path / "takes/a.bvh", discover_takes.take("a", 6.0, **WALK))
+    write(tmp_path / "takes/day2/b.bvh", discover_takes.take("b", 4.0, heading=1.0, **WALK))
+    (tmp_path / "takes/broken.bvh").write_text("HIERARCHY\nROOT a {")
+    return tmp_path / "takes"
+
+
+def rows(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_strides_of_a_folder_become_a_table(posefield, folder):
+    code, out, err = posefield("discover", folder, "--strides", "-o", folder / "strides.csv")
+    assert code == 0 and "5 clips (strides) of 2 takes" in out
+    assert "left out: broken.bvh: " in err
+    found = rows(folder / "strides.csv")
+    assert [(row["file"], row["first_frame"], row["last_frame"]) for row in found] == [
+        *(("a.bvh", str(at), str(at + 72)) for at in (72, 144, 216)),
+        *(("day2/b.bvh", str(at), str(at + 72)) for at in (72, 144)),
+    ]
+    assert {(row["name"], row["seconds"], row["accepted"]) for row in found} == {
+        ("stride", "1.200", "false")
+    }
+
+
+def test_the_same_takes_give_the_same_bytes(posefield, folder):
+    words = ("--like", "a.bvh:1.2-2.4", "--name", "step")
+    for name in ("one.csv", "two.csv"):
+        assert posefield("discover", folder, *words, "-o", folder / name)[0] == 0
+    assert (folder / "one.csv").read_bytes() == (folder / "two.csv").read_bytes()
+
+
+def test_the_example_comes_first_and_is_accepted(posefield, folder):
+    words = ("--like", "a.bvh:1.2-2.4", "--name", "step", "--most", "3", "--json")
+    code, out, _ = posefield("discover", folder, *words, "-o", folder / "step.csv")
+    facts = json.loads(out)
+    assert code == 0 and (facts["clips"], facts["takes"]) == (4, 2)
+    assert list(facts["refused"]) == ["broken.bvh"]
+    found = rows(folder / "step.csv")
+    assert [row["accepted"] for row in found] == ["true", "false", "false", "false"]
+    assert (found[0]["file"], found[0]["first_frame"], found[0]["last_frame"]) == (
+        "a.bvh",
+        "72",
+        "144",
+    )
+    costs = [float(row["cost"]) for row in found]
+    assert costs == sorted(costs) and {row["name"] for row in found} == {"step"}
+    # A step of the same walk lies a whole number of strides from the example.
+    assert int(found[1]["last_frame"]) % 72 in (*range(7), *range(66, 72))
+
+
+RECIPE = """
+schema = 1
+name = "walk"
+description = "d"
+licence = "l"
+[source]
+metres_per_unit = 1.0
+up = "y"
+[clips]
+table = "strides.csv"
+file = "file"
+first_frame = "first_frame"
+last_frame = "last_frame"
+where = { accepted = { among = ["true"] } }
+[[controls]]
+name = "speed"
+auto = { quantity = "speed" }
+description = "Mean speed"
+[motion]
+frames = 60
+cyclic = true
+root = "travelling"
+[size]
+rms_budget_cm = 1.0
+"""
+
+
+def test_a_recipe_takes_the_rows_that_a_person_accepted(posefield, folder):
+    table = folder / "strides.csv"
+    posefield("discover", folder, "--strides", "-o", table)
+    (folder / "walk.toml").write_text(RECIPE)
+    own = recipe.read(folder / "walk.toml")
+    with pytest.raises(RecipeError, match="none of 5 rows meets the conditions"):
+        clip_table.read(own, folder)
+    lines = table.read_text().splitlines()
+    lines[2] = lines[2].replace("false", "true")
+    table.write_text("\n".join(lines) + "\n")
+    (row,) = clip_table.read(own, folder)
+    assert (row.first_frame, row.last_frame) == (144, 216)
+
+
+def test_swings_in_place_are_counted_and_left_out(posefield, tmp_path):
+    write(tmp_path / "a.bvh", discover_takes.take("a", 6.0, **(WALK | {"speed": 0.0})))
+    code, out, err = posefield("discover", tmp_path, "--strides", "-o", tmp_path / "s.csv")
+    assert code == 0 and "0 clips" in out
+    assert "left out: 3 swings of the legs that do not travel" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ((), "expected either --strides or --like FILE:START-END"),
+        (("--strides", "--like", "a.bvh:1-2"), "expected either --strides or --like"),
+        (("--like", "a.bvh"), "expected FILE:START-END in seconds"),
+        (("--like", "c.bvh:1-2"), "file 'c.bvh', expected a take of the folder, such as a.bvh"),
+        (("--like", "a.bvh:5-7"), "5 to 7 s, expected 0.3 s or more between 0 and 6.00 s"),
+        (("--like", "a.bvh:2-1"), "2 to 1 s, expected 0.3 s or more"),
+    ],
+)
+def test_searches_that_are_none_are_refused(posefield, folder, words, said):
+    code, out, err = posefield("discover", folder, *words, "-o", folder / "x.csv")
+    assert (code, out) == (2, "") and said in err
+    assert not (folder / "x.csv").exists()
+
+
+def test_the_output_is_a_table(posefield, folder):
+    code, _, err = posefield("discover", folder, "--strides", "-o", folder / "x.txt")
+    assert code == 2 and "expected a name that ends in .csv" in err
+
+
+def test_a_folder_without_takes_is_refused(posefield, tmp_path):
+    words = ("--strides", "-o", tmp_path / "x.csv")
+    code, _, err = posefield("discover", tmp_path, *words)
+    assert code == 3 and "no take that can be searched; it has no BVH files" in err
+    assert posefield("discover", tmp_path / "none", *words)[0] == 3
+    (tmp_path / "broken.bvh").write_text("HIERARCHY")
+    code, _, err = posefield("discover", tmp_path, *words)
+    assert code == 3 and "such as broken.bvh: " in err
+
+
+@pytest.fixture
+def odd(tmp_path):
+    """A folder with a take whose hips and feet have names that no tool gives."""
+    path = tmp_path / "a.bvh"
+    write(path, discover_takes.take("a", 6.0, **WALK))
+    text = path.read_text().replace("LeftFoot", "LeftHoof").replace("RightFoot", "RightHoof")
+    path.write_text(text)
+    return tmp_path
+
+
+def test_roles_that_names_do_not_tell_are_asked_and_can_be_stated(posefield, odd):
+    words = ("--strides", "-o", odd / "x.csv")
+    code, _, err = posefield("discover", odd, *words)
+    assert code == 3 and "no joint for leftFoot, rightFoot" in err
+    (odd / "roles.toml").write_text('[roles]\nleftFoot = "LeftHoof"\nrightFoot = "RightHoof"\n')
+    code, out, _ = posefield("discover", odd, *words, "--roles", odd / "roles.toml")
+    assert code == 0 and "of 1 takes" in out and len(rows(odd / "x.csv")) >= 3
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("x = 1", "no table [roles] of joints by role"),
+        ("[roles]\nleftFoot = 3", "no table [roles] of joints by role"),
+        ("[roles", "not TOML"),
+        ('[roles]\nleftPaw = "a"', "unknown roles ['leftPaw'], expected some of hips, spine"),
+        ('[roles]\nleftFoot = "a"\nrightFoot = "a"', "a joint with two roles, expected one each"),
+        ('[roles]\nleftFoot = "a"', "no joint 'a', which the roles name"),
+    ],
+)
+def test_roles_that_cannot_be_are_refused(posefield, odd, text, said):
+    (odd / "roles.toml").write_text(text)
+    words = ("--strides", "-o", odd / "x.csv", "--roles", odd / "roles.toml")
+    code, _, err = posefield("discover", odd, *words)
+    assert code == 3 and said in err

@@ -1,0 +1,150 @@
+"""Tests of the search for motions like an example."""
+
+import discover_takes
+import numpy as np
+import pytest
+
+from posefield_train.discover import example_search, motion_features, subsequence_dtw
+from posefield_train.discover.example_search import Span
+from posefield_train.discover.take_reading import Take
+
+PLANTED = ((0, 4.0, 2.0), (0, 12.0, 1.6), (1, 5.0, 2.4), (1, 15.0, 2.0), (2, 9.0, 1.8))
+"""Take, begin and duration, s, of a raised hand in takes of other movements."""
+
+
+def waving(seed, raises):
+    """Movements (F, 3) of a hand over 20 s: slow noise, and raises at (begin, duration)."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(round(20.0 * discover_takes.RATE) + 1) / discover_takes.RATE
+    found = np.zeros((len(times), 3))
+    for axis in range(3):
+        knots = rng.normal(0.0, 0.08, 21)
+        found[:, axis] = np.interp(times, np.arange(21.0), knots)
+    for begin, duration in raises:
+        share = np.clip((times - begin) / duration, 0.0, 1.0)
+        found[:, 1] += 0.8 * np.sin(np.pi * share) ** 2
+        found[:, 2] += 0.3 * np.sin(2.0 * np.pi * share)
+    return found
+
+
+@pytest.fixture(scope="module")
+def corpus():
+    """Three takes that go to different places and face elsewhere, with planted motions."""
+    takes = []
+    for index in range(3):
+        raises = [(begin, duration) for take, begin, duration in PLANTED if take == index]
+        hands = waving(index, raises)
+        takes.append(
+            discover_takes.take(f"{index}.bvh", 20.0, hands=hands, heading=2.0 * index, speed=0.1)
+        )
+    return motion_features.build_corpus(takes)
+
+
+@pytest.mark.parametrize("query", range(len(PLANTED)))
+def test_planted_motions_come_first(corpus, query):
+    take, begin, duration = PLANTED[query]
+    found = example_search.find_like(corpus, Span(take, begin, begin + duration), 8)
+    expected = {one for one in PLANTED if one != PLANTED[query]}
+    best = [match.span for match in found[:4]]
+    for other, start, seconds in expected:
+        wanted = Span(other, start, start + seconds)
+        assert max(shared(span, wanted) for span in best) > 0.65, (wanted, best)
+    costs = [match.cost for match in found]
+    assert costs == sorted(costs) and costs[3] < 0.75 * costs[4]
+
+
+def shared(one, other):
+    """Common time of two parts as a share of the time of either."""
+    if one.take != other.take:
+        return 0.0
+    common = min(one.end, other.end) - max(one.start, other.start)
+    return common / (max(one.end, other.end) - min(one.start, other.start))
+
+
+def test_matches_do_not_overlap(corpus):
+    example = Span(0, 4.0, 6.0)
+    spans = [example, *(match.span for match in example_search.find_like(corpus, example, 30))]
+    for at, span in enumerate(spans):
+        assert all(span.overlap(other) <= 0.2 for other in spans[:at])
+        assert 0.9 <= span.end - span.start <= 4.1
+        assert 0.0 <= span.start and span.end <= 20.0
+
+
+def test_place_heading_and_floor_change_no_feature():
+    hands = waving(5, [(3.0, 2.0)])
+    one = discover_takes.take("a.bvh", 20.0, hands=hands, speed=0.3)
+    other = discover_takes.take("a.bvh", 20.0, hands=hands, speed=0.3, heading=1.2)
+    moved = {role: own + np.array([3.0, 0.7, -5.0]) for role, own in other.places.items()}
+    roles = list(motion_features.WEIGHTS)
+    np.testing.assert_allclose(
+        motion_features.take_features(Take("a.bvh", discover_takes.RATE, moved), roles),
+        motion_features.take_features(one, roles),
+        atol=1e-9,
+    )
+    mirrored = {role: own * [-1.0, 1.0, 1.0] for role, own in one.places.items()}
+    changed = motion_features.take_features(Take("a.bvh", 60.0, mirrored), roles)
+    assert np.abs(changed - motion_features.take_features(one, roles)).max() > 0.1
+
+
+def brute_force(apart):
+    """Least mean cost and first frame of the match that ends at each frame, by recursion."""
+    length, frames = apart.shape
+    best = {}
+
+    def cost(row, column):
+        if row == 0:
+            return (apart[0, column], column) if column >= 0 else (np.inf, 0)
+        if row < 0 or column < 0:
+            return np.inf, 0
+        if (row, column) not in best:
+            own = apart[row, column]
+            ways = []
+            for rows, columns in ((1, 1), (1, 2), (2, 1)):
+                if row >= rows and column >= columns:
+                    before, start = cost(row - rows, column - columns)
+                    extra = apart[row - 1, column] if rows == 2 else 0.0
+                    ways.append((before + own + extra, start))
+            best[row, column] = min(ways, default=(np.inf, 0), key=lambda way: way[0])
+        return best[row, column]
+
+    return [cost(length - 1, column) for column in range(frames)]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_matches_are_those_of_the_recursion(seed):
+    apart = np.random.default_rng(seed).uniform(0.1, 1.0, (7, 40))
+    apart[:, 20:22] = np.inf
+    found = subsequence_dtw.match_ends(apart)
+    expected = brute_force(apart)
+    np.testing.assert_allclose(found.costs, [cost / 7 for cost, _ in expected], rtol=1e-12)
+    finite = np.isfinite(found.costs)
+    assert finite.any() and not finite.all()
+    starts = [start for _, start in expected]
+    assert found.starts[finite].tolist() == np.array(starts)[finite].tolist()
+
+
+def test_no_match_leads_from_one_take_to_the_next():
+    apart = np.ones((9, 60))
+    apart[:, 30:32] = np.inf
+    found = subsequence_dtw.match_ends(apart)
+    ends = np.flatnonzero(np.isfinite(found.costs))
+    assert np.all((ends < 30) == (found.starts[ends] < 30))
+
+
+def test_distances_are_euclidean_and_infinite_between_takes():
+    rng = np.random.default_rng(3)
+    query, known = rng.normal(size=(4, 3)), rng.normal(size=(6, 3))
+    known[2] = np.nan
+    found = subsequence_dtw.distances(query, known)
+    expected = np.linalg.norm(query[:, None] - known, axis=-1)
+    assert np.all(np.isinf(found[:, 2]))
+    np.testing.assert_allclose(np.delete(found, 2, 1), np.delete(expected, 2, 1), atol=1e-7)
+
+
+def test_components_keep_most_of_the_variance():
+    rng = np.random.default_rng(6)
+    values = rng.normal(size=(500, 6)) * [5.0, 5.0, 5.0, 0.5, 0.3, 0.1]
+    mean, basis = motion_features.principal_components(values)
+    kept = np.var((values - mean) @ basis, axis=0).sum() / np.var(values, axis=0).sum()
+    assert basis.shape == (6, 3) and kept >= 0.9
+    np.testing.assert_allclose(basis.T @ basis, np.eye(3), atol=1e-12)

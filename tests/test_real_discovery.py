@@ -1,0 +1,83 @@
+"""Tests of discovery on real takes: strides against those cut by hand, motions like an example."""
+
+import csv
+import shutil
+import zipfile
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from posefield_train.discover import example_search, motion_features, stride_detection, take_reading
+from posefield_train.discover.example_search import Span
+
+pytestmark = pytest.mark.system
+
+
+@pytest.fixture(scope="module")
+def unpacked(real_data, tmp_path_factory):
+    """Function that returns the folder of a data set, unpacked."""
+
+    def of(name):
+        target = tmp_path_factory.mktemp(name)
+        if (real_data / f"{name}.zip").exists():
+            with zipfile.ZipFile(real_data / f"{name}.zip") as archive:
+                archive.extractall(target)
+        elif (real_data / name).is_dir():
+            shutil.copytree(real_data / name, target / name)
+        else:
+            pytest.skip(f"no {name} in {real_data}")
+        return target / name
+
+    return of
+
+
+def table(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_strides_are_those_cut_by_hand(unpacked):
+    folder = unpacked("cmu_walk")
+    found = {
+        take.file: [one for one in stride_detection.find_strides(take) if one.travels]
+        for take in take_reading.read_takes(folder).takes
+    }
+    offsets, cuts = [], table(folder / "strides.csv")
+    for row in cuts:
+        first, last = int(row["start_frame"]), int(row["end_frame"])
+        for one in found.get(row["file"], []):
+            common = min(one.last, last) - max(one.first, first)
+            if common > 0.8 * (max(one.last, last) - min(one.first, first)):
+                offsets.append((abs(one.first - first), abs(one.last - last)))
+    assert len(cuts) == 92 and len(offsets) >= 0.97 * 92
+    assert np.median(offsets) <= 1 and np.percentile(offsets, 90) <= 4
+
+
+def shared(one, other):
+    """Common time of two parts as a share of the time of either."""
+    if one.take != other.take:
+        return 0.0
+    common = min(one.end, other.end) - max(one.start, other.start)
+    return common / (max(one.end, other.end) - min(one.start, other.start))
+
+
+def test_one_example_finds_the_motions_of_its_action(unpacked):
+    """R-precision: the share of the best R matches that are one of the R other cuts."""
+    folder = unpacked("hdm05_long")
+    takes = take_reading.read_takes(folder / "bvh").takes
+    corpus = motion_features.build_corpus(takes)
+    files = [take.file for take in takes]
+    truth = []
+    for row in table(folder / "truth.csv"):
+        take = files.index(row["file"])
+        frames = int(row["first_frame"]), int(row["last_frame"])
+        truth.append((row["action"], Span(take, *(at / takes[take].rate for at in frames))))
+    counts = Counter(action for action, _ in truth)
+    precisions = []
+    for action, example in truth[::4]:
+        others = [span for own, span in truth if own == action and span != example]
+        found = example_search.find_like(corpus, example, counts[action] - 1)
+        right = sum(any(shared(match.span, one) >= 0.5 for one in others) for match in found)
+        precisions.append(right / len(others))
+    assert len(truth) == 288 and np.mean(precisions) >= 0.88
