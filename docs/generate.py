@@ -25,6 +25,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "results/targets.md": lambda: data_pages.results("targets"),
     "results/support.md": lambda: data_pages.results("support"),
     "results/performances.md": lambda: data_pages.results("performances"),
+    "results/discovery.md": lambda: data_pages.results("discovery"),
     "results/speed.md": lambda: data_pages.results("speed"),
 }
 

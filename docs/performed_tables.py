@@ -1,6 +1,7 @@
 """Tables of figures with a value that they must have and one that is wished for.
 
-`performed.json` is written by benchmarks/performances.py, `joins.json` by benchmarks/joins.py.
+`performed.json` is written by benchmarks/performances.py, `joins.json` by benchmarks/joins.py,
+`discovered.json` by benchmarks/discovery.py.
 """
 
 from collections.abc import Iterator
@@ -15,6 +16,11 @@ WISHES = {
 }
 """Wishes for joins of captured takes, by recipe and measure; slides and heights have their own."""
 OTHER_WISHES = {"slide of standing feet": 0.2, "pelvis lowered": 2.0}
+DISCOVERY_WISHES = {
+    "strides: missed": 0.0,
+    "one example: missed by the best R": 5.0,
+    "one example: processor time of reading and features": 10.0,
+}
 Rows = Iterator[list[str]]
 
 
@@ -30,6 +36,12 @@ def joins() -> Rows:
         recipe = subject.partition(",")[0]
         wishes = OTHER_WISHES | WISHES.get(recipe, {})
         yield from _rows([row | {"wish": wishes.get(measure)}])
+
+
+def discovered() -> Rows:
+    """Yield the figures of clips found in long takes."""
+    for row in measured_tables.read("discovered")["rows"]:
+        yield from _rows([row | {"wish": DISCOVERY_WISHES.get(row["name"])}])
 
 
 def _rows(found: list[dict[str, Any]]) -> Rows:

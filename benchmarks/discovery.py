@@ -1,0 +1,134 @@
+"""Discovery in long takes: strides against those cut by hand, and motions like one example.
+
+R-precision of an example: the share of its best R matches that are one of the R other cuts of its
+action, with half of their time in common at least.
+"""
+
+import argparse
+import csv
+import sys
+import time
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from rows import Row, record, table
+
+from posefield_train.discover import (
+    example_search,
+    motion_features,
+    stride_detection,
+    take_reading,
+)
+from posefield_train.discover.example_search import Span
+
+ROOT = Path(__file__).resolve().parents[1]
+SAME_STRIDE, SAME_MOTION = 0.8, 0.5
+"""Least common time of a found clip and a cut, as a share of the time of either."""
+
+
+def records(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a CSV table."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def strides(folder: Path) -> list[Row]:
+    """Return the figures of strides against those of strides.csv, at 120 frames a second."""
+    found = {
+        take.file: [one for one in stride_detection.find_strides(take) if one.travels]
+        for take in take_reading.read_takes(folder).takes
+    }
+    cuts = records(folder / "strides.csv")
+    apart = []
+    for row in cuts:
+        first, last = int(row["start_frame"]), int(row["end_frame"])
+        for one in found.get(row["file"], []):
+            common = min(one.last, last) - max(one.first, first)
+            if common > SAME_STRIDE * (max(one.last, last) - min(one.first, first)):
+                apart.append((abs(one.first - first), abs(one.last - last)))
+    several = sum(map(len, found.values()))
+    missed = 100.0 * (1.0 - len(apart) / len(cuts))
+    said = f"of {len(cuts)} cut by hand; {several} found in all"
+    middle, most = float(np.median(apart)), float(np.percentile(apart, 90))
+    return [
+        Row("strides: missed", missed, "%", said, None, 3.0),
+        Row("strides: cuts apart, median", middle, "frames", "120 frames a second", None, 1.0),
+        Row(
+            "strides: cuts apart, 90th percentile",
+            most,
+            "frames",
+            f"worst {np.max(apart)}",
+            None,
+            4.0,
+        ),
+    ]
+
+
+def examples(folder: Path) -> list[Row]:
+    """Return the figures of each cut of truth.csv as an example."""
+    begin = time.process_time()
+    takes = take_reading.read_takes(folder / "bvh").takes
+    corpus = motion_features.build_corpus(takes)
+    reading = time.process_time() - begin
+    files = [take.file for take in takes]
+    truth = []
+    for row in records(folder / "truth.csv"):
+        take = files.index(row["file"])
+        first, last = (int(row[name]) / takes[take].rate for name in ("first_frame", "last_frame"))
+        truth.append((row["action"], Span(take, first, last)))
+    begin = time.process_time()
+    precisions = defaultdict(list)
+    for action, example in truth:
+        others = [span for own, span in truth if own == action and span != example]
+        found = example_search.find_like(corpus, example, len(others))
+        right = sum(any(_shared(one.span, cut) >= SAME_MOTION for cut in others) for one in found)
+        precisions[action].append(right / len(others))
+    query = (time.process_time() - begin) / len(truth)
+    every = np.concatenate(list(precisions.values()))
+    worst = min(precisions, key=lambda action: np.mean(precisions[action]))
+    counts = Counter(action for action, _ in truth)
+    said = (
+        f"{len(truth)} examples of {len(counts)} actions; worst {worst}, "
+        f"{100.0 * (1.0 - np.mean(precisions[worst])):.0f} %"
+    )
+    minutes = sum(len(take) / take.rate for take in takes) / 60.0
+    return [
+        Row(
+            "one example: missed by the best R", 100.0 * (1.0 - every.mean()), "%", said, None, 12.0
+        ),
+        Row(
+            "one example: processor time of reading and features",
+            reading,
+            "s",
+            f"{minutes:.1f} minutes in {len(takes)} takes",
+            None,
+            60.0,
+        ),
+        Row("one example: processor time of a query", 1e3 * query, "ms", "mean", None, None),
+    ]
+
+
+def _shared(one: Span, other: Span) -> float:
+    if one.take != other.take:
+        return 0.0
+    common = min(one.end, other.end) - max(one.start, other.start)
+    return common / (max(one.end, other.end) - min(one.start, other.start))
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the figures; write them where the documentation reads them if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path, help="folder with cmu_walk and hdm05_long, unpacked")
+    parser.add_argument("--record", action="store_true")
+    given = parser.parse_args(arguments)
+    found = [*strides(given.data / "cmu_walk"), *examples(given.data / "hdm05_long")]
+    print(table(found))
+    if given.record:
+        command = "python benchmarks/discovery.py DATA --record"
+        record({"discovered": found}, command, ROOT / "docs/results")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
