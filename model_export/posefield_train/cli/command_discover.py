@@ -55,8 +55,7 @@ class StatementOptions:
     roles: Annotated[
         Path | None,
         typer.Option(
-            help="TOML file with a table [roles], such as a recipe: joints that the names do not "
-            "tell",
+            help="TOML file with a table of roles as in recipes: joints that the names do not tell",
             metavar="FILE",
         ),
     ] = None
@@ -76,9 +75,8 @@ def discover(
 ) -> None:
     """Find clips in long takes, and write a table of them for a recipe.
 
-    Each row has `accepted` false until a person changes it: a recipe takes the accepted rows with
-    [clips.where] accepted = { among = ["true"] }. Files that cannot be searched are named with the
-    reason.
+    Each row has `accepted` false until a person changes it, and a recipe takes the accepted rows.
+    Files that cannot be searched are named with the reason.
     """
     from posefield_train.discover import found_clips
 
