@@ -59,12 +59,16 @@ class StatementOptions:
             metavar="FILE",
         ),
     ] = None
+    rate: Annotated[
+        float | None,
+        typer.Option(help="frames a second of files that state none, such as AMC", min=1.0),
+    ] = None
 
 
 @with_option_groups
 def discover(
     folder: Annotated[
-        Path, typer.Argument(help="folder with BVH files, in any subfolders", metavar="FOLDER")
+        Path, typer.Argument(help="folder with motion files, in any subfolders", metavar="FOLDER")
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="table to write, CSV; best in the folder")
@@ -108,10 +112,12 @@ def _read(folder: Path, stated: StatementOptions) -> "ReadTakes":
     """Return the takes of a folder; files that were refused are named on standard error."""
     from posefield.console.progress import ProgressBar
     from posefield_train.discover import found_clips, take_reading
+    from posefield_train.source import motion_readers
 
     roles = {} if stated.roles is None else found_clips.read_roles(stated.roles)
-    with ProgressBar("files", len(take_reading.motion_files(folder))) as bar:
-        read = take_reading.read_takes(folder, take_reading.Stated(stated.up, roles), bar.update)
+    with ProgressBar("files", len(motion_readers.find_files(folder))) as bar:
+        known = take_reading.Stated(stated.up, roles, stated.rate)
+        read = take_reading.read_takes(folder, known, bar.update)
     for file, reason in list(read.refused.items())[:MAX_NOTES]:
         typer.echo(f"left out: {file}: {reason}", err=True)
     if len(read.refused) > MAX_NOTES:

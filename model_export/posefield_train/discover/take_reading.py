@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from posefield.common.errors import BvhError, FileError
+from posefield.common.errors import FileError, MotionFileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
 from posefield_train.probe import figure, proposals
 from posefield_train.roles.joint_recognition import RoleGuess
-from posefield_train.source import bvh
-from posefield_train.source.bvh import bvh_conversion
+from posefield_train.source import motion_readers
+from posefield_train.source.motion_files import clip_conversion
+from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
 
 LEG = ("UpperLeg", "LowerLeg", "Foot")
 SEARCHED = frozenset(
@@ -71,32 +72,36 @@ class ReadTakes:
 
 @dataclass(frozen=True)
 class Stated:
-    """Statements about all files. up: axis; None for that which each body tells. roles: joints by
-    role, which count more than those that are recognised.
+    """Statements about all files.
+
+    up: axis; None for that which each file or body tells. roles: joints by role, which count more
+    than those that are recognised. rate: frames a second of files that state none.
     """
 
     up: UpAxis | None = None
     roles: Mapping[str, str] = field(default_factory=dict)
+    rate: float | None = None
 
 
 def read_takes(
     folder: Path, stated: Stated | None = None, report: Callable[[int], None] = lambda _: None
 ) -> ReadTakes:
-    """Return the takes of all BVH files below a folder.
+    """Return the takes of all motion files below a folder.
 
     report: called with the number of files that are read. A file that cannot be read or searched is
     refused with its reason; FileError if none is left.
     """
     if not folder.is_dir():
-        raise FileError(folder, "not a folder, expected one with BVH files")
+        raise FileError(folder, "not a folder, expected one with motion files")
     bodies, refused, frames = [], dict[str, str](), 0
-    files = motion_files(folder)
-    for count, path in enumerate(files, 1):
+    known = stated or Stated()
+    for count, path in enumerate(motion_readers.find_files(folder), 1):
         name = path.relative_to(folder).as_posix()
         try:
-            bodies.append(_body(name, bvh.read(path), stated or Stated()))
+            file = motion_readers.read(path, ReadOptions(rate=known.rate))
+            bodies.append(_body(name, file, known))
             frames += len(bodies[-1].take)
-        except (BvhError, UnusableTake) as fault:
+        except (MotionFileError, UnusableTake) as fault:
             refused[name] = str(fault)
         if frames > MOST_FRAMES:
             raise FileError(
@@ -104,17 +109,12 @@ def read_takes(
                 f"found more than {MOST_FRAMES} frames, expected a smaller part of the files",
             )
         report(count)
-    takes = _turned(bodies, None if stated is None else stated.up, refused)
+    takes = _turned(bodies, known.up, refused)
     if not takes:
         first = next(iter(refused.items()), None)
-        said = f"such as {first[0]}: {first[1]}" if first else "it has no BVH files"
+        said = f"such as {first[0]}: {first[1]}" if first else "it has no motion files"
         raise FileError(folder, f"no take that can be searched; {said}")
     return ReadTakes(tuple(takes), refused)
-
-
-def motion_files(folder: Path) -> list[Path]:
-    """Return the motion files below a folder, sorted by name."""
-    return sorted(path for path in folder.rglob("*") if path.suffix.lower() == ".bvh")
 
 
 class UnusableTake(ValueError):
@@ -132,7 +132,9 @@ class Body:
     figure: figure.Figure
 
 
-def _body(name: str, file: bvh.BvhFile, stated: Stated) -> Body:
+def _body(name: str, file: MotionFile, stated: Stated) -> Body:
+    if file.rate is None:
+        raise UnusableTake(f"{file.format} states no frame rate: say it with --rate")
     measured = _with_roles(figure.measure(file), stated.roles)
     lacking = _lacking(measured)
     if lacking:
@@ -142,16 +144,16 @@ def _body(name: str, file: bvh.BvhFile, stated: Stated) -> Body:
     leg = measured.leg_length()
     if not leg:
         raise UnusableTake("the legs have no length, expected bones from hip to foot")
-    rotations, translations = bvh_conversion.local_motion(file)
-    parents = tuple(joint.parent for joint in file.joints)
-    positions = skeleton.positions(parents, rotations, translations)
-    index = {joint.name: at for at, joint in enumerate(file.joints)}
+    joints = file.skeleton
+    positions = skeleton.positions(joints.parents, file.rotations, file.translations)
+    index = {joint: at for at, joint in enumerate(joints.names)}
     places = {
         role: positions[:, index[joint]] / leg
         for role, joint in measured.sure_roles.items()
         if role in SEARCHED
     }
-    light = replace(measured, file=replace(file, values=file.values[:1]))
+    first = replace(file, rotations=file.rotations[:1], translations=file.translations[:1])
+    light = replace(measured, file=first)
     return Body(Take(name, file.rate, places), tuple(measured.names), light)
 
 
@@ -175,7 +177,7 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
             said = f"its up axis is unclear ({reasons[body.joints]}): say it with --up"
             refused[body.take.file] = said
             continue
-        places = {r: bvh_conversion.to_y_up(own, axis) for r, own in body.take.places.items()}
+        places = {r: clip_conversion.to_y_up(own, axis) for r, own in body.take.places.items()}
         found.append(replace(body.take, places=places))
     return found
 
