@@ -15,7 +15,7 @@ from posefield.motion.skeleton import Skeleton
 from posefield_train import train
 from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
 from posefield_train.adapt.adapted_file import NewPerformer
-from posefield_train.graph import onnx_export
+from posefield_train.graph import onnx_export, trained_card
 from posefield_train.kriging import sample_points
 from posefield_train.source import ingest
 from posefield_train.source.takes import frame_features, shared_frames
@@ -242,3 +242,7 @@ def test_an_adapted_model_keeps_its_takes_and_adds_those_of_new_clips(tmp_path):
     found, _ = new_clips.examples_of_table(reopened, table, recipe.source, {"performer": "cy"})
     adapted = adapted_file.export_adapted(reopened, NewPerformer("cy", found, "CC0"))
     assert adapted.card.making.takes == (*before, max(before) + 1, max(before) + 2)
+    # The new clips are not among those whose accelerations the card has.
+    captured = adapted.card.captured_acceleration
+    assert captured == reopened.card.captured_acceleration is not None
+    assert captured != trained_card.captured_acceleration([*trained.examples, *found])
