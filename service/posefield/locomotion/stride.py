@@ -149,17 +149,13 @@ def root_places(
     time of the poses.
     """
     # A matrix product with one row sums in another order.
-    twice = [np.repeat(own, 2, axis=0) for own in (controls, labels)]
-    found = strides(session, *twice, level)
+    twice = np.repeat(np.arange(len(controls)), 2)
+    found = strides(session, controls[twice], labels[twice], level)
     count = len(phases)
-    own = Strides(*(np.repeat(each[::2], count) for each in vars(found).values()))
-    rows, names, times = (
-        np.repeat(controls, count, axis=0),
-        np.repeat(labels, count, axis=0),
-        np.tile(phases, len(controls)),
-    )
+    rows, times = np.repeat(np.arange(len(controls)), count), np.tile(phases, len(controls))
+    own = Strides(*(each[::2][rows] for each in vars(found).values()))
     at = (times * own.durations)[:, None]
-    (roots,) = _run_batches(session, rows, at, names, level, "root_position")
+    (roots,) = _run_batches(session, controls[rows], at, labels[rows], level, "root_position")
     return _relative_places(own, times, roots[:, 0]).reshape(-1, count)
 
 

@@ -212,18 +212,17 @@ def _protagonist(
 
 def _bones(model: Synthesizer, asked: MotionQuestion) -> Bones:
     """Return bone offsets (J, 3), m, at the controls and labels of a question."""
-    key = model.session.digest, msgspec.json.encode(asked)
-    return _kept_bones.find(key, lambda: _evaluated_bones(model, asked))
+
+    def evaluated() -> Bones:
+        question = model.question(asked)
+        found = stride.bones(model.session, question.point, question.labels)[0].astype(float)
+        found.flags.writeable = False
+        return np.asarray(found)
+
+    return _kept_bones.find((model.session.digest, msgspec.json.encode(asked)), evaluated)
 
 
 _kept_bones: ValueCache[tuple[str, bytes], Bones] = ValueCache(KEPT_BONES)
-
-
-def _evaluated_bones(model: Synthesizer, asked: MotionQuestion) -> Bones:
-    question = model.question(asked)
-    found = stride.bones(model.session, question.point, question.labels)[0].astype(np.float64)
-    found.flags.writeable = False
-    return np.asarray(found)
 
 
 def _sources(

@@ -210,3 +210,16 @@ def test_a_way_that_ends_too_soon_is_refused(own):
     ways = routes.paths_through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
     with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
         locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_the_root_alone_is_where_it_is_in_whole_poses_bit_for_bit(own, count):
+    opened, phases = own.session, np.arange(8) / 8
+    controls = np.array(opened.card.examples[:count])
+    labels = np.zeros((count, len(opened.card.clip_labels[0])))
+    found = stride.root_places(opened, controls, labels, phases)
+    rows, whole = np.repeat(np.arange(count), 8), np.tile(phases, count)
+    posed = stride.synthesize_poses(opened, controls[rows], labels[rows], whole)
+    assert found.tobytes() == posed.places.reshape(count, 8).tobytes()
+    later = stride.synthesize_poses(opened, controls[rows], labels[rows], np.roll(whole, 1))
+    assert found.tobytes() != later.places.tobytes()

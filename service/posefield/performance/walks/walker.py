@@ -95,7 +95,8 @@ class Walker:
         """Return the mean places (B,) of the root over a cycle, in the frame that travels."""
         phases = np.arange(AVERAGED_PHASES) / AVERAGED_PHASES
         labels = self.labels(len(controls))
-        return stride.root_places(self.gait.session, controls, labels, phases).mean(axis=1)
+        places = stride.root_places(self.gait.session, controls, labels, phases)
+        return np.asarray(places.mean(axis=1))
 
     @cached_property
     def double_supports(self) -> Annotated[Floats, "phases"]:
