@@ -2959,7 +2959,7 @@ export interface components {
                 "application/json": components["schemas"]["PerformanceQuestion"];
             };
         };
-        /** @description Default limits: 8 MiB, 256 scripts, 1,024 segments in all, and 7,200 seconds in all. */
+        /** @description Default limits: 8 MiB, 256 scripts, 1,024 segments in all, and 1,800 seconds in all. */
         PerformancesQuestion: {
             content: {
                 "application/json": components["schemas"]["PerformancesQuestion"];

@@ -74,11 +74,11 @@ class Settings:
     clips_poses: int = 1_000_000
     # A target takes 3 to 12 ms of CPU time: at most 25 s in all, within the default deadline.
     clips_targets: int = 2000
-    # A segment takes about 10 ms of CPU time to plan and a second of motion 2 ms: at most 25 s in
-    # all, within the default deadline.
+    # To plan a segment takes about 10 ms of CPU time, and a second of motion 2 ms, or 12 ms with
+    # takes: at most 25 s in all, within the default deadline.
     performances_limit: int = 256
     performances_segments: int = 1024
-    performances_seconds: int = 7200
+    performances_seconds: int = 1800
     # 50 ms of CPU time.
     grid_limit: int = 65_536
     output_limit: int = 256 * 1024 * 1024
