@@ -57,12 +57,14 @@ class SampledMotion:
 
     rotations: (F, J, 4). roots: (F, 3), m. rate: frames a second. cycle: floor motion of a cycle,
     whose last frame is missing, as it is the first one of the next; None for other motions.
+    walking: whether it walks in each frame (F,); None for a motion that is no walk.
     """
 
     rotations: Rotations
     roots: RootPath
     rate: float
     cycle: Cycle | None = None
+    walking: Annotated[Booleans, "frames"] | None = None
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,10 @@ def plan_feet(
     poses = limbs.evaluate_poses(
         character.parents, character.bones, character.limbs, motion.rotations, motion.roots
     )
-    paths = [FootPath(poses.position(leg.tip), motion.rate, motion.cycle) for leg in character.legs]
+    paths = [
+        FootPath(poses.position(leg.tip), motion.rate, motion.cycle, motion.walking)
+        for leg in character.legs
+    ]
     if likely is None:
         down = contact_estimates.from_motion(paths)
         known = [

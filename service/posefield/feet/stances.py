@@ -61,11 +61,13 @@ class FootPath:
     """Predicted path of the joint that contacts, over the grid.
 
     positions: (F, 3), m. rate: frames a second. cycle: None where the motion does not repeat.
+    walking: whether the motion walks in each frame (F,); None for a motion that is no walk.
     """
 
     positions: RootPath
     rate: float
     cycle: Cycle | None = None
+    walking: Annotated[Booleans, "frames"] | None = None
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -114,8 +116,9 @@ def discipline(stances: Sequence[Interval], path: FootPath, foot: FootContact) -
     """Return stances whose swings are as captured ones: they go somewhere, and do not last.
 
     A swing that goes less than 3 cm is none. One that lasts longer than the captured ones is cut
-    to their median duration, where the predicted foot goes most. A foot that is in the air does
-    not stand.
+    to their median duration, where the predicted foot goes most. Slow walkers take longer steps in
+    time than most captured ones: swings within a walk stay as they are. A foot that is in the air
+    does not stand.
     """
     down = mask(stances, len(path))
     for swing in runs(~down, path.cycle is not None):
@@ -143,7 +146,9 @@ def _swing_frames(
         ends = path.places([swing.begin - 1 if swing.begin else 0, swing.end])
         if abs(ends[1] - ends[0]) < SHORTEST_STEP:
             return np.zeros(len(swing), bool)
-    if len(swing) <= foot.longest_swing * path.rate:
+    frames = np.arange(swing.begin, swing.end) % len(path)
+    walks = path.walking is not None and bool(path.walking[frames].all())
+    if walks or len(swing) <= foot.longest_swing * path.rate:
         return np.ones(len(swing), bool)
     length = min(max(2, round(foot.swing * path.rate)), len(swing) - 1)
     places = path.places(range(swing.begin, swing.end))

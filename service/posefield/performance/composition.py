@@ -158,7 +158,8 @@ def plan_feet(script: Script, composed: Composed) -> FeetPlan:
     limbs = limb_targets.find_limbs(character.body, targets).values()
     kept = tuple(dict.fromkeys(limb for limb in limbs if limb is not None))
     body = replace(character.body, kept=kept)
-    motion = SampledMotion(composed.motion.rotations, composed.motion.roots, RATE)
+    own = composed.motion
+    motion = SampledMotion(own.rotations, own.roots, RATE, walking=composed.walking)
     return footsteps.plan_feet(body, motion, character.contacts, composed.motion.contacts)
 
 

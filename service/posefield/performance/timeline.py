@@ -8,7 +8,7 @@ import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Booleans, Floats
 from posefield.motion import quat
 from posefield.performance.joins import blends, cut_search, join_quality, join_steps
 from posefield.performance.joins.blends import Blend
@@ -163,6 +163,14 @@ class Composed:
     motion: Passage
     timeline: Timeline
     missed: tuple[float, ...]
+
+    @property
+    def walking(self) -> Annotated[Booleans, "frames"]:
+        """Return whether each frame of the motion belongs to a walk (F,)."""
+        found = np.zeros(len(self.motion), bool)
+        for span in self.timeline.spans:
+            found[max(span.begin - self.timeline.begin, 0) :] = span.kind == "walk"
+        return found
 
 
 def choose_blend(join: Join, gaits: tuple[bool, bool]) -> tuple[Blend, float]:

@@ -1,5 +1,7 @@
 """Stances and swings: runs, tidying, and swings as captured feet have them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -62,6 +64,16 @@ def test_a_long_swing_is_cut_where_the_foot_goes_most():
     (before, after) = stances.discipline(held, path_of(forward), FOOT)
     assert after.begin - before.end == round(FOOT.swing * RATE)
     assert 38 <= before.end <= 42
+
+
+def test_a_long_swing_within_a_walk_stays():
+    forward = np.concatenate([np.zeros(40), np.linspace(0.0, 0.5, 20), np.full(40, 0.5)])
+    held = [Interval(0, 10), Interval(90, 100)]
+    walking = np.zeros(100, bool)
+    walking[5:95] = True
+    assert stances.discipline(held, replace(path_of(forward), walking=walking), FOOT) == held
+    walking[80:] = False
+    assert stances.discipline(held, replace(path_of(forward), walking=walking), FOOT) != held
 
 
 def test_a_foot_in_the_air_does_not_stand():
