@@ -1,8 +1,8 @@
-"""Joins of captured takes: against the real continuation of the take before, as they are and with
-feet that stand.
+"""Joins of captured takes, with and without placed feet, against the take's own continuation.
 
-A reach is joined to what another take of the same performer does after its own target; a stride to
-a stride of another take. The real continuation is the same take's own.
+A reach is joined to the motion after the target of another take by the same performer, a stride to
+a stride of another take. The take's own continuation shows how fast captured joints accelerate
+there.
 """
 
 import argparse
@@ -61,10 +61,12 @@ class Take:
 
 @dataclass(frozen=True)
 class Join:
-    """What is measured of a join, of feet in m.
+    """Measures of a join of two takes.
 
-    facts: with placed feet. real, blended: peaks of acceleration of the real continuation, and
-    before feet are placed, m/s².
+    facts: of the join with placed feet. real, blended: peak accelerations of the take's own
+    continuation, and of the join before feet are placed, m/s². slides: distances by which standing
+    feet slide near the join, m. lowered: mean lowering of the pelvis there, m. height: of the root
+    at the events of the two takes, m.
     """
 
     facts: JoinFacts
@@ -138,7 +140,7 @@ def pairs(found: Sequence[Take], every: bool = False) -> Iterator[tuple[Take, Ta
 
 
 def join(own: Take, other: Take, cyclic: bool, kind: Blend, usual: UsualMotion) -> Join:
-    """Return what a join of two takes measures. usual: what it is compared with."""
+    """Return the measures of a join of two takes. usual: what it is compared with."""
     body, rest = own.character, len(other.passage)
     before = own.passage.part(0, own.event + 1)
     if cyclic:

@@ -1,4 +1,4 @@
-"""Random scripts of performances that the schema takes, and checks of what is made of them."""
+"""Random scripts of performances that are valid by the schema, and checks of their answers."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -22,9 +22,10 @@ from posefield.synthesis.synthesizer import Synthesizer
 FPS = 60.0
 MOST_FRAMES = 100_000
 MOST_PEAK = 3.0
-# Largest acceleration of captured walking, m/s²: steps of a slow walk may be as sudden.
+"""A frame jumps if its acceleration exceeds the usual one by this factor."""
 CAPTURED_PEAK = 16.0
-"""Acceleration over the usual one from which on a frame is a jump."""
+"""Largest mean acceleration of captured walking, m/s². Away from joins, a frame with no larger one
+does not jump: feet of slow walkers land as suddenly as those of fast ones."""
 BEFORE, AFTER = 0.1, 0.6
 """Times before and after a join that belong to it, s."""
 DEEPEST = 0.0105
@@ -181,7 +182,11 @@ def _round(value: float) -> float:
 
 @dataclass
 class Outcome:
-    """What became of a script. faults: what is wrong with it; refused: the message of a refusal."""
+    """Result of a script.
+
+    faults: one sentence each. refused: message of the refusal; empty for a script that is
+    performed. answer: None for a refused script.
+    """
 
     faults: list[str] = field(default_factory=list)
     refused: str = ""
@@ -189,7 +194,7 @@ class Outcome:
 
 
 def check(document: Document, find: Callable[[str], Synthesizer]) -> Outcome:
-    """Return what becomes of a script, and all that is wrong with it."""
+    """Perform a script, and return the answer or the refusal, and all faults found in it."""
     question = read(document)
     try:
         script = resolve_script(question, find)
@@ -221,7 +226,7 @@ def exists(document: Any, pointer: str) -> bool:
 
 
 def faults(script: Script, answer: PerformanceAnswer) -> Iterator[str]:
-    """Yield all that is wrong with a performance."""
+    """Yield the faults of a performance, one sentence each."""
     clip, report = answer.clip, answer.trust
     numbers = (clip.rotations, clip.translations, clip.root_path)
     if not all(np.isfinite(own).all() for own in numbers):
@@ -264,7 +269,7 @@ def _timeline(answer: PerformanceAnswer) -> Iterator[str]:
 
 
 def _jumps(answer: PerformanceAnswer, found: Frames) -> Iterator[str]:
-    """Yield jumps that no join tells of."""
+    """Yield frames whose accelerations are larger than the report of the joins says."""
     joins = answer.trust.joins
     usual = max((own.usual for own in joins), default=float(np.percentile(found, 99.0)))
     times = np.arange(len(found)) / answer.clip.rate

@@ -124,7 +124,11 @@ def _apart(
 
 
 def _landing(shown: Annotated[Floats, "frames 3"], there: Annotated[Floats, "frames 3"]) -> int:
-    """Return the number of frames after a cut in which a foot comes to where it stands."""
+    """Return the number of frames from a cut to the landing of a foot.
+
+    It lands once its shown path is within 5 cm of the place where it stands after the join, and
+    nearly as low; at `LANDING` at the latest.
+    """
     count = min(len(shown), len(there), round(LANDING * RATE))
     own, other = shown[:count], there[:count]
     near = (_apart(own, other) <= FARTHEST) & (np.abs(own[:, 1] - other[:, 1]) <= LOW)
