@@ -141,20 +141,48 @@ def _walk(way: Mapping[str, object]) -> Document:
 
 
 def _starts(find: Find) -> list[Row]:
-    """Return the skate of walks that start and stop over that of steady ones."""
+    """Return how walks with standing ends skate, and how suddenly these move, over steady walks."""
     way = {"to": [0.0, 12.0], "speed": 1.1}
     steady, both = (
-        make(_walk(way | ends), find).answer.trust.feet
-        for ends in ({}, {"start": "standing", "stop": "standing"})
+        make(_walk(way | ends), find) for ends in ({}, {"start": "standing", "stop": "standing"})
     )
-    if steady is None or both is None:
+    own, usual = both.answer.trust.feet, steady.answer.trust.feet
+    if own is None or usual is None:
         raise ValueError("no feet, expected feet that stand")
-    ratio = both.skate_before / steady.skate_before
-    said = (
-        f"{100 * both.skate_before:.3g} and {100 * steady.skate_before:.3g} cm/s; with placed feet "
-        f"{100 * both.skate:.2g} and {100 * steady.skate:.2g}"
-    )
-    return [Figure("starts and stops: skate over steady walk", ratio, "times", said, None, 1.1)]
+    title, peaks = "starts and stops", [_end_peak(each) for each in (both, steady)]
+    feet = [
+        ("skate over steady walk", own.skate_before, usual.skate_before),
+        ("skate with placed feet over steady walk", own.skate, usual.skate),
+    ]
+    return [
+        *(
+            Figure(
+                f"{title}: {name}",
+                first / second,
+                "times",
+                f"{100 * first:.2g} and {100 * second:.2g} cm/s",
+                None,
+                1.1,
+            )
+            for name, first, second in feet
+        ),
+        Figure(
+            f"{title}: peak over steady walk",
+            peaks[0] / peaks[1],
+            "times",
+            f"{peaks[0]:.2g} and {peaks[1]:.2g} m/s² in the first and last 1.5 s",
+            None,
+            1.1,
+        ),
+    ]
+
+
+def _end_peak(made: Made) -> float:
+    """Return the largest acceleration in the first and last 1.5 s of a clip, m/s²."""
+    clip = made.answer.clip
+    found = random_scripts.accelerations(clip, clip.positions())
+    ends = round(1.5 * clip.rate)
+    return float(max(found[:ends].max(), found[-ends:].max()))
 
 
 def flag_rows(find: Find) -> list[Row]:
