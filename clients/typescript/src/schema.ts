@@ -987,7 +987,7 @@ export interface components {
          */
         Turn: number | components["schemas"]["NumberCurve"] | null;
         /**
-         * @description `rolling` begins or ends at full speed. `standing` begins or ends at rest: no captured clip does, so it is synthesised from slower steps.
+         * @description `rolling` begins or ends at full speed. `standing` begins or ends at rest with the feet beside each other: no captured clip does, so the step that leads there is synthesised.
          * @default rolling
          * @enum {string}
          */

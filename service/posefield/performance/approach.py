@@ -51,6 +51,11 @@ class LastCycle:
     act: Passage
     entries: range
 
+    @property
+    def exits(self) -> range:
+        """Frames from which the act may go on: the last one of a walk that ends standing."""
+        return range(len(self.poses) - 1 if self.plan.closes else 0, len(self.poses))
+
     def find_cut(self, runs: Sequence[range]) -> Cut:
         """Return the best cut from frames of the cycle; of equal ones the first."""
         found = [
@@ -82,27 +87,32 @@ def lead_to(
     that the act lies where it should. An act without a heading of its own faces the way the walk
     comes.
     """
-    free = timeline.motion is None
     by = staged.by or staged.facing(float(np.angle(staged.goal - entry.start.shift)))
     act = script.adapted(staged.segment, staged.act.passage)
     plan = _plan_to(script, index, entry, by.after(_arrival(act)), staged)
     cycle = _last_cycle(script, index, plan, (act, staged.act.event))
-    cut = cycle.find_cut([range(len(cycle.poses))])
+    # A walk that begins standing begins in its own phase.
+    free = timeline.motion is None and plan.standing is None
+    cut = cycle.find_cut([cycle.exits])
     for _ in range(APPROACHES):
         cancellation.check()
         rest = cycle.lies(cut).inverse().after(_trail(plan))
         by = staged.by or staged.facing(staged.act.heading + _turn(plan, rest, by, staged.goal))
         plan = _plan_to(script, index, entry, by.after(rest), staged)
-        runs = cycle.reachable(plan, free)
-        if not any(cut.exit in own for own in runs):
+        if plan.closes:
+            # Where a walk stands depends on the foot that closes.
+            cycle = _last_cycle(script, index, plan, (act, staged.act.event))
+        runs = [cycle.exits] if plan.closes else cycle.reachable(plan, free)
+        if plan.closes or not any(cut.exit in own for own in runs):
             cut = cycle.find_cut(runs)
         shown = _travelling(plan, -1).after(cycle.lies(cut))
         by = staged.by or staged.facing(staged.act.heading + shown.turn)
         away = by.after(shown.inverse())
         if abs(away.shift) < NEAR and abs(away.turn) < STRAIGHT:
             break
-    phase = float(cycle.plan.phases[cut.exit])
-    return _ending_in(plan, phase, free), replace(staged, by=by, adapted=act)
+    if not plan.closes:
+        plan = _ending_in(plan, float(cycle.plan.phases[cut.exit]), free)
+    return plan, replace(staged, by=by, adapted=act)
 
 
 def _turn(plan: WalkPlan, rest: FloorMotion, by: FloorMotion, goal: complex) -> float:

@@ -11,7 +11,7 @@ from posefield.performance.joins.cut_search import Cut
 from posefield.performance.passages.passage import RATE, FloorMotion
 from posefield.performance.script import Script, Source
 from posefield.performance.timeline import Timeline
-from posefield.performance.walks import walk_passage, walker
+from posefield.performance.walks import standing_pose, walk_passage, walker
 from posefield.performance.walks.discs import Disc
 from posefield.performance.walks.walk_passage import Manner
 from posefield.performance.walks.walk_request import WalkRequest
@@ -76,7 +76,7 @@ def _continued(timeline: Timeline, source: Source, request: WalkRequest) -> Walk
         return None
     plan, rolling = before.plan, request.start == "rolling"
     same = plan.walker.is_same(walker.find_walker(source.walks, request.labels, request.controls))
-    if not (same and rolling and plan.speeds[-1] > 0.0):
+    if not (same and rolling and not plan.stops):
         return None
     low, high = source.walks.region.speeds
     speed, turn = plan.exit_rates
@@ -102,6 +102,12 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
     if own.join.cut == "end":
         timeline.exits = timeline.exits[-1:]
     who = walker.find_walker(source.walks, request.labels, request.controls)
+    pose = standing_pose.find_standing_pose(who) if request.start == "standing" else None
+    if pose is not None:
+        still = timeline.find_cut(script.adapted(index, walk_passage.still(pose)), range(1))
+        begin, first = standing_pose.path_start(who, pose)
+        at_rest = replace(still, motion=FloorMotion())
+        return WalkEntry(request, still.motion.after(begin), first, at_rest)
     speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]
     controls = who.controls(np.clip([speed], *source.walks.region.speeds), np.zeros(1))
     stride = who.strides(controls)

@@ -1,4 +1,4 @@
-"""Walks of a script: how they go on from the segment before, and what is known of them."""
+"""Walks of a script: planned, joined to the segment before, and recorded in the timeline."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from posefield.performance.acts.staged_act import StagedAct
 from posefield.performance.script import Script
 from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
 from posefield.performance.walk_entries import WalkEntry, find_entry, manner, walk_of
-from posefield.performance.walks import walk_passage, walk_segment
+from posefield.performance.walks import walk_passage, walk_phases, walk_segment
 from posefield.performance.walks.walk_segment import WalkPlan
 
 
@@ -57,6 +57,9 @@ def _record(timeline: Timeline, script: Script, plan: WalkPlan, place: tuple[int
     own, source = walk_of(script, index)
     card, notes = source.model.session.card, [note.message for note in plan.notes]
     for note in plan.notes:
+        # How a step is made is told by the notes of the segment alone.
+        if note.code.startswith(walk_phases.SYNTHESISED):
+            continue
         # Obstacles are those of the whole script; the end of a walk to an act is no field of it.
         if note.field.startswith("obstacles"):
             timeline.warn(f"/{note.field}", note.message)

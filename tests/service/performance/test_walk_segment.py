@@ -156,10 +156,10 @@ def test_skate_with_start_and_stop_is_that_of_a_steady_walk(walk, walking):
         assert skate(replace(own, **BOTH)) < 1.1 * skate(own)
 
 
-def test_a_walk_stops_in_double_support(walking):
+def test_a_walk_stops_where_a_foot_passes_the_other_one(walking):
     for length in (6.0, 6.3, 6.6, 6.9, 7.2):
         plan = planned(walking, WalkRequest(1.2, to=(0.0, length), **BOTH))
-        quiet = plan.walker.double_supports
+        quiet = plan.standing.pose.phases
         for phase in (plan.phases[0], plan.phases[-1]):
             assert np.abs((quiet - phase + 0.5) % 1.0 - 0.5).min() < 0.01
         assert plan.speeds[0] < 0.02
@@ -182,7 +182,7 @@ def test_double_support_is_where_both_feet_stand(walk, walking):
     assert swings.min() < 0.5
 
 
-def test_a_walk_too_short_to_stop_in_double_support_says_so(walking):
+def test_a_walk_too_short_to_stop_with_its_feet_beside_each_other_says_so(walking):
     notes = [
         note.code
         for length in np.linspace(1.5, 2.1, 7)

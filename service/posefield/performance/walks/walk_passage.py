@@ -11,6 +11,9 @@ from posefield.inference.takes import TakeSettings
 from posefield.locomotion import floor_plane, stride
 from posefield.locomotion.stride import RelativePoses
 from posefield.performance.passages.passage import Passage
+from posefield.performance.walks import standing_steps
+from posefield.performance.walks.standing_pose import StandingPose
+from posefield.performance.walks.standing_steps import Travel
 from posefield.performance.walks.walk_segment import WalkPlan
 from posefield.performance.walks.walker import Walker
 from posefield.synthesis import crowd_takes, walking_feet
@@ -40,13 +43,17 @@ def walk_passage(model: Synthesizer, plan: WalkPlan, manner: Manner = Manner()) 
     phases = plan.phases % 1.0
     posed = _poses(model, plan.walker, plan.controls, phases, manner)
     places = plan.places + posed.places * np.exp(1j * plan.headings)
-    return Passage(
+    walked = Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),
         floor_plane.at_height(places, posed.heights),
         _contacts(model, plan.walker, plan.controls, phases, manner.level),
         _sigmas(model, plan.walker, plan.controls),
         phases,
     )
+    if plan.standing is None:
+        return walked
+    travel = Travel(plan.places, plan.headings, plan.phases)
+    return standing_steps.add_standing_ends(walked, travel, plan.standing)
 
 
 def cycle_passage(
@@ -73,6 +80,17 @@ def cycle_passage(
         _contacts(model, walker, rows, phases, manner.level),
         _sigmas(model, walker, rows),
         phases,
+    )
+
+
+def still(pose: StandingPose) -> Passage:
+    """Return three frames of a standing pose, in the frame that travels."""
+    root = floor_plane.at_height(np.array([pose.place]), np.array([pose.height]))
+    return Passage(
+        np.repeat(pose.rotations[None], 3, axis=0),
+        np.repeat(root, 3, axis=0),
+        np.ones((3, len(pose.legs))),
+        np.zeros(3),
     )
 
 

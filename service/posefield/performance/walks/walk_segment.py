@@ -25,6 +25,7 @@ from posefield.performance.walks import (
 )
 from posefield.performance.walks.floor_path import FloorPath
 from posefield.performance.walks.speed_profile import SpeedRamps
+from posefield.performance.walks.standing_steps import StandingEnds
 from posefield.performance.walks.turning_curves import Radii
 from posefield.performance.walks.walk_paths import Destination
 from posefield.performance.walks.walk_request import WalkNote, WalkRequest
@@ -52,6 +53,7 @@ class WalkPlan:
     path: that the root follows in the mean over a cycle. distances: (F,), along it, m. places: (F,)
     and headings: (F,), rad, of the frame that travels with the walker. phases: (F,), of the cycle,
     without wrapping. controls: (F, d). speeds: (F,), m/s. notes: on what is not as captured.
+    stops: whether it ends standing. standing: steps at standing ends; None without them.
     """
 
     walker: Walker
@@ -63,6 +65,8 @@ class WalkPlan:
     controls: Annotated[Floats, "frames controls"]
     speeds: Annotated[Floats, "frames"]
     notes: tuple[WalkNote, ...] = ()
+    stops: bool = False
+    standing: StandingEnds | None = None
 
     def __len__(self) -> int:
         """Return the number of frames."""
@@ -76,7 +80,14 @@ class WalkPlan:
     def part(self, begin: int, end: int) -> "WalkPlan":
         """Return the frames from `begin` until before `end`, on the same path."""
         names = ("distances", "places", "headings", "phases", "controls", "speeds")
-        return replace(self, **{name: getattr(self, name)[begin:end] for name in names})
+        found = {name: getattr(self, name)[begin:end] for name in names}
+        standing = self.standing and self.standing.part(len(self), begin, end)
+        return replace(self, **found, standing=standing)
+
+    @property
+    def closes(self) -> bool:
+        """Return whether the walk ends with a closing step."""
+        return self.standing is not None and self.standing.closing > 0
 
     @property
     def exit_rates(self) -> tuple[float, float]:
@@ -112,15 +123,13 @@ def plan_walk(
     done = walker.strides(own)
     ways = _between(len(distances), knots, np.abs(done.travels))
     ends = (request.start, request.stop)
-    quiet = walker.double_supports if "standing" in ends else np.zeros(0)
-    phases, said = walk_phases.tied_to_distance(distances, ways, phase, quiet, ends)
+    phased = walk_phases.plan_phases(walker, distances, ways, phase, ends)
     centres, tangents = path.at(distances)
     headings = tangents - _between(len(distances), knots, done.drifts)
     places = centres - np.exp(1j * headings) * _offsets(walker, controls)
-    notes = [*notes, *pivots, *(WalkNote(*each) for each in said)]
-    return WalkPlan(
-        walker, path, distances, places, headings, phases, controls, speeds, tuple(notes)
-    )
+    fields = walker, path, distances, places, headings, phased.phases, controls, speeds
+    said = *notes, *pivots, *phased.notes
+    return WalkPlan(*fields, said, request.stop == "standing", phased.standing)
 
 
 def _route(

@@ -99,6 +99,11 @@ class Walker:
         return np.asarray(places.mean(axis=1))
 
     @cached_property
+    def slowest(self) -> Annotated[Floats, "1 controls"]:
+        """Controls (1, d) of the slowest walk straight ahead."""
+        return self._mean_controls(np.array([self.gait.region.speeds[0]]), np.zeros(1))
+
+    @cached_property
     def double_supports(self) -> Annotated[Floats, "phases"]:
         """Phases at which all feet stand, at the slowest speed: one in each half of the cycle.
 
@@ -107,8 +112,7 @@ class Walker:
         """
         if not self.card.feet:
             return np.zeros(0)
-        controls = self._mean_controls(np.array([self.gait.region.speeds[0]]), np.zeros(1))
-        phases = np.arange(MEASURED_PHASES) / MEASURED_PHASES
+        controls, phases = self.slowest, np.arange(MEASURED_PHASES) / MEASURED_PHASES
         by_contacts = len(walking_feet.foot_contacts(self.card)) > 1
         values = self._swings(controls, phases) if by_contacts else self._paces(controls, phases)
         return phases[_lowest(values)]

@@ -1,0 +1,300 @@
+"""Tests of the steps with which walks begin and end standing, with the shipped walk."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from posefield.inference import session
+from posefield.locomotion import floor_plane
+from posefield.motion import quat, skeleton
+from posefield.performance import approach, composition, walk_entries
+from posefield.performance.acts.act_segment import Act
+from posefield.performance.acts.staged_act import StagedAct
+from posefield.performance.joins import cut_search
+from posefield.performance.passages.passage import RATE, FloorMotion, Passage
+from posefield.performance.script import resolve_script
+from posefield.performance.timeline import Timeline
+from posefield.performance.walks import standing_pose, standing_steps, walk_passage, walk_phases
+from posefield.performance.walks.standing_steps import StandingEnds, Travel
+from posefield.performance.walks.walk_request import WalkRequest
+from posefield.performance.walks.walk_segment import plan_walk
+from posefield.performance.walks.walker import find_walker
+from posefield.question import json_decoding
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.synthesis.synthesizer import Synthesizer
+
+SHIPPED = Path(__file__).parents[3] / "service/posefield/shipped/cmu_walk.onnx"
+BOTH = {"start": "standing", "stop": "standing"}
+KNEES = ("LeftLeg", "RightLeg")
+
+
+@cache
+def walk():
+    return Synthesizer("cmu_walk", session.load(SHIPPED))
+
+
+@cache
+def pose():
+    return standing_pose.find_standing_pose(find_walker(walk().gait, {}, {}))
+
+
+def joints(passage):
+    """Return the positions (F, J, 3) of the joints of a passage."""
+    own = pose()
+    local = skeleton.translations(own.bones, passage.roots)
+    return skeleton.positions(own.parents, passage.rotations, local)
+
+
+def balls(passage):
+    """Return the paths (F, 2, 3) of the balls of the feet, m."""
+    return joints(passage)[:, [leg.tip for leg in pose().legs]]
+
+
+def accelerations(passage):
+    """Return the mean accelerations of the joints relative to the root, m/s²."""
+    found = joints(passage) - passage.roots[:, None]
+    return np.linalg.norm(np.diff(found, n=2, axis=0), axis=-1).mean(axis=-1) * RATE**2
+
+
+def walked(request, phase=0.1):
+    plan = plan_walk(walk().gait, request, FloorMotion(), phase)
+    return plan, walk_passage.walk_passage(walk(), plan)
+
+
+def bends(passage):
+    """Return the bends of both knees (F, 2), degrees."""
+    places = [walk().session.card.skeleton.names.index(name) for name in KNEES]
+    return np.degrees(2.0 * np.arccos(np.abs(passage.rotations[:, places, 0])))
+
+
+def test_the_standing_pose_has_its_feet_beside_each_other():
+    own = pose()
+    (still,) = {array.tobytes() for array in walk_passage.still(own).rotations}
+    assert still == own.rotations.tobytes()
+    feet = balls(walk_passage.still(own))[0]
+    apart = feet[0] - feet[1]
+    assert abs(apart[2]) < 1e-9
+    assert 0.1 < abs(apart[0]) < 0.2
+    assert np.abs(feet[:, 1] - own.levels).max() < 1e-9
+    # The root is between the feet, and ahead of the ankles by less than the balls are.
+    assert feet[:, 0].mean() == pytest.approx(own.place.imag, abs=1e-9)
+    assert 0.03 < feet[0, 2] - own.place.real < 0.15
+
+
+def test_its_knees_are_bent_as_those_of_a_walker_who_stands_on_one_leg():
+    _, steady = walked(WalkRequest(0.5, seconds=4.0))
+    own = bends(walk_passage.still(pose()))[0]
+    usual = bends(steady).min(axis=1)
+    assert usual.min() < own.min() < own.max() < usual.max() + 10.0
+    assert bends(steady).max() > own.max() + 20.0
+
+
+def test_a_pose_is_made_once_for_each_walker():
+    again = standing_pose.find_standing_pose(find_walker(walk().gait, {}, {}))
+    assert again is pose()
+    named = walk().session.card.performers[0]
+    other = standing_pose.find_standing_pose(find_walker(walk().gait, {"performer": named}, {}))
+    assert np.abs(other.rotations - pose().rotations).max() > 0.01
+
+
+def test_a_model_without_contacts_has_none_and_slows_down():
+    known = walk().gait
+    card = replace(known.session.card, contacts=())
+    own = replace(known, session=replace(known.session, card=card, digest="without contacts"))
+    assert standing_pose.find_standing_pose(find_walker(own, {}, {})) is None
+    plan = plan_walk(own, WalkRequest(1.0, seconds=5.0, **BOTH), None, 0.0)
+    assert plan.standing is None
+    assert [note.code for note in plan.notes].count("feet-apart") == 2
+    assert "synthesised" in plan.notes[0].message
+    assert plan.notes[0].code.startswith(walk_phases.SYNTHESISED)
+
+
+@pytest.mark.parametrize("length", [3.0, 5.3, 8.0])
+@pytest.mark.parametrize("end", ["start", "stop"])
+def test_a_walk_begins_and_ends_with_its_feet_beside_each_other(length, end):
+    plan, made = walked(WalkRequest(1.1, to=(0.0, length), **BOTH))
+    frame, place = (0, 0.0) if end == "start" else (-1, length)
+    feet = balls(made)[frame]
+    assert abs(feet[0, 2] - feet[1, 2]) < 0.01
+    assert 0.1 < abs(feet[0, 0] - feet[1, 0]) < 0.2
+    assert np.abs(feet[:, 1] - pose().levels).max() < 0.005
+    root = made.roots[frame]
+    assert np.hypot(root[0], root[2] - place) < 0.06
+    assert root[0] == pytest.approx(feet[:, 0].mean(), abs=0.01)
+    # Without the steps one foot is in the air or ahead.
+    travel = Travel(plan.places, plan.headings, plan.phases)
+    bare = walk_passage.walk_passage(walk(), replace(plan, standing=None))
+    assert np.abs(balls(bare)[frame, :, 1] - pose().levels).max() > 0.01
+    none = standing_steps.add_standing_ends(bare, travel, StandingEnds(pose()))
+    assert none.rotations.tobytes() == bare.rotations.tobytes()
+
+
+def test_a_closing_step_lifts_one_foot_and_stands_on_the_other():
+    plan, made = walked(WalkRequest(1.1, to=(0.0, 6.0), stop="standing"))
+    count = plan.standing.closing
+    feet, down = balls(made)[-count:], made.contacts[-count:] > 0.5
+    swinging = pose().passing_at(plan.phases[-1]).swinging
+    assert down[:, 1 - swinging].all()
+    swing = np.flatnonzero(~down[:, swinging])
+    assert 0.25 < len(swing) / RATE < 0.65
+    assert down[swing[-1] + 1 :, swinging].all()
+    assert feet[swing, swinging, 1].max() > pose().levels[swinging] + 0.03
+    moved = np.linalg.norm(np.diff(feet[:, :, [0, 2]], axis=0), axis=-1).sum(axis=0)
+    assert moved[1 - swinging] < 0.03
+    assert moved[swinging] > 0.3
+    # It comes to rest.
+    assert np.linalg.norm(np.diff(made.roots[-3:], axis=0), axis=-1).max() * RATE < 0.03
+    assert np.abs(feet[-5:] - feet[-1]).max() < 1e-3
+
+
+def test_steps_are_no_more_sudden_than_walking():
+    plan, made = walked(WalkRequest(1.1, to=(0.0, 8.0), **BOTH))
+    found, own = accelerations(made), plan.standing
+    usual = np.percentile(found[own.opening : -own.closing], 99.0)
+    assert found[: own.opening].max() < usual
+    assert found[-own.closing :].max() < usual
+    # A pose that is put at the end is seen.
+    still = walk_passage.still(pose()).rotations[0]
+    sudden = made.rotations.copy()
+    sudden[len(made) - own.closing :] = still
+    assert accelerations(replace(made, rotations=sudden)).max() > usual
+    # Knees turn smoothly, too.
+    bent = np.abs(np.diff(bends(made), n=2, axis=0)).max(axis=1)
+    assert bent[: own.opening].max() < bent[own.opening : -own.closing].max()
+    assert bent[-own.closing :].max() < bent[own.opening : -own.closing].max()
+
+
+def backwards(own):
+    """Return a passage in the other order, in which no contact is likely."""
+    none = np.zeros_like(own.contacts)
+    return Passage(*(array[::-1] for array in (own.rotations, own.roots, none, own.sigmas)))
+
+
+def test_an_opening_step_is_a_closing_step_backwards():
+    plan, _ = walked(WalkRequest(1.1, to=(0.0, 4.0), start="standing"))
+    count = plan.standing.opening
+    part = plan.part(0, count)
+    bare = walk_passage.walk_passage(walk(), replace(part, standing=None))
+    travel = Travel(part.places, part.headings, part.phases)
+    opened = standing_steps.add_standing_ends(bare, travel, StandingEnds(pose(), opening=count))
+    closed = standing_steps.add_standing_ends(
+        backwards(bare),
+        Travel(*(array[::-1] for array in (part.places, part.headings, part.phases))),
+        StandingEnds(pose(), closing=count),
+    )
+    for name in ("rotations", "roots", "contacts"):
+        assert np.array_equal(getattr(opened, name), getattr(closed, name)[::-1])
+    assert not np.array_equal(opened.roots, bare.roots)
+
+
+def test_a_part_of_a_walk_has_the_steps_that_are_whole_in_it():
+    plan, made = walked(WalkRequest(1.1, to=(0.0, 6.0), **BOTH))
+    steps, count = plan.standing, len(plan)
+    assert plan.part(0, count).standing == steps
+    last = plan.part(count - steps.closing, count)
+    assert (last.standing.opening, last.standing.closing) == (0, steps.closing)
+    found = walk_passage.walk_passage(walk(), last)
+    assert np.allclose(found.roots, made.roots[-steps.closing :], atol=2e-3)
+    assert not plan.part(count - steps.closing + 1, count).closes
+    assert plan.part(0, steps.opening - 1).standing.opening == 0
+
+
+def test_a_walk_too_short_for_a_step_stops_in_double_support_and_says_so():
+    plan, _ = walked(WalkRequest(0.8, seconds=0.3, **BOTH))
+    assert plan.standing is None
+    codes = [note.code for note in plan.notes]
+    assert codes.count("feet-apart") == 2
+    whole, _ = walked(WalkRequest(0.8, seconds=4.0, **BOTH))
+    assert whole.standing.opening and whole.standing.closing
+    assert "feet-apart" not in [note.code for note in whole.notes]
+
+
+def test_feet_that_cannot_be_beside_each_other_have_the_root_between_them():
+    said = []
+    for length in np.linspace(0.6, 1.2, 7):
+        plan, made = walked(WalkRequest(0.8, to=(0.0, length), stop="standing"))
+        if not plan.closes:
+            continue
+        feet = balls(made)[-1]
+        apart = abs(feet[0, 2] - feet[1, 2])
+        told = "stops-in-mid-stride" in [note.code for note in plan.notes]
+        assert told if apart > 0.05 else not told or apart > 0.02
+        ahead = feet[:, 2].mean() - made.roots[-1, 2]
+        assert ahead == pytest.approx(pose().balls.real.mean() - pose().place.real, abs=0.01)
+        said.append(apart)
+    assert max(said) > 0.1 > 0.02 > min(said)
+
+
+def test_the_path_of_a_walk_from_its_standing_pose_begins_below_the_root():
+    who = find_walker(walk().gait, {}, {})
+    begin, phase = standing_pose.path_start(who, pose())
+    plan = plan_walk(walk().gait, WalkRequest(0.8, seconds=4.0, start="standing"), begin, phase)
+    made = walk_passage.walk_passage(walk(), plan)
+    still = walk_passage.still(pose())
+    assert np.abs(balls(made)[0] - balls(still)[0]).max() < 0.02
+    turned = quat.mul(quat.conj(made.rotations[0]), still.rotations[0])
+    assert np.abs(quat.log(turned)).max() < 0.05
+    apart = plan_walk(walk().gait, WalkRequest(0.8, seconds=4.0), begin, phase)
+    moved = balls(walk_passage.walk_passage(walk(), apart))[0] - balls(still)[0]
+    assert np.abs(moved).max() > 0.05
+
+
+def performed(*segments):
+    document = {"fps": RATE, "segments": [{"model": "cmu_walk", **own} for own in segments]}
+    asked = json_decoding.decode_question(PerformanceQuestion, msgspec.json.encode(document))
+    return composition.perform(resolve_script(asked, lambda _: walk()), 10_000)
+
+
+@pytest.mark.parametrize("speed", [0.6, 0.8, 1.1, 1.3])
+def test_placed_feet_skate_no_more_in_starts_and_stops(speed):
+    way = {"kind": "walk", "to": [0, 10], "speed": speed}
+    steady, both = performed(way).trust, performed(way | BOTH).trust
+    assert both.feet.skate < 1.1 * steady.feet.skate
+    assert both.feet.lowered < 0.045
+    assert both.script_warnings == ()
+    assert len(both.segments[0].notes) == 2
+
+
+def test_a_walk_goes_on_from_where_another_one_stands():
+    first = {"kind": "walk", "to": [0, 4], "stop": "standing"}
+    then = {"kind": "walk", "to": [0, 8]}
+    stood = performed(first, then | {"start": "standing"}).trust
+    (join,) = stood.joins
+    assert join.distance < 0.02
+    assert not join.hard
+    rolling = performed(first, then).trust
+    assert len(rolling.joins) == 1
+    assert rolling.joins[0].distance > join.distance
+
+
+def test_floor_points_of_a_pose_are_those_of_its_feet():
+    feet = balls(walk_passage.still(pose()))[0]
+    assert np.abs(floor_plane.project(feet) - pose().balls).max() < 1e-9
+
+
+@pytest.mark.parametrize("way", [6.0, 6.5, 7.0, 7.5])
+def test_an_act_goes_on_from_where_a_walk_stands(way):
+    own = {"kind": "walk", "model": "cmu_walk", "seconds": 2.0, "stop": "standing"}
+    content = msgspec.json.encode({"segments": [own, own]})
+    asked = json_decoding.decode_question(PerformanceQuestion, content)
+    script = resolve_script(asked, lambda _: walk())
+    still = walk_passage.still(pose())
+    act = Act(still.placed(FloorMotion(0.7, 3.0 - 2.0j)), script.character.bones, None, None)
+    place = FloorMotion(-0.5, way + 1.0j)
+    timeline = Timeline(script.character)
+    entry = walk_entries.find_entry(timeline, script, 0)
+    entry = replace(entry, request=replace(entry.request, seconds=None))
+    plan, staged = approach.lead_to(timeline, script, 0, entry, StagedAct(1, act, place))
+    assert plan.closes
+    stood = script.adapted(0, walk_passage.walk_passage(walk(), plan))
+    last = range(len(stood) - 1, len(stood))
+    body, placed = script.character.body, act.passage.placed(staged.by)
+    found = cut_search.find_cut(body, stood, placed, last, range(1), FloorMotion())
+    assert found.distance < 0.02
+    aside = placed.placed(FloorMotion(0.0, 0.05j))
+    moved = cut_search.find_cut(body, stood, aside, last, range(1), FloorMotion())
+    assert moved.distance > 0.03
