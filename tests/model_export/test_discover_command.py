@@ -196,7 +196,7 @@ def test_the_output_is_a_table(posefield, folder):
 def test_a_folder_without_takes_is_refused(posefield, tmp_path):
     words = ("--strides", "-o", tmp_path / "x.csv")
     code, _, err = posefield("discover", tmp_path, *words)
-    assert code == 3 and "no take that can be searched; it has no BVH files" in err
+    assert code == 3 and "no take that can be searched; it has no motion files" in err
     assert posefield("discover", tmp_path / "none", *words)[0] == 3
     (tmp_path / "broken.bvh").write_text("HIERARCHY")
     code, _, err = posefield("discover", tmp_path, *words)
