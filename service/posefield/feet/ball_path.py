@@ -54,20 +54,29 @@ class Footsteps:
         return Footsteps(moved, self.stances, anchors)
 
 
-def plan_path(path: FootPath, found: Sequence[Interval], foot: FootContact) -> Footsteps:
-    """Return the path of a foot that stands in the intervals `found`."""
+def plan_path(
+    path: FootPath, found: Sequence[Interval], foot: FootContact, goal: RootPath | None = None
+) -> Footsteps:
+    """Return the path of a foot that stands in the intervals `found`.
+
+    goal: points (F, 3), m, that the path goes through; not a number in other frames.
+    """
     height = foot.height
-    held = _held(path, found)
-    floor_path = smooth_change(path.floor, held, path.rate, path.cycle)
+    goal = np.full(path.positions.shape, np.nan) if goal is None else goal
+    held = _held(path, found, goal)
+    floor_path = smooth_change(
+        path.floor, held, path.rate, path.cycle, fixed=floor_plane.project(goal)
+    )
     heights = smooth_change(
         path.heights,
         found,
         path.rate,
         None if path.cycle is None else Cycle(0.0, 0.0),
         np.full(len(found), height),
+        goal[:, 1],
     )
     placed = FootPath(floor_plane.at_height(floor_path, heights), path.rate, path.cycle)
-    added, least = _lifts(placed, found, foot)
+    added, least = _lifts(placed, found, foot, goal)
     heights = np.maximum(heights + added, height + least)
     positions = floor_plane.at_height(floor_path, heights)
     anchors = positions[[stance.begin for stance in found]].reshape(-1, 3)
@@ -80,13 +89,17 @@ def smooth_change(
     rate: float,
     cycle: Cycle | None = None,
     values: Floats | None = None,
+    fixed: Numbers | None = None,
 ) -> Numbers:
     """Return the path (F,) of smoothest change that is constant in each interval.
 
     path: (F,), real or complex. rate: frames a second. cycle: motion from frame 0 to frame F; None
-    where the path does not repeat. values: of the intervals, if they are given.
+    where the path does not repeat. values: of the intervals, if they are given. fixed: values (F,)
+    of single frames, and thereby of the intervals that they are in; not a number in other frames.
+    A path with fixed values does not repeat.
     """
-    if not intervals:
+    through = np.flatnonzero(~np.isnan(fixed)) if fixed is not None else np.zeros(0, np.int64)
+    if not intervals and not len(through):
         return path
     count = len(path)
     groups, firsts = _groups(count, intervals)
@@ -106,6 +119,8 @@ def smooth_change(
     if values is not None:
         own = groups[[interval.begin for interval in intervals]]
         known[own], free[own] = values, False
+    if fixed is not None:
+        known[groups[through]], free[groups[through]] = fixed[through], False
     if cycle is None:
         bands = _normal_bands(bends, groups, stiffness)
         known = banded_systems.solve(bands, goal, ~free, known)
@@ -208,16 +223,21 @@ def _groups(
     return groups, firsts
 
 
-def _held(path: FootPath, found: Sequence[Interval]) -> list[Interval]:
-    """Return the stances with the ends of the swings in which the foot keeps its place."""
-    count, hold = len(path), round(HOLD * path.rate)
+def _held(path: FootPath, found: Sequence[Interval], goal: RootPath) -> list[Interval]:
+    """Return the stances with the ends of the swings in which the foot keeps its place.
+
+    It does not where it is led elsewhere.
+    """
+    count, hold, led = len(path), round(HOLD * path.rate), ~np.isnan(goal[:, 0])
     longer = []
     for index, stance in enumerate(found):
-        before = _gap(found, index - 1, path)
-        after = _gap(found, index, path)
-        longer.append(
-            Interval(stance.begin - min(hold, before // 4), stance.end + min(hold, after // 4))
-        )
+        before = min(hold, _gap(found, index - 1, path) // 4)
+        after = min(hold, _gap(found, index, path) // 4)
+        if led[stance.begin - before : stance.begin].any():
+            before = 0
+        if led[stance.end : stance.end + after].any():
+            after = 0
+        longer.append(Interval(stance.begin - before, stance.end + after))
     if path.cycle is None:
         return [Interval(max(i.begin, 0), min(i.end, count)) for i in longer]
     return [Interval(i.begin % count, i.begin % count + min(len(i), count)) for i in longer]
@@ -234,14 +254,25 @@ def _gap(found: Sequence[Interval], index: int, path: FootPath) -> int:
     return found[index + 1].begin - found[index].end
 
 
-def _lifts(path: FootPath, found: Sequence[Interval], foot: FootContact) -> tuple[Frames, Frames]:
+def _lifts(
+    path: FootPath, found: Sequence[Interval], foot: FootContact, goal: RootPath
+) -> tuple[Frames, Frames]:
     """Return how much a swinging foot is lifted (F,), m, and its least height (F,) while it swings.
 
-    A foot whose prediction is lifted as captured feet are is not lifted more. Zero in stances.
+    A foot whose prediction is lifted as captured feet are is not lifted more, and neither is one
+    that is led. Zero in stances, or less where the foot is led to a place below the floor.
     """
     count = len(path)
     added, lowest = np.zeros(count), np.zeros(count)
+    below = np.fmin(goal[:, 1] - foot.height, 0.0)
+    for stance in found:
+        own = np.arange(stance.begin, stance.end) % count
+        lowest[own] = below[own].min()
     for swing in stances.runs(~stances.mask(found, count), path.cycle is not None):
+        own = np.arange(swing.begin, swing.end) % count
+        if not np.isnan(goal[own]).all():
+            lowest[own] = below[own].min()
+            continue
         share = _shares(swing, path, foot)
         if share is None:
             continue

@@ -50,13 +50,11 @@ def place_feet(
     shift = _shift(plan, at)
     turned = rotations.copy()
     above = None if joints is None else _joints_above(body.parents, joints)
-    for index, (limb, target) in enumerate(_targets(plan, poses, at)):
+    for index, (limb, target) in enumerate(_targets(plan, poses, at, shift)):
         if above is not None and limb.upper not in above:
             continue
         found = two_bone.solve(poses, limb, two_bone.reach(poses, limb, shift, target))
-        turned[:, limb.upper] = found.upper
-        turned[:, limb.middle] = found.middle
-        turned[:, limb.lower] = found.lower
+        found.apply(limb, turned)
         if index < len(body.legs) and not plan.floor.is_level:
             # The foot is tilted as the floor is, in the axes of the ankle.
             own = poses.orientation(limb.lower)
@@ -76,7 +74,7 @@ def foot_paths(plan: FeetPlan) -> FootPaths:
     at = np.arange(float(len(plan.lowered)))
     shift = _shift(plan, at)
     before, after = np.empty((2, len(at), len(legs), 3))
-    for foot, (leg, target) in enumerate(list(_targets(plan, poses, at))[: len(legs)]):
+    for foot, (leg, target) in enumerate(list(_targets(plan, poses, at, shift))[: len(legs)]):
         upper = poses.position(leg.upper) + shift
         arm = _foot_arm(plan, poses, leg)
         before[:, foot] = poses.position(leg.tip)
@@ -91,7 +89,7 @@ def _shift(plan: FeetPlan, at: Frames) -> RootPath:
 
 
 def _targets(
-    plan: FeetPlan, poses: limbs.LimbPoses, at: Frames
+    plan: FeetPlan, poses: limbs.LimbPoses, at: Frames, shift: RootPath
 ) -> Iterator[tuple[limbs.Limb, RootPath]]:
     """Yield each limb with the target (S, 3), m, of its end, the legs first."""
     body = plan.character
@@ -99,8 +97,10 @@ def _targets(
         moved = _interpolate(_extended_path(change, plan.cycle), at)
         path = poses.position(leg.tip) + moved
         yield leg, _anchored(steps, plan, at, path) - _foot_arm(plan, poses, leg)
-    for limb in body.kept:
-        yield limb, poses.position(limb.lower)
+    for limb, share in zip(body.kept, plan.led.limbs, strict=True):
+        # Where it is not led, the end moves with the root.
+        free = 1.0 - np.clip(_interpolate(_extended(share, plan.cycle), at), 0.0, 1.0)
+        yield limb, poses.position(limb.lower) + free[:, None] * shift
 
 
 def _foot_arm(plan: FeetPlan, poses: limbs.LimbPoses, leg: limbs.Limb) -> RootPath:

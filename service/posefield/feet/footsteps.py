@@ -11,9 +11,10 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
-from posefield.common.units import UP, Booleans, Floats
-from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stances
+from posefield.common.units import UP, Floats
+from posefield.feet import ball_path, contact_estimates, leads, limbs, pelvis, stances
 from posefield.feet.ball_path import Footsteps
+from posefield.feet.leads import UNEVEN, Led
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.motion.foot_contacts import FootContact
@@ -21,8 +22,6 @@ from posefield.question.floor import LEVEL_FLOOR, Floor
 
 # Rounds in which stances are shortened whose leg does not reach.
 ROUNDS = 4
-# A foot may stand this much higher or lower than captured feet do, m: soles differ.
-UNEVEN = 0.01
 # On a slope the feet of a step differ in height: the pelvis is lowered by this length times the
 # slope more, m.
 STEP = 0.4
@@ -33,7 +32,8 @@ class Character:
     """Skeleton and limbs of a character.
 
     parents: of the joints. bones: offsets (J, 3), m. legs: of the feet that are planted. kept:
-    limbs whose ends keep their predicted paths, such as the arm of a hand with an exact target.
+    limbs whose ends keep their predicted paths while they are led there, such as the arm of a hand
+    with an exact target.
     fixed: whether the pelvis keeps its height above the floor. raised: whether a fixed one follows
     the floor nevertheless.
     """
@@ -75,8 +75,8 @@ class FeetPlan:
     path of each foot (K, F, 3), m. lowered: how much the root is lowered (F,), m. followed: the
     part of it that follows the floor (F,), m; the rest is the pelvis. grounded: how much a
     character that floats was lowered to the level on which it was captured, m. poses: predicted, of
-    the limbs. floor: on which the feet stand. unreached: legs, by place, none of whose stances
-    reaches it.
+    the limbs. led: what keeps its predicted path, and when. floor: on which the feet stand.
+    unreached: legs, by place, none of whose stances reaches it.
     """
 
     character: Character
@@ -88,6 +88,7 @@ class FeetPlan:
     followed: Frames
     grounded: float
     poses: LimbPoses
+    led: Led
     floor: Floor = LEVEL_FLOOR
     unreached: tuple[int, ...] = ()
 
@@ -98,13 +99,15 @@ def plan_feet(
     contacts: Sequence[FootContact] = (),
     likely: Annotated[Floats, "frames feet"] | None = None,
     floor: Floor = LEVEL_FLOOR,
+    led: Led | None = None,
 ) -> FeetPlan:
     """Return where the feet of a motion stand, and how low its pelvis must be for that.
 
     Any motion may be planned, also one that is joined of several. contacts: statistics of each
     leg's foot, with the probabilities `likely` (F, K) of its contacts; both are estimated from the
     motion if they are not given. floor: on which the feet stand. The steps are those of a floor at
-    height 0, moved to it. A cycle does not climb: its floor must be level.
+    height 0, moved to it. A cycle does not climb: its floor must be level. led: what keeps its
+    predicted path; the kept limbs all the time if not given. A foot is led over a level floor only.
     """
     poses = limbs.evaluate_poses(
         character.parents, character.bones, character.limbs, motion.rotations, motion.roots
@@ -121,22 +124,22 @@ def plan_feet(
         ]
     else:
         down, known = contact_estimates.from_probabilities(paths, likely), list(contacts)
+    led = led or leads.always(len(paths), len(character.kept), len(motion.roots))
+    room = led.room(poses, character.limbs)
     above = _heights_above(paths, down, known)
-    grounded = _grounded(above, poses, character)
+    grounded = _grounded(above, room, character)
     # The ground first: the whole character stands as high as its feet do.
     feet = [
         _GroundedFoot(
             replace(path, positions=path.positions - grounded * UP),
             replace(foot, height=foot.height + float(np.clip(own - grounded, -UNEVEN, UNEVEN))),
+            leads.goals(path, exact),
         )
-        for path, foot, own in zip(paths, known, above, strict=True)
+        for path, foot, own, exact in zip(paths, known, above, led.feet, strict=True)
     ]
-    found = [
-        stances.discipline(own, foot.path, foot.contact)
-        for own, foot in zip(down, feet, strict=True)
-    ]
-    followed = _follow(floor, grounded, motion, poses, character)
-    body = _GroundedBody(poses, character, floor, grounded, followed)
+    found = [_stances(own, foot) for own, foot in zip(down, feet, strict=True)]
+    followed = _follow(floor, grounded, motion, room, character)
+    body = _GroundedBody(poses, character, floor, grounded, followed, room[1])
     steps, lowered = _reachable_steps(body, feet, found)
     changes = np.array(
         [own.positions - path.positions for own, path in zip(steps, paths, strict=True)]
@@ -151,6 +154,7 @@ def plan_feet(
         followed,
         grounded,
         poses,
+        led,
         floor,
         _unreached(floor, found, steps),
     )
@@ -158,10 +162,14 @@ def plan_feet(
 
 @dataclass(frozen=True)
 class _GroundedFoot:
-    """A foot of a character that stands on the floor; contact: with its own height, m."""
+    """A foot of a character that stands on the floor.
+
+    contact: with its own height, m. goal: where the foot is led (F, 3), m, as of `leads.goals`.
+    """
 
     path: FootPath
     contact: FootContact
+    goal: RootPath
 
 
 @dataclass(frozen=True)
@@ -169,7 +177,8 @@ class _GroundedBody:
     """Character on a floor.
 
     grounded: how much it is lowered to the level on which it was captured, m. followed: the same,
-    and how its root follows the floor (F,), m.
+    and how its root follows the floor (F,), m. below: how far the predicted root may be lowered
+    (F,), m.
     """
 
     poses: LimbPoses
@@ -177,6 +186,13 @@ class _GroundedBody:
     floor: Floor
     grounded: float
     followed: Frames
+    below: Frames
+
+
+def _stances(down: Sequence[Interval], foot: _GroundedFoot) -> list[Interval]:
+    """Return the stances of a foot whose swings are as captured ones, or where it is led."""
+    found = stances.discipline(down, foot.path, foot.contact)
+    return leads.lead_stances(found, foot.path, foot.contact, foot.goal)
 
 
 def _reachable_steps(
@@ -187,9 +203,8 @@ def _reachable_steps(
     Stances whose leg does not reach are shortened.
     """
     count, legs = len(body.poses.positions), body.character.legs
-    _, below = pelvis.room(body.poses, body.character.kept)
     deepest = pelvis.MOST + STEP * body.floor.slope
-    most = np.clip(below - body.followed, 0.0, deepest)
+    most = np.clip(body.below - body.followed, 0.0, deepest)
     if body.character.fixed:
         most = np.zeros(count)
     planned = [
@@ -197,7 +212,7 @@ def _reachable_steps(
     ]
     for _ in range(ROUNDS):
         shorter = [
-            _shortened(own, pelvis.beyond(foot.need, most), path.path)
+            stances.shortened(own, pelvis.beyond(foot.need, most), path.path)
             for own, foot, path in zip(found, planned, feet, strict=True)
         ]
         if shorter == found:
@@ -226,7 +241,8 @@ def _plan_foot(
 ) -> _PlannedFoot:
     """Return the steps of a foot that stands in the intervals `found`."""
     poses = body.poses
-    steps = ball_path.plan_path(foot.path, found, foot.contact).on_floor(body.floor)
+    steps = ball_path.plan_path(foot.path, found, foot.contact, foot.goal)
+    steps = steps.on_floor(body.floor)
     target = poses.position(leg.lower) - body.grounded * UP + steps.positions - foot.path.positions
     if not body.floor.is_level:
         arm = poses.position(leg.tip) - poses.position(leg.lower)
@@ -256,7 +272,7 @@ def _heights_above(
     return found
 
 
-def _grounded(above: Sequence[float], poses: LimbPoses, character: Character) -> float:
+def _grounded(above: Sequence[float], room: tuple[Frames, Frames], character: Character) -> float:
     """Return how far a character is lowered to the ground, m: it floats, or sinks, by its feet.
 
     Feet may be uneven, and limbs that keep their ends must reach them.
@@ -264,13 +280,17 @@ def _grounded(above: Sequence[float], poses: LimbPoses, character: Character) ->
     if character.fixed or not above:
         return 0.0
     mean = float(np.mean(above))
-    up, down = pelvis.room(poses, character.kept)
+    up, down = room
     wanted = float(np.sign(mean) * max(abs(mean) - UNEVEN, 0.0))
     return float(np.clip(wanted, -up.min(), down.min()))
 
 
 def _follow(
-    floor: Floor, grounded: float, motion: SampledMotion, poses: LimbPoses, character: Character
+    floor: Floor,
+    grounded: float,
+    motion: SampledMotion,
+    room: tuple[Frames, Frames],
+    character: Character,
 ) -> Frames:
     """Return how much the root is lowered so that it follows the floor (F,), m.
 
@@ -279,25 +299,9 @@ def _follow(
     wanted = grounded - floor.heights(motion.roots)
     if character.fixed and not character.raised:
         return np.zeros(len(wanted))
-    up, down = pelvis.room(poses, character.kept)
+    up, down = room
     cyclic = motion.cycle is not None
     high = pelvis.cover(np.maximum(-wanted - up, 0.0), motion.rate, cyclic)
     low = pelvis.cover(np.maximum(wanted - down, 0.0), motion.rate, cyclic)
     found: Frames = wanted + high - low
     return found
-
-
-def _shortened(
-    found: Sequence[Interval], beyond: Annotated[Booleans, "frames"], path: FootPath
-) -> list[Interval]:
-    """Return the stances without the frames in which the leg does not reach."""
-    count, shorter = len(path), []
-    for stance in found:
-        kept = ~beyond[np.arange(stance.begin, stance.end) % count]
-        longest = max(stances.runs(kept, False), key=len, default=Interval(0, 0))
-        if len(longest) >= stances.SHORTEST_CONTACT * path.rate:
-            begin, end = stance.begin + longest.begin, stance.begin + longest.end
-            # A stance of a cycle begins within it.
-            whole = count if begin >= count else 0
-            shorter.append(Interval(begin - whole, end - whole))
-    return sorted(shorter, key=lambda own: own.begin)

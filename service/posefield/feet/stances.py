@@ -164,3 +164,19 @@ def runs(down: Annotated[Booleans, "frames"], cyclic: bool) -> list[Interval]:
     found = contact_detection.runs(down, cyclic)
     intervals = [Interval(int(own[0]), int(own[0]) + len(own)) for own in found]
     return sorted(intervals, key=lambda own: own.begin)
+
+
+def shortened(
+    found: Sequence[Interval], beyond: Annotated[Booleans, "frames"], path: FootPath
+) -> list[Interval]:
+    """Return the stances without the frames in which the leg does not reach."""
+    count, shorter = len(path), []
+    for stance in found:
+        kept = ~beyond[np.arange(stance.begin, stance.end) % count]
+        longest = max(runs(kept, False), key=len, default=Interval(0, 0))
+        if len(longest) >= SHORTEST_CONTACT * path.rate:
+            begin, end = stance.begin + longest.begin, stance.begin + longest.end
+            # A stance of a cycle begins within it.
+            whole = count if begin >= count else 0
+            shorter.append(Interval(begin - whole, end - whole))
+    return sorted(shorter, key=lambda own: own.begin)

@@ -31,6 +31,14 @@ class LimbTurns:
     middle: Turns
     lower: Turns
 
+    def apply(
+        self, limb: Limb, rotations: Annotated[Floats, "*characters frames joints 4"]
+    ) -> None:
+        """Write the rotations of the limb's joints into poses (..., F, J, 4)."""
+        rotations[..., limb.upper, :] = self.upper
+        rotations[..., limb.middle, :] = self.middle
+        rotations[..., limb.lower, :] = self.lower
+
 
 def firm_reach(poses: LimbPoses, limb: Limb) -> Values:
     """Return the distance (..., F), m, up to which the end of a limb follows its target exactly."""

@@ -153,14 +153,12 @@ def frame_times(composed: Composed, fps: float, most: int) -> Frames:
 
 
 def plan_feet(script: Script, composed: Composed) -> FeetPlan:
-    """Return the plan of the feet over a whole performance; limbs with targets keep their ends."""
-    character, targets = script.character, composed.timeline.targets
-    limbs = limb_targets.find_limbs(character.body, targets).values()
-    kept = tuple(dict.fromkeys(limb for limb in limbs if limb is not None))
-    body = replace(character.body, kept=kept)
-    own = composed.motion
+    """Return the plan of the feet over a whole performance, in which targets stay met."""
+    character, timeline, own = script.character, composed.timeline, composed.motion
+    frames = range(timeline.begin, timeline.begin + len(own))
+    body, led = limb_targets.find_leads(character.body, timeline.targets, frames)
     motion = SampledMotion(own.rotations, own.roots, RATE, walking=composed.walking)
-    return footsteps.plan_feet(body, motion, character.contacts, composed.motion.contacts)
+    return footsteps.plan_feet(body, motion, character.contacts, own.contacts, led=led)
 
 
 def _place_feet(planned: FeetPlan | None, times: Frames, motion: Passage) -> PlacedFrames:

@@ -10,10 +10,11 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Vector
+from posefield.common.array_shapes import Frames, Vector
 from posefield.common.units import Floats
 from posefield.feet import limbs, two_bone
 from posefield.feet.footsteps import Character
+from posefield.feet.leads import Led
 from posefield.feet.limbs import Limb
 from posefield.motion import skeleton
 from posefield.performance.passages.passage import RATE, Passage
@@ -58,6 +59,41 @@ def meet_targets(
             passage = _moved(character, passage, limb, own)
         left.append(_miss(character, passage, own))
     return passage, tuple(left)
+
+
+def find_leads(
+    character: Character, targets: Sequence[WorldTarget], frames: range
+) -> tuple[Character, Led]:
+    """Return the character with the limbs that targets lead, and when they are led.
+
+    frames: of the motion in the time of the targets. A foot with a target is led while the target
+    holds, and planned as any other foot before and after. Another limb keeps the path of its end
+    while its way is eased. Where a target is met by neither, such as one of the trunk, the whole
+    body stays as it is.
+    """
+    count = len(frames)
+    feet, root = np.zeros((len(character.legs), count), bool), np.zeros(count, bool)
+    arms: dict[Limb, Frames] = {}
+    found = find_limbs(character, targets)
+    used = {joint for leg in character.legs for joint in _chain(leg)}
+    for own in targets:
+        limb, share = found[own.joint], _share(np.array(frames, float), own)
+        above = skeleton.joint_chain(character.parents, own.joint)
+        legs = [leg.lower in above for leg in character.legs]
+        if limb is not None and (limb in arms or not used.intersection(_chain(limb))):
+            arms[limb] = np.maximum(arms.get(limb, 0.0), share)
+            used.update(_chain(limb))
+        elif any(legs):
+            feet[legs] |= share == 1.0
+        else:
+            feet[:] |= share == 1.0
+            root |= share == 1.0
+    shares = np.array(list(arms.values())).reshape(len(arms), count)
+    return replace(character, kept=tuple(arms)), Led(feet, shares, root)
+
+
+def _chain(limb: Limb) -> tuple[int, int, int]:
+    return limb.upper, limb.middle, limb.lower
 
 
 def _moved(character: Character, passage: Passage, limb: Limb, own: WorldTarget) -> Passage:
