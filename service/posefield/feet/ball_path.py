@@ -259,30 +259,27 @@ def _lifts(
 ) -> tuple[Frames, Frames]:
     """Return how much a swinging foot is lifted (F,), m, and its least height (F,) while it swings.
 
-    A foot whose prediction is lifted as captured feet are is not lifted more, and neither is one
-    that is led. Zero in stances, or less where the foot is led to a place below the floor.
+    A foot whose prediction is lifted as captured feet are is not lifted more. A point to which it
+    is led ends a swing. Zero in stances, or less where the foot is led to a place below the floor.
     """
     count = len(path)
-    added, lowest = np.zeros(count), np.zeros(count)
-    below = np.fmin(goal[:, 1] - foot.height, 0.0)
+    added, lowest = np.zeros(count), np.fmin(goal[:, 1] - foot.height, 0.0)
     for stance in found:
         own = np.arange(stance.begin, stance.end) % count
-        lowest[own] = below[own].min()
-    for swing in stances.runs(~stances.mask(found, count), path.cycle is not None):
-        own = np.arange(swing.begin, swing.end) % count
-        if not np.isnan(goal[own]).all():
-            lowest[own] = below[own].min()
-            continue
+        lowest[own] = lowest[own].min()
+    ended = stances.mask(found, count) | ~np.isnan(goal[:, 0])
+    for swing in stances.runs(~ended, path.cycle is not None):
         share = _shares(swing, path, foot)
         if share is None:
             continue
-        begin, end = path.places(_ends(swing, path))
+        ends = np.array(_ends(swing, path))
+        begin, end = path.places(ends)
         least = foot.clearance * min(abs(end - begin) / FULL_STEP, 1.0)
         frames = np.arange(swing.begin, swing.end) % count
         rise = np.sin(np.pi * share) ** LIFT_EXPONENT
         lifted = max(float(path.heights[frames].max()) - foot.height, 0.0)
         added[frames] = max(least * float(rise.max()) - lifted, 0.0) * rise
-        lowest[frames] = min(least, LEAST_LIFT) * rise
+        lowest[frames] = min(least, LEAST_LIFT) * rise + lowest[ends % count].min() * (1.0 - rise)
     return added, lowest
 
 
