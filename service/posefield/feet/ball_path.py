@@ -29,6 +29,8 @@ HOLD = 0.04
 FULL_STEP, LIFT_EXPONENT = 0.1, 0.7
 # A foot in the middle of a full step is at least this high above its place, m.
 LEAST_LIFT = 0.025
+# Acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
+LIFT_ACCELERATION = 20.0
 
 Numbers = npt.NDArray[Any]
 
@@ -275,12 +277,19 @@ def _lifts(
         ends = np.array(_ends(swing, path))
         begin, end = path.places(ends)
         least = foot.clearance * min(abs(end - begin) / FULL_STEP, 1.0)
+        if path.cycle is not None or (swing.begin > 0 and swing.end < count):
+            least = min(least, float(highest_lift(len(swing) / path.rate)))
         frames = np.arange(swing.begin, swing.end) % count
         rise = np.sin(np.pi * share) ** LIFT_EXPONENT
         lifted = max(float(path.heights[frames].max()) - foot.height, 0.0)
         added[frames] = max(least * float(rise.max()) - lifted, 0.0) * rise
         lowest[frames] = min(least, LEAST_LIFT) * rise + lowest[ends % count].min() * (1.0 - rise)
     return added, lowest
+
+
+def highest_lift(seconds: float | Floats) -> float | Floats:
+    """Return how high a foot is lifted at most in a swing of a duration, m."""
+    return LIFT_ACCELERATION * seconds**2 / (LIFT_EXPONENT * np.pi**2)
 
 
 def _shares(swing: Interval, path: FootPath, foot: FootContact) -> Frames | None:

@@ -14,7 +14,15 @@ import numpy as np
 
 from posefield.common.units import Booleans, Floats
 from posefield.feet import stance_rows
-from posefield.feet.ball_path import FULL_STEP, HOLD, LEAST_LIFT, LIFT_EXPONENT, SPREAD, Numbers
+from posefield.feet.ball_path import (
+    FULL_STEP,
+    HOLD,
+    LEAST_LIFT,
+    LIFT_EXPONENT,
+    SPREAD,
+    Numbers,
+    highest_lift,
+)
 from posefield.feet.stance_rows import FootRows, Rows, Runs
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
@@ -196,6 +204,8 @@ def _lifts(
     ends = np.maximum(swings.begins - 1, 0), np.minimum(swings.ends, count - 1)
     step = np.abs(floor[rows, ends[1]] - floor[rows, ends[0]])
     least = feet.clearance[rows] * np.minimum(step / FULL_STEP, 1.0)
+    highest = np.where(swings.inner(count), highest_lift(swings.lengths / feet.rate), np.inf)
+    least = np.minimum(least, highest)
     rise = np.sin(np.pi * _shares(swings, count, feet)) ** LIFT_EXPONENT
     starts = np.cumsum(swings.lengths) - swings.lengths
     top = np.maximum.reduceat(rise, starts)
