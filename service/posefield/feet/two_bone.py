@@ -111,20 +111,20 @@ def shortest_turn(
 def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
     """Return the unit vectors (..., F, 3), orthogonal to the limb, towards which its middle bends.
 
-    Where a limb is nearly straight its plane is that of the mean bend in its parent's axes; so is
-    that of a leg that bends a little the other way.
+    Where a limb is nearly straight its plane is that of its mean bend, about one axis of its upper
+    bone, as that of a knee; so is that of a leg that bends a little the other way.
     """
     upper, middle = poses.position(limb.upper), poses.position(limb.middle)
     chord = poses.position(limb.lower) - upper
     old = chord / np.maximum(np.linalg.norm(chord, axis=-1, keepdims=True), 1e-9)
     bone = middle - upper
     bend = bone - np.sum(bone * old, axis=-1, keepdims=True) * old
-    frame = poses.parent_orientation(limb.upper)
-    mean = np.mean(quat.rotate(quat.conj(frame), bend), axis=-2, keepdims=True)
+    frame = poses.orientation(limb.upper)
+    mean = np.mean(quat.rotate(quat.conj(frame), quat.cross(bone, old)), axis=-2, keepdims=True)
     size = np.linalg.norm(mean, axis=-1, keepdims=True)
     least = LEAST_BEND * poses.length(limb.middle)[..., None]
-    usual = quat.rotate(frame, np.broadcast_to(mean / np.maximum(size, 1e-9), bend.shape))
-    usual = usual - np.sum(usual * old, axis=-1, keepdims=True) * old
+    axis = quat.rotate(frame, np.broadcast_to(mean / np.maximum(size, 1e-9), bend.shape))
+    usual = quat.cross(old, axis)
     bent = np.linalg.norm(bend, axis=-1)
     if limb.tip != limb.lower:
         # A knee that is a little overstretched would bend backwards where its leg is shortened.
