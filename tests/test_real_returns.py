@@ -70,7 +70,8 @@ def test_a_target_at_the_event_of_a_return_gives_its_controls(made):
 def test_a_hand_of_a_captured_body_is_held(made):
     _, _, model = made
     found = act_segment.act_passage(model, MotionQuestion(controls={}))
-    body = hold_segment.body_of(model.session.card, found.bones)
+    card = model.session.card
+    body = hold_segment.body_of(card.skeleton, card.roles, found.bones)
     held = hold_segment.hold_passage(
         hold_segment.come_to_rest(found.passage), Hold(2.0, "rhand"), body
     ).passage

@@ -29,3 +29,12 @@ UpAxis = Literal["y", "z"]
 """Up axis of a file."""
 
 UP = np.array([0.0, 1.0, 0.0])
+
+MICROMETRES = 6
+"""Decimals of metres to which numbers of answers are rounded, and distances compared, so that
+machines whose last digits differ agree."""
+
+
+def round_micrometres(value: float) -> float:
+    """Return a number of an answer, such as a length, m, rounded to six decimals."""
+    return round(float(value), MICROMETRES)

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import ball_path, contact_estimates, leads, limbs, pelvis, stances
 from posefield.feet.ball_path import Footsteps
 from posefield.feet.leads import UNEVEN, Led

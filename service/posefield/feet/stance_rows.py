@@ -9,10 +9,9 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import UP, Booleans, Floats, Indices
+from posefield.common.units import MICROMETRES, UP, Booleans, Floats, Indices
 from posefield.feet.stances import (
     LIFTED,
-    MICROMETRES,
     SHORTEST_CONTACT,
     SHORTEST_GAP,
     SHORTEST_STEP,

@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import UP, Booleans
+from posefield.common.units import MICROMETRES, UP, Booleans
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion.contacts import contact_detection
@@ -21,8 +21,6 @@ from posefield.motion.foot_contacts import FootContact
 # Contacts that are shorter are dropped, and gaps that are shorter are closed, s.
 SHORTEST_CONTACT = contact_detection.DEFAULT.shortest
 SHORTEST_GAP = contact_detection.DEFAULT.shortest_gap
-# Distances are compared to the micrometre, so that two machines plan the same steps.
-MICROMETRES = 6
 # A swing that goes less is none, m.
 SHORTEST_STEP = 0.03
 # A foot that is higher above the place where it stands is in the air whatever the plan says, m.

@@ -4,7 +4,6 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.performance.acts import act_placement, act_segment
-from posefield.performance.acts.act_segment import Act
 from posefield.performance.acts.staged_act import StagedAct
 from posefield.performance.approach import entry_range
 from posefield.performance.passages.limb_targets import WorldTarget
@@ -14,6 +13,7 @@ from posefield.performance.timeline import Span, Timeline, check_distance, choos
 from posefield.question import performance_question
 from posefield.question.motion_question import MotionQuestion, Target, replace
 from posefield.question.results import split_results
+from posefield.synthesis import synthesizer
 
 EXIT_SECONDS = 1.5
 """Time before the end of an act in which it may go on into the next segment, s."""
@@ -118,6 +118,10 @@ def add_act(timeline: Timeline, script: Script, staged: StagedAct) -> None:
     else:
         entries = entry_range(passage, act.event)
         entries = range(1) if own.join.cut == "end" else entries
+        # A target is not cut off by the join.
+        entries = range(
+            min([entries.stop, *(frame + 1 for frame in _target_frames(script, staged))])
+        )
         if own.join.cut == "end":
             timeline.exits = timeline.exits[-1:]
         cut = timeline.find_cut(passage, entries, staged.by)
@@ -135,13 +139,17 @@ def _record(
 ) -> None:
     """Add the span of an act. place: frame of its own first one, of its begin, and its motion."""
     (first, begin, by), act, index = place, staged.act, staged.segment
+    frames = [first + frame for frame in _target_frames(script, staged)]
     own, source = act_of(script, index)
     trust, done = act.trust, timeline.done
     # An act that is entered after its event, as a return is, has no event of its own.
     event = None if act.event is None or first + act.event <= begin else first + act.event
-    for sentence in trust.warnings:
-        timeline.warn(f"/segments/{index}", sentence)
     _, results = split_results(trust.targets, len(own.targets))
+    # How far its limbs stay from targets is said of the character of the performance.
+    missed = synthesizer.miss_warnings(results)
+    for sentence in trust.warnings:
+        if sentence not in missed:
+            timeline.warn(f"/segments/{index}", sentence)
     timeline.spans.append(
         Span(
             "act",
@@ -157,15 +165,10 @@ def _record(
         )
     )
     last = len(done) - 1
-    earliest = max(begin + 1, last - round(EXIT_SECONDS * RATE), event or 0)
+    earliest = max(begin + 1, last - round(EXIT_SECONDS * RATE), event or 0, *frames)
     timeline.exits = range(min(earliest, last), last + 1)
-    for place_of, target in enumerate(own.targets):
-        frame = _target_frame(act, target, first)
-        pointer = f"/segments/{index}/targets/{place_of}"
-        if frame is not None and frame < begin:
-            timeline.warn(pointer, "not met: the join goes into the act after the target's moment")
-        if frame is None or frame < begin:
-            continue
+    for number, (target, frame) in enumerate(zip(own.targets, frames, strict=True)):
+        pointer = f"/segments/{index}/targets/{number}"
         position = np.array(target.position, dtype=np.float64)
         if target.frame == "segment":
             position = by.place(position)
@@ -173,11 +176,11 @@ def _record(
         timeline.targets.append(WorldTarget(joint, position, frame, frame, pointer))
 
 
-def _target_frame(act: Act, target: performance_question.PlacedTarget, first: int) -> int | None:
-    """Return the frame at which a target holds; None for a moment that only the model knows."""
-    when = target.when
-    if isinstance(when, int | float):
-        return first + round((when - act.begins) * RATE)
-    known = {"start": 0, "end": len(act.passage) - 1, "event": act.event}
-    found = known.get(when)
-    return None if found is None else first + found
+def _target_frames(script: Script, staged: StagedAct) -> list[int]:
+    """Return the frames of an act at which its targets hold."""
+    own, source = act_of(script, staged.segment)
+    skeleton = source.model.session.card.skeleton
+    return [
+        staged.act.frame_of(each.when, skeleton.parents, skeleton.names.index(each.joint))
+        for each in own.targets
+    ]

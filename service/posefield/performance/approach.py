@@ -20,7 +20,7 @@ from posefield.performance.joins import cut_search
 from posefield.performance.joins.cut_search import Cut
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script
-from posefield.performance.timeline import Timeline, heading
+from posefield.performance.timeline import Timeline, 
 from posefield.performance.walk_entries import WalkEntry, manner, walk_of
 from posefield.performance.walks import walk_passage, walk_segment
 from posefield.performance.walks.walk_segment import WalkPlan
@@ -184,7 +184,7 @@ def _arrival(act: Passage) -> FloorMotion:
     frames = min(round(ENTRY_SECONDS * RATE), len(act) - 1)
     places = floor_plane.project(act.roots[[0, frames]])
     moved = complex(places[1] - places[0])
-    turned = float(np.angle(moved)) if abs(moved) > MOVING else heading(act, 0)
+    turned = float(np.angle(moved)) if abs(moved) > MOVING else act.heading(0)
     return FloorMotion(turned, complex(places[0]))
 
 

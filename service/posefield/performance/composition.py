@@ -1,7 +1,6 @@
 """Performances: one motion of all segments of a script, its feet, and the report about it."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import orjson

@@ -1,12 +1,19 @@
-"""Holds of a script: the character comes to rest and stays as it is."""
+"""Holds of a script: the character stops after the segment before, and stays in its pose.
+
+After an act that has an event, such as the grasp of a reach, it stops at the event; else at the end
+of the motion so far. Targets that are met there stay met until the hold ends.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 
+from posefield.common.errors import InvalidField
+from posefield.feet.contact_estimates import STANDING
+from posefield.motion import skeleton
 from posefield.performance.acts import hold_segment
-from posefield.performance.acts.hold_segment import HeldBody
-from posefield.performance.joins.blends import concatenate
+from posefield.performance.passages.limb_targets import WorldTarget
+from posefield.performance.passages.passage import RATE, concatenate
 from posefield.performance.script import Script
 from posefield.performance.timeline import Span, Timeline
 from posefield.question.performance_question import Hold
@@ -16,19 +23,21 @@ LOOKS_ASIDE = np.radians(2.0)
 
 
 def add_hold(timeline: Timeline, script: Script, index: int) -> None:
-    """Go on with a hold; an act before it stops at its event.
+    """Add a hold to the motion; an act before it stops at its event.
 
-    Raises InvalidField for a joint that cannot be held, and for a point that cannot be looked at.
+    Raises InvalidField for a joint that cannot be held, for a point that cannot be looked at, and
+    for an act before it that has a target after its event.
     """
     own = script.segments[index]
     if not isinstance(own, Hold):
         raise TypeError(f"segment {index}, expected a hold")
     _come_to_rest(timeline)
     before = timeline.done
-    asked = hold_segment.Hold(
-        own.seconds, own.joint or _held_joint(timeline, script), own.look_at, script.question.take
-    )
-    held = hold_segment.hold_passage(before, asked, _body(script))
+    joint = own.joint or _held_joint(timeline, script)
+    who = script.character
+    asked = hold_segment.Hold(own.seconds, joint, own.look_at, script.question.take)
+    body = hold_segment.body_of(who.skeleton, who.roles, who.bones, who.facing)
+    held = hold_segment.hold_passage(before, asked, body)
     if held.miss > LOOKS_ASIDE:
         timeline.warn(
             f"/segments/{index}/look_at",
@@ -44,22 +53,59 @@ def add_hold(timeline: Timeline, script: Script, index: int) -> None:
     timeline.targets = [
         replace(each, end=last) if each.end == begin else each for each in timeline.targets
     ]
+    timeline.targets += _held_place(timeline, script, joint, range(begin, last + 1), index)
     timeline.exits = range(last, last + 1)
 
 
+def _held_place(
+    timeline: Timeline, script: Script, joint: str | None, frames: range, index: int
+) -> list[WorldTarget]:
+    """Return the place of the joint that is held as a target, so that feet are planned around it.
+
+    Empty for a joint that stays anyway: one with a target there, or of a foot that stands.
+    """
+    body, character = script.character.body, script.character
+    if joint is None:
+        return []
+    own = character.skeleton.names.index(joint)
+    above = skeleton.joint_chain(body.parents, own)
+    standing = timeline.done.contacts[frames.start] > STANDING
+    legs = zip(body.legs, standing.tolist(), strict=True)
+    known = [each for each in timeline.targets if each.end == frames[-1]]
+    if any(down and leg.lower in above for leg, down in legs) or own in {
+        each.joint for each in known
+    }:
+        return []
+    pose = timeline.done.part(frames.start, frames.start + 1)
+    moved = skeleton.translations(body.bones, pose.roots)
+    place = skeleton.positions(body.parents, pose.rotations, moved)[0, own]
+    return [WorldTarget(own, place, frames[0], frames[-1], f"/segments/{index}")]
+
+
 def _come_to_rest(timeline: Timeline) -> None:
-    """End the motion at its last event, at rest; what happens at that frame happens later."""
+    """End the motion at its last event, at rest; targets near it are met later."""
     done, span = timeline.done, timeline.spans[-1] if timeline.spans else None
     if span is not None and span.kind == "hold":
         return
     last = len(done) - 1 if span is None or span.event is None else span.event
+    late = next((own for own in timeline.targets if own.begin > last), None)
+    if late is not None:
+        raise InvalidField(
+            "",
+            f"stops the act before it at its event, {(late.begin - last) / RATE:.2f} s before the "
+            f"moment of the target {late.pointer}, expected targets until the event",
+        )
     rested = hold_segment.come_to_rest(done.part(0, last + 1))
     later = len(rested) - 1
     timeline.motion = rested
     if span is not None and span.event == last:
         timeline.spans[-1] = replace(span, event=later)
     timeline.targets = [
-        replace(own, begin=later, end=later) if own.begin == last else own
+        replace(
+            own,
+            begin=hold_segment.rest_frame(last + 1, own.begin),
+            end=hold_segment.rest_frame(last + 1, own.end),
+        )
         for own in timeline.targets
     ]
 
@@ -72,10 +118,3 @@ def _held_joint(timeline: Timeline, script: Script) -> str | None:
     if event is None or timeline.spans[-1].kind != "act":
         return None
     return script.character.skeleton.names[event.joint]
-
-
-def _body(script: Script) -> HeldBody:
-    character = script.character
-    names = character.skeleton.names
-    joints = {role: names.index(joint) for role, joint in character.roles.items()}
-    return HeldBody(names, character.skeleton.parents, character.bones, joints, character.facing)

@@ -1,15 +1,18 @@
 """Report of a performance from its timeline."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
+from posefield.common.units import round_micrometres
+from posefield.constraints.gauss_newton import MISS_TOLERANCE
 from posefield.locomotion import floor_plane
 from posefield.performance.joins.join_quality import JoinFacts
 from posefield.performance.passages.passage import RATE
 from posefield.performance.script import Script
-from posefield.performance.timeline import Composed, Seam, Span, heading
+from posefield.performance.timeline import Composed, Seam, Span
 from posefield.performance.walks import path_following
 from posefield.question.performance_report import (
     JoinReport,
@@ -18,11 +21,7 @@ from posefield.question.performance_report import (
     ScriptWarning,
     SegmentReport,
 )
-from posefield.question.results import FeetResult
-
-DECIMALS = 6
-MET = 1e-3
-"""Largest distance of a joint from a target that is met, m."""
+from posefield.question.results import ConstraintResult, FeetResult
 
 
 def report(
@@ -42,9 +41,9 @@ def report(
     return PerformanceReport(
         script.identities,
         script.character.identity,
-        _rounded((len(composed.motion) - 1) / RATE),
+        round_micrometres((len(composed.motion) - 1) / RATE),
         frames,
-        _rounded(sigma),
+        round_micrometres(sigma),
         all(span.supported for span in timeline.spans),
         _segments(composed),
         tuple(_join(composed, *pair) for pair in zip(timeline.seams, joins, strict=True)),
@@ -56,28 +55,42 @@ def report(
 def _segments(composed: Composed) -> tuple[SegmentReport, ...]:
     spans = composed.timeline.spans
     ends = [later.begin for _, later in pairwise(spans)] + [len(composed.timeline.done) - 1]
-    return tuple(_segment(composed, span, end) for span, end in zip(spans, ends, strict=True))
+    return tuple(_segment(composed, index, end) for index, end in enumerate(ends))
 
 
-def _segment(composed: Composed, span: Span, end: int) -> SegmentReport:
-    timeline = composed.timeline
+def _segment(composed: Composed, index: int, end: int) -> SegmentReport:
+    timeline, span = composed.timeline, composed.timeline.spans[index]
     shift = timeline.begin
     place = complex(floor_plane.project(timeline.done.roots[span.begin]))
     return SegmentReport(
         span.kind,
         span.model,
-        _rounded((span.begin - shift) / RATE),
-        _rounded((end - shift) / RATE),
-        (_rounded(place.imag), _rounded(place.real)),
-        _rounded(heading(timeline.done, span.begin)),
-        _rounded(span.sigma),
-        {name: _rounded(value) for name, value in span.controls.items()},
-        None if span.phase is None else _rounded(span.phase),
-        None if span.event is None else _rounded((span.event - shift) / RATE),
-        span.targets,
+        round_micrometres((span.begin - shift) / RATE),
+        round_micrometres((end - shift) / RATE),
+        (round_micrometres(place.imag), round_micrometres(place.real)),
+        round_micrometres(timeline.done.heading(span.begin)),
+        round_micrometres(span.sigma),
+        {name: round_micrometres(value) for name, value in span.controls.items()},
+        None if span.phase is None else round_micrometres(span.phase),
+        None if span.event is None else round_micrometres((span.event - shift) / RATE),
+        _results(composed, index),
         _path(composed, span),
         span.notes,
     )
+
+
+def _results(composed: Composed, index: int) -> tuple[ConstraintResult, ...]:
+    """Return how far the character stays from the targets of a segment."""
+    targets = zip(composed.timeline.targets, composed.missed, strict=True)
+    missed = {own.pointer: miss for own, miss in targets}
+    return tuple(
+        _result(each, missed[f"/segments/{index}/targets/{number}"])
+        for number, each in enumerate(composed.timeline.spans[index].targets)
+    )
+
+
+def _result(each: ConstraintResult, miss: float) -> ConstraintResult:
+    return replace(each, miss=round_micrometres(miss), reached=miss <= MISS_TOLERANCE)
 
 
 def _path(composed: Composed, span: Span) -> PathReport | None:
@@ -92,19 +105,19 @@ def _path(composed: Composed, span: Span) -> PathReport | None:
     if found.cycles < 1.0:
         return None
     numbers = (found.lateral, found.along, found.heading, found.speed)
-    return PathReport(*map(_rounded, numbers))
+    return PathReport(*map(round_micrometres, numbers))
 
 
 def _join(composed: Composed, seam: Seam, facts: JoinFacts) -> JoinReport:
     shift, cut = composed.timeline.begin, seam.cut
     return JoinReport(
         seam.segment,
-        _rounded((seam.frame - shift) / RATE),
-        _rounded(cut.distance),
+        round_micrometres((seam.frame - shift) / RATE),
+        round_micrometres(cut.distance),
         cut.blend,
-        _rounded(seam.seconds),
-        _rounded(facts.peak),
-        _rounded(cut.usual.acceleration),
+        round_micrometres(seam.seconds),
+        round_micrometres(facts.peak),
+        round_micrometres(cut.usual.acceleration),
         facts.hard,
         cut.usual.reference,
     )
@@ -116,9 +129,5 @@ def _missed(composed: Composed) -> list[ScriptWarning]:
     return [
         ScriptWarning(own.pointer, f"stays {100.0 * miss:.1f} cm from its target: out of reach")
         for own, miss in targets
-        if miss > MET
+        if miss > MISS_TOLERANCE
     ]
-
-
-def _rounded(value: float) -> float:
-    return round(float(value), DECIMALS)

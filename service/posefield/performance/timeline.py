@@ -8,7 +8,7 @@ import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.units import Booleans, Floats
 from posefield.motion import quat
 from posefield.performance.joins import blends, cut_search, join_quality, join_steps
 from posefield.performance.joins.blends import Blend
@@ -238,8 +238,3 @@ def resample(
     share = at - before
     turned = quat.slerp(rotations[before], rotations[after], share[:, None])
     return turned, roots[before] + share[:, None] * (roots[after] - roots[before])
-
-
-def heading(passage: Passage, frame: int) -> float:
-    """Return the heading of the root in a frame, rad."""
-    return float(quat.twist(passage.rotations[frame, 0], UP))

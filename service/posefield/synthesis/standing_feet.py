@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Floats, round_micrometres
 from posefield.constraints.targets import ConstraintSet
 from posefield.feet import foot_placement, footsteps, limb_choice, limbs, stances
 from posefield.feet.footsteps import FeetPlan, SampledMotion
@@ -24,7 +24,7 @@ from posefield.question.floor import LEVEL_FLOOR, Floor
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import FeetResult, PoseAnswer, StanceResult
 from posefield.question.value_validation import check_number, check_range
-from posefield.synthesis.synthesizer import MICROMETRES, Synthesizer
+from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
 
 # Frames a second of the grid of a plan, and the smallest and largest number of its steps.
@@ -167,9 +167,13 @@ def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
             frames = np.arange(stance.begin, min(stance.end, count))
             away = (whole.after[frames, foot] - anchor)[:, [0, 2]]
             drift = max(drift, float(np.linalg.norm(away, axis=-1).max()))
-            position = tuple(round(float(axis), MICROMETRES) for axis in anchor)
+            position = tuple(map(round_micrometres, anchor.tolist()))
             begin, end = stance.begin / plan.rate, (stance.end - 1) / plan.rate
-            found.append(StanceResult(names[leg.tip], _rounded(begin), _rounded(end), position))
+            found.append(
+                StanceResult(
+                    names[leg.tip], round_micrometres(begin), round_micrometres(end), position
+                )
+            )
     # Feet on a slope are low where they are near it.
     level = whole.after - plan.floor.heights(whole.after)[..., None] * UP
     before, after = (
@@ -179,11 +183,11 @@ def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
     return FeetResult(
         tuple(found),
         swings,
-        _rounded(before),
-        _rounded(after),
-        _rounded(drift),
-        _rounded(lowered),
-        _rounded(plan.grounded),
+        round_micrometres(before),
+        round_micrometres(after),
+        round_micrometres(drift),
+        round_micrometres(lowered),
+        round_micrometres(plan.grounded),
         tuple(f"{names[plan.character.legs[leg].tip]} {UNREACHED}" for leg in plan.unreached),
         _told(plan.floor),
     )
@@ -192,10 +196,6 @@ def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
 def _told(floor: Floor) -> Floor | None:
     """Return the floor of an answer; None for the level on which motions are captured."""
     return None if floor == LEVEL_FLOOR else floor
-
-
-def _rounded(value: float) -> float:
-    return round(value, MICROMETRES)
 
 
 def _held_joints(goals: ConstraintSet) -> set[int]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from posefield.common.errors import OutOfReach, OutsideSamples
+from posefield.common.units import MICROMETRES
 from posefield.constraints import take_variation
 from posefield.constraints.constrained_motion import ConstrainedMotion
 from posefield.constraints.constraint_solver import ConstraintSolver
@@ -18,8 +19,6 @@ from posefield.validation import input_limits, question_validation
 from posefield.validation.question_validation import QuestionValidator, ValidatedQuestion
 
 NO_DETAIL = "detail: this model's file has none to sample"
-MICROMETRES = 6
-"""Decimals of a length in metres."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
+from posefield.performance.acts import hold_segment
 from posefield.performance.passages.passage import FloorMotion
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -24,6 +25,12 @@ def measured_reach(model):
     )
     feet = tuple(names.index(name) for name in ("LeftToeBase", "RightToeBase"))
     return with_card(model, controls=controls, feet=feet, contacts=())
+
+
+def body(model, bones):
+    """The skeleton of a model's character, for holds."""
+    card = model.session.card
+    return hold_segment.body_of(card.skeleton, card.roles, bones)
 
 
 def positions(model, passage, bones, by=None):

@@ -59,7 +59,7 @@ def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
     found = act_placement.act_from(reach, asked, position, facing, [0])
     first = found.act.passage.placed(found.by).part(0, 1)
     assert abs(floor_plane.project(first.roots)[0] - position) < 1e-4
-    assert act_segment.heading(first.rotations[0]) == pytest.approx(facing, abs=1e-4)
+    assert first.heading() == pytest.approx(facing, abs=1e-4)
     assert np.linalg.norm(hand(reach, found) - wanted) < EXACT
     # One round is not enough: the target moves the first pose.
     once = act_placement.act_at(reach, asked, near, [0]).passage.placed(near)
@@ -70,7 +70,7 @@ def test_an_act_without_world_targets_begins_at_its_place(reach):
     found = act_placement.act_from(reach, MotionQuestion(controls={}), 1.0 - 1.0j, 0.3)
     first = found.act.passage.placed(found.by).part(0, 1)
     assert floor_plane.project(first.roots)[0] == pytest.approx(1.0 - 1.0j)
-    assert act_segment.heading(first.rotations[0]) == pytest.approx(0.3)
+    assert first.heading() == pytest.approx(0.3)
 
 
 def test_a_target_that_contradicts_the_place_is_missed(reach):
@@ -92,8 +92,8 @@ def test_a_free_act_takes_place_where_its_target_is(reach):
     for facing in (-2.0, 0.0, 1.0):
         found = act_placement.place_by_target(reach, hand_to((2.0, 1.5, -3.0))).facing(facing)
         assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
-        first = found.act.passage.placed(found.by).rotations[0]
-        assert act_segment.heading(first) == pytest.approx(facing)
+        first = found.act.passage.placed(found.by)
+        assert first.heading() == pytest.approx(facing)
 
 
 def test_a_free_act_does_not_depend_on_the_place_but_on_the_height(reach):

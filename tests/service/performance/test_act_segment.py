@@ -126,7 +126,7 @@ def test_motion_to_places_the_first_frame(reach):
     by = found.motion_to(2.0 - 1.0j, 0.8)
     placed = found.passage.placed(by)
     assert floor_plane.project(placed.roots[0]) == pytest.approx(2.0 - 1.0j)
-    assert act_segment.heading(placed.rotations[0]) == pytest.approx(0.8)
+    assert placed.heading() == pytest.approx(0.8)
 
 
 def test_a_cyclic_model_is_refused(walker):

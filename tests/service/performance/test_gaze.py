@@ -22,7 +22,7 @@ def posed(model_path):
     """Looker of the reaching model and a pose: rotations (J, 4) and root (3,)."""
     model = acting.measured_reach(Synthesizer("reach", session.load(model_path)))
     act = act_segment.act_passage(model, MotionQuestion(controls={"target_height": 1.5}))
-    body = hold_segment.body_of(model.session.card, act.bones)
+    body = acting.body(model, act.bones)
     return body, act.passage.part(0, 20)
 
 

@@ -9,7 +9,7 @@ from posefield.inference import session
 from posefield.motion import quat
 from posefield.performance.acts import act_segment, hold_segment, sway
 from posefield.performance.acts.hold_segment import Hold
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance.passages.passage import RATE, Passage, concatenate
 from posefield.question.motion_question import MotionQuestion
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -34,7 +34,7 @@ def rested(act):
 
 @pytest.fixture(scope="module")
 def body(reach, act):
-    return hold_segment.body_of(reach.session.card, act.bones)
+    return acting.body(reach, act.bones)
 
 
 def path(reach, act, passage, name):
@@ -129,7 +129,7 @@ def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, b
     assert np.allclose(found.passage.roots[-1], rested.roots[-1], atol=1e-12)
     dots = np.abs(np.sum(found.passage.rotations[-1] * rested.rotations[-1], axis=-1))
     assert np.allclose(dots, 1.0, atol=1e-9)
-    whole = hold_segment.joined(rested, found.passage)
+    whole = concatenate(rested, found.passage)
     own, after = (
         np.linalg.norm(np.diff(acting.positions(reach, passage, act.bones), 2, axis=0), axis=-1)
         .mean(axis=-1)
@@ -140,7 +140,7 @@ def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, b
     assert after <= own + 1e-9
     # Without coming to rest the motion stops at once.
     cut = act.passage.part(0, act.event - 5)
-    stopped = hold_segment.joined(cut, hold_segment.hold_passage(cut, asked, body).passage)
+    stopped = concatenate(cut, hold_segment.hold_passage(cut, asked, body).passage)
     x = acting.positions(reach, stopped, act.bones)
     assert np.linalg.norm(np.diff(x, 2, axis=0), axis=-1).mean(axis=-1).max() * RATE**2 > own
 

@@ -5,16 +5,17 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from posefield.common.array_shapes import Bones, Frames, JointRotations
+from posefield.common.array_shapes import Bones, Frames
 from posefield.common.errors import InvalidField
-from posefield.common.units import UP, Floats
+from posefield.common.units import Floats
 from posefield.feet import contact_estimates
 from posefield.feet.stances import FootPath
 from posefield.inference.graph_ports import CONTACTS
 from posefield.locomotion import floor_plane
-from posefield.motion import quat, skeleton
+from posefield.motion import measures, quat, skeleton
+from posefield.motion.measures import Measure
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
-from posefield.question.motion_question import MotionQuestion, PoseQuestion
+from posefield.question.motion_question import MotionQuestion, PoseQuestion, TargetTime
 from posefield.question.results import PoseAnswer, Trust
 from posefield.synthesis import poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -42,7 +43,7 @@ class Act:
     @property
     def heading(self) -> float:
         """Heading of the root in the first frame, rad."""
-        return heading(self.passage.rotations[0])
+        return self.passage.heading()
 
     def motion_to(self, position: complex, facing: float) -> FloorMotion:
         """Return the motion after which the first frame's root is at a place of the floor, facing.
@@ -53,10 +54,16 @@ class Act:
         start = complex(floor_plane.project(self.passage.roots[0]))
         return FloorMotion(turn, complex(position - np.exp(1j * turn) * start))
 
-
-def heading(rotations: JointRotations) -> float:
-    """Return the heading of the root in a pose (J, 4), rad."""
-    return float(quat.twist(rotations[0], UP))
+    def frame_of(self, when: TargetTime, parents: tuple[int, ...], joint: int) -> int:
+        """Return the frame of a target of a joint: at a time, s, of the clip, or at a moment."""
+        last = len(self.passage) - 1
+        if isinstance(when, int | float):
+            return min(max(round((when - self.begins) * RATE), 0), last)
+        if when == "event":
+            return last if self.event is None else self.event
+        moved = skeleton.translations(self.bones, self.passage.roots)
+        paths = skeleton.positions(parents, self.passage.rotations, moved)
+        return round(measures.moment_frame(Measure("height", (joint,), when), paths, 0.0))
 
 
 def act_passage(model: Synthesizer, asked: MotionQuestion) -> Act:

@@ -1,7 +1,12 @@
-"""Holds: a motion comes to rest, and its last pose is kept with life in it."""
+"""Holds: a character stops and stays in its pose for a time, such as with a hand at a shelf.
+
+First the motion before slows down until it stops (`come_to_rest`). Then its last pose is kept
+(`hold_passage`): the body sways a little, the head may turn to a point, and one joint, such as the
+hand, stays exactly where it is. The hold ends in the pose in which it began.
+"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,11 +16,11 @@ from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.feet import limbs, two_bone
 from posefield.feet.limbs import Limb
-from posefield.model_file.model_card import ModelCard
 from posefield.motion import quat
+from posefield.motion.skeleton import Skeleton
 from posefield.performance.acts import sway
 from posefield.performance.acts.gaze import Looker
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance.passages.passage import RATE, Passage, concatenate
 from posefield.question import value_validation
 
 REST_FRAMES = 16
@@ -30,10 +35,10 @@ WINDOW = 4
 
 @dataclass(frozen=True)
 class Hold:
-    """A pose that is held.
+    """What is asked of a hold.
 
-    seconds: how long. joint: name of the joint that stays where it is. look_at: point that the head
-    turns to, in the frame of the passage, m. seed: of the sway.
+    seconds: how long the pose is kept. joint: name of the joint that stays where it is. look_at:
+    point that the head turns to, in the frame of the passage, m. seed: of the sway.
     """
 
     seconds: float
@@ -44,7 +49,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class HeldBody:
-    """Skeleton of the character of a performance.
+    """Skeleton of a character that stays in a pose.
 
     bones: offsets (J, 3), m. joints: by role. facing: of the rest pose, from +z to the left, rad.
     """
@@ -63,18 +68,21 @@ class HeldBody:
 
 @dataclass(frozen=True)
 class HeldPassage:
-    """A hold. miss: angle by which the gaze stays beside its point, rad; 0 without one."""
+    """Frames of a hold. miss: angle by which the gaze stays beside its point, rad; 0 for none."""
 
     passage: Passage
     miss: float = 0.0
 
 
-def body_of(card: ModelCard, bones: Bones) -> HeldBody:
-    """Return the body of a model's character with bone offsets (J, 3), m."""
-    names = card.skeleton.names
-    joints = {role: names.index(joint) for role, joint in card.roles.items()}
-    facing = float(np.radians(card.making.facing or 0.0))
-    return HeldBody(names, card.skeleton.parents, bones, joints, facing)
+def body_of(
+    skeleton: Skeleton, roles: Mapping[str, str], bones: Bones, facing: float = 0.0
+) -> HeldBody:
+    """Return the body of a character with joints by role, bone offsets (J, 3), m, and its facing.
+
+    facing: of the rest pose, from +z to the left, rad.
+    """
+    joints = {role: skeleton.names.index(joint) for role, joint in roles.items()}
+    return HeldBody(skeleton.names, skeleton.parents, bones, joints, facing)
 
 
 def come_to_rest(before: Passage) -> Passage:
@@ -83,14 +91,34 @@ def come_to_rest(before: Passage) -> Passage:
     The last frames are shown in twice their time, `REST_FRAMES` at most, with the speed of time
     1 - 3 u^2 + 2 u^3 over them, so that each joint keeps its path.
     """
-    shown = min(REST_FRAMES // 2, len(before) - 1)
-    if not shown:
+    places = _slowed_places(len(before))
+    if not len(places):
         return before
+    begin = len(before) - 1 - len(places) // 2
+    return concatenate(before.part(0, begin + 1), at_frames(before, places))
+
+
+def rest_frame(frames: int, frame: int) -> int:
+    """Return the frame of a passage that has come to rest which shows best one of it before.
+
+    frames: number of them before it comes to rest.
+    """
+    places = _slowed_places(frames)
+    begin = frames - 1 - len(places) // 2
+    if frame <= begin:
+        return frame
+    return begin + 1 + int(np.argmin(np.abs(places - frame)))
+
+
+def _slowed_places(frames: int) -> Frames:
+    """Return the fractional frames (S,) that a passage of F frames shows while it comes to rest."""
+    shown = min(REST_FRAMES // 2, frames - 1)
+    if not shown:
+        return np.zeros(0)
     share = np.arange(1, 2 * shown + 1) / (2 * shown)
     gone = 2.0 * shown * (share - share**3 + 0.5 * share**4)
-    begin = len(before) - 1 - shown
-    slowed = at_frames(before, begin + np.minimum(gone, shown))
-    return joined(before.part(0, begin + 1), slowed)
+    found: Frames = frames - 1 - shown + np.minimum(gone, shown)
+    return found
 
 
 def hold_passage(before: Passage, asked: Hold, body: HeldBody) -> HeldPassage:
@@ -122,12 +150,6 @@ def hold_passage(before: Passage, asked: Hold, body: HeldBody) -> HeldPassage:
     return HeldPassage(Passage(rotations, roots, contacts, sigmas), miss)
 
 
-def joined(first: Passage, second: Passage) -> Passage:
-    """Return a passage after another, without phases."""
-    pairs = zip(_arrays(first), _arrays(second), strict=True)
-    return Passage(*(np.concatenate(pair) for pair in pairs))
-
-
 def at_frames(own: Passage, places: Frames) -> Passage:
     """Return a passage at fractional frames (S,), by cubics through the nearest ones."""
     size = min(WINDOW, len(own))
@@ -154,10 +176,6 @@ def _lagrange(places: Frames, size: int) -> np.ndarray:
             if other != point:
                 found[:, point] *= (places - other) / (point - other)
     return found
-
-
-def _arrays(own: Passage) -> tuple[np.ndarray, ...]:
-    return own.rotations, own.roots, own.contacts, own.sigmas
 
 
 def _frames(asked: Hold) -> int:
@@ -215,14 +233,8 @@ def _keep(
     beyond = np.maximum(distance - two_bone.firm_reach(last, limb), 0.0)
     shift = (beyond / distance)[:, None] * apart
     turns = two_bone.solve(poses, limb, apart - shift)
-    lower = quat.mul(
-        turns.lower,
-        quat.mul(quat.conj(poses.orientation(limb.lower)), last.orientation(limb.lower)),
-    )
+    # The hand keeps its orientation while the body above it sways.
+    kept = quat.mul(quat.conj(poses.orientation(limb.lower)), last.orientation(limb.lower))
     found = rotations.copy()
-    found[:, limb.upper], found[:, limb.middle], found[:, limb.lower] = (
-        turns.upper,
-        turns.middle,
-        lower,
-    )
+    replace(turns, lower=quat.mul(turns.lower, kept)).apply(limb, found)
     return found, roots + shift

@@ -7,7 +7,7 @@ from posefield.performance.acts.act_segment import Act
 from posefield.performance.passages.passage import FloorMotion, Passage
 
 
-def _nowhere(angle: float) -> FloorMotion:
+def _no_goal(angle: float) -> FloorMotion:
     raise TypeError("an act without a goal, expected one that may face any way")
 
 
@@ -24,7 +24,7 @@ class StagedAct:
     act: Act
     by: FloorMotion | None
     goal: complex = 0j
-    facing: Callable[[float], FloorMotion] = _nowhere
+    facing: Callable[[float], FloorMotion] = _no_goal
     adapted: Passage | None = None
 
     def faced(self, angle: float) -> "StagedAct":

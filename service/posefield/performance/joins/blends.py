@@ -15,7 +15,7 @@ from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.blend import smoothstep
 from posefield.performance.joins.cut_search import Cut
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance.passages.passage import RATE, Passage, concatenate
 
 Blend = Literal["dead", "hermite", "cut"]
 SECONDS: dict[Blend, float] = {"dead": 0.5, "hermite": 0.3, "cut": 0.0}
@@ -64,18 +64,6 @@ def entered(
     variance = variance + cut.distance**2 * shares * (1.0 - shares)
     sigmas = np.concatenate([np.sqrt(variance), found.sigmas[frames:]])
     return replace(found, rotations=rotations, roots=roots, sigmas=sigmas)
-
-
-def concatenate(*parts: Passage) -> Passage:
-    """Return passages one after another; with phases if all have them."""
-    phases = [part.phases for part in parts if part.phases is not None]
-    return Passage(
-        np.concatenate([part.rotations for part in parts]),
-        np.concatenate([part.roots for part in parts]),
-        np.concatenate([part.contacts for part in parts]),
-        np.concatenate([part.sigmas for part in parts]),
-        np.concatenate(phases) if len(phases) == len(parts) else None,
-    )
 
 
 @dataclass(frozen=True)

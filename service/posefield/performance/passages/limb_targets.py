@@ -7,11 +7,12 @@ needs it, and before and after that by a share of these turns, so that no limb i
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath, Vector
-from posefield.common.units import Indices
+from posefield.common.units import Floats, Indices
 from posefield.feet import limbs, two_bone
 from posefield.feet.footsteps import Character
 from posefield.feet.leads import Led
@@ -199,7 +200,13 @@ def _eased(poses: LimbPoses, limb: Limb, held: LimbTurns, share: Frames, first: 
     return LimbTurns(upper, middle, quat.mul(quat.conj(turned), poses.orientation(limb.lower)))
 
 
-def _turned(before: Turns, held: Turns, share: Frames, near: Indices, first: int) -> Turns:
+def _turned(
+    before: Turns,
+    held: Annotated[Floats, "held 4"],
+    share: Frames,
+    near: Annotated[Indices, "frames"],
+    first: int,
+) -> Turns:
     """Return a joint's rotations (F, 4) with a share of the turn that it has at a target.
 
     near: for each frame, that of the held ones (H, 4) that is nearest to it.
@@ -210,7 +217,7 @@ def _turned(before: Turns, held: Turns, share: Frames, near: Indices, first: int
 
 
 def _share(frames: Frames, own: WorldTarget, before: float, after: float) -> Frames:
-    """Return the share (F,) of a target: 1 while it holds, 0 `before` frames before it, and after."""
+    """Return the share (F,) of a target: 1 while it holds, 0 some frames `before` and `after`."""
     early, late = (own.begin - frames) / before, (frames - own.end) / after
     away = np.clip(np.maximum(early, late), 0.0, 1.0)
     found: Frames = 0.5 + 0.5 * np.cos(np.pi * away)

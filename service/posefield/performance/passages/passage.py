@@ -6,8 +6,9 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import RootPath, Rotations
-from posefield.common.units import Floats
+from posefield.common.units import UP, Floats
 from posefield.locomotion import floor_plane
+from posefield.motion import quat
 
 RATE = 60.0
 """Frames a second at which performances are planned and joined, whatever their frame rate is."""
@@ -58,6 +59,10 @@ class Passage:
         """Return the number of frames."""
         return len(self.roots)
 
+    def heading(self, frame: int = 0) -> float:
+        """Return the heading of the root in a frame, rad."""
+        return float(quat.twist(self.rotations[frame, 0], UP))
+
     def placed(self, by: FloorMotion) -> "Passage":
         """Return the passage moved over the floor."""
         turned = floor_plane.turn_roots(self.rotations, np.full(len(self), by.turn))
@@ -70,3 +75,15 @@ class Passage:
         return Passage(
             self.rotations[rows], self.roots[rows], self.contacts[rows], self.sigmas[rows], phases
         )
+
+
+def concatenate(*parts: Passage) -> Passage:
+    """Return passages one after another; with phases if all have them."""
+    phases = [part.phases for part in parts if part.phases is not None]
+    return Passage(
+        np.concatenate([part.rotations for part in parts]),
+        np.concatenate([part.roots for part in parts]),
+        np.concatenate([part.contacts for part in parts]),
+        np.concatenate([part.sigmas for part in parts]),
+        np.concatenate(phases) if len(phases) == len(parts) else None,
+    )
