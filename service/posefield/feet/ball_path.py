@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from posefield.common.array_shapes import Frames, RootPath
+from posefield.common.array_shapes import RootPath
 from posefield.common.units import UP, Floats, Indices
 from posefield.feet import banded_systems, stances
 from posefield.feet.stances import Cycle, FootPath, Interval
@@ -25,12 +25,6 @@ from posefield.question.floor import LEVEL_FLOOR, Floor
 SPREAD = 0.1
 # A foot keeps its place over the floor for this time before and after a swing, while it is low, s.
 HOLD = 0.04
-# Step from which on a swing is lifted to the full clearance, m, and the exponent of its lift.
-FULL_STEP, LIFT_EXPONENT = 0.1, 0.7
-# A foot in the middle of a full step is at least this high above its place, m.
-LEAST_LIFT = 0.025
-# Acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
-LIFT_ACCELERATION = 20.0
 
 Numbers = npt.NDArray[Any]
 
@@ -78,7 +72,7 @@ def plan_path(
         goal[:, 1],
     )
     placed = FootPath(floor_plane.at_height(floor_path, heights), path.rate, path.cycle)
-    added, least = _lifts(placed, found, foot, goal)
+    added, least = stances.lifts(placed, found, foot, goal[:, 1])
     heights = np.maximum(heights + added, height + least)
     positions = floor_plane.at_height(floor_path, heights)
     anchors = positions[[stance.begin for stance in found]].reshape(-1, 3)
@@ -254,62 +248,3 @@ def _gap(found: Sequence[Interval], index: int, path: FootPath) -> int:
     if not 0 <= index < len(found) - 1:
         return 0
     return found[index + 1].begin - found[index].end
-
-
-def _lifts(
-    path: FootPath, found: Sequence[Interval], foot: FootContact, goal: RootPath
-) -> tuple[Frames, Frames]:
-    """Return how much a swinging foot is lifted (F,), m, and its least height (F,) while it swings.
-
-    A foot whose prediction is lifted as captured feet are is not lifted more. A point to which it
-    is led ends a swing. Zero in stances, or less where the foot is led to a place below the floor.
-    """
-    count = len(path)
-    added, lowest = np.zeros(count), np.fmin(goal[:, 1] - foot.height, 0.0)
-    for stance in found:
-        own = np.arange(stance.begin, stance.end) % count
-        lowest[own] = lowest[own].min()
-    ended = stances.mask(found, count) | ~np.isnan(goal[:, 0])
-    for swing in stances.runs(~ended, path.cycle is not None):
-        share = _shares(swing, path, foot)
-        if share is None:
-            continue
-        ends = np.array(_ends(swing, path))
-        begin, end = path.places(ends)
-        least = foot.clearance * min(abs(end - begin) / FULL_STEP, 1.0)
-        if path.cycle is not None or (swing.begin > 0 and swing.end < count):
-            least = min(least, float(highest_lift(len(swing) / path.rate)))
-        frames = np.arange(swing.begin, swing.end) % count
-        rise = np.sin(np.pi * share) ** LIFT_EXPONENT
-        lifted = max(float(path.heights[frames].max()) - foot.height, 0.0)
-        added[frames] = max(least * float(rise.max()) - lifted, 0.0) * rise
-        lowest[frames] = min(least, LEAST_LIFT) * rise + lowest[ends % count].min() * (1.0 - rise)
-    return added, lowest
-
-
-def highest_lift(seconds: float | Floats) -> float | Floats:
-    """Return how high a foot is lifted at most in a swing of a duration, m."""
-    return LIFT_ACCELERATION * seconds**2 / (LIFT_EXPONENT * np.pi**2)
-
-
-def _shares(swing: Interval, path: FootPath, foot: FootContact) -> Frames | None:
-    """Return the shares (S,) of a swing at its frames, 0 to 1; None for a swing without a stance.
-
-    A swing at an end of a clip goes on outside it, for the usual duration.
-    """
-    count, length = len(path), len(swing)
-    cyclic = path.cycle is not None
-    leads, trails = (not cyclic and swing.begin == 0), (not cyclic and swing.end == count)
-    if (leads and trails) or (cyclic and length == count):
-        return None
-    steps = np.arange(1.0, length + 1.0)
-    whole = max(length, round(foot.swing * path.rate)) + 1 if leads or trails else length + 1
-    return (steps + (whole - 1 - length) * leads) / whole
-
-
-def _ends(swing: Interval, path: FootPath) -> list[int]:
-    """Return the frames in which a foot stands before and after a swing, or the clip's ends."""
-    if path.cycle is None:
-        return [max(swing.begin - 1, 0), min(swing.end, len(path) - 1)]
-    after = len(path) if swing.begin == 0 else 0
-    return [swing.begin - 1 + after, swing.end + after]

@@ -65,3 +65,16 @@ def statistics(joint: int, path: FootPath, found: Sequence[Interval]) -> FootCon
         float(np.percentile(seconds, LONG_SWING)),
         max(0.0, float(np.percentile(lifts, CLEARANCE))),
     )
+
+
+def heights_above(
+    paths: Sequence[FootPath],
+    down: Sequence[Sequence[Interval]],
+    known: Sequence[FootContact],
+) -> list[float]:
+    """Return how much higher each foot stands than captured feet do, by its median, m."""
+    found = []
+    for path, own, foot in zip(paths, down, known, strict=True):
+        standing = path.heights[stances.mask(own, len(path))]
+        found.append(float(np.median(standing)) - foot.height if len(standing) else 0.0)
+    return found

@@ -14,9 +14,9 @@ from posefield.common.array_shapes import Bones, Frames, RootPath, Rotations
 from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import ball_path, contact_estimates, leads, limbs, pelvis, stances
 from posefield.feet.ball_path import Footsteps
-from posefield.feet.leads import UNEVEN, Led
+from posefield.feet.leads import Led
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.feet.stances import UNEVEN, Cycle, FootPath, Interval
 from posefield.motion.foot_contacts import FootContact
 from posefield.question.floor import LEVEL_FLOOR, Floor
 
@@ -126,7 +126,7 @@ def plan_feet(
         down, known = contact_estimates.from_probabilities(paths, likely), list(contacts)
     led = led or leads.always(len(paths), len(character.kept), len(motion.roots))
     room = led.room(poses, character.limbs)
-    above = _heights_above(paths, down, known)
+    above = contact_estimates.heights_above(paths, down, known)
     grounded = _grounded(above, room, character)
     # The ground first: the whole character stands as high as its feet do.
     feet = [
@@ -257,19 +257,6 @@ def _unreached(
     if floor == LEVEL_FLOOR:
         return ()
     return tuple(leg for leg, own in enumerate(steps) if found[leg] and not own.stances)
-
-
-def _heights_above(
-    paths: Sequence[FootPath],
-    down: Sequence[Sequence[Interval]],
-    known: Sequence[FootContact],
-) -> list[float]:
-    """Return how much higher each foot stands than captured feet do, by its median, m."""
-    found = []
-    for path, own, foot in zip(paths, down, known, strict=True):
-        standing = path.heights[stances.mask(own, len(path))]
-        found.append(float(np.median(standing)) - foot.height if len(standing) else 0.0)
-    return found
 
 
 def _grounded(above: Sequence[float], room: tuple[Frames, Frames], character: Character) -> float:

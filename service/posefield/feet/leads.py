@@ -15,11 +15,9 @@ from posefield.common.array_shapes import Frames, RootPath
 from posefield.common.units import Booleans, Floats
 from posefield.feet import pelvis, stances
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stances import LIFTED, SHORTEST_CONTACT, FootPath, Interval
+from posefield.feet.stances import LIFTED, SHORTEST_CONTACT, UNEVEN, FootPath, Interval
 from posefield.motion.foot_contacts import FootContact
 
-# A foot may stand this much higher or lower than captured feet do, m: soles differ.
-UNEVEN = 0.01
 # A foot that is led to two places that are farther apart does not stand on both, m.
 SAME_PLACE = 1e-3
 

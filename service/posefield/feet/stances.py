@@ -12,7 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import MICROMETRES, UP, Booleans
+from posefield.common.units import MICROMETRES, UP, Booleans, Floats
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion.contacts import contact_detection
@@ -25,6 +25,14 @@ SHORTEST_GAP = contact_detection.DEFAULT.shortest_gap
 SHORTEST_STEP = 0.03
 # A foot that is higher above the place where it stands is in the air whatever the plan says, m.
 LIFTED = contact_detection.DEFAULT.grown_height
+# A foot may stand this much higher or lower than captured feet do, m: soles differ.
+UNEVEN = 0.01
+# Step from which on a swing is lifted to the full clearance, m, and the exponent of its lift.
+FULL_STEP, LIFT_EXPONENT = 0.1, 0.7
+# A foot in the middle of a full step is at least this high above its place, m.
+LEAST_LIFT = 0.025
+# Acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
+LIFT_ACCELERATION = 20.0
 
 
 @dataclass(frozen=True)
@@ -178,3 +186,65 @@ def shortened(
             whole = count if begin >= count else 0
             shorter.append(Interval(begin - whole, end - whole))
     return sorted(shorter, key=lambda own: own.begin)
+
+
+def lifts(
+    path: FootPath, found: Sequence[Interval], foot: FootContact, led: Frames
+) -> tuple[Frames, Frames]:
+    """Return how much a swinging foot is lifted (F,), m, and its least height (F,) while it swings.
+
+    led: heights (F,), m, of points to which the foot is led; not a number in other frames. Such a
+    point ends a swing. A foot whose prediction is lifted as captured feet are is not lifted more.
+    Zero in stances, or less where the foot is led to a place below the floor.
+    """
+    count = len(path)
+    added, lowest = np.zeros(count), np.fmin(led - foot.height, 0.0)
+    for stance in found:
+        own = np.arange(stance.begin, stance.end) % count
+        lowest[own] = lowest[own].min()
+    ended = mask(found, count) | ~np.isnan(led)
+    for swing in runs(~ended, path.cycle is not None):
+        share = _shares(swing, path, foot)
+        if share is None:
+            continue
+        ends = np.array(_ends(swing, path))
+        begin, end = path.places(ends)
+        least = foot.clearance * min(abs(end - begin) / FULL_STEP, 1.0)
+        if path.cycle is not None or (swing.begin > 0 and swing.end < count):
+            least = min(least, float(highest_lift(len(swing) / path.rate)))
+        first, last = lowest[ends % count]
+        least = 0.0 if min(first, last) < -UNEVEN else least
+        frames = np.arange(swing.begin, swing.end) % count
+        rise = np.sin(np.pi * share) ** LIFT_EXPONENT
+        lifted = max(float(path.heights[frames].max()) - foot.height, 0.0)
+        added[frames] = max(least * float(rise.max()) - lifted, 0.0) * rise
+        lowest[frames] = min(least, LEAST_LIFT) * rise + first + share * (last - first)
+    return added, lowest
+
+
+def highest_lift(seconds: float | Floats) -> float | Floats:
+    """Return how high a foot is lifted at most in a swing of a duration, m."""
+    return LIFT_ACCELERATION * seconds**2 / (LIFT_EXPONENT * np.pi**2)
+
+
+def _shares(swing: Interval, path: FootPath, foot: FootContact) -> Frames | None:
+    """Return the shares (S,) of a swing at its frames, 0 to 1; None for a swing without a stance.
+
+    A swing at an end of a clip goes on outside it, for the usual duration.
+    """
+    count, length = len(path), len(swing)
+    cyclic = path.cycle is not None
+    leads, trails = (not cyclic and swing.begin == 0), (not cyclic and swing.end == count)
+    if (leads and trails) or (cyclic and length == count):
+        return None
+    steps = np.arange(1.0, length + 1.0)
+    whole = max(length, round(foot.swing * path.rate)) + 1 if leads or trails else length + 1
+    return (steps + (whole - 1 - length) * leads) / whole
+
+
+def _ends(swing: Interval, path: FootPath) -> list[int]:
+    """Return the frames in which a foot stands before and after a swing, or the clip's ends."""
+    if path.cycle is None:
+        return [max(swing.begin - 1, 0), min(swing.end, len(path) - 1)]
+    after = len(path) if swing.begin == 0 else 0
+    return [swing.begin - 1 + after, swing.end + after]

@@ -14,16 +14,9 @@ import numpy as np
 
 from posefield.common.units import Booleans, Floats
 from posefield.feet import stance_rows
-from posefield.feet.ball_path import (
-    FULL_STEP,
-    HOLD,
-    LEAST_LIFT,
-    LIFT_EXPONENT,
-    SPREAD,
-    Numbers,
-    highest_lift,
-)
+from posefield.feet.ball_path import HOLD, SPREAD, Numbers
 from posefield.feet.stance_rows import FootRows, Rows, Runs
+from posefield.feet.stances import FULL_STEP, LEAST_LIFT, LIFT_EXPONENT, highest_lift
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 

@@ -125,3 +125,25 @@ def test_locking_a_dragged_foot_without_swing_rules_makes_it_slide_faster():
     moving = np.abs(np.diff(locked))[22:37].mean() * RATE
     assert moving > 1.5 * slid
     assert plan < 0.1 * lock
+
+
+@pytest.mark.parametrize(("frames", "most"), [(6, 0.028), (30, FOOT.clearance)])
+def test_a_foot_is_lifted_less_in_a_short_swing(frames, most):
+    count = 40 + frames
+    places = np.zeros((count, 3))
+    places[:, 1], places[:, 2] = FOOT.height, np.repeat([0.0, 0.0, 0.3], [20, frames, 20])
+    found = [Interval(0, 20), Interval(20 + frames, count)]
+    planned = ball_path.plan_path(FootPath(places, RATE), found, FOOT).positions
+    assert planned[:, 1].max() - FOOT.height == pytest.approx(most, rel=0.05)
+
+
+def test_a_path_goes_through_the_points_to_which_it_is_led(rng):
+    places = np.cumsum(rng.normal(size=(80, 3)), axis=0) * 0.003 + [0.0, 0.1, 0.0]
+    path, goal = FootPath(places, RATE), np.full((80, 3), np.nan)
+    goal[30] = places[30] + [0.02, 0.3, 0.01]
+    found = (Interval(0, 20), Interval(45, 66))
+    planned = ball_path.plan_path(path, found, FOOT, goal).positions
+    assert planned[30] == pytest.approx(goal[30], abs=1e-12)
+    assert np.abs(ball_path.plan_path(path, found, FOOT).positions[30] - goal[30]).max() > 0.1
+    # The change is as smooth as one that stands.
+    assert np.abs(np.diff(planned - places, 2, axis=0)).max() < 0.05

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield.feet import foot_placement, footsteps, limb_choice, limbs, pelvis
+from posefield.feet import foot_placement, footsteps, limb_choice, limbs, pelvis, stances
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
 from posefield.motion.foot_contacts import FootContact
@@ -118,9 +118,9 @@ def test_a_character_that_floats_is_moved_to_the_floor(floats):
     known = [contact(motion, foot) for foot in FEET]
     lifted = SampledMotion(motion.rotations, np.add(motion.roots, [0.0, floats, 0.0]), RATE)
     plan = footsteps.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)))
-    assert plan.grounded == pytest.approx(floats - np.sign(floats) * footsteps.UNEVEN)
+    assert plan.grounded == pytest.approx(floats - np.sign(floats) * stances.UNEVEN)
     heights = feet_of(placed(lifted, plan))[..., 1]
-    assert np.abs(heights - known[0].height).max() <= footsteps.UNEVEN + 1e-9
+    assert np.abs(heights - known[0].height).max() <= stances.UNEVEN + 1e-9
 
 
 FLOORS = [at_height(0.5), at_height(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2, -0.2)]

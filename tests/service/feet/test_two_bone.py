@@ -50,12 +50,7 @@ def forward(rotations, roots):
 
 def moved(rotations, limb, found):
     turned = rotations.copy()
-    for joint, own in zip(
-        (limb.upper, limb.middle, limb.lower),
-        (found.upper, found.middle, found.lower),
-        strict=True,
-    ):
-        turned[:, joint] = own
+    found.apply(limb, turned)
     return turned
 
 
@@ -146,3 +141,23 @@ def test_a_knee_that_is_overstretched_bends_to_the_front_when_its_leg_is_shorten
     steps = np.linalg.norm(np.diff(after[:, LEG.middle], axis=0), axis=-1)
     # One that goes on backwards jumps by 0.2 m.
     assert steps.max() < 0.02
+
+
+def test_a_knee_that_is_overstretched_bends_to_its_front_in_a_kick_too():
+    """The leg hangs, and is raised until above level, so that its front is up and then behind."""
+    raised = np.concatenate([np.zeros(60), np.linspace(0.0, -2.4, 41)])
+    # The knee bends, is overstretched around where the leg is level, and bends again.
+    bend = np.concatenate([np.full(60, 0.6), 0.25 + 0.35 * np.cos(np.linspace(0.0, 6.0, 41))])
+    rotations = np.tile(quat.IDENTITY, (101, len(PARENTS), 1))
+    rotations[:, LEG.upper] = flexed(raised)
+    # A knee that bends, is overstretched while the leg is level, and bends again.
+    rotations[:, LEG.middle] = flexed(bend)
+    roots = np.tile([0.0, 0.95, 0.0], (101, 1))
+    own = limbs.evaluate_poses(PARENTS, BONES, [LEG], rotations, roots)
+    end = 0.9 * (own.position(LEG.lower) - own.position(LEG.upper))
+    turned = moved(rotations, LEG, two_bone.solve(own, LEG, end))
+    positions, _ = forward(turned, roots)
+    knee = positions[:, LEG.middle] - positions[:, LEG.upper]
+    front = np.stack([0.0 * raised, -np.sin(raised), np.cos(raised)], axis=1)
+    assert np.sum(knee * front, axis=-1).min() > 0.1
+    assert np.linalg.norm(np.diff(knee, axis=0), axis=-1).max() < 0.1

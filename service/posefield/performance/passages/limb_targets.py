@@ -21,7 +21,7 @@ from posefield.feet.two_bone import LimbTurns
 from posefield.motion import quat, skeleton
 from posefield.performance.passages.passage import RATE, Passage
 
-EASING, LONGEST_EASING = 0.5, 1.0
+EASING, LONGEST_EASING = 0.5, 1.2
 """Shortest and longest time before and after a target over which a limb goes to and from it, s."""
 GENTLE = 8.0
 """Acceleration of a limb's end on its way to and from a target, m/s²; the longest time limits it
@@ -110,10 +110,10 @@ def _chain(limb: Limb) -> tuple[int, int, int]:
 class _Held:
     """A limb in the frames in which its target holds.
 
-    gap: distance from where the limb's end is to where it comes, m. turns: of its joints then.
+    way: along which its end goes there, m, as an arc. turns: of its joints then.
     """
 
-    gap: float
+    way: float
     turns: LimbTurns
 
 
@@ -129,7 +129,8 @@ def _moved(
     others: targets of joints of the same limb, at which this one does not act.
     """
     held = _hold(_poses(character, passage, limb, range(own.begin, own.end + 1)), limb, own)
-    around = float(np.sqrt(0.5 * np.pi**2 * held.gap / GENTLE))
+    # A cosine over a time T has the acceleration 0.5 (pi / T)^2 times the way.
+    around = float(np.sqrt(0.5 * np.pi**2 * held.way / GENTLE))
     frames = round(float(np.clip(around, EASING, LONGEST_EASING)) * RATE)
     before = min([frames, *(own.begin - each.end for each in others if each.end < own.begin)])
     after = min([frames, *(each.begin - own.end for each in others if each.begin > own.end)])
@@ -160,8 +161,11 @@ def _hold(poses: LimbPoses, limb: Limb, own: WorldTarget) -> _Held:
     above, below = poses.length(limb.middle), poses.length(limb.lower)
     least = np.maximum(distance, 1.001 * np.abs(above - below) + 1e-6)
     end = end * (least / np.maximum(distance, 1e-9))[:, None]
-    gap = float(np.linalg.norm(goal - lower, axis=-1).max())
-    return _Held(gap, two_bone.solve(poses, limb, end))
+    before = (lower - upper)[:1]
+    sine, cosine = np.linalg.norm(quat.cross(before, end[:1])), np.sum(before * end[:1])
+    arc = float(np.arctan2(sine, cosine) * np.linalg.norm(end[0]))
+    stretch = float(np.linalg.norm(end[0]) - np.linalg.norm(before))
+    return _Held(float(np.hypot(arc, stretch)), two_bone.solve(poses, limb, end))
 
 
 def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, wanted: RootPath) -> Vector:

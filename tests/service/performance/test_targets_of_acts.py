@@ -1,0 +1,137 @@
+"""Targets of acts in performances: before the next join and hold, at moments, and in the report."""
+
+import acting
+import msgspec
+import numpy as np
+import pytest
+
+from posefield.common.errors import InvalidField
+from posefield.model_file.model_card import Event
+from posefield.performance import composition
+from posefield.performance.acts import act_segment
+from posefield.performance.script import resolve_script
+from posefield.question import json_decoding
+from posefield.question.motion_question import MotionQuestion
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.registry import model_registry, shipped_models
+from posefield.registry.model_registry import ModelRegistry
+
+EXACT, STILL = 1e-3, 1e-5
+HAND = "RightHand"
+
+
+@pytest.fixture(scope="module")
+def find(models):
+    """The models of the examples; a reach without event, one whose event is early, and a walk."""
+    library = dict(model_registry.load([models]).models)
+    reach = library["reach"]
+    own = reach.session.card.event
+    library["free"] = acting.with_card(reach, event=None)
+    library["early"] = acting.with_card(reach, event=Event(own.joint, 0.5))
+    library["cmu_walk"] = model_registry.load([shipped_models.FOLDER]).find("cmu_walk")
+    return ModelRegistry(library).find
+
+
+@pytest.fixture(scope="module")
+def own_hand(find):
+    """The hand's path (F, 3), m, of the reach of no controls, at 60 frames a second."""
+    return acting.joint_path(find("reach"), act_segment.act_passage(find("reach"), ASKED), HAND)
+
+
+ASKED = MotionQuestion(controls={})
+
+
+def performed(find, *segments, fps=60):
+    content = msgspec.json.encode({"segments": segments, "fps": fps})
+    question = json_decoding.decode_question(PerformanceQuestion, content)
+    return composition.perform(resolve_script(question, find), 10_000)
+
+
+def reach(position, model="free", **when):
+    place = [float(axis) for axis in position]
+    return {
+        "kind": "act",
+        "model": model,
+        "targets": [{"joint": HAND, "position": place, **when}],
+    }
+
+
+def path(answer, name=HAND):
+    clip = answer.clip
+    return clip.positions()[:, clip.skeleton.names.index(name)]
+
+
+PLAIN = {"kind": "act", "model": "free"}
+
+
+def test_an_act_is_left_after_its_last_target(find, own_hand):
+    seconds = 1.35
+    wanted = own_hand[round(60 * seconds)] + [0.02, 0.03, 0.0]
+    answer = performed(find, reach(wanted, time=seconds), PLAIN)
+    first, second = answer.trust.segments
+    assert second.begins >= seconds - 0.02
+    assert np.linalg.norm(path(answer)[round(60 * seconds)] - wanted) < EXACT
+    assert first.targets[0].reached
+    assert answer.trust.script_warnings == ()
+    # An act without a target is left earlier.
+    assert performed(find, PLAIN, PLAIN).trust.segments[1].begins < seconds - 0.1
+
+
+def test_an_act_is_entered_before_its_first_target(find, own_hand):
+    answer = performed(find, PLAIN, reach(own_hand[2], time=2 / 60))
+    assert answer.trust.segments[1].targets[0].reached
+    assert answer.trust.script_warnings == ()
+
+
+@pytest.mark.parametrize("when", ["highest", "lowest", "farthest"])
+def test_a_target_at_a_moment_of_the_motion_is_met_by_the_character(find, own_hand, when):
+    frame = {"highest": 86, "lowest": 0, "farthest": 86}[when]
+    wanted = own_hand[frame] + [0.02, 0.03, 0.02]
+    answer = performed(find, reach(wanted, at=when), PLAIN)
+    (target,) = answer.trust.segments[0].targets
+    assert target.reached
+    assert np.linalg.norm(path(answer) - wanted, axis=-1).min() < EXACT
+
+
+def test_a_target_shortly_before_the_event_is_met_while_the_act_comes_to_rest(find, own_hand):
+    before = 2
+    wanted = own_hand[-1 - before] + [0.0, 0.02, 0.0]
+    seconds = (len(own_hand) - 1 - before) / 60.0 + 0.0076
+    asked = reach(wanted, "reach", time=seconds)
+    answer = performed(find, asked, {"kind": "hold", "seconds": 0.5})
+    away = np.linalg.norm(path(answer) - wanted, axis=-1)
+    assert away.min() < EXACT
+    # The act has slowed down by then, so that the frame is later than without a hold.
+    assert int(np.argmin(away)) > len(own_hand) - 1 - before
+
+
+def test_a_hold_that_would_cut_off_a_target_is_refused(find, own_hand):
+    asked = reach(own_hand[-5], "early", time=(len(own_hand) - 5) / 60.0)
+    with pytest.raises(
+        InvalidField, match=r"before the moment of the target /segments/0/targets/0"
+    ):
+        performed(find, asked, {"kind": "hold", "seconds": 0.5})
+    assert performed(find, asked, PLAIN).trust.segments[0].targets[0].reached
+
+
+def test_the_report_tells_how_far_the_character_stays_from_a_target(find):
+    answer = performed(find, reach([0.0, 9.0, 0.0], "reach", at="event"))
+    (segment,) = answer.trust.segments
+    missed = np.linalg.norm(path(answer)[round(60 * segment.event)] - [0.0, 9.0, 0.0])
+    assert not segment.targets[0].reached
+    assert segment.targets[0].miss == pytest.approx(missed, abs=1e-4)
+    (warning,) = [own for own in answer.trust.script_warnings if "target" in own.message]
+    assert warning.pointer == "/segments/0/targets/0"
+    assert warning.message == f"stays {100.0 * missed:.1f} cm from its target: out of reach"
+
+
+@pytest.mark.parametrize("joint", ["LeftHand", "RightHand"])
+def test_a_held_hand_is_still_while_the_feet_are_placed(find, joint):
+    walk = {"kind": "walk", "model": "cmu_walk", "seconds": 2.0}
+    answer = performed(find, walk, {"kind": "hold", "seconds": 1.0, "joint": joint}, walk)
+    hold = answer.trust.segments[1]
+    rows = slice(round(60 * hold.begins), round(60 * hold.ends) + 1)
+    assert np.ptp(path(answer, joint)[rows], axis=0).max() < STILL
+    assert answer.trust.feet.lowered > 0.01
+    free = performed(find, walk, {"kind": "hold", "seconds": 1.0}, walk)
+    assert np.ptp(path(free, joint)[rows], axis=0).max() > 100.0 * STILL
