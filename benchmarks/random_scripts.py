@@ -10,6 +10,7 @@ import numpy as np
 
 from posefield.common.array_shapes import Frames, Positions
 from posefield.common.errors import QueryError
+from posefield.common.units import Booleans
 from posefield.locomotion import gait
 from posefield.motion.clip import Clip
 from posefield.performance import composition
@@ -30,6 +31,9 @@ BEFORE, AFTER = 0.1, 0.6
 """Times before and after a join that belong to it, s."""
 DEEPEST = 0.0105
 """How far a foot may be below the floor, m: feet may be uneven by 1 cm."""
+
+LED = 0.3
+"""Time before and after a target for which a foot is led, s."""
 
 Document = dict[str, Any]
 
@@ -243,7 +247,7 @@ def faults(script: Script, answer: PerformanceAnswer) -> Iterator[str]:
     positions = clip.positions()
     yield from _timeline(answer)
     yield from _jumps(answer, accelerations(clip, positions))
-    yield from _depth(script, positions)
+    yield from _depth(script, answer, positions)
 
 
 def accelerations(clip: Clip, positions: Positions) -> Frames:
@@ -290,17 +294,31 @@ def _jumps(answer: PerformanceAnswer, found: Frames) -> Iterator[str]:
         yield f"{worst:.1f} m/s² at {time:.2f} s, away from joins; usual {usual:.1f}"
 
 
-def _depth(script: Script, positions: Positions) -> Iterator[str]:
+def _depth(script: Script, answer: PerformanceAnswer, positions: Positions) -> Iterator[str]:
     feet = script.character.feet
     if script.question.feet != "stand" or not feet:
         return
-    # A foot with a target goes where its act leads it.
-    acts = [own for own in script.segments if isinstance(own, Act)]
-    led = {each.joint for own in acts for each in own.targets}
     for foot, known in zip(feet, script.character.contacts, strict=True):
-        if script.character.skeleton.names[foot] in led:
+        # A foot goes where its target is.
+        led = _led(script, answer, script.character.skeleton.names[foot])
+        depth = np.where(led, 0.0, known.height - positions[:, foot, 1])
+        if depth.max() > DEEPEST:
+            frame = int(np.argmax(depth))
+            yield f"foot {foot} is {100 * depth.max():.1f} cm below the floor in frame {frame}"
+
+
+def _led(script: Script, answer: PerformanceAnswer, joint: str) -> Booleans:
+    """Return the frames (F,) near the event of an act, or in a hold of it, that leads a joint."""
+    report = answer.trust
+    times = np.arange(report.frames) / answer.clip.rate
+    found = np.zeros(len(times), dtype=bool)
+    for index, (own, told) in enumerate(zip(script.segments, report.segments, strict=True)):
+        if not isinstance(own, Act) or joint not in {each.joint for each in own.targets}:
             continue
-        depth = known.height - float(positions[:, foot, 1].min())
-        if depth > DEEPEST:
-            frame = int(np.argmin(positions[:, foot, 1]))
-            yield f"foot {foot} is {100 * depth:.1f} cm below the floor in frame {frame}"
+        begins = ends = told.event or told.ends
+        for later in report.segments[index + 1 :]:
+            if later.kind != "hold":
+                break
+            ends = later.ends
+        found |= (times >= begins - LED) & (times <= ends + LED)
+    return found
