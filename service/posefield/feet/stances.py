@@ -32,7 +32,7 @@ FULL_STEP, LIFT_EXPONENT = 0.1, 0.7
 # A foot in the middle of a full step is at least this high above its place, m.
 LEAST_LIFT = 0.025
 # Acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
-LIFT_ACCELERATION = 20.0
+LIFT_ACCELERATION = 10.0
 
 
 @dataclass(frozen=True)

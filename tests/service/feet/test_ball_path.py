@@ -127,7 +127,7 @@ def test_locking_a_dragged_foot_without_swing_rules_makes_it_slide_faster():
     assert plan < 0.1 * lock
 
 
-@pytest.mark.parametrize(("frames", "most"), [(6, 0.028), (30, FOOT.clearance)])
+@pytest.mark.parametrize(("frames", "most"), [(6, 0.014), (30, FOOT.clearance)])
 def test_a_foot_is_lifted_less_in_a_short_swing(frames, most):
     count = 40 + frames
     places = np.zeros((count, 3))

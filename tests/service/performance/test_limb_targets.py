@@ -69,7 +69,7 @@ def test_a_target_out_of_reach_is_missed_without_a_jerk(body, way):
     found, (missed,) = limb_targets.meet_targets(body, own, [target(place)])
     hip = path(own, 1)[MOMENT]
     length = sum(np.linalg.norm(passages.BONES[joint]) for joint in (2, 3))
-    assert missed == pytest.approx(np.linalg.norm(place - hip) - length, abs=0.01)
+    assert missed == pytest.approx(np.linalg.norm(place - hip) - length, abs=0.03)
     # All joints of the limb, so that a knee that is jerked straight is seen too.
     assert max(hardest(found, joint) for joint in (2, LEFT)) < GENTLE
     # A shorter time is what makes a jerk: another target of the foot is a tenth of a second before.

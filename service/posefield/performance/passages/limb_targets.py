@@ -19,10 +19,14 @@ from posefield.feet.leads import Led
 from posefield.feet.limbs import Limb, LimbPoses, Turns
 from posefield.feet.two_bone import LimbTurns
 from posefield.motion import quat, skeleton
+from posefield.motion.blend import smoothstep
 from posefield.performance.passages.passage import RATE, Passage
 
 EASING, LONGEST_EASING = 0.5, 1.2
 """Shortest and longest time before and after a target over which a limb goes to and from it, s."""
+EASE, FAR = 0.02, 0.1
+"""Length by which a limb stays shorter than it could, m, for a target this much or more out of
+reach, m: a stretched limb leaves the pelvis no room to be lowered for the feet."""
 GENTLE = 8.0
 """Acceleration of a limb's end on its way to and from a target, m/s²; the longest time limits it
 less."""
@@ -180,6 +184,8 @@ def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, wanted: RootPath) 
     length = float((poses.length(limb.middle) + poses.length(limb.lower))[0])
     firm = two_bone.firm_reach(poses, limb)[:1]
     reached = float(two_bone.soften(np.array([distance + spread]), firm, length)[0]) - spread
+    beyond = np.clip((distance + spread - firm) / FAR, 0.0, 1.0)
+    reached -= EASE * float(smoothstep(beyond)[0])
     return away * (reached / distance - 1.0)
 
 
