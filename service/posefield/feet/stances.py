@@ -207,12 +207,12 @@ def lifts(
         share = _shares(swing, path, foot)
         if share is None:
             continue
-        ends = np.array(_ends(swing, path))
+        ends = _ends(swing, path)
         begin, end = path.places(ends)
         least = foot.clearance * min(abs(end - begin) / FULL_STEP, 1.0)
         if path.cycle is not None or (swing.begin > 0 and swing.end < count):
             least = min(least, float(highest_lift(len(swing) / path.rate)))
-        first, last = lowest[ends % count]
+        first, last = (float(lowest[end % count]) for end in ends)
         least = 0.0 if min(first, last) < -UNEVEN else least
         frames = np.arange(swing.begin, swing.end) % count
         rise = np.sin(np.pi * share) ** LIFT_EXPONENT

@@ -15,9 +15,10 @@ from posefield.common import cancellation
 from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import limbs, pelvis, stance_rows, step_rows, two_bone
 from posefield.feet.contact_estimates import DECIMALS, STANDING
-from posefield.feet.footsteps import ROUNDS, UNEVEN
+from posefield.feet.footsteps import ROUNDS
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.feet.stance_rows import FootRows, Rows
+from posefield.feet.stances import UNEVEN
 from posefield.feet.step_rows import StepRows
 from posefield.motion.foot_contacts import FootContact
 

@@ -20,7 +20,7 @@ from posefield.performance.joins import cut_search
 from posefield.performance.joins.cut_search import Cut
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script
-from posefield.performance.timeline import Timeline, 
+from posefield.performance.timeline import Timeline
 from posefield.performance.walk_entries import WalkEntry, manner, walk_of
 from posefield.performance.walks import walk_passage, walk_segment
 from posefield.performance.walks.walk_segment import WalkPlan

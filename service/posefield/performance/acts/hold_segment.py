@@ -35,7 +35,7 @@ WINDOW = 4
 
 @dataclass(frozen=True)
 class Hold:
-    """What is asked of a hold.
+    """Question for a hold.
 
     seconds: how long the pose is kept. joint: name of the joint that stays where it is. look_at:
     point that the head turns to, in the frame of the passage, m. seed: of the sway.

@@ -177,16 +177,19 @@ def _shortfall(poses: LimbPoses, limb: Limb, upper: RootPath, wanted: RootPath) 
 
     It is the same in all frames, so that what is held stays still while the body sways.
     """
+    firm = two_bone.firm_reach(poses, limb)
+    if (np.linalg.norm(wanted - upper, axis=-1) <= firm + 1e-9).all():
+        return np.zeros(3)
     centre = upper.mean(axis=0)
     spread = float(np.linalg.norm(upper - centre, axis=-1).max())
     away = wanted.mean(axis=0) - centre
     distance = max(float(np.linalg.norm(away)), 1e-9)
     length = float((poses.length(limb.middle) + poses.length(limb.lower))[0])
-    firm = two_bone.firm_reach(poses, limb)[:1]
-    reached = float(two_bone.soften(np.array([distance + spread]), firm, length)[0]) - spread
-    beyond = np.clip((distance + spread - firm) / FAR, 0.0, 1.0)
+    reached = float(two_bone.soften(np.array([distance + spread]), firm[:1], length)[0]) - spread
+    beyond = np.clip((distance + spread - firm[:1]) / FAR, 0.0, 1.0)
     reached -= EASE * float(smoothstep(beyond)[0])
-    return away * (reached / distance - 1.0)
+    shortfall: Vector = away * (reached / distance - 1.0)
+    return shortfall
 
 
 def _eased(poses: LimbPoses, limb: Limb, held: LimbTurns, share: Frames, first: int) -> LimbTurns:
