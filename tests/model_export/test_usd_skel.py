@@ -5,7 +5,7 @@ import pytest
 import usd_files
 from pxr import Sdf, Usd, UsdSkel
 
-from posefield.common.errors import MotionFileError
+from posefield.common.errors import FileError, MotionFileError
 from posefield.motion import quat
 from posefield.motion.skeleton import positions
 from posefield_train.source import motion_readers
@@ -282,6 +282,22 @@ def test_a_damaged_file_is_refused(tmp_path, name, content, said):
         (tmp_path / name).write_bytes(content)
     with pytest.raises(MotionFileError, match=said):
         read(tmp_path / name)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_damaged_text_is_refused_or_read_but_never_crashes(tmp_path, swinging, seed):
+    """Of text alone: usd-core takes sizes in damaged binary files as they are."""
+    swinging()
+    content = bytearray((tmp_path / "a.usda").read_bytes())
+    rng = np.random.default_rng(seed)
+    for place in rng.integers(0, len(content), 4):
+        content[place] = rng.integers(0, 256)
+    (tmp_path / "b.usda").write_bytes(content)
+    try:
+        found = read(tmp_path / "b.usda")
+    except FileError:
+        return
+    assert np.all(np.isfinite(found.rotations))
 
 
 def test_a_contradiction_of_the_recipe_is_an_error(swinging):

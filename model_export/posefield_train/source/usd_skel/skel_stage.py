@@ -8,7 +8,7 @@ from pxr import Tf, Usd, UsdGeom, UsdSkel
 
 from posefield.common.errors import MotionFileError
 from posefield.common.units import UpAxis
-from posefield_train.source.motion_files import key_times, posed_joints
+from posefield_train.source.motion_files import key_times, motion_file, posed_joints
 from posefield_train.source.motion_files.key_times import UnevenKeys
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
 from posefield_train.source.usd_skel.skel_samples import SkelMotion
@@ -45,6 +45,13 @@ def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     whole, that has no skeleton, no animation or several without one chosen, and for samples that
     are no frames.
     """
+    # usd-core finds damage of values when they are read: its own errors are RuntimeErrors, and
+    # names of joints may be no text.
+    with motion_file.naming_faults(source, RuntimeError, ValueError, TypeError):
+        return _read(path, source, options)
+
+
+def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     opened = _open(path, source)
     motion = _chosen(opened, options.animation)
     codes = motion.sample_codes()
