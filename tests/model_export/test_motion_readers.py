@@ -13,7 +13,7 @@ from minimal import recipe_with, small_clip, write_clips
 
 from posefield.common.errors import AcclaimError, FileError, MotionFileError
 from posefield.motion import bvh_writer
-from posefield_train.probe import probe_report
+from posefield_train.probe import probe_report, recipe_draft
 from posefield_train.source import data_folder, ingest, motion_readers
 from posefield_train.source.motion_files import clip_conversion
 from posefield_train.source.motion_files.motion_file import ReadOptions
@@ -89,7 +89,10 @@ def test_an_amc_file_needs_the_rate_of_the_recipe(tmp_path):
     (tmp_path / "clips.csv").write_text("file,v\n07_01.amc,1\n")
     with pytest.raises(MotionFileError, match=r"Acclaim files state no frame rate, .*source\.rate"):
         ingest.ingest(recipe_with(), tmp_path)
-    assert probe_report.probe([tmp_path / "07_01.amc"]).proposed["fps"].value is None
+    report = probe_report.probe([tmp_path / "07_01.amc"])
+    assert report.proposed["fps"].value is None
+    assert "# TODO rate = \n" in recipe_draft.recipe_text(report, "arm", None)
+    assert "unknown s" in probe_report.text(report)
 
 
 def test_files_in_archives_are_read_alike(tmp_path):

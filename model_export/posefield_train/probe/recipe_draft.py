@@ -111,6 +111,9 @@ def _source(report: ProbeReport) -> list[str]:
         lines.append(f"# confidence: {found.confidence}")
         known = found.value is not None
         lines.append(f"{key} = {json.dumps(found.value)}" if known else f"# TODO {key} = ")
+    rate = report.proposed["fps"]
+    if rate.value is None:
+        lines += [*(f"# {said}" for said in rate.evidence), "# TODO rate = "]
     return [*lines, ""]
 
 
