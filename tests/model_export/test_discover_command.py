@@ -171,6 +171,27 @@ def test_swings_in_place_are_counted_and_left_out(posefield, tmp_path):
     assert "left out: 3 swings of the legs that do not travel" in err
 
 
+def test_takes_are_compared_in_the_roles_of_all_and_the_others_are_told(posefield, folder):
+    path = folder / "a.bvh"
+    path.write_text(path.read_text().replace("Hand", "Hook"))
+    words = ("--like", "a.bvh:1.2-2.4", "-o", folder / "x.csv")
+    _, _, err = posefield("discover", folder, *words)
+    assert "not compared, because some takes have none: leftHand, rightHand" in err
+    assert json.loads(posefield("discover", folder, *words, "--json")[1])["not_compared"] == [
+        "leftHand",
+        "rightHand",
+    ]
+    (folder / "a.bvh").write_text(path.read_text().replace("Hook", "Hand"))
+    assert "not compared" not in posefield("discover", folder, *words)[2]
+
+
+def test_takes_without_motion_are_refused(posefield, tmp_path):
+    write(tmp_path / "a.bvh", discover_takes.take("a", 6.0))
+    words = ("--like", "a.bvh:1.2-2.4", "-o", tmp_path / "x.csv")
+    code, _, err = posefield("discover", tmp_path, *words)
+    assert code == 2 and "nothing moves in the takes" in err
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

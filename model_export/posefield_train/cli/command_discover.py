@@ -15,6 +15,7 @@ from posefield.console.question_options import with_option_groups
 from posefield_train.cli.output_files import MAX_NOTES
 
 if TYPE_CHECKING:
+    from posefield_train.discover.found_clips import FoundClip
     from posefield_train.discover.take_reading import ReadTakes
 
 EXAMPLES = [
@@ -89,23 +90,36 @@ def discover(
     if search.strides == (search.like is not None):
         raise InvalidField("strides", "expected either --strides or --like FILE:START-END")
     read = _read(folder, stated)
-    in_place = 0
-    if search.like is None:
-        found, in_place = found_clips.strides(read.takes)
-    else:
-        found = found_clips.like(read.takes, search.like, search.name, search.most)
+    found, facts = _search(read, search)
     atomic_files.write(found_clips.table(found), output)
     if json:
-        facts = {"table": str(output), "clips": len(found), "takes": len(read.takes)}
-        typer.echo(as_json({**facts, "in_place": in_place, "refused": read.refused}))
+        own = {"table": str(output), "clips": len(found), "takes": len(read.takes)}
+        typer.echo(as_json({**own, **facts, "refused": read.refused}))
         return
-    if in_place:
-        typer.echo(f"left out: {in_place} swings of the legs that do not travel", err=True)
     kind = "strides" if search.like is None else f"{search.name}, the example first"
     typer.echo(
         f"{output}: {len(found)} clips ({kind}) of {len(read.takes)} takes; set accepted to true "
         "in the rows to train from"
     )
+
+
+def _search(
+    read: "ReadTakes", search: SearchOptions
+) -> "tuple[list[FoundClip], dict[str, int | list[str]]]":
+    """Return the clips that are found, and what was left out, which standard error tells too."""
+    from posefield_train.discover import found_clips, motion_features
+
+    if search.like is None:
+        found, in_place = found_clips.strides(read.takes)
+        if in_place:
+            typer.echo(f"left out: {in_place} swings of the legs that do not travel", err=True)
+        return found, {"in_place": in_place}
+    found = found_clips.like(read.takes, search.like, search.name, search.most)
+    lacking = motion_features.lacking_roles(read.takes)
+    if lacking:
+        said = f"not compared, because some takes have none: {', '.join(lacking)}"
+        typer.echo(said, err=True)
+    return found, {"not_compared": lacking}
 
 
 def _read(folder: Path, stated: StatementOptions) -> "ReadTakes":

@@ -12,6 +12,7 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.motion.joint_roles import ROLES
 from posefield_train.discover import example_search, motion_features, stride_detection
 from posefield_train.discover.example_search import Span
+from posefield_train.discover.motion_features import StillTakes
 from posefield_train.discover.take_reading import Take
 from posefield_train.source import data_folder
 
@@ -52,10 +53,13 @@ def like(takes: Sequence[Take], text: str, name: str, most: int) -> list[FoundCl
     """Return an example, accepted, and the clips that are like it, the best first.
 
     text: of the example, such as "walks/a.bvh:12.1-14.6", file and seconds. Raises InvalidField for
-    an example that is none.
+    an example that is none, and for takes in which nothing moves.
     """
     example = _example(takes, text)
-    corpus = motion_features.build_corpus(takes)
+    try:
+        corpus = motion_features.build_corpus(takes)
+    except StillTakes as fault:
+        raise InvalidField("like", str(fault)) from fault
     matches = example_search.find_like(corpus, example, most)
     rows = [(example, 0.0, True), *((one.span, one.cost, False) for one in matches)]
     found = []

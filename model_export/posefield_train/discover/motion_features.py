@@ -37,13 +37,19 @@ VELOCITY_SPAN = 0.1
 """Half the time over which a velocity is measured, s."""
 EXPLAINED = 0.9
 """Share of the variance that the principal components keep."""
+STILL = 1e-6
+"""Largest range of a feature of takes in which nothing moves, leg lengths."""
+
+
+class StillTakes(ValueError):
+    """Takes in which nothing moves."""
 
 
 @dataclass(frozen=True)
 class Corpus:
     """Features of takes in one basis.
 
-    features: (F, k) of each take, at SEARCH_RATE. lengths: frames of each take as recorded.
+    features: (F, k) of each take, at SEARCH_RATE.
     """
 
     takes: tuple[Take, ...]
@@ -56,12 +62,21 @@ class Corpus:
 
 
 def build_corpus(takes: Sequence[Take]) -> Corpus:
-    """Return the features of takes, which may have different skeletons."""
-    roles = [role for role in WEIGHTS if all(role in take.places for take in takes)]
+    """Return the features of takes, which may have different skeletons.
+
+    Raises StillTakes for takes in which nothing moves.
+    """
+    lacking = lacking_roles(takes)
+    roles = [role for role in WEIGHTS if role not in lacking]
     raw = [take_features(take, roles) for take in takes]
     mean, basis = principal_components(np.concatenate(raw))
     step = round(RATE / SEARCH_RATE)
     return Corpus(tuple(takes), tuple((own[::step] - mean) @ basis for own in raw))
+
+
+def lacking_roles(takes: Sequence[Take]) -> list[str]:
+    """Return the roles that a take lacks, so that the takes are not compared in them."""
+    return [role for role in WEIGHTS if any(role not in take.places for take in takes)]
 
 
 def take_features(take: Take, roles: Sequence[str]) -> Floats:
@@ -82,8 +97,13 @@ def take_features(take: Take, roles: Sequence[str]) -> Floats:
 
 
 def principal_components(values: Floats) -> tuple[Floats, Floats]:
-    """Return the mean (d,) and the directions (d, k) that keep EXPLAINED of the variance."""
+    """Return the mean (d,) and the directions (d, k) that keep EXPLAINED of the variance.
+
+    Raises StillTakes without variance.
+    """
     mean = values.mean(axis=0)
+    if np.ptp(values, axis=0).max() < STILL:
+        raise StillTakes("nothing moves in the takes, expected motions to compare")
     variances, directions = np.linalg.eigh(np.cov(values - mean, rowvar=False))
     share = np.cumsum(variances[::-1]) / variances.sum()
     count = int(np.searchsorted(share, EXPLAINED)) + 1
