@@ -77,7 +77,7 @@ def test_one_example_finds_the_motions_of_its_action(unpacked):
     precisions = []
     for action, example in truth[::4]:
         others = [span for own, span in truth if own == action and span != example]
-        found = example_search.find_like(corpus, example, counts[action] - 1)
+        found = example_search.find_like(corpus, [example], counts[action] - 1)
         right = sum(any(shared(match.span, one) >= 0.5 for one in others) for match in found)
         precisions.append(right / len(others))
     assert len(truth) == 288 and np.mean(precisions) >= 0.88

@@ -185,6 +185,37 @@ def test_takes_are_compared_in_the_roles_of_all_and_the_others_are_told(posefiel
     assert "not compared" not in posefield("discover", folder, *words)[2]
 
 
+def test_reviewed_rows_are_the_examples_of_the_next_round(posefield, folder):
+    one, two = folder / "one.csv", folder / "two.csv"
+    posefield("discover", folder, "--like", "a.bvh:1.2-2.4", "-o", one)
+    lines = one.read_text().splitlines()
+    lines[2] = lines[2].replace("false", "true")
+    lines[3] = lines[3].replace("false", "rejected")
+    one.write_text("\n".join(lines) + "\n")
+    assert posefield("discover", folder, "--like", one, "-o", two)[0] == 0
+    before, after = rows(one), rows(two)
+    frames = [[(row["file"], row["first_frame"]) for row in each] for each in (before, after)]
+    assert frames[1][:2] == frames[0][:2] and frames[1][-1] == frames[0][2]
+    assert frames[0][2] not in frames[1][:-1]
+    verdicts = [row["accepted"] for row in after]
+    assert verdicts == ["true", "true", *["false"] * (len(after) - 3), "rejected"]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "code", "said"),
+    [
+        ("false", 2, "no row is accepted, expected one or more"),
+        ("maybe", 3, "accepted 'maybe', expected one of true, rejected, false"),
+    ],
+)
+def test_a_table_without_examples_is_refused(posefield, folder, verdict, code, said):
+    table = folder / "one.csv"
+    posefield("discover", folder, "--like", "a.bvh:1.2-2.4", "-o", table)
+    table.write_text(table.read_text().replace("true", verdict))
+    found, _, err = posefield("discover", folder, "--like", table, "-o", folder / "two.csv")
+    assert found == code and said in err
+
+
 def test_takes_without_motion_are_refused(posefield, tmp_path):
     write(tmp_path / "a.bvh", discover_takes.take("a", 6.0))
     words = ("--like", "a.bvh:1.2-2.4", "-o", tmp_path / "x.csv")
@@ -199,8 +230,8 @@ def test_takes_without_motion_are_refused(posefield, tmp_path):
         (("--strides", "--like", "a.bvh:1-2"), "expected either --strides or --like"),
         (("--like", "a.bvh"), "expected FILE:START-END in seconds"),
         (("--like", "c.bvh:1-2"), "file 'c.bvh', expected a take of the folder, such as a.bvh"),
-        (("--like", "a.bvh:5-7"), "5 to 7 s, expected 0.3 s or more between 0 and 6.00 s"),
-        (("--like", "a.bvh:2-1"), "2 to 1 s, expected 0.3 s or more"),
+        (("--like", "a.bvh:5-7"), "5 to 7 s, expected 0.6 s or more between 0 and 6.00 s"),
+        (("--like", "a.bvh:2-1"), "2 to 1 s, expected 0.6 s or more"),
     ],
 )
 def test_searches_that_are_none_are_refused(posefield, folder, words, said):

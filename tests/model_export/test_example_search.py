@@ -43,7 +43,7 @@ def corpus():
 @pytest.mark.parametrize("query", range(len(PLANTED)))
 def test_planted_motions_come_first(corpus, query):
     take, begin, duration = PLANTED[query]
-    found = example_search.find_like(corpus, Span(take, begin, begin + duration), 8)
+    found = example_search.find_like(corpus, [Span(take, begin, begin + duration)], 8)
     expected = {one for one in PLANTED if one != PLANTED[query]}
     best = [match.span for match in found[:4]]
     for other, start, seconds in expected:
@@ -51,6 +51,21 @@ def test_planted_motions_come_first(corpus, query):
         assert max(shared(span, wanted) for span in best) > 0.65, (wanted, best)
     costs = [match.cost for match in found]
     assert costs == sorted(costs) and costs[3] < 0.75 * costs[4]
+
+
+def test_further_examples_and_rejections_change_the_list(corpus):
+    first, second = (Span(take, begin, begin + length) for take, begin, length in PLANTED[:2])
+    alone = example_search.find_like(corpus, [first], 6)
+    assert example_search.find_like(corpus, [first, first], 6) == [
+        example_search.Match(match.span, pytest.approx(match.cost)) for match in alone
+    ]
+    both = example_search.find_like(corpus, [first, second], 6)
+    assert all(match.span.overlap(second) <= 0.2 for match in both)
+    assert len({match.span for match in both[:3]}) == 3
+    rejected = alone[0].span
+    left = example_search.find_like(corpus, [first], 6, [rejected])
+    assert all(match.span.overlap(rejected) <= 0.5 for match in left)
+    assert any(match.span.overlap(rejected) > 0.5 for match in alone)
 
 
 def shared(one, other):
@@ -63,7 +78,7 @@ def shared(one, other):
 
 def test_matches_do_not_overlap(corpus):
     example = Span(0, 4.0, 6.0)
-    spans = [example, *(match.span for match in example_search.find_like(corpus, example, 30))]
+    spans = [example, *(match.span for match in example_search.find_like(corpus, [example], 30))]
     for at, span in enumerate(spans):
         assert all(span.overlap(other) <= 0.2 for other in spans[:at])
         assert 0.9 <= span.end - span.start <= 4.1

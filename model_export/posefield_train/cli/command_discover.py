@@ -34,7 +34,8 @@ class SearchOptions:
     like: Annotated[
         str | None,
         typer.Option(
-            help="find motions like this part of a take: its file below the folder, and seconds",
+            help="find motions like this part of a take, its file below the folder and seconds; or "
+            "like the accepted rows of a former table, TABLE.csv",
             metavar="FILE:START-END",
         ),
     ] = None
@@ -96,7 +97,7 @@ def discover(
         own = {"table": str(output), "clips": len(found), "takes": len(read.takes)}
         typer.echo(as_json({**own, **facts, "refused": read.refused}))
         return
-    kind = "strides" if search.like is None else f"{search.name}, the example first"
+    kind = "strides" if search.like is None else f"{search.name}, examples first"
     typer.echo(
         f"{output}: {len(found)} clips ({kind}) of {len(read.takes)} takes; set accepted to true "
         "in the rows to train from"
@@ -114,7 +115,8 @@ def _search(
         if in_place:
             typer.echo(f"left out: {in_place} swings of the legs that do not travel", err=True)
         return found, {"in_place": in_place}
-    found = found_clips.like(read.takes, search.like, search.name, search.most)
+    examples = found_clips.parse_examples(read.takes, search.like)
+    found = found_clips.like(read.takes, examples, search.name, search.most)
     lacking = motion_features.lacking_roles(read.takes)
     if lacking:
         said = f"not compared, because some takes have none: {', '.join(lacking)}"

@@ -7,19 +7,32 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
-from posefield.common.errors import FileError, InvalidField
+from posefield.common.errors import FileError, InvalidField, RecipeError
 from posefield.motion.joint_roles import ROLES
 from posefield_train.discover import example_search, motion_features, stride_detection
 from posefield_train.discover.example_search import Span
 from posefield_train.discover.motion_features import StillTakes
 from posefield_train.discover.take_reading import Take
-from posefield_train.source import data_folder
+from posefield_train.source import data_folder, table_cells
 
 EXAMPLE = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
-SHORTEST_EXAMPLE = 0.3
-"""Duration of the shortest example, s: fewer frames fit anywhere."""
+SHORTEST_EXAMPLE, SHORTEST_ROW = 0.6, 0.2
+"""Durations of the shortest example, and of the shortest row of a table, s: a match lasts half as
+long as its example at least."""
 MOST_ROLES_BYTES = 128_000
+
+
+Verdict = Literal["true", "false", "rejected"]
+
+
+@dataclass(frozen=True)
+class Examples:
+    """Parts of takes that a person accepted, one or more, and rejected."""
+
+    accepted: tuple[Span, ...]
+    rejected: tuple[Span, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -27,7 +40,7 @@ class FoundClip:
     """A row of the table.
 
     file: below the folder. first_frame, last_frame: inclusive. seconds: duration. cost: of a match,
-    None for a stride. accepted: whether a person named it.
+    None for a stride. accepted: by a person; "false" until then.
     """
 
     file: str
@@ -36,7 +49,7 @@ class FoundClip:
     last_frame: int
     seconds: float
     cost: float | None = None
-    accepted: bool = False
+    accepted: Verdict = "false"
 
 
 COLUMNS = ("file", "name", "first_frame", "last_frame", "seconds", "cost", "accepted")
@@ -49,19 +62,21 @@ def strides(takes: Sequence[Take]) -> tuple[list[FoundClip], int]:
     return found, len(every) - len(found)
 
 
-def like(takes: Sequence[Take], text: str, name: str, most: int) -> list[FoundClip]:
-    """Return an example, accepted, and the clips that are like it, the best first.
+def like(takes: Sequence[Take], examples: "Examples", name: str, most: int) -> list[FoundClip]:
+    """Return the examples, the clips that are like them, the best first, and the rejected ones.
 
-    text: of the example, such as "walks/a.bvh:12.1-14.6", file and seconds. Raises InvalidField for
-    an example that is none, and for takes in which nothing moves.
+    Raises InvalidField for takes in which nothing moves.
     """
-    example = _example(takes, text)
     try:
         corpus = motion_features.build_corpus(takes)
     except StillTakes as fault:
         raise InvalidField("like", str(fault)) from fault
-    matches = example_search.find_like(corpus, example, most)
-    rows = [(example, 0.0, True), *((one.span, one.cost, False) for one in matches)]
+    matches = example_search.find_like(corpus, examples.accepted, most, examples.rejected)
+    rows: list[tuple[Span, float | None, Verdict]] = [
+        *((span, 0.0, "true") for span in examples.accepted),
+        *((match.span, match.cost, "false") for match in matches),
+        *((span, None, "rejected") for span in examples.rejected),
+    ]
     found = []
     for span, cost, accepted in rows:
         first, last = corpus.frame(span.take, span.start), corpus.frame(span.take, span.end)
@@ -77,7 +92,7 @@ def table(clips: Sequence[FoundClip]) -> bytes:
     for one in clips:
         cost = "" if one.cost is None else f"{one.cost:.4f}"
         frames = (one.first_frame, one.last_frame, f"{one.seconds:.3f}")
-        writer.writerow([one.file, one.name, *frames, cost, str(one.accepted).lower()])
+        writer.writerow([one.file, one.name, *frames, cost, one.accepted])
     return lines.getvalue().encode()
 
 
@@ -87,29 +102,63 @@ def _clip(
     first: int,
     last: int,
     cost: float | None = None,
-    accepted: bool = False,
+    accepted: Verdict = "false",
 ) -> FoundClip:
     return FoundClip(take.file, name, first, last, (last - first) / take.rate, cost, accepted)
 
 
-def _example(takes: Sequence[Take], text: str) -> Span:
-    """Return the part of a take that a text names."""
+def parse_examples(takes: Sequence[Take], text: str) -> Examples:
+    """Return the example "FILE:START-END", or those of a table "TABLE.csv" of a former search.
+
+    Of a table, rows count whose cell `accepted` is true or rejected. Raises InvalidField for an
+    example that is none, RecipeError for a table that cannot be read.
+    """
+    if text.endswith(".csv"):
+        return _reviewed(takes, Path(text))
     parts = EXAMPLE.fullmatch(text)
     if parts is None:
-        raise InvalidField("like", f"{text!r}, expected FILE:START-END in seconds")
-    start, end = float(parts[2]), float(parts[3])
+        raise InvalidField("like", f"{text!r}, expected FILE:START-END in seconds, or TABLE.csv")
+    return Examples((_span(takes, parts[1], (float(parts[2]), float(parts[3])), SHORTEST_EXAMPLE),))
+
+
+def _reviewed(takes: Sequence[Take], path: Path) -> Examples:
+    """Return the rows of a table that a person accepted or rejected."""
+    cells = table_cells.open_table(path)
+    cells.require(dict.fromkeys(("file", "first_frame", "last_frame", "accepted"), "discover"))
+    spans: dict[str, list[Span]] = {"true": [], "rejected": [], "false": []}
+    rates = {take.file: take.rate for take in takes}
+    for line, record in cells.records:
+        if record["accepted"] not in spans:
+            known = ", ".join(spans)
+            raise RecipeError(
+                cells.name, f"accepted {record['accepted']!r}, expected one of {known}", line
+            )
+        if record["accepted"] == "false":
+            continue
+        rate = rates.get(record["file"], 1.0)
+        first = cells.frame(line, record, "first_frame") / rate
+        last = cells.frame(line, record, "last_frame") / rate
+        spans[record["accepted"]].append(_span(takes, record["file"], (first, last), SHORTEST_ROW))
+    if not spans["true"]:
+        raise InvalidField("like", f"{path}: no row is accepted, expected one or more")
+    return Examples(tuple(spans["true"]), tuple(spans["rejected"]))
+
+
+def _span(takes: Sequence[Take], file: str, part: tuple[float, float], shortest: float) -> Span:
+    """Return a part of a take, s; InvalidField if the take is unknown or lacks it."""
+    start, end = part
     for index, take in enumerate(takes):
-        if take.file == parts[1]:
+        if take.file == file:
             seconds = (len(take) - 1) / take.rate
-            if end > seconds or end - start < SHORTEST_EXAMPLE:
+            if end > seconds or end - start < shortest:
                 raise InvalidField(
                     "like",
-                    f"{start:g} to {end:g} s, expected {SHORTEST_EXAMPLE:g} s or more between 0 "
+                    f"{start:g} to {end:g} s, expected {shortest:g} s or more between 0 "
                     f"and {seconds:.2f} s of {take.file}",
                 )
             return Span(index, start, end)
     known = ", ".join(take.file for take in takes[:5])
-    raise InvalidField("like", f"file {parts[1]!r}, expected a take of the folder, such as {known}")
+    raise InvalidField("like", f"file {file!r}, expected a take of the folder, such as {known}")
 
 
 def read_roles(path: Path) -> dict[str, str]:
