@@ -157,7 +157,7 @@ def plan_feet(script: Script, composed: Composed) -> FeetPlan:
     frames = range(timeline.begin, timeline.begin + len(own))
     body, led = limb_targets.find_leads(character.body, timeline.targets, frames)
     motion = SampledMotion(own.rotations, own.roots, RATE, walking=composed.walking)
-    return footsteps.plan_feet(body, motion, character.contacts, own.contacts, led=led)
+    return footsteps.plan_feet(body, motion, script.contacts, own.contacts, led=led)
 
 
 def _place_feet(planned: FeetPlan | None, times: Frames, motion: Passage) -> PlacedFrames:

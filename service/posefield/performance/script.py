@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import msgspec
 import numpy as np
@@ -37,6 +37,8 @@ from posefield.synthesis.synthesizer import Synthesizer
 
 # Characters whose bones are kept, by model, controls and labels; 1 kB each.
 KEPT_BONES = 256
+HIGHEST_LIFT = 1.5
+"""Largest lift of a character's feet over that of the captured walks of a script."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,14 @@ class Source:
         if self.gait is None:
             raise TypeError(f"{self.model.name}, expected a model of a gait")
         return self.gait
+
+    @property
+    def contacts(self) -> tuple[FootContact | None, ...]:
+        """Contacts of the character's feet in captured clips of the model; None for unknown."""
+        card = self.model.session.card
+        known = {own.joint: own for own in walking_feet.foot_contacts(card)}
+        joints = list(known) if card.cyclic else list(card.feet)
+        return tuple(known.get(joints[column]) for column in self.feet)
 
     def adapted(self, passage: Passage) -> Passage:
         """Return a passage of the model as one of the character."""
@@ -111,6 +121,26 @@ class Script:
         if source is None:
             return passage
         return join_steps.on_floor(own.body, source.adapted(passage), own.contacts)[0]
+
+    @property
+    def contacts(self) -> tuple[FootContact, ...]:
+        """Contacts of the character's feet, whose swings are those of all models of the script.
+
+        They are as long as in the model with the longest, and lifted by no more than 1.5 times as
+        much as in the walks: a character that hops does not walk as it hops.
+        """
+        return tuple(self._contact(foot, own) for foot, own in enumerate(self.character.contacts))
+
+    def _contact(self, foot: int, own: FootContact) -> FootContact:
+        pairs = [(source.contacts[foot], source.gait) for source in self.sources if source]
+        known = [found for found, _ in pairs if found is not None] or [own]
+        walks = [found.clearance for found, gait in pairs if found is not None and gait]
+        return replace(
+            own,
+            swing=max(found.swing for found in known),
+            longest_swing=max(found.longest_swing for found in known),
+            clearance=min(own.clearance, HIGHEST_LIFT * max(walks, default=np.inf)),
+        )
 
     @property
     def identities(self) -> tuple[str, ...]:

@@ -1,5 +1,7 @@
 """Targets of acts in performances: before the next join and hold, at moments, and in the report."""
 
+from dataclasses import replace
+
 import acting
 import msgspec
 import numpy as np
@@ -135,3 +137,17 @@ def test_a_held_hand_is_still_while_the_feet_are_placed(find, joint):
     assert answer.trust.feet.lowered > 0.01
     free = performed(find, walk, {"kind": "hold", "seconds": 1.0}, walk)
     assert np.ptp(path(free, joint)[rows], axis=0).max() > 100.0 * STILL
+
+
+def test_a_character_that_hops_walks_as_walkers_do(find):
+    content = {"segments": [{"kind": "walk", "model": "cmu_walk", "seconds": 2.0}]}
+    question = json_decoding.decode_question(PerformanceQuestion, msgspec.json.encode(content))
+    script = resolve_script(question, find)
+    captured = script.character.contacts
+    assert script.contacts == captured
+    lifted = tuple(replace(own, clearance=0.3, longest_swing=0.2) for own in captured)
+    hopping = replace(script, character=replace(script.character, contacts=lifted))
+    for own, known in zip(hopping.contacts, captured, strict=True):
+        assert own.clearance == pytest.approx(1.5 * known.clearance)
+        assert own.longest_swing == known.longest_swing
+        assert own.height == known.height
