@@ -85,8 +85,8 @@ def stood(made: Made) -> tuple[list[float], Frames]:
     times = np.arange(len(motion)) / RATE
     paths = foot_placement.foot_paths(plan).after
     slides = []
-    for seam in timeline.seams:
-        time = (seam.frame - timeline.begin) / RATE
+    for join in timeline.joins:
+        time = (join.frame - timeline.begin) / RATE
         near = (times >= time - NEAR[0]) & (times <= time + NEAR[1])
         for foot, steps in enumerate(plan.steps):
             for stance in steps.stances:

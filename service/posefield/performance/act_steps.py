@@ -5,7 +5,7 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.performance.acts import act_placement, act_segment
 from posefield.performance.acts.staged_act import StagedAct
-from posefield.performance.approach import entry_range
+from posefield.performance.approach import entries_of, entry_range, target_frames
 from posefield.performance.passages.limb_targets import WorldTarget
 from posefield.performance.passages.passage import RATE, FloorMotion
 from posefield.performance.script import Script, Source
@@ -99,7 +99,7 @@ def stage_at_join(timeline: Timeline, script: Script, index: int) -> StagedAct:
         return StagedAct(index, act_segment.act_passage(source.model, asked), None)
     rest = tuple(each for place, each in enumerate(asked.targets) if place not in world)
     free = act_segment.act_passage(source.model, replace(asked, targets=rest))
-    own_entries = entry_range(free.passage, free.event)
+    own_entries = entry_range(len(free.passage), free.event)
     cut = timeline.find_cut(script.adapted(index, free.passage), own_entries)
     return StagedAct(
         index, act_placement.act_at(source.model, asked, cut.motion, world), cut.motion
@@ -116,12 +116,7 @@ def add_act(timeline: Timeline, script: Script, staged: StagedAct) -> None:
         timeline.begin_with(passage.placed(by))
         first, begin = 0, 0
     else:
-        entries = entry_range(passage, act.event)
-        entries = range(1) if own.join.cut == "end" else entries
-        # A target is not cut off by the join.
-        entries = range(
-            min([entries.stop, *(frame + 1 for frame in _target_frames(script, staged))])
-        )
+        entries = range(1) if own.join.cut == "end" else entries_of(script, staged, len(passage))
         if own.join.cut == "end":
             timeline.exits = timeline.exits[-1:]
         cut = timeline.find_cut(passage, entries, staged.by)
@@ -139,7 +134,7 @@ def _record(
 ) -> None:
     """Add the span of an act. place: frame of its own first one, of its begin, and its motion."""
     (first, begin, by), act, index = place, staged.act, staged.segment
-    frames = [first + frame for frame in _target_frames(script, staged)]
+    frames = [first + frame for frame in target_frames(script, staged)]
     own, source = act_of(script, index)
     trust, done = act.trust, timeline.done
     # An act that is entered after its event, as a return is, has no event of its own.
@@ -174,13 +169,3 @@ def _record(
             position = by.place(position)
         joint = source.model.session.card.skeleton.names.index(target.joint)
         timeline.targets.append(WorldTarget(joint, position, frame, frame, pointer))
-
-
-def _target_frames(script: Script, staged: StagedAct) -> list[int]:
-    """Return the frames of an act at which its targets hold."""
-    own, source = act_of(script, staged.segment)
-    skeleton = source.model.session.card.skeleton
-    return [
-        staged.act.frame_of(each.when, skeleton.parents, skeleton.names.index(each.joint))
-        for each in own.targets
-    ]

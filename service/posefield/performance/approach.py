@@ -21,9 +21,10 @@ from posefield.performance.joins.cut_search import Cut
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script
 from posefield.performance.timeline import Timeline
-from posefield.performance.walk_entries import WalkEntry, manner, walk_of
+from posefield.performance.walk_entries import WalkEntry, synthesis_settings, walk_of
 from posefield.performance.walks import walk_passage, walk_segment
 from posefield.performance.walks.walk_segment import WalkPlan
+from posefield.question.performance_question import Act
 
 # Plans that are made so that the act after a walk lies where it should, and the smallest shift, m,
 # and turn, rad, for which one more is made.
@@ -90,7 +91,8 @@ def lead_to(
     by = staged.by or staged.facing(float(np.angle(staged.goal - entry.start.shift)))
     act = script.adapted(staged.segment, staged.act.passage)
     plan = _plan_to(script, index, entry, by.after(_arrival(act)), staged)
-    cycle = _last_cycle(script, index, plan, (act, staged.act.event))
+    entries = entries_of(script, staged, len(act))
+    cycle = _last_cycle(script, index, plan, (act, entries))
     # A walk that begins standing begins in its own phase.
     free = timeline.motion is None and plan.standing is None
     cut = cycle.find_cut([cycle.exits])
@@ -101,7 +103,7 @@ def lead_to(
         plan = _plan_to(script, index, entry, by.after(rest), staged)
         if plan.closes:
             # Where a walk stands depends on the foot that closes.
-            cycle = _last_cycle(script, index, plan, (act, staged.act.event))
+            cycle = _last_cycle(script, index, plan, (act, entries))
         runs = [cycle.exits] if plan.closes else cycle.reachable(plan, free)
         if plan.closes or not any(cut.exit in own for own in runs):
             cut = cycle.find_cut(runs)
@@ -144,17 +146,19 @@ def _plan_to(
     _, source = walk_of(script, index)
     goal = {"end": end} if staged.by else {"to": (end.shift.imag, end.shift.real)}
     asked = replace(entry.request, **goal)
-    return walk_segment.plan_walk(source.walks, asked, entry.start, entry.phase)
+    return walk_segment.plan_walk(source.gait, asked, entry.start, entry.phase)
 
 
 def _last_cycle(
-    script: Script, index: int, plan: WalkPlan, act: tuple[Passage, int | None]
+    script: Script, index: int, plan: WalkPlan, act: tuple[Passage, range]
 ) -> LastCycle:
-    """Return the last cycle of a plan for an act, which has an event at a frame or none."""
+    """Return the last cycle of a plan for an act with the frames at which it may be entered."""
     _, source = walk_of(script, index)
     last = plan.part(int(np.argmax(plan.phases >= plan.phases[-1] - 1.0)), len(plan))
-    poses = source.adapted(walk_passage.walk_passage(source.model, last, manner(script.question)))
-    return LastCycle(script.character.body, last, poses, act[0], entry_range(*act))
+    poses = source.adapted(
+        walk_passage.walk_passage(source.model, last, synthesis_settings(script.question))
+    )
+    return LastCycle(script.character.body, last, poses, *act)
 
 
 def _travelling(plan: WalkPlan, frame: int) -> FloorMotion:
@@ -173,10 +177,28 @@ def _gaps(phases: Annotated[Floats, "frames"], plan: WalkPlan) -> Annotated[Floa
     return found
 
 
-def entry_range(act: Passage, event: int | None) -> range:
+def entry_range(frames: int, event: int | None) -> range:
     """Return the frames of an act at which a motion may go on into it: before its event."""
-    last = len(act) - 1 if not event else event
+    last = event or frames - 1
     return range(max(min(round(ENTRY_SECONDS * RATE), last), 1))
+
+
+def entries_of(script: Script, staged: StagedAct, frames: int) -> range:
+    """Return the frames at which a motion may go on into an act, so that no target is cut off."""
+    stop = entry_range(frames, staged.act.event).stop
+    return range(min([stop, *(frame + 1 for frame in target_frames(script, staged))]))
+
+
+def target_frames(script: Script, staged: StagedAct) -> list[int]:
+    """Return the frames of an act at which its targets hold."""
+    own, source = script.segments[staged.segment], script.sources[staged.segment]
+    if not isinstance(own, Act) or source is None:
+        raise TypeError(f"segment {staged.segment}, expected an act")
+    skeleton = source.model.session.card.skeleton
+    return [
+        staged.act.frame_of(each.when, skeleton.parents, skeleton.names.index(each.joint))
+        for each in own.targets
+    ]
 
 
 def _arrival(act: Passage) -> FloorMotion:

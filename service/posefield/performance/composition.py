@@ -67,11 +67,11 @@ def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> Seq
     Each hard one has a warning.
     """
     timeline = composed.timeline
-    joins = [(own.frame - timeline.begin, own.cut) for own in timeline.seams]
+    joins = [(own.frame - timeline.begin, own.cut) for own in timeline.joins]
     found = join_quality.judge(script.character.body, joins, every)
-    for seam, facts in zip(timeline.seams, found, strict=True):
+    for made, facts in zip(timeline.joins, found, strict=True):
         if facts.hard:
-            timeline.warn(f"/segments/{seam.segment}", "; ".join(facts.reasons))
+            timeline.warn(f"/segments/{made.segment}", "; ".join(facts.reasons))
     return found
 
 

@@ -12,7 +12,7 @@ from posefield.locomotion import floor_plane
 from posefield.performance.joins.join_quality import JoinFacts
 from posefield.performance.passages.passage import RATE
 from posefield.performance.script import Script
-from posefield.performance.timeline import Composed, Seam, Span
+from posefield.performance.timeline import Composed, MadeJoin, Span
 from posefield.performance.walks import path_following
 from posefield.question.performance_report import (
     JoinReport,
@@ -46,7 +46,7 @@ def report(
         round_micrometres(sigma),
         all(span.supported for span in timeline.spans),
         _segments(composed),
-        tuple(_join(composed, *pair) for pair in zip(timeline.seams, joins, strict=True)),
+        tuple(_join(composed, *pair) for pair in zip(timeline.joins, joins, strict=True)),
         feet,
         tuple(warnings),
     )
@@ -108,14 +108,14 @@ def _path(composed: Composed, span: Span) -> PathReport | None:
     return PathReport(*map(round_micrometres, numbers))
 
 
-def _join(composed: Composed, seam: Seam, facts: JoinFacts) -> JoinReport:
-    shift, cut = composed.timeline.begin, seam.cut
+def _join(composed: Composed, made: MadeJoin, facts: JoinFacts) -> JoinReport:
+    shift, cut = composed.timeline.begin, made.cut
     return JoinReport(
-        seam.segment,
-        round_micrometres((seam.frame - shift) / RATE),
+        made.segment,
+        round_micrometres((made.frame - shift) / RATE),
         round_micrometres(cut.distance),
         cut.blend,
-        round_micrometres(seam.seconds),
+        round_micrometres(made.seconds),
         round_micrometres(facts.peak),
         round_micrometres(cut.usual.acceleration),
         facts.hard,

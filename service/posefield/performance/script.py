@@ -47,21 +47,21 @@ class Source:
 
     share: leg length of the character over that of the model's own bones at its typical controls.
     feet: for each leg of the character, the column of its foot in the contacts of passages.
-    gait: of a cyclic model.
+    own_gait: of a cyclic model.
     """
 
     model: Synthesizer
     match: SkeletonMatch
     share: float
     feet: tuple[int, ...]
-    gait: Gait | None = None
+    own_gait: Gait | None = None
 
     @property
-    def walks(self) -> Gait:
+    def gait(self) -> Gait:
         """Return the gait of a cyclic model; TypeError for another one."""
-        if self.gait is None:
+        if self.own_gait is None:
             raise TypeError(f"{self.model.name}, expected a model of a gait")
-        return self.gait
+        return self.own_gait
 
     @property
     def contacts(self) -> tuple[FootContact | None, ...]:
@@ -84,7 +84,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Protagonist:
+class ScriptCharacter:
     """Character of a performance.
 
     identity: of the model whose bones it has. roles: of the joints. facing: of the rest pose, rad,
@@ -108,7 +108,7 @@ class Script:
 
     question: PerformanceQuestion
     sources: tuple[Source | None, ...]
-    character: Protagonist
+    character: ScriptCharacter
 
     @property
     def segments(self) -> tuple[Segment, ...]:
@@ -199,7 +199,7 @@ def _character(
     question: PerformanceQuestion,
     models: Sequence[Synthesizer | None],
     find: Callable[[str], Synthesizer],
-) -> Protagonist:
+) -> ScriptCharacter:
     """Return the character: that of the script, else of the first act, else of the first walk.
 
     An act meets its targets with its own bones; a walk is at ease with any.
@@ -207,7 +207,7 @@ def _character(
     if question.character is not None:
         chosen = question.character
         with errors_under("character"):
-            return _protagonist(
+            return _script_character(
                 find(chosen.model), chosen.controls, chosen.performer, chosen.labels
             )
     every = list(enumerate(question.segments))
@@ -216,16 +216,16 @@ def _character(
             model = models[index]
             if isinstance(own, kind) and model is not None:
                 with errors_under("segments", index):
-                    return _protagonist(model, {}, own.performer, own.labels)
+                    return _script_character(model, {}, own.performer, own.labels)
     raise InvalidField("character", "none, expected one: no segment has a model")
 
 
-def _protagonist(
+def _script_character(
     model: Synthesizer,
     controls: dict[str, float],
     performer: str | None,
     labels: dict[str, str | dict[str, float]],
-) -> Protagonist:
+) -> ScriptCharacter:
     card = model.session.card
     bones = _bones(model, MotionQuestion(controls=controls, performer=performer, labels=labels))
     known = [own for own in card.contacts if own.joint in card.feet]
@@ -235,7 +235,7 @@ def _protagonist(
     contacts = tuple(known[place] for place in choice.feet)
     feet = tuple(own.joint for own in contacts)
     facing = math.radians(card.making.facing or 0.0)
-    return Protagonist(
+    return ScriptCharacter(
         model.identity, card.skeleton, card.roles, facing, bones, choice.character, feet, contacts
     )
 
@@ -258,7 +258,7 @@ _kept_bones: ValueCache[tuple[str, bytes], Bones] = ValueCache(KEPT_BONES)
 def _sources(
     question: PerformanceQuestion,
     models: Sequence[Synthesizer | None],
-    character: Protagonist,
+    character: ScriptCharacter,
 ) -> Iterator[Source | None]:
     """Yield the sources of the segments; those of equal walkers are made once."""
     made: dict[tuple[str, str | None, bytes], Source] = {}
@@ -272,7 +272,9 @@ def _sources(
         yield made[key]
 
 
-def _source(index: int, segment: Walk | Act, model: Synthesizer, character: Protagonist) -> Source:
+def _source(
+    index: int, segment: Walk | Act, model: Synthesizer, character: ScriptCharacter
+) -> Source:
     """Return the model of a segment as a source of the character's poses."""
     card, field = model.session.card, f"segments/{index}/model"
     try:
@@ -290,7 +292,7 @@ def _source(index: int, segment: Walk | Act, model: Synthesizer, character: Prot
     return Source(model, match, share, feet, walks)
 
 
-def _feet(field: str, card: ModelCard, character: Protagonist) -> tuple[int, ...]:
+def _feet(field: str, card: ModelCard, character: ScriptCharacter) -> tuple[int, ...]:
     """Return the columns of the character's feet in the contacts of a model's passages."""
     # Walks have the contacts that the model knows; acts detect those that it does not.
     known = [own.joint for own in walking_feet.foot_contacts(card)]

@@ -16,7 +16,7 @@ from posefield.performance.joins.cut_search import Cut
 from posefield.performance.joins.join_quality import CutFacts, UsualMotion
 from posefield.performance.passages.limb_targets import WorldTarget
 from posefield.performance.passages.passage import RATE, FloorMotion, Passage
-from posefield.performance.script import Protagonist
+from posefield.performance.script import ScriptCharacter
 from posefield.performance.script_bounds import MAX_SECONDS
 from posefield.performance.walks.walk_segment import WalkPlan
 from posefield.question.performance_question import GivenPose, Join
@@ -47,7 +47,7 @@ class Span:
 
 
 @dataclass(frozen=True)
-class Seam:
+class MadeJoin:
     """A join that was made. segment: index of the one that begins. frame: at which it does."""
 
     segment: int
@@ -66,14 +66,14 @@ class Timeline:
     a card lacks it. usual: largest usual acceleration of the last segment's motion, m/s².
     """
 
-    character: Protagonist
+    character: ScriptCharacter
     captured: tuple[float, ...] = ()
     motion: Passage | None = None
     exits: range = range(0)
     begin: int = 0
     usual: float = 0.0
     spans: list[Span] = field(default_factory=list)
-    seams: list[Seam] = field(default_factory=list)
+    joins: list[MadeJoin] = field(default_factory=list)
     targets: list[WorldTarget] = field(default_factory=list)
     warnings: list[ScriptWarning] = field(default_factory=list)
 
@@ -139,7 +139,7 @@ class Timeline:
         reference: Reference = "captured" if self.captured else "synthesised"
         usual = UsualMotion(max(self.usual, own), reference)
         facts = join_quality.describe_cut((before, placed), cut, kind, usual)
-        self.seams.append(Seam(segment, cut.exit, fits, facts))
+        self.joins.append(MadeJoin(segment, cut.exit, fits, facts))
         self.usual = own
         return cut.exit - cut.entry
 
@@ -194,7 +194,7 @@ def check_distance(join: Join, cut: Cut) -> None:
         )
 
 
-def from_poses(poses: Sequence[GivenPose], fps: float, character: Protagonist) -> Passage:
+def from_poses(poses: Sequence[GivenPose], fps: float, character: ScriptCharacter) -> Passage:
     """Return given poses at a frame rate as a passage at `RATE` that ends with the last one.
 
     Raises InvalidField for poses of another number of joints and for rotations of no length.

@@ -13,7 +13,7 @@ from posefield.performance.script import Script, Source
 from posefield.performance.timeline import Timeline
 from posefield.performance.walks import standing_pose, walk_passage, walker
 from posefield.performance.walks.discs import Disc
-from posefield.performance.walks.walk_passage import Manner
+from posefield.performance.walks.walk_passage import SynthesisSettings
 from posefield.performance.walks.walk_request import WalkRequest
 from posefield.question.performance_question import PerformanceQuestion, Walk
 
@@ -33,10 +33,10 @@ class WalkEntry:
     continues: bool = False
 
 
-def manner(question: PerformanceQuestion) -> Manner:
+def synthesis_settings(question: PerformanceQuestion) -> SynthesisSettings:
     """Return the level of detail and the take of a script."""
     take = TakeSettings(question.take, question.variety, question.detail)
-    return Manner(question.level, take if take.seed or take.detail else None)
+    return SynthesisSettings(question.level, take if take.seed or take.detail else None)
 
 
 def walk_of(script: Script, index: int) -> tuple[Walk, Source]:
@@ -49,7 +49,7 @@ def walk_of(script: Script, index: int) -> tuple[Walk, Source]:
 
 def request_of(script: Script, own: Walk, source: Source) -> WalkRequest:
     """Return the walk that a segment asks for."""
-    usual = float(source.walks.rates[:, 0].mean())
+    usual = float(source.gait.rates[:, 0].mean())
     names = {PERFORMER: own.performer} if own.performer is not None else {}
     discs = tuple(Disc(*disc.position, disc.radius) for disc in script.question.obstacles)
     along = None if own.along is None else np.array(own.along, dtype=np.float64)
@@ -75,10 +75,10 @@ def _continued(timeline: Timeline, source: Source, request: WalkRequest) -> Walk
     if before is None or before.plan is None or before.model != source.model.identity:
         return None
     plan, rolling = before.plan, request.start == "rolling"
-    same = plan.walker.is_same(walker.find_walker(source.walks, request.labels, request.controls))
+    same = plan.walker.is_same(walker.find_walker(source.gait, request.labels, request.controls))
     if not (same and rolling and not plan.stops):
         return None
-    low, high = source.walks.region.speeds
+    low, high = source.gait.region.speeds
     speed, turn = plan.exit_rates
     own = replace(
         request,
@@ -101,7 +101,7 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
         return continued
     if own.join.cut == "end":
         timeline.exits = timeline.exits[-1:]
-    who = walker.find_walker(source.walks, request.labels, request.controls)
+    who = walker.find_walker(source.gait, request.labels, request.controls)
     pose = standing_pose.find_standing_pose(who) if request.start == "standing" else None
     if pose is not None:
         still = timeline.find_cut(script.adapted(index, walk_passage.still(pose)), range(1))
@@ -109,11 +109,11 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
         at_rest = replace(still, motion=FloorMotion())
         return WalkEntry(request, still.motion.after(begin), first, at_rest)
     speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]
-    controls = who.controls(np.clip([speed], *source.walks.region.speeds), np.zeros(1))
+    controls = who.controls(np.clip([speed], *source.gait.region.speeds), np.zeros(1))
     stride = who.strides(controls)
     frames = max(round(float(stride.durations[0]) * RATE), 8)
     cycle = walk_passage.cycle_passage(
-        source.model, who, controls[0], frames, manner(script.question)
+        source.model, who, controls[0], frames, synthesis_settings(script.question)
     )
     cut = timeline.find_cut(script.adapted(index, cycle), range(frames))
     phase = cut.entry / frames

@@ -8,7 +8,7 @@ from posefield.performance import approach
 from posefield.performance.acts.staged_act import StagedAct
 from posefield.performance.script import Script
 from posefield.performance.timeline import Span, Timeline, check_distance, choose_blend
-from posefield.performance.walk_entries import WalkEntry, find_entry, manner, walk_of
+from posefield.performance.walk_entries import WalkEntry, find_entry, synthesis_settings, walk_of
 from posefield.performance.walks import walk_passage, walk_phases, walk_segment
 from posefield.performance.walks.walk_segment import WalkPlan
 
@@ -24,7 +24,7 @@ def add_walk(
     entry = find_entry(timeline, script, index)
     if ahead is None:
         _, source = walk_of(script, index)
-        plan = walk_segment.plan_walk(source.walks, entry.request, entry.start, entry.phase)
+        plan = walk_segment.plan_walk(source.gait, entry.request, entry.start, entry.phase)
     else:
         plan, ahead = approach.lead_to(timeline, script, index, entry, ahead)
     _add(timeline, script, index, (plan, entry))
@@ -36,7 +36,7 @@ def _add(
 ) -> None:
     (own, source), (plan, entry) = walk_of(script, index), planned
     passage = script.adapted(
-        index, walk_passage.walk_passage(source.model, plan, manner(script.question))
+        index, walk_passage.walk_passage(source.model, plan, synthesis_settings(script.question))
     )
     first = 0
     if entry.continues:

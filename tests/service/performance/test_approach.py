@@ -39,8 +39,8 @@ def script(walk_path):
 def act(script):
     """An act that begins at a third of the cycle, turned and away from the origin."""
     source = script.sources[0]
-    who = walker.find_walker(source.walks, {}, {})
-    controls = who.controls(np.array([float(source.walks.rates[:, 0].mean())]), np.zeros(1))
+    who = walker.find_walker(source.gait, {}, {})
+    controls = who.controls(np.array([float(source.gait.rates[:, 0].mean())]), np.zeros(1))
     cycle = walk_passage.cycle_passage(source.model, who, controls[0], FRAMES)
     moved = cycle.part(FRAMES // 3, FRAMES).placed(FloorMotion(0.7, 3.0 - 2.0j))
     return Act(moved, script.character.bones, None, None)
@@ -61,7 +61,7 @@ def last_cut(script, plan, staged):
     """Return the cut from the last frame of a walk into the act where it was placed."""
     walked = script.adapted(0, walk_passage.walk_passage(script.sources[0].model, plan))
     placed = script.adapted(1, staged.act.passage.placed(staged.by))
-    exits, entries = range(len(walked) - 1, len(walked)), approach.entry_range(placed, None)
+    exits, entries = range(len(walked) - 1, len(walked)), approach.entry_range(len(placed), None)
     body = script.character.body
     return (
         cut_search.find_cut(body, walked, placed, exits, entries),

@@ -17,7 +17,7 @@ from posefield.motion import quat, skeleton
 from posefield.performance.passages.passage import RATE, FloorMotion
 from posefield.performance.walks import path_following, walk_passage
 from posefield.performance.walks.discs import Disc
-from posefield.performance.walks.walk_passage import Manner
+from posefield.performance.walks.walk_passage import SynthesisSettings
 from posefield.performance.walks.walk_request import WalkRequest
 from posefield.performance.walks.walk_segment import plan_walk
 from posefield.synthesis.synthesizer import Synthesizer
@@ -247,13 +247,13 @@ def test_given_controls_and_performers_are_kept(walking):
 def test_takes_and_details_differ_and_stay_on_the_path(walk, walking):
     plan = planned(walking, WalkRequest(1.1, to=(0.0, 10.0)))
     mean = walk_passage.walk_passage(walk, plan)
-    manner = Manner(take=TakeSettings(7, 0.7, detail=True))
-    take = walk_passage.walk_passage(walk, plan, manner)
-    again = walk_passage.walk_passage(walk, plan, manner)
+    settings = SynthesisSettings(take=TakeSettings(7, 0.7, detail=True))
+    take = walk_passage.walk_passage(walk, plan, settings)
+    again = walk_passage.walk_passage(walk, plan, settings)
     assert take.rotations.tobytes() == again.rotations.tobytes()
     assert np.abs(take.rotations - mean.rotations).max() > 0.01
     assert path_following.measure(plan, take.roots, take.rotations).lateral < 0.025
-    nothing = Manner(take=TakeSettings(0, 0.7, detail=False))
+    nothing = SynthesisSettings(take=TakeSettings(0, 0.7, detail=False))
     same = walk_passage.walk_passage(walk, plan, nothing)
     assert np.allclose(same.rotations, mean.rotations, atol=1e-4)
 

@@ -27,26 +27,28 @@ SIGMA_STEP = 6
 
 
 @dataclass(frozen=True)
-class Manner:
+class SynthesisSettings:
     """Level of detail and take of a walk; None for the prediction."""
 
     level: int = 0
     take: TakeSettings | None = None
 
 
-def walk_passage(model: Synthesizer, plan: WalkPlan, manner: Manner = Manner()) -> Passage:
+def walk_passage(
+    model: Synthesizer, plan: WalkPlan, settings: SynthesisSettings = SynthesisSettings()
+) -> Passage:
     """Return the motion of a plan.
 
     contacts: probabilities of the contacts of `walking_feet.foot_contacts`, in their order. Phases
     are those of the plan, wrapped.
     """
     phases = plan.phases % 1.0
-    posed = _poses(model, plan.walker, plan.controls, phases, manner)
+    posed = _poses(model, plan.walker, plan.controls, phases, settings)
     places = plan.places + posed.places * np.exp(1j * plan.headings)
     walked = Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),
         floor_plane.at_height(places, posed.heights),
-        _contacts(model, plan.walker, plan.controls, phases, manner.level),
+        _contacts(model, plan.walker, plan.controls, phases, settings.level),
         _sigmas(model, plan.walker, plan.controls),
         phases,
     )
@@ -61,7 +63,7 @@ def cycle_passage(
     walker: Walker,
     controls: Annotated[Floats, "controls"],
     frames: int = CYCLE_FRAMES,
-    manner: Manner = Manner(),
+    settings: SynthesisSettings = SynthesisSettings(),
 ) -> Passage:
     """Return one steady cycle at controls (d,), from phase 0, at the origin and heading along z.
 
@@ -69,15 +71,15 @@ def cycle_passage(
     """
     rows = np.repeat(controls[None], frames, axis=0)
     phases = np.arange(frames) / frames
-    own = walker.strides(controls[None], manner.level)
-    posed = _poses(model, walker, rows, phases, manner)
+    own = walker.strides(controls[None], settings.level)
+    posed = _poses(model, walker, rows, phases, settings)
     turned = phases * own.turns
     places = floor_plane.arc_displacement(phases * own.travels, turned)
     places = places + posed.places * np.exp(1j * turned)
     return Passage(
         floor_plane.turn_roots(posed.rotations, turned),
         floor_plane.at_height(places, posed.heights),
-        _contacts(model, walker, rows, phases, manner.level),
+        _contacts(model, walker, rows, phases, settings.level),
         _sigmas(model, walker, rows),
         phases,
     )
@@ -95,9 +97,13 @@ def still(pose: StandingPose) -> Passage:
 
 
 def _poses(
-    model: Synthesizer, walker: Walker, controls: PointControls, phases: PerPoint, manner: Manner
+    model: Synthesizer,
+    walker: Walker,
+    controls: PointControls,
+    phases: PerPoint,
+    settings: SynthesisSettings,
 ) -> RelativePoses:
-    labels, level, take = walker.labels(len(controls)), manner.level, manner.take
+    labels, level, take = walker.labels(len(controls)), settings.level, settings.take
     if take is None:
         return stride.synthesize_poses(model.session, controls, labels, phases, level)
     own = walker.strides(controls, level)
