@@ -190,10 +190,10 @@ def entries_of(script: Script, staged: StagedAct, frames: int) -> range:
 
 
 def target_frames(script: Script, staged: StagedAct) -> list[int]:
-    """Return the frames of an act at which its targets hold."""
+    """Return the frames of an act at which its targets hold; none for a motion without targets."""
     own, source = script.segments[staged.segment], script.sources[staged.segment]
     if not isinstance(own, Act) or source is None:
-        raise TypeError(f"segment {staged.segment}, expected an act")
+        return []
     skeleton = source.model.session.card.skeleton
     return [
         staged.act.frame_of(each.when, skeleton.parents, skeleton.names.index(each.joint))
