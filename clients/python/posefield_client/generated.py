@@ -289,7 +289,9 @@ class GivenPose(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 
 class PerformanceStart(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Where a performance begins, or what it goes on from."""
+    """Place and heading at which a performance begins, or the last poses of the motion that it
+    continues.
+    """
 
     position: tuple[float, float] | UnsetType = UNSET
     heading: float | UnsetType = UNSET

@@ -1165,7 +1165,7 @@ export interface components {
             rotations: components["schemas"]["Quaternion"][];
             root_position: components["schemas"]["Vector"];
         };
-        /** @description Where a performance begins, or what it goes on from. */
+        /** @description Place and heading at which a performance begins, or the last poses of the motion that it continues. */
         PerformanceStart: {
             position?: components["schemas"]["FloorPoint"];
             /**
@@ -1388,7 +1388,7 @@ export interface components {
             phase?: number;
             /** @description Time of the event of an act in seconds. */
             event?: number;
-            /** @description Residuals of its targets. */
+            /** @description How far the joints of the character stay from the targets of the act */
             targets?: components["schemas"]["Met"][];
             path?: components["schemas"]["PathReport"];
             /** @description What was chosen or synthesised. */
