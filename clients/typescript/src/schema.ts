@@ -1388,7 +1388,7 @@ export interface components {
             phase?: number;
             /** @description Time of the event of an act in seconds. */
             event?: number;
-            /** @description How far the joints of the character stay from the targets of the act */
+            /** @description How far the joints of the character stay from the targets of the act. */
             targets?: components["schemas"]["Met"][];
             path?: components["schemas"]["PathReport"];
             /** @description What was chosen or synthesised. */
