@@ -21,7 +21,7 @@ from posefield_train.discover import (
     stride_detection,
     take_reading,
 )
-from posefield_train.discover.example_search import Span
+from posefield_train.discover.joined_features import Span
 
 ROOT = Path(__file__).resolve().parents[1]
 ACCEPTED, REJECTED = 3, 2

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from posefield_train.discover import example_search, motion_features, stride_detection, take_reading
-from posefield_train.discover.example_search import Span
+from posefield_train.discover.joined_features import Span
 
 pytestmark = pytest.mark.system
 

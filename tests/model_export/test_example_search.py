@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from posefield_train.discover import example_search, motion_features, subsequence_dtw
-from posefield_train.discover.example_search import Span
+from posefield_train.discover.joined_features import Span
 from posefield_train.discover.take_reading import Take
 
 PLANTED = ((0, 4.0, 2.0), (0, 12.0, 1.6), (1, 5.0, 2.4), (1, 15.0, 2.0), (2, 9.0, 1.8))

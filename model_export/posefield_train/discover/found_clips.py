@@ -12,7 +12,7 @@ from typing import Literal
 from posefield.common.errors import FileError, InvalidField, RecipeError
 from posefield.motion.joint_roles import ROLES
 from posefield_train.discover import example_search, motion_features, stride_detection
-from posefield_train.discover.example_search import Span
+from posefield_train.discover.joined_features import Span
 from posefield_train.discover.motion_features import StillTakes
 from posefield_train.discover.take_reading import Take
 from posefield_train.source import data_folder, table_cells

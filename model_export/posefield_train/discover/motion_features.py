@@ -49,10 +49,11 @@ class StillTakes(ValueError):
 class Corpus:
     """Features of takes in one basis.
 
-    features: (F, k) of each take, at SEARCH_RATE.
+    roles: joints whose places are compared. features: (F, k) of each take, at SEARCH_RATE.
     """
 
     takes: tuple[Take, ...]
+    roles: tuple[str, ...]
     features: tuple[Floats, ...]
 
     def frame(self, take: int, at: float) -> int:
@@ -67,11 +68,11 @@ def build_corpus(takes: Sequence[Take]) -> Corpus:
     Raises StillTakes for takes in which nothing moves.
     """
     lacking = lacking_roles(takes)
-    roles = [role for role in WEIGHTS if role not in lacking]
+    roles = tuple(role for role in WEIGHTS if role not in lacking)
     raw = [take_features(take, roles) for take in takes]
     mean, basis = principal_components(np.concatenate(raw))
     step = round(RATE / SEARCH_RATE)
-    return Corpus(tuple(takes), tuple((own[::step] - mean) @ basis for own in raw))
+    return Corpus(tuple(takes), roles, tuple((own[::step] - mean) @ basis for own in raw))
 
 
 def lacking_roles(takes: Sequence[Take]) -> list[str]:

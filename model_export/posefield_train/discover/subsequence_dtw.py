@@ -68,3 +68,35 @@ def _before(row: tuple[Floats, Indices], step: int, added: Floats) -> tuple[Floa
     costs, starts = np.full(len(added), np.inf), np.zeros(len(added), dtype=np.int64)
     costs[step:], starts[step:] = row[0][:-step], row[1][:-step]
     return costs + added, starts
+
+
+def align(apart: Floats) -> Indices:
+    """Return for each frame of the query (L,) the frame of a clip (F,) that is most like it.
+
+    apart (L, F): distances. The first frames are alike, and the last ones; steps are those of a
+    match. A frame of the query that a step leaves out shares the frame before. Raises ValueError
+    for a clip that lasts less than half as long as the query, or more than twice.
+    """
+    length, frames = apart.shape
+    costs = np.full((length, frames), np.inf)
+    steps = np.zeros((length, frames), dtype=np.int64)
+    costs[0, 0] = apart[0, 0]
+    for at in range(1, length):
+        choices = np.full((3, frames), np.inf)
+        choices[0, 1:] = costs[at - 1, :-1]
+        choices[1, 2:] = costs[at - 1, :-2]
+        if at > 1:
+            choices[2, 1:] = costs[at - 2, :-1] + apart[at - 1, 1:]
+        steps[at] = np.argmin(choices, axis=0)
+        costs[at] = choices.min(axis=0) + apart[at]
+    if not np.isfinite(costs[-1, -1]):
+        raise ValueError(f"{frames} frames, expected {length // 2 + 1} to {2 * length - 1}")
+    found = np.zeros(length, dtype=np.int64)
+    row, column = length - 1, frames - 1
+    while row > 0:
+        found[row] = column
+        step = steps[row, column]
+        if step == 2:
+            found[row - 1] = column - 1
+        row, column = row - (2 if step == 2 else 1), column - (2 if step == 1 else 1)
+    return found

@@ -1,0 +1,227 @@
+"""Controls and events of a family of clips, proposed by what predicts takes that were left out.
+
+Candidates are the measures that recipes know: places of hands, feet, head and hips at moments of
+the motion, and quantities of locomotion. A motion is predicted from them by kriging with fixed
+scales, whose leave-one-take-out residuals have a closed form (Dubrule, 1983).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import measures
+from posefield.motion.measures import Measure, MeasuredMotion, MeasureMoment
+
+FRAMES = 30
+"""Frames at which clips are compared."""
+MOMENTS: tuple[MeasureMoment, ...] = ("end", "highest", "lowest", "farthest", "start")
+POSITIONS = ("height", "forward", "left")
+GAIT = ("speed", "turn", "stride_length")
+"""Controls of a cycle that travels."""
+NEAR_BEST = 1.15
+"""Remaining variance over the least one up to which a limb's end may be that of the event; of these
+it is the one that moves most."""
+LEAST_GAIN = 0.03
+"""Share of the remaining variance by which a further control has to lower it."""
+MOST_CONTROLS = 4
+ALIKE = 0.95
+"""Correlation from which on two measures say the same."""
+FEWEST_VALUES = 3
+"""Fewest different values of a control."""
+# Terms of the covariance, in shares of the motions' variance, and the scale in standard deviations
+# of the controls. They are those of typical trained models.
+LINEAR, CURVED, CONSTANT, SAME_PERFORMER, NUGGET = 0.5, 0.5, 1.0, 0.3, 0.15
+SCALE = 2.0
+
+
+@dataclass(frozen=True)
+class FamilyClips:
+    """Clips of a family as measures see them.
+
+    motions: of the clips. joints: index by role. performers, takes: of the clips. cyclic: whether
+    the last pose leads into the first.
+    """
+
+    motions: tuple[MeasuredMotion, ...]
+    joints: Mapping[str, int]
+    performers: tuple[str, ...]
+    takes: tuple[str, ...]
+    cyclic: bool
+
+
+@dataclass(frozen=True)
+class ProposedControl:
+    """A control. role: of the joint that is measured; None for a quantity of the whole clip."""
+
+    quantity: str
+    role: str | None = None
+    at: MeasureMoment | None = None
+
+
+@dataclass(frozen=True)
+class ControlProposal:
+    """Proposed controls and event.
+
+    event: role of its joint, and the moment; None for a family without one. remaining: share of the
+    variance of left-out takes that is left, with the first control, the first two and so on, by the
+    variance without any; the controls of an event come together.
+    """
+
+    controls: tuple[ProposedControl, ...]
+    event: tuple[str, MeasureMoment] | None
+    remaining: tuple[float, ...]
+
+
+def propose_controls(clips: FamilyClips) -> ControlProposal:
+    """Return the controls that predict clips of left-out takes best, at most MOST_CONTROLS.
+
+    Raises ValueError for clips of one take, which cannot be left out.
+    """
+    if len(set(clips.takes)) < 2:
+        raise ValueError("clips of one take, expected two takes or more")
+    prediction = _Prediction(clips)
+    known = _candidates(clips)
+    values = {name: _standardized(own) for name, own in known.items() if _varies(own)}
+    event = None if clips.cyclic else _event(clips, prediction, values)
+    if clips.cyclic:
+        first = [ProposedControl(quantity) for quantity in GAIT]
+    else:
+        first = [] if event is None else [ProposedControl(axis, *event) for axis in POSITIONS]
+    chosen = [own for own in first if own in values]
+    remaining = [prediction.remaining([values[own] for own in chosen])] if chosen else []
+    while len(chosen) < MOST_CONTROLS:
+        best = _next(prediction, values, chosen)
+        if best is None or best[0] > (remaining[-1] if remaining else 1.0) * (1.0 - LEAST_GAIN):
+            break
+        remaining.append(best[0])
+        chosen.append(best[1])
+    return ControlProposal(tuple(chosen), event, tuple(remaining))
+
+
+class _Prediction:
+    """Prediction of the motions of a family from measures, with takes left out."""
+
+    def __init__(self, clips: FamilyClips) -> None:
+        self._values = _motion_coefficients(clips.motions)
+        performers, takes = np.array(clips.performers), np.array(clips.takes)
+        self._same = performers[:, None] == performers
+        self._groups = [np.flatnonzero(takes == take) for take in sorted(set(clips.takes))]
+        self._alone = self._residual([np.zeros(len(takes))])
+
+    def remaining(self, chosen: Sequence[Floats]) -> float:
+        """Return the variance that is left with standardised measures (N,) over that without."""
+        return self._residual(chosen) / self._alone
+
+    def _residual(self, chosen: Sequence[Floats]) -> float:
+        points = np.stack(chosen, axis=1)
+        apart = np.linalg.norm(points[:, None] - points, axis=-1) / SCALE
+        root = np.sqrt(5.0) * apart
+        curved = (1.0 + root + root**2 / 3.0) * np.exp(-root)
+        covariance = LINEAR * points @ points.T + CURVED * curved + CONSTANT
+        covariance += SAME_PERFORMER * self._same + NUGGET * np.eye(len(points))
+        inverse = np.linalg.inv(covariance)
+        weighted = inverse @ self._values
+        return sum(
+            float(np.square(np.linalg.solve(inverse[np.ix_(own, own)], weighted[own])).sum())
+            for own in self._groups
+        )
+
+
+def _motion_coefficients(motions: Sequence[MeasuredMotion]) -> Floats:
+    """Return the motions (N, k) by coefficients of their principal components."""
+    rows = []
+    for motion in motions:
+        at = np.linspace(0.0, len(motion.positions) - 1.0, FRAMES)
+        before = np.minimum(at.astype(int), len(motion.positions) - 2)
+        share = (at - before)[:, None, None]
+        own = motion.positions
+        rows.append((own[before] * (1.0 - share) + own[before + 1] * share).ravel())
+    values = np.array(rows) - np.mean(rows, axis=0)
+    left, sizes, _ = np.linalg.svd(values, full_matrices=False)
+    return np.asarray(left * sizes)
+
+
+def _candidates(clips: FamilyClips) -> dict[ProposedControl, Floats]:
+    """Return the measures (N,) of the clips that may be controls."""
+    roles = ["hips", "head", *_limb_ends(clips.joints)]
+    found = {
+        ProposedControl(axis, role, at): _measured(clips, Measure(axis, (clips.joints[role],), at))
+        for role in roles
+        if role in clips.joints
+        for axis in POSITIONS
+        for at in MOMENTS
+        if (role, at) != ("hips", "farthest")
+    }
+    for quantity in GAIT:
+        found[ProposedControl(quantity)] = _measured(clips, Measure(quantity))
+    return found
+
+
+def _limb_ends(joints: Mapping[str, int]) -> list[str]:
+    ends = [
+        next((side + part for part in parts if side + part in joints), None)
+        for side in ("left", "right")
+        for parts in (("Hand",), ("Toes", "Foot"))
+    ]
+    return [end for end in ends if end is not None]
+
+
+def _measured(clips: FamilyClips, measure: Measure) -> Floats:
+    return np.array([measures.evaluate(measure, motion) for motion in clips.motions])
+
+
+def _varies(values: Floats) -> bool:
+    return len(np.unique(values.round(4))) >= FEWEST_VALUES
+
+
+def _standardized(values: Floats) -> Floats:
+    return np.asarray((values - values.mean()) / values.std())
+
+
+def _event(
+    clips: FamilyClips, prediction: _Prediction, values: Mapping[ProposedControl, Floats]
+) -> tuple[str, MeasureMoment] | None:
+    """Return the limb's end that moves most among those that predict well, and its best moment."""
+    found: dict[str, tuple[float, MeasureMoment]] = {}
+    for role in _limb_ends(clips.joints):
+        for at in MOMENTS:
+            own = [ProposedControl(axis, role, at) for axis in POSITIONS]
+            given = [values[each] for each in own if each in values]
+            left = prediction.remaining(given) if given else np.inf
+            if left < found.get(role, (np.inf, at))[0]:
+                found[role] = left, at
+    least = min((left for left, _ in found.values()), default=np.inf)
+    if least > 1.0 - LEAST_GAIN:
+        return None
+    near = [role for role, (left, _) in found.items() if left <= NEAR_BEST * least]
+    role = max(near, key=lambda role: _excursion(clips, role))
+    return role, found[role][1]
+
+
+def _excursion(clips: FamilyClips, role: str) -> float:
+    """Return how far a joint goes relative to the hips, from its first place, mean of clips, m."""
+    joint, hips = clips.joints[role], clips.joints["hips"]
+    found = []
+    for motion in clips.motions:
+        own = motion.positions[:, joint] - motion.positions[:, hips]
+        found.append(float(np.linalg.norm(own - own[0], axis=1).max()))
+    return float(np.mean(found))
+
+
+def _next(
+    prediction: _Prediction,
+    values: Mapping[ProposedControl, Floats],
+    chosen: Sequence[ProposedControl],
+) -> tuple[float, ProposedControl] | None:
+    """Return the measure that lowers the remaining variance most, and what remains with it."""
+    best: tuple[float, ProposedControl] | None = None
+    given = [values[own] for own in chosen]
+    for candidate, own in values.items():
+        if candidate in chosen or any(abs(np.mean(own * other)) > ALIKE for other in given):
+            continue
+        left = prediction.remaining([*given, own])
+        if best is None or left < best[0]:
+            best = left, candidate
+    return best
