@@ -1,4 +1,4 @@
-"""Tests of discovery on real takes: strides against those cut by hand, motions like an example."""
+"""Tests of discovery on real takes: against cuts by hand, and the controls of recipes by hand."""
 
 import csv
 import shutil
@@ -8,8 +8,19 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from posefield_train.discover import example_search, motion_features, stride_detection, take_reading
+from posefield_train.discover import (
+    control_proposals,
+    example_search,
+    family_quality,
+    family_search,
+    joined_features,
+    motion_features,
+    stride_detection,
+    take_reading,
+)
+from posefield_train.discover.control_proposals import FamilyClips
 from posefield_train.discover.joined_features import Span
+from posefield_train.source import ingest, measured_controls, recipe, shipped_recipes
 
 pytestmark = pytest.mark.system
 
@@ -81,3 +92,65 @@ def test_one_example_finds_the_motions_of_its_action(unpacked):
         right = sum(any(shared(match.span, one) >= 0.5 for one in others) for match in found)
         precisions.append(right / len(others))
     assert len(truth) == 288 and np.mean(precisions) >= 0.88
+
+
+def test_families_are_the_actions_of_long_takes(unpacked):
+    """Precision and recall of the clips of families that are offered, against cuts by hand."""
+    folder = unpacked("hdm05_long")
+    corpus = motion_features.build_corpus(take_reading.read_takes(folder / "bvh").takes)
+    joined = joined_features.join_features(corpus)
+    files = [take.file for take in corpus.takes]
+    truth = []
+    for row in table(folder / "truth.csv"):
+        take = files.index(row["file"])
+        frames = int(row["first_frame"]), int(row["last_frame"])
+        truth.append((row["action"], Span(take, *(at / corpus.takes[take].rate for at in frames))))
+    clips, right, hits = 0, 0, set()
+    for family in family_search.find_families(corpus):
+        if family_quality.assess(joined, family).reasons:
+            continue
+        own = [
+            [at for at, (_, span) in enumerate(truth) if shared(span, member.span) >= 0.5]
+            for member in family.members
+        ]
+        counts = Counter(truth[at][0] for found in own for at in found)
+        action = counts.most_common(1)[0][0] if counts else None
+        found = {at for each in own for at in each if truth[at][0] == action}
+        clips, right, hits = clips + len(own), right + len(found), hits | found
+    assert right / clips >= 0.90 and len(hits) / len(truth) >= 0.80
+
+
+RECIPES = (
+    "hdm05_grab_high",
+    "hdm05_deposit_floor",
+    "hdm05_kick",
+    "hdm05_hop",
+    "cmu_walk",
+    "bandai_raise_hand",
+)
+
+
+def proposal_of(name, folder):
+    """Proposal for the clips of a shipped recipe, and the recipe's own controls."""
+    own = recipe.read(shipped_recipes.FOLDER / f"{name}.toml")
+    examples, _ = ingest.ingest(own, folder)
+    joints = examples[0].clip.skeleton.names
+    clips = FamilyClips(
+        tuple(measured_controls.measured_quantities(one.clip) for one in examples),
+        {role: joints.index(joint) for role, joint in own.roles.items()},
+        tuple(one.row.performer for one in examples),
+        tuple(one.take for one in examples),
+        own.motion.cyclic,
+    )
+    roles = {joint: role for role, joint in own.roles.items()}
+    autos = [control.auto for control in own.measured]
+    by_hand = {(auto.quantity, roles.get(auto.joint), auto.at) for auto in autos}
+    return control_proposals.propose_controls(clips), by_hand
+
+
+def test_proposed_controls_are_those_of_most_recipes(real_data):
+    same = {}
+    for name in RECIPES:
+        found, by_hand = proposal_of(name, real_data)
+        same[name] = by_hand <= {(one.quantity, one.role, one.at) for one in found.controls}
+    assert sum(same.values()) >= 4, same

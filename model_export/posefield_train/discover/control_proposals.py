@@ -1,8 +1,7 @@
 """Controls and events of a family of clips, proposed by what predicts takes that were left out.
 
 Candidates are the measures that recipes know: places of hands, feet, head and hips at moments of
-the motion, and quantities of locomotion. A motion is predicted from them by kriging with fixed
-scales, whose leave-one-take-out residuals have a closed form (Dubrule, 1983).
+the motion, and quantities of locomotion.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,9 +12,9 @@ import numpy as np
 from posefield.common.units import Floats
 from posefield.motion import measures
 from posefield.motion.measures import Measure, MeasuredMotion, MeasureMoment
+from posefield_train.discover import take_prediction
+from posefield_train.discover.take_prediction import TakePrediction
 
-FRAMES = 30
-"""Frames at which clips are compared."""
 MOMENTS: tuple[MeasureMoment, ...] = ("end", "highest", "lowest", "farthest", "start")
 POSITIONS = ("height", "forward", "left")
 GAIT = ("speed", "turn", "stride_length")
@@ -30,10 +29,6 @@ ALIKE = 0.95
 """Correlation from which on two measures say the same."""
 FEWEST_VALUES = 3
 """Fewest different values of a control."""
-# Terms of the covariance, in shares of the motions' variance, and the scale in standard deviations
-# of the controls. They are those of typical trained models.
-LINEAR, CURVED, CONSTANT, SAME_PERFORMER, NUGGET = 0.5, 0.5, 1.0, 0.3, 0.15
-SCALE = 2.0
 
 
 @dataclass(frozen=True)
@@ -81,7 +76,9 @@ def propose_controls(clips: FamilyClips) -> ControlProposal:
     """
     if len(set(clips.takes)) < 2:
         raise ValueError("clips of one take, expected two takes or more")
-    prediction = _Prediction(clips)
+    prediction = TakePrediction(
+        take_prediction.motion_coefficients(clips.motions), clips.performers, clips.takes
+    )
     known = _candidates(clips)
     values = {name: _standardized(own) for name, own in known.items() if _varies(own)}
     event = None if clips.cyclic else _event(clips, prediction, values)
@@ -98,49 +95,6 @@ def propose_controls(clips: FamilyClips) -> ControlProposal:
         remaining.append(best[0])
         chosen.append(best[1])
     return ControlProposal(tuple(chosen), event, tuple(remaining))
-
-
-class _Prediction:
-    """Prediction of the motions of a family from measures, with takes left out."""
-
-    def __init__(self, clips: FamilyClips) -> None:
-        self._values = _motion_coefficients(clips.motions)
-        performers, takes = np.array(clips.performers), np.array(clips.takes)
-        self._same = performers[:, None] == performers
-        self._groups = [np.flatnonzero(takes == take) for take in sorted(set(clips.takes))]
-        self._alone = self._residual([np.zeros(len(takes))])
-
-    def remaining(self, chosen: Sequence[Floats]) -> float:
-        """Return the variance that is left with standardised measures (N,) over that without."""
-        return self._residual(chosen) / self._alone
-
-    def _residual(self, chosen: Sequence[Floats]) -> float:
-        points = np.stack(chosen, axis=1)
-        apart = np.linalg.norm(points[:, None] - points, axis=-1) / SCALE
-        root = np.sqrt(5.0) * apart
-        curved = (1.0 + root + root**2 / 3.0) * np.exp(-root)
-        covariance = LINEAR * points @ points.T + CURVED * curved + CONSTANT
-        covariance += SAME_PERFORMER * self._same + NUGGET * np.eye(len(points))
-        inverse = np.linalg.inv(covariance)
-        weighted = inverse @ self._values
-        return sum(
-            float(np.square(np.linalg.solve(inverse[np.ix_(own, own)], weighted[own])).sum())
-            for own in self._groups
-        )
-
-
-def _motion_coefficients(motions: Sequence[MeasuredMotion]) -> Floats:
-    """Return the motions (N, k) by coefficients of their principal components."""
-    rows = []
-    for motion in motions:
-        at = np.linspace(0.0, len(motion.positions) - 1.0, FRAMES)
-        before = np.minimum(at.astype(int), len(motion.positions) - 2)
-        share = (at - before)[:, None, None]
-        own = motion.positions
-        rows.append((own[before] * (1.0 - share) + own[before + 1] * share).ravel())
-    values = np.array(rows) - np.mean(rows, axis=0)
-    left, sizes, _ = np.linalg.svd(values, full_matrices=False)
-    return np.asarray(left * sizes)
 
 
 def _candidates(clips: FamilyClips) -> dict[ProposedControl, Floats]:
@@ -181,7 +135,7 @@ def _standardized(values: Floats) -> Floats:
 
 
 def _event(
-    clips: FamilyClips, prediction: _Prediction, values: Mapping[ProposedControl, Floats]
+    clips: FamilyClips, prediction: TakePrediction, values: Mapping[ProposedControl, Floats]
 ) -> tuple[str, MeasureMoment] | None:
     """Return the limb's end that moves most among those that predict well, and its best moment."""
     found: dict[str, tuple[float, MeasureMoment]] = {}
@@ -211,7 +165,7 @@ def _excursion(clips: FamilyClips, role: str) -> float:
 
 
 def _next(
-    prediction: _Prediction,
+    prediction: TakePrediction,
     values: Mapping[ProposedControl, Floats],
     chosen: Sequence[ProposedControl],
 ) -> tuple[float, ProposedControl] | None:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from posefield.common.units import Floats
 
 Indices = NDArray[np.int64]
+STEPS = ((1, 1), (1, 2), (2, 1))
+"""Frames of query and corpus by which a match advances."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ def align(apart: Floats) -> Indices:
     """Return for each frame of the query (L,) the frame of a clip (F,) that is most like it.
 
     apart (L, F): distances. The first frames are alike, and the last ones; steps are those of a
-    match. A frame of the query that a step leaves out shares the frame before. Raises ValueError
+    match. A frame of the query that a step leaves out shares the frame after. Raises ValueError
     for a clip that lasts less than half as long as the query, or more than twice.
     """
     length, frames = apart.shape
@@ -82,7 +84,7 @@ def align(apart: Floats) -> Indices:
     steps = np.zeros((length, frames), dtype=np.int64)
     costs[0, 0] = apart[0, 0]
     for at in range(1, length):
-        choices = np.full((3, frames), np.inf)
+        choices = np.full((len(STEPS), frames), np.inf)
         choices[0, 1:] = costs[at - 1, :-1]
         choices[1, 2:] = costs[at - 1, :-2]
         if at > 1:
@@ -91,12 +93,15 @@ def align(apart: Floats) -> Indices:
         costs[at] = choices.min(axis=0) + apart[at]
     if not np.isfinite(costs[-1, -1]):
         raise ValueError(f"{frames} frames, expected {length // 2 + 1} to {2 * length - 1}")
-    found = np.zeros(length, dtype=np.int64)
-    row, column = length - 1, frames - 1
+    return _path(steps)
+
+
+def _path(steps: Indices) -> Indices:
+    """Return the frames (L,) of the best path, from the step (L, F) that led to each place."""
+    row, column = steps.shape[0] - 1, steps.shape[1] - 1
+    found = np.zeros(row + 1, dtype=np.int64)
     while row > 0:
-        found[row] = column
-        step = steps[row, column]
-        if step == 2:
-            found[row - 1] = column - 1
-        row, column = row - (2 if step == 2 else 1), column - (2 if step == 1 else 1)
+        rows, columns = STEPS[steps[row, column]]
+        found[row - rows + 1 : row + 1] = column
+        row, column = row - rows, column - columns
     return found

@@ -1,0 +1,133 @@
+"""Tests of proposed events and controls: residuals by refitting, and families of known truth."""
+
+import numpy as np
+import pytest
+
+from posefield.motion.measures import MeasuredMotion
+from posefield_train.discover import control_proposals, take_prediction
+from posefield_train.discover.control_proposals import FamilyClips, ProposedControl
+from posefield_train.discover.take_prediction import TakePrediction
+
+ROLES = ("hips", "head", "leftHand", "rightHand", "leftToes", "rightToes")
+REST = np.array(
+    [[0, 1, 0], [0, 1.7, 0], [0.3, 0.9, 0], [-0.3, 0.9, 0], [0.1, 0, 0], [-0.1, 0, 0.1]], float
+)
+PERFORMERS, TAKES = 3, 12
+
+
+def reaching(seed, count=36, moving=True):
+    """A family whose right hand goes to a height and back, and whose head and hips follow.
+
+    moving: whether they do; else each clip has the same motion and noise.
+    """
+    rng = np.random.default_rng(seed)
+    motions = []
+    for _ in range(count):
+        wave = np.sin(np.linspace(0.0, np.pi, 40))[:, None] ** 2
+        height = rng.uniform(0.2, 0.9) if moving else 0.5
+        places = np.repeat(REST[None], 40, axis=0)
+        places[:, 3] += wave * [0.0, height, 0.6 - 0.3 * height]
+        places[:, 1] += wave * [0.0, 0.1 * height, 0.2 * height]
+        places[:, 0] += wave * [0.1 * height, -0.2 + 0.2 * height, 0.0]
+        places += rng.normal(0.0, 0.004, (1, len(ROLES), 3)) * [1.0, 0.0, 1.0]
+        motions.append(MeasuredMotion(places, 1.3, np.zeros(3), (-1, 0, 0, 0, 0, 0), REST))
+    takes = [f"take{at % TAKES}" for at in range(count)]
+    performers = [f"p{at % TAKES % PERFORMERS}" for at in range(count)]
+    joints = {role: at for at, role in enumerate(ROLES)}
+    return FamilyClips(tuple(motions), joints, tuple(performers), tuple(takes), False)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_residuals_are_those_of_refitting_without_each_take(seed):
+    rng = np.random.default_rng(seed)
+    values, measures = rng.normal(size=(14, 5)), rng.normal(size=(2, 14))
+    takes = [f"t{at // 3}" for at in range(14)]
+    prediction = TakePrediction(values, [f"p{at % 2}" for at in range(14)], takes)
+    covariance = prediction.covariance(list(measures))
+    expected = np.zeros_like(values)
+    for take in set(takes):
+        own = np.array([other == take for other in takes])
+        weights = np.linalg.solve(covariance[np.ix_(~own, ~own)], values[~own])
+        expected[own] = values[own] - covariance[np.ix_(own, ~own)] @ weights
+    found = prediction.residuals(list(measures))
+    np.testing.assert_allclose(found, expected, atol=1e-10)
+    # Leaving out single clips gives other residuals.
+    single = TakePrediction(values, [f"p{at % 2}" for at in range(14)], [str(i) for i in range(14)])
+    assert np.abs(single.residuals(list(measures)) - expected).max() > 0.01
+
+
+def test_a_measure_without_meaning_leaves_all_the_variance():
+    rng = np.random.default_rng(4)
+    values = rng.normal(size=(30, 4))
+    prediction = TakePrediction(values, ["p"] * 30, [f"t{at % 10}" for at in range(30)])
+    assert prediction.remaining([np.zeros(30)]) == pytest.approx(1.0)
+    assert prediction.remaining([rng.normal(size=30)]) > 0.97
+    telling = np.outer(rng.normal(size=30), rng.normal(size=4))
+    score = (telling[:, 0] - telling[:, 0].mean()) / telling[:, 0].std()
+    whole = TakePrediction(telling, ["p"] * 30, [f"t{at % 10}" for at in range(30)])
+    assert whole.remaining([score]) < 0.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_hand_that_a_family_depends_on_is_its_event_and_its_control(seed):
+    found = control_proposals.propose_controls(reaching(seed))
+    assert found.event is not None and found.event[0] == "rightHand"
+    assert found.event[1] in ("highest", "farthest")
+    assert ProposedControl("height", *found.event) in found.controls
+    assert len(found.controls) <= control_proposals.MOST_CONTROLS
+    assert found.remaining[0] < 0.2 and list(found.remaining) == sorted(found.remaining)[::-1]
+
+
+def test_a_constant_measure_is_never_proposed():
+    """Feet and the other hand keep their height; gait is nought in all clips."""
+    for seed in range(3):
+        for control in control_proposals.propose_controls(reaching(seed)).controls:
+            assert control.quantity not in control_proposals.GAIT
+            still = control.role in ("leftToes", "rightToes", "leftHand")
+            assert not (still and control.quantity == "height")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_equal_motions_have_no_event(seed):
+    """Only offsets of joints differ, which no measure of another joint predicts."""
+    found = control_proposals.propose_controls(reaching(seed, moving=False))
+    assert not found.remaining or found.remaining[-1] > 0.5
+
+
+def test_strides_are_controlled_by_their_gait():
+    rng = np.random.default_rng(0)
+    own = reaching(1)
+    speeds = rng.uniform(0.5, 2.0, len(own.motions))
+    motions = []
+    for motion, speed in zip(own.motions, speeds, strict=True):
+        travelled = np.linspace(0.0, speed, 40)[:, None, None] * [0.0, 0.0, 1.0]
+        travel = np.array([0.0, speed, 0.1 * rng.normal()])
+        motions.append(
+            MeasuredMotion(REST + travelled, 1.0, travel, motion.parents, motion.offsets)
+        )
+    family = FamilyClips(tuple(motions), own.joints, own.performers, own.takes, True)
+    found = control_proposals.propose_controls(family)
+    assert found.event is None
+    assert [one.quantity for one in found.controls[:3]] == ["speed", "turn", "stride_length"]
+
+
+def test_one_take_cannot_be_left_out():
+    own = reaching(0)
+    alone = FamilyClips(own.motions, own.joints, own.performers, ("a",) * len(own.takes), False)
+    with pytest.raises(ValueError, match="clips of one take, expected two takes or more"):
+        control_proposals.propose_controls(alone)
+
+
+def test_motions_are_compared_at_equal_steps_of_time():
+    own = reaching(0, count=6)
+    slower = []
+    for motion in own.motions:
+        at = np.linspace(0.0, 39.0, 79)
+        before = np.minimum(at.astype(int), 38)
+        share = (at - before)[:, None, None]
+        places = motion.positions[before] * (1 - share) + motion.positions[before + 1] * share
+        slower.append(MeasuredMotion(places, 2.6, motion.travel, motion.parents, motion.offsets))
+    one, other = (take_prediction.motion_coefficients(each) for each in (own.motions, slower))
+    apart = [np.linalg.norm(each[:, None] - each, axis=-1) for each in (one, other)]
+    np.testing.assert_allclose(apart[0], apart[1], atol=0.05)
+    assert apart[0].max() > 0.5

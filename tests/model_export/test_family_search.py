@@ -1,0 +1,193 @@
+"""Tests of the search for families: planted motions are found, rests and noise are not offered."""
+
+import discover_takes
+import numpy as np
+import pytest
+
+from posefield_train.discover import (
+    family_quality,
+    family_search,
+    joined_features,
+    motion_features,
+    subsequence_dtw,
+)
+from posefield_train.discover.family_quality import FamilyQuality
+from posefield_train.discover.family_search import Family
+from posefield_train.discover.joined_features import Match, Span
+
+SECONDS, TAKES = 24.0, 3
+ORDERS = ("RCCRRC", "CRRRCC", "CCRCRR")
+"""Planted motions of each take, raises and circles, in an order that does not repeat."""
+
+
+def plan(kind):
+    """Take, begin and duration, s, of the planted motions of a kind; the hand rests between."""
+    rng = np.random.default_rng(8)
+    found = []
+    for take, order in enumerate(ORDERS):
+        at = 1.0
+        for own in order:
+            seconds, rest = rng.uniform(1.5, 2.0), rng.uniform(0.9, 2.2)
+            found += [(take, at, seconds)] if own == kind else []
+            at += seconds + rest
+    return tuple(found)
+
+
+RAISES, CIRCLES = plan("R"), plan("C")
+
+
+def moving(planted, noise=0.0, seed=0):
+    """Takes whose right hand makes the planted motions: raises and circles to the side."""
+    takes = []
+    for index in range(TAKES):
+        times = np.arange(round(SECONDS * discover_takes.RATE) + 1) / discover_takes.RATE
+        hands = np.zeros((len(times), 3))
+        for kind, (_, begin, seconds) in ((k, p) for k, p in planted if p[0] == index):
+            share = np.clip((times - begin) / seconds, 0.0, 1.0)
+            up, side = np.sin(np.pi * share) ** 2, np.sin(2.0 * np.pi * share)
+            hands += np.stack([-0.1 * up, 0.9 * up, 0.4 * side], axis=1) * (kind == "raise")
+            hands += np.stack([0.5 * side, -0.1 * up, 0.8 * up], axis=1) * (kind == "circle")
+        knots = np.random.default_rng(seed + index).normal(0.0, noise, (3, 49))
+        wander = [np.interp(times, np.arange(49.0) / 2.0, own) for own in knots]
+        takes.append(
+            discover_takes.take(f"{index}.bvh", SECONDS, hands=hands + np.stack(wander, axis=1))
+        )
+    return motion_features.build_corpus(takes)
+
+
+PLANTED = [("raise", one) for one in RAISES] + [("circle", one) for one in CIRCLES]
+
+
+@pytest.fixture(scope="module")
+def corpus():
+    return moving(PLANTED, noise=0.02)
+
+
+def kinds(span):
+    """Kinds of the planted motions that lie in a part of a take, each but for a tenth."""
+    found = []
+    for kind, (take, begin, seconds) in PLANTED:
+        both = min(span.end, begin + seconds) - max(span.start, begin)
+        found += [kind] if span.take == take and both >= 0.9 * seconds else []
+    return found
+
+
+def offered(corpus):
+    joined = joined_features.join_features(corpus)
+    found = family_search.find_families(corpus)
+    return [one for one in found if not family_quality.assess(joined, one).reasons]
+
+
+def test_planted_motions_are_found_as_families_of_their_own(corpus):
+    """A clip may have some of the rest before and after its motion."""
+    families = offered(corpus)
+    found = [[kinds(member.span) for member in family.members] for family in families]
+    for kind, planted in (("raise", RAISES), ("circle", CIRCLES)):
+        hits = max(sum(own == [kind] for own in members) for members in found)
+        assert hits >= 0.8 * len(planted), found
+    clips = [own for members in found for own in members]
+    assert sum(len(own) == 1 for own in clips) >= 0.9 * len(clips)
+    assert all(len({tuple(own) for own in members if own}) == 1 for members in found), found
+
+
+def test_families_share_few_frames_and_begin_with_the_most_similar_clip(corpus):
+    families = family_search.find_families(corpus)
+    spans = [member.span for family in families for member in family.members]
+    for at, span in enumerate(spans):
+        assert all(span.overlap(other) <= 0.5 for other in spans[:at])
+    for family in families:
+        costs = [member.cost for member in family.members]
+        assert costs == sorted(costs) and len(costs) >= family_search.FEWEST
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_hand_that_wanders_without_a_pattern_is_not_offered(seed):
+    wandering = moving([], noise=0.2, seed=10 * seed)
+    clips = sum(len(one.members) for one in offered(wandering))
+    assert clips <= 0.2 * TAKES * SECONDS / family_search.SHORTEST
+
+
+def test_rests_are_not_searched(corpus):
+    searched = []
+    families = family_search.find_families(corpus, 10_000, searched.append)
+    assert 0 < len(searched) < len(family_search.candidates(corpus))
+    joined = joined_features.join_features(corpus)
+    for family in families:
+        motion = joined.clip(family.example).var(axis=0).sum()
+        assert motion > family_search.LEAST_MOTION * joined.variance
+
+
+def test_candidates_lie_between_minima_of_the_speed(corpus):
+    spans = family_search.candidates(corpus)
+    for kind, planted in PLANTED:
+        own = [span for span in spans if kinds(span) == [kind] and span.take == planted[0]]
+        assert any(abs(span.seconds - planted[2]) < 0.7 for span in own)
+    for index, take in enumerate(corpus.takes):
+        times = family_search.speed_minima(take, corpus.roles)
+        assert times[0] == 0.0 and times[-1] == pytest.approx(SECONDS, abs=0.05)
+        # Only the begin and the end of a take may be nearer to a minimum.
+        assert np.diff(times)[1:-1].min() > family_search.MINIMUM_SPAN / 30.0
+        assert {span.start for span in spans if span.take == index} <= set(times)
+    for span in spans:
+        assert family_search.SHORTEST - 1e-9 <= span.seconds <= family_search.LONGEST + 1e-9
+
+
+def test_the_search_reports_each_candidate_and_is_repeated_exactly(corpus):
+    counts = []
+    one = family_search.find_families(corpus, 40, counts.append)
+    assert counts == list(range(1, 41)) and one == family_search.find_families(corpus, 40)
+
+
+def test_equal_clips_differ_by_nothing_and_others_do(corpus):
+    joined = joined_features.join_features(corpus)
+
+    def quality(spans):
+        return family_quality.assess(joined, Family(spans[0], tuple(Match(s, 0.1) for s in spans)))
+
+    raises = [Span(take, begin, begin + seconds) for take, begin, seconds in RAISES]
+    circles = [Span(take, begin, begin + seconds) for take, begin, seconds in CIRCLES]
+    same, alike, mixed = (
+        quality([raises[0]] * 3),
+        quality(raises),
+        quality(raises[:2] + circles[:2]),
+    )
+    assert same.within < 1e-12 and same.shared == pytest.approx(1.0)
+    assert same.within < alike.within < 0.2 * mixed.within and not alike.reasons
+    assert any(reason.startswith("clips differ by") for reason in mixed.reasons)
+
+
+def test_the_reasons_name_what_was_found_and_expected():
+    assert FamilyQuality(0.1, 0.5, 1.5).reasons == ()
+    assert FamilyQuality(0.3, 0.1, 0.6).reasons == (
+        "0.6 s long, expected 0.7 s or more",
+        "clips differ by 30% of all motion, expected at most 20%",
+        "25% of its motion is common to the clips, expected 50% or more",
+    )
+
+
+def paths(length, frames):
+    """All alignments by the steps of a match: frames of the clip for those of the query."""
+    if length == 1:
+        return [[0]] if frames == 1 else []
+    found = []
+    for rows, columns in subsequence_dtw.STEPS:
+        if length > rows and frames > columns:
+            found += [own + [frames - 1] * rows for own in paths(length - rows, frames - columns)]
+    return found
+
+
+@pytest.mark.parametrize(("length", "frames"), [(5, 3), (5, 5), (5, 9), (6, 4), (7, 8), (2, 3)])
+def test_the_alignment_is_the_best_of_all(length, frames):
+    apart = np.random.default_rng(length * frames).uniform(0.1, 1.0, (length, frames))
+    every = {tuple(path) for path in paths(length, frames)}
+    costs = {path: apart[np.arange(length), list(path)].sum() for path in every}
+    found = tuple(subsequence_dtw.align(apart).tolist())
+    assert costs[found] == pytest.approx(min(costs.values()), rel=1e-12)
+    assert len(every) == 1 or max(costs.values()) > costs[found]
+
+
+@pytest.mark.parametrize(("length", "frames"), [(5, 2), (5, 10), (6, 3)])
+def test_a_clip_of_another_duration_is_not_aligned(length, frames):
+    assert not paths(length, frames)
+    with pytest.raises(ValueError, match=f"{frames} frames, expected"):
+        subsequence_dtw.align(np.ones((length, frames)))
