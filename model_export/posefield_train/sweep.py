@@ -32,7 +32,7 @@ def train_models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterat
     names = [path.stem for path in paths]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise InvalidField("RECIPE", f"{', '.join(twice)} twice, expected names of their own")
-    read = [(path, recipe.read(path)) for path in paths]
+    read = [(path, recipe.read_accepted(path)) for path in paths]
     # Data are read when jobs are started, so that few recipes' data are in memory.
     return jobs.run(
         _train_model,

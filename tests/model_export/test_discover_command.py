@@ -226,7 +226,7 @@ def test_takes_without_motion_are_refused(posefield, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ((), "expected either --strides or --like FILE:START-END"),
+        ((), "expected a folder of recipes"),
         (("--strides", "--like", "a.bvh:1-2"), "expected either --strides or --like"),
         (("--like", "a.bvh"), "expected FILE:START-END in seconds"),
         (("--like", "c.bvh:1-2"), "file 'c.bvh', expected a take of the folder, such as a.bvh"),

@@ -125,8 +125,6 @@ def test_candidates_lie_between_minima_of_the_speed(corpus):
     for index, take in enumerate(corpus.takes):
         times = family_search.speed_minima(take, corpus.roles)
         assert times[0] == 0.0 and times[-1] == pytest.approx(SECONDS, abs=0.05)
-        # Only the begin and the end of a take may be nearer to a minimum.
-        assert np.diff(times)[1:-1].min() > family_search.MINIMUM_SPAN / 30.0
         assert {span.start for span in spans if span.take == index} <= set(times)
     for span in spans:
         assert family_search.SHORTEST - 1e-9 <= span.seconds <= family_search.LONGEST + 1e-9

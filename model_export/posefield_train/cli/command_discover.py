@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from posefield_train.discover.take_reading import ReadTakes
 
 EXAMPLES = [
+    "discover takes -o recipes --licence 'CC BY 4.0, by us'",
     "discover takes --strides -o takes/strides.csv",
     "discover takes --like day1/bd_0.bvh:12.1-14.6 --name grab -o takes/grab.csv",
 ]
@@ -67,29 +68,104 @@ class StatementOptions:
     ] = None
 
 
+@dataclass(frozen=True)
+class FamilyOptions:
+    """Recipes of families, which are written without --strides and --like."""
+
+    unit: Annotated[
+        float | None,
+        typer.Option(
+            help="metres per unit of all files; default: by the length of the legs", min=1e-6
+        ),
+    ] = None
+    licence: Annotated[
+        str, typer.Option(help="licence of the motions with its attribution, for the recipes")
+    ] = ""
+    candidates: Annotated[
+        int, typer.Option(help="number of parts of takes that are searched", min=1, max=100_000)
+    ] = 1_000
+    overwrite: Annotated[
+        bool, typer.Option("--overwrite", help="replace the recipes of an earlier search")
+    ] = False
+
+
 @with_option_groups
 def discover(
     folder: Annotated[
         Path, typer.Argument(help="folder with motion files, in any subfolders", metavar="FOLDER")
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="table to write, CSV; best in the folder")
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            help="folder of recipes to write; with --strides or --like a table, CSV, best in the "
+            "folder of the takes",
+        ),
     ],
     search: SearchOptions,
     stated: StatementOptions,
+    families: FamilyOptions,
     json: Json = False,
 ) -> None:
-    """Find clips in long takes, and write a table of them for a recipe.
+    """Find families of motions in long takes and write recipes, or a table of clips.
 
-    Each row has `accepted` false until a person changes it, and a recipe takes the accepted rows.
-    Files that cannot be searched are named with the reason.
+    Without --strides and --like, each family gets a recipe, which posefield train refuses until
+    posefield review or an editor accepts it. In a table, each row has `accepted` false until a
+    person changes it, and a recipe takes the accepted rows. Files that cannot be searched are named
+    with the reason.
     """
+    if search.strides and search.like is not None:
+        raise InvalidField("strides", "expected either --strides or --like FILE:START-END")
+    if search.strides or search.like is not None:
+        if families != FamilyOptions():
+            raise InvalidField("strides", "expected no option of recipes for a table of clips")
+        _write_table(folder, output, search, stated, json)
+    else:
+        _write_recipes(folder, output, stated, families, json)
+
+
+def _write_recipes(
+    folder: Path, output: Path, stated: StatementOptions, wanted: FamilyOptions, json: bool
+) -> None:
+    from posefield.console.progress import ProgressBar
+    from posefield_train.families import body_kinds, family_recipe, found_families, recipe_folder
+
+    if output.suffix in (".csv", ".toml", ".json"):
+        raise InvalidField("output", f"{output.name!r}, expected a folder of recipes")
+    replaced = recipe_folder.expect_free(output, wanted.overwrite)
+    read = _read(folder, stated)
+    files = [take.file for take in read.takes]
+    statements = body_kinds.FileStatements(wanted.unit, stated.up, _roles(stated))
+    with ProgressBar("bodies", len(files)) as bar:
+        kinds = body_kinds.find_kinds(folder, files, statements, bar.update)
+    with ProgressBar("candidates", wanted.candidates) as bar:
+        listed = found_families.find_families(read.takes, kinds, wanted.candidates, bar.update)
+    found = recipe_folder.offer(listed, kinds, folder, wanted.licence)
+    facts = recipe_folder.summary(found, folder, read, kinds, wanted.candidates)
+    recipe_folder.write(recipe_folder.contents(found, facts), output, replaced)
+    if json:
+        typer.echo(as_json(facts))
+        return
+    for one in found.offered:
+        controls = ", ".join(map(family_recipe.control_name, one.proposal.controls))
+        typer.echo(
+            f"{output / one.name}.toml: {len(one.family.rows)} {one.family.kind}, "
+            f"{one.family.seconds:.1f} s; controls {controls}"
+        )
+    typer.echo(
+        f"{output}: {len(found.offered)} families of {len(read.takes)} takes, "
+        f"{len(found.refused)} not offered; accept with: posefield review {output} --accept NUMBER"
+    )
+
+
+def _write_table(
+    folder: Path, output: Path, search: SearchOptions, stated: StatementOptions, json: bool
+) -> None:
     from posefield_train.discover import found_clips
 
     if output.suffix != ".csv":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .csv")
-    if search.strides == (search.like is not None):
-        raise InvalidField("strides", "expected either --strides or --like FILE:START-END")
     read = _read(folder, stated)
     found, facts = _search(read, search)
     atomic_files.write(found_clips.table(found), output)
@@ -127,15 +203,20 @@ def _search(
 def _read(folder: Path, stated: StatementOptions) -> "ReadTakes":
     """Return the takes of a folder; files that were refused are named on standard error."""
     from posefield.console.progress import ProgressBar
-    from posefield_train.discover import found_clips, take_reading
+    from posefield_train.discover import take_reading
     from posefield_train.source import motion_readers
 
-    roles = {} if stated.roles is None else found_clips.read_roles(stated.roles)
     with ProgressBar("files", len(motion_readers.find_files(folder))) as bar:
-        known = take_reading.Stated(stated.up, roles, stated.rate)
+        known = take_reading.Stated(stated.up, _roles(stated), stated.rate)
         read = take_reading.read_takes(folder, known, bar.update)
     for file, reason in list(read.refused.items())[:MAX_NOTES]:
         typer.echo(f"left out: {file}: {reason}", err=True)
     if len(read.refused) > MAX_NOTES:
         typer.echo(f"left out: {len(read.refused) - MAX_NOTES} further files: see --json", err=True)
     return read
+
+
+def _roles(stated: StatementOptions) -> dict[str, str]:
+    from posefield_train.discover import found_clips
+
+    return {} if stated.roles is None else found_clips.read_roles(stated.roles)

@@ -201,7 +201,7 @@ def _family(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> _Family:
     from posefield_train.evaluate import protocol
     from posefield_train.source import ingest, recipe
 
-    own = recipe.read(recipe_file)
+    own = recipe.read_accepted(recipe_file)
     if wanted.learning and not own.truth:
         raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
     examples, _ = ingest.ingest(own, data)
@@ -227,7 +227,7 @@ def _joined(own: _Family, data: Path, wanted: EvaluateOptions) -> _JoinedFamily 
 
     if not wanted.joined:
         return None
-    other = recipe.read(wanted.joined)
+    other = recipe.read_accepted(wanted.joined)
     examples, _ = ingest.ingest(other, data)
     return _JoinedFamily(
         other.name, support_flags.measure_joined(own.recipe, own.examples, other, examples)

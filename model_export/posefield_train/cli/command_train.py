@@ -70,7 +70,7 @@ def _train(
     from posefield_train.source import ingest, preset_check, recipe
 
     output_files.expect_onnx(output)
-    own = recipe.read(recipe_file)
+    own = recipe.read_accepted(recipe_file)
     with ProgressPrinter("training", REPORT_STEPS if report else STEPS) as progress:
         progress(f"reading {recipe_file}")
         examples, notes = ingest.ingest(own, data or recipe_file.parent)

@@ -108,7 +108,8 @@ def _candidates(clips: FamilyClips) -> dict[ProposedControl, Floats]:
         for at in MOMENTS
         if (role, at) != ("hips", "farthest")
     }
-    for quantity in GAIT:
+    # Speed and turn of a motion that ends elsewhere depend on the cut: recipes refuse them.
+    for quantity in GAIT if clips.cyclic else ():
         found[ProposedControl(quantity)] = _measured(clips, Measure(quantity))
     return found
 

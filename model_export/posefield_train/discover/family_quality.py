@@ -19,7 +19,7 @@ the clips have in common."""
 
 @dataclass(frozen=True)
 class FamilyQuality:
-    """How alike the clips of a family are.
+    """Likeness of the clips of a family, and their common motion.
 
     within: mean variance between the clips at the same part of the motion. motion: variance of
     their mean over time; both as shares of the variance of all takes. seconds: median duration.

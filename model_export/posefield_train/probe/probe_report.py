@@ -93,6 +93,11 @@ def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None)
     for count, path in enumerate(paths, 1):
         figures.append(figure.measure(motion_readers.read(path)))
         report(count)
+    return report_of(paths, figures)
+
+
+def report_of(paths: Sequence[Path], figures: Sequence[Figure]) -> ProbeReport:
+    """Return the report on the figures of motion files."""
     common, _ = Counter(tuple(each.names) for each in figures).most_common(1)[0]
     usual = [each for each in figures if tuple(each.names) == common]
     up = proposals.propose_up(usual)

@@ -42,12 +42,12 @@ def recipe_text(report: ProbeReport, name: str, table: ClipTable | None) -> str:
     return "\n".join(
         [
             *_head(name),
-            *_source(report),
+            *source_lines(report),
             *_clips(table),
             *_controls(report, table),
-            *_motion(report),
+            *motion_lines(report),
             *_event(report, table),
-            *_roles(report),
+            *role_lines(report),
             "[size]",
             "rms_budget_cm = 1.0",
             "",
@@ -83,27 +83,29 @@ def _first_of(table: ClipTable, names: Sequence[str]) -> str:
     return next((name for name in names if name in there), "")
 
 
-def _quote(text: str) -> str:
+def quote(text: str) -> str:
+    """Return a text as a TOML string."""
     return json.dumps(text, ensure_ascii=False)
 
 
 def _list(words: Sequence[str]) -> str:
-    return f"[{', '.join(map(_quote, words))}]"
+    return f"[{', '.join(map(quote, words))}]"
 
 
 def _head(name: str) -> list[str]:
     return [
         "# Draft by posefield init: complete what is marked TODO, then train it.",
         "schema = 1",
-        f"name = {_quote(recipe_name(name))}",
-        f"description = {_quote(f'Motions of {name}')}",
+        f"name = {quote(recipe_name(name))}",
+        f"description = {quote(f'Motions of {name}')}",
         "# TODO licence of the motions with its attribution; motion files state none.",
         'licence = ""',
         "",
     ]
 
 
-def _source(report: ProbeReport) -> list[str]:
+def source_lines(report: ProbeReport) -> list[str]:
+    """Return the section [source], with the evidence of unit and up axis as comments."""
     unit, up = report.proposed["metres_per_unit"], report.proposed["up"]
     lines = ["[source]"]
     for key, found in (("metres_per_unit", unit), ("up", up)):
@@ -121,7 +123,7 @@ def _clips(table: ClipTable | None) -> list[str]:
     if table is None:
         return [
             "[clips]",
-            f"table = {_quote(TABLE)}",
+            f"table = {quote(TABLE)}",
             'file = "file"',
             'first_frame = "first_frame"  # from 0',
             'last_frame = "last_frame"    # inclusive',
@@ -134,12 +136,12 @@ def _clips(table: ClipTable | None) -> list[str]:
             "",
         ]
     performer = _first_of(table, PERFORMER_COLUMNS)
-    lines = ["[clips]", f"table = {_quote(Path(table.name).name)}"]
-    lines.append(f"file = {_quote(_first_of(table, FILE_COLUMNS))}")
+    lines = ["[clips]", f"table = {quote(Path(table.name).name)}"]
+    lines.append(f"file = {quote(_first_of(table, FILE_COLUMNS))}")
     if performer:
-        lines.append(f"performer = {_quote(performer)}")
+        lines.append(f"performer = {quote(performer)}")
     if take := _first_of(table, TAKE_COLUMNS):
-        lines.append(f"take = {_quote(take)}  # clips of one take are left out together")
+        lines.append(f"take = {quote(take)}  # clips of one take are left out together")
     marks = frame_columns(table)
     lines.append("# Columns that may hold the frame of an event; those that do become landmarks:")
     lines.append(f"# landmarks = {_list(marks or ['contact_frame'])}")
@@ -171,9 +173,9 @@ def _controls(report: ProbeReport, table: ClipTable | None) -> list[str]:
     lines = [
         "# TODO at least one control: what a clip is an example of. Either measured of the motion:",
         "# [[controls]]",
-        f"# name = {_quote(_control_name(hand) + '_height')}",
-        f'# auto = {{ quantity = "height", joint = {_quote(hand)}, at = "end" }}',
-        f"# description = {_quote(f'Height of {hand} at the end')}",
+        f"# name = {quote(control_name(hand) + '_height')}",
+        f'# auto = {{ quantity = "height", joint = {quote(hand)}, at = "end" }}',
+        f"# description = {quote(f'Height of {hand} at the end')}",
         "# or a column of the table, in its unit:",
     ]
     marks = [] if table is None else frame_columns(table)
@@ -192,18 +194,20 @@ def _controls(report: ProbeReport, table: ClipTable | None) -> list[str]:
     return lines
 
 
-def _control_name(text: str) -> str:
+def control_name(text: str) -> str:
+    """Return a text as a name of a control, of at most 30 letters."""
     plain = re.sub(r"[^a-z0-9_]+", "_", text.lower()).strip("_")[:30]
     return plain if re.match("[a-z]", plain) else f"at_{plain}"
 
 
-def _motion(report: ProbeReport) -> list[str]:
+def motion_lines(report: ProbeReport, cyclic: bool = False) -> list[str]:
+    """Return the section [motion], with the evidence of feet and facing as comments."""
     feet, facing = report.proposed["feet"], report.proposed["facing"]
     return [
         "[motion]",
         "frames = 60",
         "# true if the last pose leads into the first, as in one whole stride:",
-        "cyclic = false",
+        f"cyclic = {json.dumps(cyclic)}",
         'root = "travelling"  # or "in_place"',
         *[f"# {said} (confidence: {feet.confidence})" for said in feet.evidence],
         f"feet = {_list(feet.value)}",
@@ -221,19 +225,20 @@ def _event(report: ProbeReport, table: ClipTable | None) -> list[str]:
         '# The joint that the motion is for, and the moment: "start", "end", "highest", "lowest",',
         '# "farthest" from the root, or a column of clips.landmarks',
         "# [event]",
-        f"# joint = {_quote(joint)}",
-        f"# at = {_quote(at)}",
+        f"# joint = {quote(joint)}",
+        f"# at = {quote(at)}",
         "",
     ]
 
 
-def _roles(report: ProbeReport) -> list[str]:
+def role_lines(report: ProbeReport) -> list[str]:
+    """Return the section [roles]; joints that have to be confirmed are comments."""
     if not report.guesses:
         return ["# No joints were recognised by their names: [roles] tells other tools who is who."]
-    lines = [f"{role} = {_quote(joint)}" for role, joint in report.roles.items()]
+    lines = [f"{role} = {quote(joint)}" for role, joint in report.roles.items()]
     for role, guess in report.asked.items():
         lines += [
             f"# TODO confirm (confidence {guess.confidence:.2f}: {'; '.join(guess.reasons)})",
-            f"# {role} = {_quote(guess.joint)}",
+            f"# {role} = {quote(guess.joint)}",
         ]
     return ["# By the joints' names; check them, or delete the table.", "[roles]", *lines, ""]

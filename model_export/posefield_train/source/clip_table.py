@@ -84,11 +84,11 @@ class ClipRow:
 def read(recipe: Recipe, folder: Path) -> list[ClipRow]:
     """Return the rows of the recipe's table that meet its conditions.
 
-    If the folder lacks the table, the shipped one of its name is read, if there is one. Raises
-    RecipeError, naming line and column, for the first invalid cell, and for a missing column, no
-    matching row, and two rows of the same frames.
+    If the folder lacks the table, the one beside the recipe is read, else the shipped one of its
+    name, if there is one. Raises RecipeError, naming line and column, for the first invalid cell,
+    and for a missing column, no matching row, and two rows of the same frames.
     """
-    place = shipped_recipes.find_table(folder, recipe.clips.table)
+    place = shipped_recipes.find_table(folder, recipe.clips.table, recipe.folder)
     cells = table_cells.open_table(place)
     cells.require(_columns(recipe))
     rows = [

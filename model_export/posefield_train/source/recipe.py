@@ -10,7 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
 
 from posefield.common.errors import RecipeError
 from posefield.motion.joint_roles import Role
@@ -49,6 +49,11 @@ class Recipe(RecipePart):
         default=None,
         description="procedural family with known noise-free motions at all control values",
     )
+    accepted: bool = Field(
+        default=True,
+        description="whether a person agrees with the recipe; posefield discover writes false, and "
+        "no model is trained until posefield review --accept, or an editor, writes true",
+    )
     source: Source
     clips: Clips
     controls: Annotated[list[Control], Field(min_length=1)]
@@ -69,6 +74,16 @@ class Recipe(RecipePart):
         "[presets.stroll]: offered as buttons by the page",
     )
     size: Size
+    _folder: Path | None = PrivateAttr(default=None)
+
+    @property
+    def folder(self) -> Path | None:
+        """Return the folder of the recipe's file; None for a recipe that was not read of one."""
+        return self._folder
+
+    def model_post_init(self, context: Any, /) -> None:
+        """Keep the folder that the reader of the file tells in the context of validation."""
+        self._folder = (context or {}).get("folder")
 
     @property
     def column_controls(self) -> list[ControlColumn]:
@@ -162,9 +177,21 @@ def read(path: Path) -> Recipe:
     if _nesting_depth(found) > MAX_DEPTH:
         raise RecipeError(path, TOO_DEEP)
     try:
-        return Recipe.model_validate(found)
+        return Recipe.model_validate(found, context={"folder": path.parent})
     except ValidationError as fault:
         raise recipe_errors.recipe_error(path, text, Recipe, fault) from fault
+
+
+def read_accepted(path: Path) -> Recipe:
+    """Return the recipe of a TOML file; RecipeError also for one that no person accepted."""
+    found = read(path)
+    if not found.accepted:
+        raise RecipeError(
+            path,
+            "accepted = false: look at its clips, then accept it with posefield review "
+            f"{path.parent} --accept NUMBER, or write accepted = true",
+        )
+    return found
 
 
 TOO_DEEP = f"tables or arrays nested deeper than {MAX_DEPTH} levels, expected at most that many"

@@ -32,14 +32,16 @@ def file_of(given: Path, data: Path | None) -> Path:
     return FOLDER / f"{given.name}.toml"
 
 
-def find_table(folder: Path, name: str) -> FileLocation:
-    """Return the table of clips in a data folder, else the shipped table of that name.
+def find_table(folder: Path, name: str, beside: Path | None = None) -> FileLocation:
+    """Return the table of clips in a data folder, else beside the recipe, else the shipped one.
 
-    Raises RecipeError, as `data_folder.find`, if neither exists.
+    beside: folder of the recipe. Raises RecipeError, as `data_folder.find`, if none exists.
     """
     try:
         return data_folder.find(folder, name)
     except RecipeError:
+        if beside is not None and ".." not in Path(name).parts and (beside / name).is_file():
+            return beside / name
         shipped = {path.relative_to(FOLDER).as_posix(): path for path in FOLDER.glob("*/*.csv")}
         if name not in shipped:
             raise

@@ -14,7 +14,7 @@ Value = TypeVar("Value")
 class ValueCache(Generic[Key, Value]):
     """Bounded cache for several threads; the least recently used values are removed.
 
-    most: largest number of values. Values must not be changed. Unlike `functools.lru_cache`, it
+    most: largest number of values. Values must not be changed. Unlike `lru_cache` of functools, it
     makes a value from what is no part of the key, so that it keeps no model in memory.
     """
 

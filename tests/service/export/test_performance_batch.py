@@ -117,7 +117,7 @@ def test_all_scripts_at_fault_are_named_and_nothing_is_written(batch, tmp_path):
     said = str(caught.value).splitlines()
     assert said[0] == "scripts: 2 that cannot be performed:"
     assert said[1].startswith("  scripts.jsonl:2: segments/0/model: no model 'reech' (did you")
-    assert said[2].startswith("  scripts.jsonl:3: fps: 5000, expected 1 to ")
+    assert said[2].startswith("  scripts.jsonl:3: fps: 5000 frames/s, expected 1 to ")
     assert not (tmp_path / "out").exists()
 
 

@@ -50,7 +50,10 @@ class Condition(RecipePart):
 class Clips(RecipePart):
     """Location of the table and the meaning of its columns."""
 
-    table: Text = Field(description="CSV file, relative to the data folder")
+    table: Text = Field(
+        description="CSV file, relative to the data folder, or to the recipe's folder if the data "
+        "folder has none of that name"
+    )
     file: Text = Field(description="column: motion file, relative to the table")
     animation: Text | None = Field(
         default=None,

@@ -1,0 +1,117 @@
+"""Families of a folder's takes: similar motions and strides, as rows of tables."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import PurePosixPath
+
+from posefield_train.discover import (
+    family_quality,
+    family_search,
+    joined_features,
+    motion_features,
+    stride_detection,
+)
+from posefield_train.discover.family_quality import FamilyQuality
+from posefield_train.discover.family_search import FEWEST
+from posefield_train.discover.motion_features import Corpus
+from posefield_train.discover.take_reading import Take
+from posefield_train.families.body_kinds import BodyKind
+from posefield_train.families.family_table import FamilyRow
+
+STRIDE_CLIPS = 5
+"""Fewest strides of a family."""
+
+
+@dataclass(frozen=True)
+class FoundFamily:
+    """Clips that may be a family.
+
+    kind: motions or strides. rows: the most similar first. example: row that the others are like;
+    None for strides. joints: of the bodies. seconds: median duration. quality: None for strides.
+    left_out: reason by clip, such as "a.bvh@3.2". reasons: why it is not offered.
+    """
+
+    kind: str
+    rows: tuple[FamilyRow, ...]
+    example: FamilyRow | None
+    joints: tuple[str, ...]
+    seconds: float
+    quality: FamilyQuality | None
+    left_out: Mapping[str, str]
+    reasons: tuple[str, ...]
+
+
+def find_families(
+    takes: Sequence[Take],
+    kinds: Sequence[BodyKind],
+    count: int,
+    report: Callable[[int], None] = lambda _: None,
+) -> list[FoundFamily]:
+    """Return the families of takes, those that are not offered too, and that of strides last.
+
+    count, report: as in `family_search.find_families`.
+    """
+    corpus = motion_features.build_corpus(takes)
+    joined = joined_features.join_features(corpus)
+    found = []
+    for family in family_search.find_families(corpus, count, report):
+        quality = family_quality.assess(joined, family)
+        rows = [_row(corpus, member.span, member.cost, kinds) for member in family.members]
+        example = _row(corpus, family.example, 0.0, kinds)
+        own = FoundFamily(
+            "motions", tuple(rows), example, (), family.seconds, quality, {}, quality.reasons
+        )
+        found.append(_of_one_kind(own, kinds, takes))
+    strides = _strides(takes, kinds)
+    return found if strides is None else [*found, strides]
+
+
+def _row(
+    corpus: Corpus, span: joined_features.Span, cost: float, kinds: Sequence[BodyKind]
+) -> FamilyRow:
+    first, last = corpus.frame(span.take, span.start), corpus.frame(span.take, span.end)
+    return _clip(corpus.takes[span.take].file, first, last, cost, kinds)
+
+
+def _clip(
+    file: str, first: int, last: int, cost: float | None, kinds: Sequence[BodyKind]
+) -> FamilyRow:
+    performer = next(kind.performers[file] for kind in kinds if file in kind.performers)
+    take = PurePosixPath(file).with_suffix("").as_posix()
+    return FamilyRow(file, first, last, performer, take, cost)
+
+
+def _strides(takes: Sequence[Take], kinds: Sequence[BodyKind]) -> FoundFamily | None:
+    """Return the strides that travel as a family; None if there are few."""
+    found = [
+        (take, one) for take in takes for one in stride_detection.find_strides(take) if one.travels
+    ]
+    if len(found) < STRIDE_CLIPS:
+        return None
+    rows = [_clip(take.file, one.first, one.last, None, kinds) for take, one in found]
+    seconds = sorted((one.last - one.first) / take.rate for take, one in found)
+    own = FoundFamily("strides", tuple(rows), None, (), seconds[len(seconds) // 2], None, {}, ())
+    return _of_one_kind(own, kinds, takes)
+
+
+def _of_one_kind(
+    family: FoundFamily, kinds: Sequence[BodyKind], takes: Sequence[Take]
+) -> FoundFamily:
+    """Return the family with the clips of its most common joints, the others named."""
+    joints = {file: kind.joints for kind in kinds for file in kind.performers}
+    rates = {take.file: take.rate for take in takes}
+    counts = Counter(joints[row.file] for row in family.rows)
+    ((common, _),) = counts.most_common(1)
+    kept = tuple(row for row in family.rows if joints[row.file] == common)
+    left_out = {
+        f"{row.file}@{row.first_frame / rates[row.file]:.1f}": "other joints than most clips"
+        for row in family.rows
+        if joints[row.file] != common
+    }
+    reasons = family.reasons
+    if len(kept) < FEWEST:
+        reasons = (*reasons, f"{len(kept)} clips of one skeleton, expected {FEWEST} or more")
+    if len({row.take for row in kept}) < 2:
+        reasons = (*reasons, "clips of one take, expected two takes or more")
+    return replace(family, rows=kept, joints=common, left_out=left_out, reasons=reasons)

@@ -1,0 +1,167 @@
+"""Tests of recipes of found families: what they say, who performs, and what is refused."""
+
+import json
+import re
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+import rigid_takes
+
+from posefield.common.errors import RecipeError
+from posefield.motion import bvh_writer
+from posefield_train.families import body_kinds, family_recipe, family_table
+from posefield_train.families.family_table import FamilyRow
+from posefield_train.source import clip_table, ingest, recipe
+
+LICENCE = ("--licence", "CC BY 4.0, by us")
+FEW = ("--candidates", "60")
+
+
+@pytest.fixture(scope="module")
+def takes(tmp_path_factory):
+    return rigid_takes.write_takes(tmp_path_factory.mktemp("takes"))
+
+
+@pytest.fixture(scope="module")
+def made_once(tmp_path_factory):
+    return tmp_path_factory.mktemp("made") / "recipes"
+
+
+@pytest.fixture
+def made(posefield, takes, made_once, tmp_path):
+    """A folder of recipes with a stated licence."""
+    if not made_once.exists():
+        code, out, err = posefield("discover", takes, "-o", made_once, *LICENCE, *FEW)
+        assert code == 0, err
+        assert "families of 4 takes" in out
+    return shutil.copytree(made_once, tmp_path / "recipes")
+
+
+def test_families_become_recipes_that_train_reads(made, takes):
+    facts = json.loads((made / "discover.json").read_text())
+    assert len(facts["families"]) >= 2 and set(facts["takes"]) == {p.name for p in takes.iterdir()}
+    for one in facts["families"]:
+        own = recipe.read(made / f"family_{one['number']:02d}.toml")
+        assert not own.accepted and own.licence == LICENCE[1] and own.source.up == "y"
+        assert own.source.metres_per_unit == 0.01 and own.roles["rightHand"] == "RightHand"
+        assert one["clips"] == len(clip_table.read(own, takes))
+        assert [control.name for control in own.controls] == one["controls"]
+        assert {row.performer for row in clip_table.read(own, takes)} <= {"ann", "bob"}
+    first = recipe.read(made / "family_01.toml")
+    examples, _ = ingest.ingest(first, takes)
+    assert first.event.joint == "RightHand" and first.controls[0].auto.joint == "RightHand"
+    assert np.ptp([one.controls for one in examples], axis=0).min() > 0.01
+
+
+def test_evidence_stands_beside_what_was_proposed(made):
+    text = (made / "family_01.toml").read_text()
+    assert re.search(r"# \d+ clips of 2 performers, [\d.]+ s long in the median\.", text)
+    assert re.search(r"# \d+% of the variance of takes left out remains with right_hand_", text)
+    assert re.search(r"# leg, hip to foot: [\d.]+ units, which is 0\.\d+ m in centimetres", text)
+
+
+def test_the_same_takes_give_the_same_bytes(posefield, made, takes):
+    before = {path.name: path.read_bytes() for path in made.iterdir()}
+    words = ("discover", takes, "-o", made, *LICENCE, *FEW)
+    code, _, err = posefield(*words)
+    assert code == 3 and "exists already, and is not overwritten: say --overwrite" in err
+    (made / "family_77.toml").write_text("left over")
+    (made / "notes.txt").write_text("mine")
+    assert posefield(*words, "--overwrite")[0] == 0
+    after = {path.name: path.read_bytes() for path in made.iterdir()}
+    assert after == before | {"notes.txt": b"mine"}
+
+
+def test_a_recipe_without_licence_is_refused_by_its_reader(posefield, takes, tmp_path):
+    out = tmp_path / "recipes"
+    assert posefield("discover", takes, "-o", out, *FEW)[0] == 0
+    assert "# TODO licence" in (out / "family_01.toml").read_text()
+    with pytest.raises(RecipeError, match="licence"):
+        recipe.read(out / "family_01.toml")
+
+
+@pytest.mark.parametrize("command", ["train", "evaluate"])
+def test_no_model_is_made_of_a_recipe_that_nobody_accepted(posefield, made, takes, command):
+    words = ("-o", made / "x.onnx") if command == "train" else ()
+    code, _, err = posefield(command, made / "family_01.toml", "--data", takes, *words)
+    assert code == 3 and "accepted = false: look at its clips, then accept it with" in err
+    assert f"posefield review {made} --accept NUMBER" in err
+    text = (made / "family_01.toml").read_text()
+    (made / "family_01.toml").write_text(family_recipe.with_accepted(text, True))
+    assert recipe.read_accepted(made / "family_01.toml").accepted
+
+
+def test_unit_and_up_can_be_stated(posefield, takes, tmp_path):
+    out = tmp_path / "recipes"
+    words = ("--unit", "0.0125", "--up", "y", *LICENCE, *FEW)
+    assert posefield("discover", takes, "-o", out, *words)[0] == 0
+    text = (out / "family_01.toml").read_text()
+    assert tomllib.loads(text)["source"] == {"metres_per_unit": 0.0125, "up": "y"}
+    assert "# stated by an option of posefield discover" in text
+
+
+def test_clips_with_other_joints_are_named_and_left_out(posefield, takes, tmp_path):
+    folder = tmp_path / "takes"
+    shutil.copytree(takes, folder)
+    hat = rigid_takes.clip("FSSFFS", 9, extra=True)
+    (folder / "cid_9.bvh").write_bytes(bvh_writer.dumps(hat, metres_per_unit=0.01))
+    assert posefield("discover", folder, "-o", tmp_path / "recipes", *LICENCE, *FEW)[0] == 0
+    facts = json.loads((tmp_path / "recipes/discover.json").read_text())
+    left_out = {name: why for one in facts["families"] for name, why in one["left_out"].items()}
+    assert left_out and set(left_out.values()) == {"other joints than most clips"}
+    assert all(name.startswith("cid_9.bvh@") for name in left_out)
+    tables = "".join(path.read_text() for path in (tmp_path / "recipes").glob("*.csv"))
+    assert "cid_9" not in tables and facts["takes"]["cid_9.bvh"]["performer"] == "performer_1"
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-o", "x.csv"), "expected a folder of recipes"),
+        (("-o", "x.csv", "--strides", "--overwrite"), "expected no option of recipes for a table"),
+    ],
+)
+def test_outputs_that_do_not_fit_are_refused(posefield, takes, words, said):
+    code, _, err = posefield("discover", takes, *words)
+    assert code == 2 and said in err
+
+
+def test_performers_are_told_by_bones_and_named_by_files():
+    one, other = np.array([0.4, 0.3]), np.array([0.4, 0.3008])
+    files = ["day/ann_1.bvh", "day/bob_1.bvh", "day/ann_2.bvh"]
+    assert body_kinds.name_performers(files, [one, other, one + 0.0004]) == [
+        "ann",
+        "bob",
+        "ann",
+    ]
+    # Within the tolerance all are one, whom no word tells from others.
+    assert set(body_kinds.name_performers(files, [one, one, one])) == {"performer_1"}
+    # A name on files of two bodies tells neither of them.
+    mixed = ["ann_1.bvh", "ann_2.bvh", "bob_1.bvh"]
+    assert body_kinds.name_performers(mixed, [one, other, one]) == [
+        "performer_1",
+        "performer_2",
+        "performer_1",
+    ]
+
+
+def test_a_table_is_read_as_it_was_written(tmp_path):
+    rows = [FamilyRow("a/b.bvh", 3, 90, "ann", "a/b", 0.25), FamilyRow("c.bvh", 0, 9, "x", "c")]
+    path = tmp_path / "t.csv"
+    path.write_bytes(family_table.table(rows))
+    assert family_table.read(path) == rows
+    path.write_text(path.read_text().replace("true", "yes", 1))
+    with pytest.raises(RecipeError, match="column 'accepted': 'yes', expected true or false"):
+        family_table.read(path)
+
+
+def test_a_table_beside_the_recipe_counts_if_the_data_folder_has_none(made, takes, tmp_path):
+    data = tmp_path / "data"
+    shutil.copytree(takes, data)
+    own = recipe.read(made / "family_01.toml")
+    beside = clip_table.read(own, data)
+    lines = (made / "family_01.csv").read_text().splitlines()
+    (data / "family_01.csv").write_text("\n".join(lines[:3]) + "\n")
+    assert len(clip_table.read(own, data)) == 2 < len(beside)
