@@ -1,4 +1,4 @@
-"""Training commands: `probe`, `init`, `discover`, `fetch`, `sample`, `train` and others."""
+"""Training commands: `probe`, `init`, `discover`, `review`, `train` and others."""
 
 from collections.abc import Callable
 
@@ -12,6 +12,7 @@ from posefield_train.cli import (
     command_evaluate,
     command_fetch,
     command_probe,
+    command_review,
     command_sample,
     command_train,
 )
@@ -21,6 +22,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], list[str]]] = {
     "init": (command_probe.init, command_probe.INIT_EXAMPLES),
     "convert": (command_convert.convert, command_convert.CONVERT_EXAMPLES),
     "discover": (command_discover.discover, command_discover.EXAMPLES),
+    "review": (command_review.review, command_review.EXAMPLES),
     "fetch": (
         command_fetch.fetch,
         ["fetch cmu downloads -o motion", "fetch hdm05 downloads -o motion"],

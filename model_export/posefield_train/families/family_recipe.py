@@ -92,6 +92,12 @@ def with_accepted(text: str, accepted: bool) -> str:
     return line.sub(f"accepted = {str(accepted).lower()}", text, count=1)
 
 
+def with_licence(text: str, licence: str) -> str:
+    """Return a recipe with a licence if it has none, and the rest of it as it is."""
+    line = re.compile(r'^licence = ""$', re.MULTILINE)
+    return line.sub(lambda _: f"licence = {recipe_draft.quote(licence)}", text, count=1)
+
+
 def proposal_lines(proposal: ControlProposal, roles: dict[str, str]) -> list[str]:
     """Return the event and the controls of a recipe, with what they explain as comments."""
     quote = recipe_draft.quote

@@ -90,7 +90,7 @@ def _facts(
             f"{family.quality.shared:.0%} of the family's motion is common to them."
         )
     return RecipeFacts(
-        f"family_{number:02d}",
+        family_name(number),
         f"{what} found in long takes, family {number}",
         licence,
         kind.report,
@@ -130,11 +130,23 @@ def _offered_facts(one: OfferedFamily) -> dict[str, Any]:
         "number": one.number,
         "status": "proposed",
         **_family_facts(one.family),
-        "controls": [family_recipe.control_name(own) for own in one.proposal.controls],
-        "event": one.proposal.event,
-        "remaining": [round(left, 4) for left in one.proposal.remaining],
+        **proposal_facts(one.proposal),
         "roles": one.facts.report.roles,
     }
+
+
+def proposal_facts(proposal: ControlProposal) -> dict[str, Any]:
+    """Return the proposed event and controls as JSON values."""
+    return {
+        "controls": [family_recipe.control_name(own) for own in proposal.controls],
+        "event": proposal.event,
+        "remaining": [round(left, 4) for left in proposal.remaining],
+    }
+
+
+def family_name(number: int) -> str:
+    """Return the name of a family's files, without the ending."""
+    return f"family_{number:02d}"
 
 
 def _family_facts(family: FoundFamily) -> dict[str, Any]:
