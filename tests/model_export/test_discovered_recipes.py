@@ -63,10 +63,11 @@ def test_evidence_stands_beside_what_was_proposed(made):
 
 
 def test_the_same_takes_give_the_same_bytes(posefield, made, takes):
-    before = {path.name: path.read_bytes() for path in made.iterdir()}
     words = ("discover", takes, "-o", made, *LICENCE, *FEW)
     code, _, err = posefield(*words)
     assert code == 3 and "exists already, and is not overwritten: say --overwrite" in err
+    assert posefield(*words, "--overwrite")[0] == 0
+    before = {path.name: path.read_bytes() for path in made.iterdir()}
     (made / "family_77.toml").write_text("left over")
     (made / "notes.txt").write_text("mine")
     assert posefield(*words, "--overwrite")[0] == 0

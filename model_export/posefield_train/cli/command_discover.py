@@ -129,21 +129,29 @@ def _write_recipes(
     folder: Path, output: Path, stated: StatementOptions, wanted: FamilyOptions, json: bool
 ) -> None:
     from posefield.console.progress import ProgressBar
-    from posefield_train.families import body_kinds, family_recipe, found_families, recipe_folder
+    from posefield_train.families import (
+        body_kinds,
+        contact_sheet,
+        family_recipe,
+        found_families,
+        recipe_folder,
+    )
 
     if output.suffix in (".csv", ".toml", ".json"):
         raise InvalidField("output", f"{output.name!r}, expected a folder of recipes")
     replaced = recipe_folder.expect_free(output, wanted.overwrite)
     read = _read(folder, stated)
-    files = [take.file for take in read.takes]
+    names = [take.file for take in read.takes]
     statements = body_kinds.FileStatements(wanted.unit, stated.up, _roles(stated))
-    with ProgressBar("bodies", len(files)) as bar:
-        kinds = body_kinds.find_kinds(folder, files, statements, bar.update)
+    with ProgressBar("bodies", len(names)) as bar:
+        kinds = body_kinds.find_kinds(folder, names, statements, bar.update)
     with ProgressBar("candidates", wanted.candidates) as bar:
         listed = found_families.find_families(read.takes, kinds, wanted.candidates, bar.update)
     found = recipe_folder.offer(listed, kinds, folder, wanted.licence)
     facts = recipe_folder.summary(found, folder, read, kinds, wanted.candidates)
-    recipe_folder.write(recipe_folder.contents(found, facts), output, replaced)
+    page = contact_sheet.render(found, read.takes, output.as_posix(), read.refused)
+    files = recipe_folder.contents(found, facts) | {recipe_folder.PAGE: page}
+    recipe_folder.write(files, output, replaced)
     if json:
         typer.echo(as_json(facts))
         return
@@ -155,7 +163,8 @@ def _write_recipes(
         )
     typer.echo(
         f"{output}: {len(found.offered)} families of {len(read.takes)} takes, "
-        f"{len(found.refused)} not offered; accept with: posefield review {output} --accept NUMBER"
+        f"{len(found.refused)} not offered; look at {output / recipe_folder.PAGE}, then accept "
+        f"with: posefield review {output} --accept NUMBER"
     )
 
 

@@ -1,0 +1,106 @@
+"""Tests of the page of found families: what it shows, and its decisions in a browser."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+
+import discover_takes
+import numpy as np
+import pytest
+import rigid_takes
+
+from posefield_train.families import clip_sticks, decisions
+
+WORDS = ("--licence", "ours", "--candidates", "60")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("sheet")
+
+
+@pytest.fixture
+def page(posefield, folder):
+    """The page of a folder of takes."""
+    made = folder / "recipes"
+    if not made.exists():
+        takes = rigid_takes.write_takes(folder / "takes")
+        (takes / "broken.bvh").write_text("HIERARCHY <b>")
+        assert posefield("discover", takes, "-o", made, *WORDS)[0] == 0
+    return made / "index.html"
+
+
+def test_each_family_has_its_example_its_best_and_its_worst_clips(page):
+    text = page.read_text()
+    facts = json.loads((page.parent / "discover.json").read_text())
+    for one in facts["families"]:
+        section = re.search(rf'<section id="family-{one["number"]}".*?</section>', text, re.DOTALL)
+        shown = min(one["clips"], 8)
+        assert section[0].count("<svg ") == shown + 1
+        assert section[0].count('name="drop"') == shown
+        assert all(name in section[0] for name in one["controls"])
+        assert all(who in section[0] for who in one["performers"])
+    assert "broken.bvh: " in text and "<b>" not in text
+
+
+def test_the_page_needs_no_other_file(page):
+    text = page.read_text()
+    assert not re.search(r"""(src|href)=|@import|url\(|https?://""", text)
+
+
+def test_clips_of_the_page_are_those_that_review_drops(posefield, page, tmp_path):
+    made = shutil.copytree(page.parent, tmp_path / "recipes")
+    keys = [
+        html.unescape(key) for key in re.findall(r'name="drop" value="([^"]+)"', page.read_text())
+    ]
+    (tmp_path / "d.json").write_text(json.dumps({"drop": keys}))
+    assert posefield("review", made, "--decisions", tmp_path / "d.json")[0] == 0
+    rows = "".join(path.read_text() for path in made.glob("*.csv"))
+    assert rows.count("false") == len(keys) == len(set(keys)) > 5
+
+
+CLICKS = """
+<script>
+const one = document.querySelector("input[value=accept]");
+one.focus(); one.click();
+document.querySelector("#family-1 input[name=drop]").click();
+const select = document.querySelector("#family-2 select");
+select.value = "1"; select.dispatchEvent(new Event("change", { bubbles: true }));
+document.title = JSON.stringify(decisions());
+</script>
+"""
+
+
+@pytest.mark.system
+def test_choices_become_decisions_and_their_command(page, tmp_path):
+    browser = shutil.which("chromium")
+    if browser is None:
+        pytest.skip("no chromium")
+    clicked = tmp_path / "clicked.html"
+    clicked.write_text(page.read_text().replace("</body>", f"{CLICKS}</body>"))
+    options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}/b")
+    done = subprocess.run(
+        [browser, *options, "--dump-dom", clicked.as_uri()], capture_output=True, timeout=120
+    )
+    found = done.stdout.decode()
+    title = html.unescape(re.search(r"<title>(.*?)</title>", found)[1])
+    (tmp_path / "decisions.json").write_text(title)
+    read = decisions.read(tmp_path / "decisions.json")
+    assert (read.accept, read.reject, read.merge) == ((1,), (), ((1, 2),)) and len(read.drop) == 1
+    said = html.unescape(re.search(r"<output[^>]*>(.*?)</output>", found)[1])
+    wanted = f"posefield review {page.parent} --accept 1 --merge 1,2 --drop {read.drop[0].family}:"
+    assert said.startswith(wanted)
+
+
+def test_figures_keep_the_proportions_of_the_body():
+    take = discover_takes.take("a.bvh", 3.0, hands=np.zeros((181, 3)))
+    strip = clip_sticks.draw(take, 0, 90)
+    assert strip.body.count("M") == clip_sticks.INSTANTS * 9
+    assert strip.right.count("M") == clip_sticks.INSTANTS * 7
+    numbers = [float(word) for word in re.findall(r"-?\d+", strip.body + strip.right)]
+    assert min(numbers) >= 0.0 and max(numbers[1::2]) <= strip.height + 1.0
+    # The body stands 1.65 legs high, from its toes to its head.
+    ys = numbers[1::2]
+    assert max(ys) - min(ys) == pytest.approx(1.65 * clip_sticks.UNIT, abs=2.0)
