@@ -13,6 +13,7 @@ from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer
 from posefield_train.families import body_kinds, family_recipe, family_table
 from posefield_train.families.family_table import FamilyRow
+from posefield_train.probe import recipe_draft
 from posefield_train.source import clip_table, ingest, recipe
 
 LICENCE = ("--licence", "CC BY 4.0, by us")
@@ -166,3 +167,15 @@ def test_a_table_beside_the_recipe_counts_if_the_data_folder_has_none(made, take
     lines = (made / "family_01.csv").read_text().splitlines()
     (data / "family_01.csv").write_text("\n".join(lines[:3]) + "\n")
     assert len(clip_table.read(own, data)) == 2 < len(beside)
+
+
+def test_a_rate_is_written_where_it_is_stated(takes):
+    files = sorted(path.name for path in takes.iterdir())
+
+    def source(rate):
+        stated = body_kinds.FileStatements(None, None, {}, rate)
+        return recipe_draft.source_lines(body_kinds.find_kinds(takes, files, stated)[0].report)
+
+    assert f"rate = {rigid_takes.RATE}" in source(rigid_takes.RATE)
+    # Files that state their rate need none.
+    assert not any("rate" in line for line in source(None))

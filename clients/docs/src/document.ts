@@ -66,15 +66,17 @@ export function foldDescription(document: JsonObject): void {
 function valuesOf({ name, controls, cyclic = false }: Model): Values {
   const given = Object.fromEntries(controls.map((control) => [control.name, control.default]));
   const [across, along] = controls.map((control) => control.name);
+  const segments = cyclic
+    ? [{ kind: "walk", model: name, seconds: 2 }]
+    : [{ kind: "act", model: name, controls: given }];
   return {
     model: name,
     controls: given,
     time: [0],
     times: [0],
     clips: [{ name: "first", controls: given }],
-    segments: cyclic
-      ? [{ kind: "walk", model: name, seconds: 2 }]
-      : [{ kind: "act", model: name, controls: given }],
+    segments,
+    scripts: [{ name: "first", segments }],
     ...(across && along ? { across, along } : {}),
   };
 }

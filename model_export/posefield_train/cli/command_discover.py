@@ -142,7 +142,7 @@ def _write_recipes(
     replaced = recipe_folder.expect_free(output, wanted.overwrite)
     read = _read(folder, stated)
     names = [take.file for take in read.takes]
-    statements = body_kinds.FileStatements(wanted.unit, stated.up, _roles(stated))
+    statements = body_kinds.FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
     with ProgressBar("bodies", len(names)) as bar:
         kinds = body_kinds.find_kinds(folder, names, statements, bar.update)
     with ProgressBar("candidates", wanted.candidates) as bar:

@@ -11,13 +11,13 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import measures
-from posefield.motion.measures import Measure, MeasuredMotion, MeasureMoment
+from posefield.motion.measures import Measure, MeasuredMotion, MeasureMoment, Quantity
 from posefield_train.discover import take_prediction
 from posefield_train.discover.take_prediction import TakePrediction
 
 MOMENTS: tuple[MeasureMoment, ...] = ("end", "highest", "lowest", "farthest", "start")
-POSITIONS = ("height", "forward", "left")
-GAIT = ("speed", "turn", "stride_length")
+POSITIONS: tuple[Quantity, ...] = ("height", "forward", "left")
+GAIT: tuple[Quantity, ...] = ("speed", "turn", "stride_length")
 """Controls of a cycle that travels."""
 NEAR_BEST = 1.15
 """Remaining variance over the least one up to which a limb's end may be that of the event; of these

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Indices
 from posefield_train.discover import joined_features, motion_features
 from posefield_train.discover.example_search import LARGEST_OVERLAP
 from posefield_train.discover.joined_features import JoinedFeatures, Match, Span
@@ -107,8 +107,8 @@ class _Matches:
     """Matches of a candidate as first and last frames (M,) with their costs (M,)."""
 
     example: Span
-    firsts: Floats
-    lasts: Floats
+    firsts: Indices
+    lasts: Indices
     costs: Floats
 
 

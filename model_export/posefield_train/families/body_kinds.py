@@ -14,7 +14,8 @@ from posefield_train.probe.figure import Figure
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Proposal
 from posefield_train.roles.joint_recognition import RoleGuess
-from posefield_train.source import bvh
+from posefield_train.source import motion_readers
+from posefield_train.source.motion_files.motion_file import ReadOptions
 
 SAME_BONE = 0.0005
 """Largest difference of a bone's length between files of one performer, m."""
@@ -25,12 +26,14 @@ STATED = ("stated by an option of posefield discover",)
 class FileStatements:
     """Statements about all files, which count more than what is proposed.
 
-    metres_per_unit, up: None for what the bodies tell. roles: joints by role.
+    metres_per_unit, up: None for what the files or bodies tell. roles: joints by role. rate: frames
+    a second of files that state none.
     """
 
     metres_per_unit: float | None
     up: UpAxis | None
     roles: Mapping[str, str]
+    rate: float | None = None
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,7 @@ def find_kinds(
     """
     groups: dict[tuple[str, ...], list[tuple[str, Figure]]] = {}
     for count, file in enumerate(files, 1):
-        own = figure.measure(bvh.read(folder / file))
+        own = figure.measure(motion_readers.read(folder / file, ReadOptions(rate=stated.rate)))
         groups.setdefault(tuple(own.names), []).append((file, own))
         report(count)
     return [_kind(folder, joints, group, stated) for joints, group in groups.items()]
@@ -82,7 +85,7 @@ def _kind(
 
 def _stated(found: ProbeReport, stated: FileStatements) -> ProbeReport:
     """Return the report with statements in place of proposals and guesses."""
-    values = {"metres_per_unit": stated.metres_per_unit, "up": stated.up}
+    values = {"metres_per_unit": stated.metres_per_unit, "up": stated.up, "rate": stated.rate}
     proposed = {
         name: Proposal(value, "certain", STATED)
         for name, value in values.items()

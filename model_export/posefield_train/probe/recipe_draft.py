@@ -105,7 +105,10 @@ def _head(name: str) -> list[str]:
 
 
 def source_lines(report: ProbeReport) -> list[str]:
-    """Return the section [source], with the evidence of unit and up axis as comments."""
+    """Return the section [source], with the evidence of unit and up axis as comments.
+
+    A rate is written where it is stated, as `proposed["rate"]`, and not by the files.
+    """
     unit, up = report.proposed["metres_per_unit"], report.proposed["up"]
     lines = ["[source]"]
     for key, found in (("metres_per_unit", unit), ("up", up)):
@@ -113,8 +116,10 @@ def source_lines(report: ProbeReport) -> list[str]:
         lines.append(f"# confidence: {found.confidence}")
         known = found.value is not None
         lines.append(f"{key} = {json.dumps(found.value)}" if known else f"# TODO {key} = ")
-    rate = report.proposed["fps"]
-    if rate.value is None:
+    rate, stated = report.proposed["fps"], report.proposed.get("rate")
+    if stated is not None:
+        lines.append(f"rate = {json.dumps(stated.value)}")
+    elif rate.value is None:
         lines += [*(f"# {said}" for said in rate.evidence), "# TODO rate = "]
     return [*lines, ""]
 
