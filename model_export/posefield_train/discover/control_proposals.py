@@ -50,7 +50,7 @@ class FamilyClips:
 class ProposedControl:
     """A control. role: of the joint that is measured; None for a quantity of the whole clip."""
 
-    quantity: str
+    quantity: Quantity
     role: str | None = None
     at: MeasureMoment | None = None
 
