@@ -16,7 +16,6 @@ from posefield_train.discover import joined_features, motion_features
 from posefield_train.discover.example_search import LARGEST_OVERLAP
 from posefield_train.discover.joined_features import JoinedFeatures, Match, Span
 from posefield_train.discover.motion_features import RATE, Corpus
-from posefield_train.discover.subsequence_dtw import Indices
 from posefield_train.discover.take_reading import Take
 
 SHORTEST, LONGEST = 0.7, 5.0
