@@ -132,7 +132,7 @@ class Script:
         return tuple(self._contact(foot, own) for foot, own in enumerate(self.character.contacts))
 
     def _contact(self, foot: int, own: FootContact) -> FootContact:
-        pairs = [(source.contacts[foot], source.gait) for source in self.sources if source]
+        pairs = [(source.contacts[foot], source.own_gait) for source in self.sources if source]
         known = [found for found, _ in pairs if found is not None] or [own]
         walks = [found.clearance for found, gait in pairs if found is not None and gait]
         return replace(
