@@ -82,7 +82,7 @@ def takes(name: str, data: Path) -> list[Take]:
     path = next(Path(shipped_recipes.__file__).parents[1].glob(f"recipes/{name}.toml"))
     own = recipe.read(path)
     rows = clip_table.read(own, data)
-    files = ingest.read_files(rows)
+    files = ingest.read_files(rows, own.source)
     found = []
     for row in rows:
         clip = ingest.clip_of_file(files[str(row.place)], own.source)

@@ -21,6 +21,11 @@ LEAST_BEND = 0.01
 # Share of the limb's length up to which a leg that bends backwards is taken as straight; one that
 # bends twice as far bends on so.
 OVERSTRETCHED = 0.1
+# Distance between the ends of a limb, as a share of its length, up to which it is folded: its middle
+# stays towards where it was. From twice the distance on it bends in its plane alone.
+FOLDED = 0.2
+# Share of the upper bone that must be across the new direction for that.
+LEAST_ACROSS = 0.3
 
 
 @dataclass(frozen=True)
@@ -132,6 +137,25 @@ def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
         bent = bent + little * (np.sum(bend * usual, axis=-1) - bent)
     mixed = bend + np.maximum(least - bent[..., None], 0.0) * usual
     side = quat.rotate(shortest_turn(old, towards), mixed)
+    side = _towards_middle(side, chord, bone, towards)
     side = side - np.sum(side * towards, axis=-1, keepdims=True) * towards
     found: Points = side / np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-12)
+    return found
+
+
+def _towards_middle(side: Points, chord: Points, bone: Points, towards: Points) -> Points:
+    """Return the vectors (..., F, 3) towards which a limb bends, where it is folded to its middle.
+
+    The ends of a folded limb are so near each other that their direction turns by any angle in a
+    frame, and its plane with it; its middle moves as the limb does. bone: to it (..., F, 3), m.
+    """
+    size = np.linalg.norm(bone, axis=-1, keepdims=True)
+    apart = np.linalg.norm(chord, axis=-1, keepdims=True)
+    # The distance is compared with the bone, about half of the limb.
+    folded = np.clip(2.0 - apart / (2.0 * FOLDED * size), 0.0, 1.0)
+    across = (bone - np.sum(bone * towards, axis=-1, keepdims=True) * towards) / size
+    much = np.linalg.norm(across, axis=-1, keepdims=True)
+    folded = folded * np.clip(much / LEAST_ACROSS, 0.0, 1.0)
+    own = np.linalg.norm(side, axis=-1, keepdims=True) / np.maximum(much, 1e-9)
+    found: Points = side + folded * (own * across - side)
     return found

@@ -161,3 +161,28 @@ def test_a_knee_that_is_overstretched_bends_to_its_front_in_a_kick_too():
     front = np.stack([0.0 * raised, -np.sin(raised), np.cos(raised)], axis=1)
     assert np.sum(knee * front, axis=-1).min() > 0.1
     assert np.linalg.norm(np.diff(knee, axis=0), axis=-1).max() < 0.1
+
+
+def folded_leg(flexion):
+    """Poses of a leg whose thigh points to the front and a little aside, with a flexed knee."""
+    count = len(flexion)
+    rotations = np.tile(quat.IDENTITY, (count, len(PARENTS), 1))
+    aside = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.linspace(0.0, 0.3, count))
+    rotations[:, LEG.upper] = quat.mul(aside, flexed(np.full(count, -1.6)))
+    rotations[:, LEG.middle] = flexed(flexion)
+    roots = np.tile([0.0, 0.45, 0.0], (count, 1))
+    return rotations, limbs.evaluate_poses(PARENTS, BONES, [LEG], rotations, roots), roots
+
+
+def test_a_knee_that_is_folded_does_not_turn_over_when_its_foot_is_placed():
+    """Joins of deep squats fold knees beyond 180 degrees, where the plane of the leg turns over."""
+    rotations, own, roots = folded_leg(np.linspace(2.3, 3.5, 30))
+    chord = own.position(LEG.lower) - own.position(LEG.upper)
+    end = chord + np.linspace(0.0, 1.0, 30)[:, None] * [-0.1, -0.2, 0.0]
+    after, _ = forward(moved(rotations, LEG, two_bone.solve(own, LEG, end)), roots)
+    steps = np.linalg.norm(np.diff(after[:, LEG.middle], axis=0), axis=-1)
+    assert steps.max() < 0.03
+    # A knee that turns with the direction of the foot from the hip jumps.
+    turn = two_bone.shortest_turn(chord, end)
+    knee = quat.rotate(turn, own.position(LEG.middle) - own.position(LEG.upper))
+    assert np.linalg.norm(np.diff(knee, axis=0), axis=-1).max() > 0.2
