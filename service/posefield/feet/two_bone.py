@@ -21,8 +21,8 @@ LEAST_BEND = 0.01
 # Share of the limb's length up to which a leg that bends backwards is taken as straight; one that
 # bends twice as far bends on so.
 OVERSTRETCHED = 0.1
-# Distance between the ends of a limb, as a share of its length, up to which it is folded: its middle
-# stays towards where it was. From twice the distance on it bends in its plane alone.
+# Distance between the ends of a limb, as a share of its length, up to which it is folded: its
+# middle stays towards where it was. From twice the distance on it bends in its plane alone.
 FOLDED = 0.2
 # Share of the upper bone that must be across the new direction for that.
 LEAST_ACROSS = 0.3
