@@ -17,6 +17,7 @@ from posefield_train.cli.output_files import MAX_NOTES
 if TYPE_CHECKING:
     from posefield_train.discover.found_clips import FoundClip
     from posefield_train.discover.take_reading import ReadTakes
+    from posefield_train.families.recipe_folder import FoundFamilies
 
 EXAMPLES = [
     "discover takes -o recipes --licence 'CC BY 4.0, by us'",
@@ -129,13 +130,7 @@ def _write_recipes(
     folder: Path, output: Path, stated: StatementOptions, wanted: FamilyOptions, json: bool
 ) -> None:
     from posefield.console.progress import ProgressBar
-    from posefield_train.families import (
-        body_kinds,
-        contact_sheet,
-        family_recipe,
-        found_families,
-        recipe_folder,
-    )
+    from posefield_train.families import body_kinds, contact_sheet, found_families, recipe_folder
 
     if output.suffix in (".csv", ".toml", ".json"):
         raise InvalidField("output", f"{output.name!r}, expected a folder of recipes")
@@ -154,7 +149,14 @@ def _write_recipes(
     recipe_folder.write(files, output, replaced)
     if json:
         typer.echo(as_json(facts))
-        return
+    else:
+        _tell_families(found, output, len(read.takes))
+
+
+def _tell_families(found: "FoundFamilies", output: Path, takes: int) -> None:
+    """Print each family that is offered, and how to accept it."""
+    from posefield_train.families import family_recipe, recipe_folder
+
     for one in found.offered:
         controls = ", ".join(map(family_recipe.control_name, one.proposal.controls))
         typer.echo(
@@ -162,7 +164,7 @@ def _write_recipes(
             f"{one.family.seconds:.1f} s; controls {controls}"
         )
     typer.echo(
-        f"{output}: {len(found.offered)} families of {len(read.takes)} takes, "
+        f"{output}: {len(found.offered)} families of {takes} takes, "
         f"{len(found.refused)} not offered; look at {output / recipe_folder.PAGE}, then accept "
         f"with: posefield review {output} --accept NUMBER"
     )
