@@ -24,7 +24,7 @@ from posefield.question.floor import LEVEL_FLOOR, Floor
 # Time over which a change of the path is spread, s.
 SPREAD = 0.1
 # A foot keeps its place over the floor for this time before and after a swing, while it is low, s.
-HOLD = 0.04
+HOLD = 0.05
 
 Numbers = npt.NDArray[Any]
 
@@ -222,17 +222,17 @@ def _groups(
 def _held(path: FootPath, found: Sequence[Interval], goal: RootPath) -> list[Interval]:
     """Return the stances with the ends of the swings in which the foot keeps its place.
 
-    It does not where it is led elsewhere.
+    A point to which it is led ends a swing.
     """
     count, hold, led = len(path), round(HOLD * path.rate), ~np.isnan(goal[:, 0])
     longer = []
     for index, stance in enumerate(found):
-        before = min(hold, _gap(found, index - 1, path) // 4)
-        after = min(hold, _gap(found, index, path) // 4)
-        if led[stance.begin - before : stance.begin].any():
-            before = 0
-        if led[stance.end : stance.end + after].any():
-            after = 0
+        ways = led[: stance.begin][::-1], led[stance.end :]
+        gaps = _gap(found, index - 1, path), _gap(found, index, path)
+        before, after = (
+            min(hold, min(gap, int(np.argmax(way)) if way.any() else gap) // 4)
+            for gap, way in zip(gaps, ways, strict=True)
+        )
         longer.append(Interval(stance.begin - before, stance.end + after))
     if path.cycle is None:
         return [Interval(max(i.begin, 0), min(i.end, count)) for i in longer]

@@ -27,12 +27,15 @@ SHORTEST_STEP = 0.03
 LIFTED = contact_detection.DEFAULT.grown_height
 # A foot may stand this much higher or lower than captured feet do, m: soles differ.
 UNEVEN = 0.01
-# Step from which on a swing is lifted to the full clearance, m, and the exponent of its lift.
-FULL_STEP, LIFT_EXPONENT = 0.1, 0.7
+# Step from which on a swing is lifted to the full clearance, m.
+FULL_STEP = 0.1
+# A foot leaves the floor, and comes back to it, over this time, s: the knee of a straight leg moves
+# several times as fast as its foot is lifted. The exponent of the lift between both.
+RISE, LIFT_EXPONENT = 0.09, 0.2
 # A foot in the middle of a full step is at least this high above its place, m.
 LEAST_LIFT = 0.025
-# Acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
-LIFT_ACCELERATION = 10.0
+# Mean acceleration of a lift, m/s²: a short swing is not lifted as high as a captured one.
+LIFT_ACCELERATION = 12.0
 
 
 @dataclass(frozen=True)
@@ -204,9 +207,10 @@ def lifts(
         lowest[own] = lowest[own].min()
     ended = mask(found, count) | ~np.isnan(led)
     for swing in runs(~ended, path.cycle is not None):
-        share = _shares(swing, path, foot)
-        if share is None:
+        whole = _whole(swing, path, foot)
+        if whole is None:
             continue
+        share = _shares(swing, path, whole)
         ends = _ends(swing, path)
         begin, end = path.places(ends)
         least = foot.clearance * min(abs(end - begin) / FULL_STEP, 1.0)
@@ -215,7 +219,7 @@ def lifts(
         first, last = (float(lowest[end % count]) for end in ends)
         least = 0.0 if min(first, last) < -UNEVEN else least
         frames = np.arange(swing.begin, swing.end) % count
-        rise = np.sin(np.pi * share) ** LIFT_EXPONENT
+        rise = lift_shares(share, whole / path.rate)
         lifted = max(float(path.heights[frames].max()) - foot.height, 0.0)
         added[frames] = max(least * float(rise.max()) - lifted, 0.0) * rise
         lowest[frames] = min(least, LEAST_LIFT) * rise + first + share * (last - first)
@@ -223,12 +227,23 @@ def lifts(
 
 
 def highest_lift(seconds: float | Floats) -> float | Floats:
-    """Return how high a foot is lifted at most in a swing of a duration, m."""
-    return LIFT_ACCELERATION * seconds**2 / (LIFT_EXPONENT * np.pi**2)
+    """Return how high a foot is lifted at most in a swing of a duration, m: by a parabola."""
+    return LIFT_ACCELERATION * seconds**2 / 8.0
 
 
-def _shares(swing: Interval, path: FootPath, foot: FootContact) -> Frames | None:
-    """Return the shares (S,) of a swing at its frames, 0 to 1; None for a swing without a stance.
+def lift_shares(share: Frames, seconds: float | Frames) -> Frames:
+    """Return the shares (S,) of a lift at shares of swings that last some seconds.
+
+    The foot leaves the floor, and comes to it, at rest.
+    """
+    quickest = np.maximum(seconds / RISE, 2.0)
+    soon = np.minimum(np.minimum(share, 1.0 - share) * quickest, 1.0)
+    found: Frames = np.sin(np.pi * share) ** LIFT_EXPONENT * soon**2 * (3.0 - 2.0 * soon)
+    return found
+
+
+def _whole(swing: Interval, path: FootPath, foot: FootContact) -> int | None:
+    """Return the steps of time from stance to stance of a swing; None for one without a stance.
 
     A swing at an end of a clip goes on outside it, for the usual duration.
     """
@@ -237,9 +252,14 @@ def _shares(swing: Interval, path: FootPath, foot: FootContact) -> Frames | None
     leads, trails = (not cyclic and swing.begin == 0), (not cyclic and swing.end == count)
     if (leads and trails) or (cyclic and length == count):
         return None
-    steps = np.arange(1.0, length + 1.0)
-    whole = max(length, round(foot.swing * path.rate)) + 1 if leads or trails else length + 1
-    return (steps + (whole - 1 - length) * leads) / whole
+    return max(length, round(foot.swing * path.rate)) + 1 if leads or trails else length + 1
+
+
+def _shares(swing: Interval, path: FootPath, whole: int) -> Frames:
+    """Return the shares (S,), 0 to 1, of a swing at its frames. whole: steps of time, as above."""
+    leads = path.cycle is None and swing.begin == 0
+    steps = np.arange(1.0, len(swing) + 1.0)
+    return (steps + (whole - 1 - len(swing)) * leads) / whole
 
 
 def _ends(swing: Interval, path: FootPath) -> list[int]:

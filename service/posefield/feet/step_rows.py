@@ -12,11 +12,11 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import Booleans, Floats
+from posefield.common.units import Booleans, Floats, Indices
 from posefield.feet import stance_rows
 from posefield.feet.ball_path import HOLD, SPREAD, Numbers
 from posefield.feet.stance_rows import FootRows, Rows, Runs
-from posefield.feet.stances import FULL_STEP, LEAST_LIFT, LIFT_EXPONENT, highest_lift
+from posefield.feet.stances import FULL_STEP, LEAST_LIFT, highest_lift, lift_shares
 from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 
@@ -199,7 +199,8 @@ def _lifts(
     least = feet.clearance[rows] * np.minimum(step / FULL_STEP, 1.0)
     highest = np.where(swings.inner(count), highest_lift(swings.lengths / feet.rate), np.inf)
     least = np.minimum(least, highest)
-    rise = np.sin(np.pi * _shares(swings, count, feet)) ** LIFT_EXPONENT
+    share, whole = _shares(swings, count, feet)
+    rise = lift_shares(share, whole / feet.rate)
     starts = np.cumsum(swings.lengths) - swings.lengths
     top = np.maximum.reduceat(rise, starts)
     height = np.maximum.reduceat(level[rows[run], frames], starts) - feet.height[rows]
@@ -209,8 +210,10 @@ def _lifts(
     return added, lowest
 
 
-def _shares(swings: Runs, count: int, feet: FootRows) -> Annotated[Floats, "frames"]:
-    """Return the shares of swings at their frames, 0 to 1, swing after swing.
+def _shares(
+    swings: Runs, count: int, feet: FootRows
+) -> tuple[Annotated[Floats, "frames"], Annotated[Indices, "frames"]]:
+    """Return the shares of swings at their frames, 0 to 1, and the steps of time of the swings.
 
     A swing at an end of a motion goes on outside it, for the usual duration.
     """
@@ -220,4 +223,4 @@ def _shares(swings: Runs, count: int, feet: FootRows) -> Annotated[Floats, "fram
     whole = 1 + np.where(inner, swings.lengths, np.maximum(swings.lengths, usual))
     steps = frames - swings.begins[run] + 1.0
     found: Floats = (steps + ((whole - 1 - swings.lengths) * leads)[run]) / whole[run]
-    return found
+    return found, whole[run]
