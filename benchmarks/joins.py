@@ -28,6 +28,7 @@ from posefield.performance.joins.join_quality import JoinFacts, UsualMotion
 from posefield.performance.passages.passage import RATE, Passage
 from posefield_train.graph import trained_card
 from posefield_train.source import clip_table, ingest, recipe, shipped_recipes
+from posefield_train.source.canonical import half_turns
 
 ROOT = Path(__file__).resolve().parents[1]
 AFTER, LEAST = 1.2, 0.6
@@ -102,7 +103,8 @@ def captured(name: str, data: Path) -> UsualMotion:
 
 
 def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
-    """Return the take of a row."""
+    """Return the take of a row, mended as training does: hips that turn half about their bone."""
+    clip, _ = half_turns.remove_jumps(clip, 0)
     joints = [clip.skeleton.names.index(name) for name in feet]
     every = round(clip.rate / RATE)
     paths = clip.positions()[:, joints]

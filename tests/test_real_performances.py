@@ -72,6 +72,17 @@ def whole(library):
     return perform(library, {"segments": segments(), "fps": 60})
 
 
+def test_a_walk_that_stops_standing_is_joined_to_a_reach_gently(library):
+    target = {"joint": "rhand", "position": [0.0, 1.65, 5.0], "at": "event"}
+    walk, act = segments(stop="standing")[:2]
+    answer = perform(library, {"segments": [walk, {**act, "targets": [target]}], "fps": 60})
+    (join,) = answer.trust.joins
+    # 10.0 with feet that left the floor and came back within a frame (0097).
+    assert join.peak < 8.0
+    assert answer.trust.feet.skate < 0.01
+    assert not join.hard
+
+
 def hand(answer):
     """Return the positions (F, 3), m, of the hand."""
     clip = answer.clip

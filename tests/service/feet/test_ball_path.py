@@ -137,6 +137,25 @@ def test_a_foot_is_lifted_less_in_a_short_swing(frames, most):
     assert planned[:, 1].max() - FOOT.height == pytest.approx(most, rel=0.05)
 
 
+def test_a_foot_leaves_the_floor_and_comes_back_at_rest():
+    """The knee of a straight leg jumps where a foot is lifted by a centimetre in one frame."""
+    places = np.zeros((60, 3))
+    places[:, 1], places[:, 2] = FOOT.height, np.repeat([0.0, 0.0, 0.15], [20, 20, 20])
+    found = [Interval(0, 20), Interval(40, 60)]
+    planned = ball_path.plan_path(FootPath(places, RATE), found, FOOT).positions
+    heights = planned[:, 1] - FOOT.height
+    first, last = heights[20], heights[39]
+    assert max(first, last) < 0.1 * heights.max()
+    # A sine to the power of 0.7 rises by a quarter in the first frame.
+    steep = np.sin(np.pi * np.arange(1, 21) / 21.0) ** 0.7
+    assert steep[0] > 0.25 * steep.max()
+    # While it is low it keeps its place; halfway it does not.
+    low = heights[20:40] < 0.3 * heights.max()
+    places = np.where(np.arange(20) < 10, planned[19, 2], planned[40, 2])
+    moved = np.abs(planned[20:40, 2] - places)
+    assert low.sum() >= 4 and moved[low].max() < 0.005 < moved[9]
+
+
 def test_a_path_goes_through_the_points_to_which_it_is_led(rng):
     places = np.cumsum(rng.normal(size=(80, 3)), axis=0) * 0.003 + [0.0, 0.1, 0.0]
     path, goal = FootPath(places, RATE), np.full((80, 3), np.nan)
