@@ -71,3 +71,12 @@ def test_facts_that_differ_in_numbers_and_texts_alone_have_one_shape():
         custom_data.split_facts(twice).shape
         != custom_data.split_facts({"of": [*one["of"], *other["of"]]}).shape
     )
+
+
+def test_words_of_the_character_belong_to_the_shape():
+    one, other = ({"of": [{"joint": joint, "by": "u"}]} for joint in ("ltoes", "rtoes"))
+    words = frozenset(("ltoes", "rtoes"))
+    found = custom_data.split_facts(one, words)
+    assert (found.join(), found.texts) == (one, ("u",))
+    assert found.shape != custom_data.split_facts(other, words).shape
+    assert found.texts != custom_data.split_facts(one).texts

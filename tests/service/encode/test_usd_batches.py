@@ -225,6 +225,15 @@ def test_clips_that_are_held_to_different_places_share_a_template(form):
     assert found == {"ordinary": 2 if form is crate_template else 1, "template": 1}
 
 
+@pytest.mark.parametrize("form", [crate_template, text_template])
+def test_clips_whose_facts_name_a_joint_share_a_template(form):
+    given = list(held(4, 39))
+    joint = given[0].clip.skeleton.names[-1]
+    named = [replace(one, trust=replace(one.trust, inferred=(joint,))) for one in given]
+    assert pressed(form, named) == {"ordinary": 1, "template": 1}
+    assert usd_clip.usdc(named, METRES) == [usd_clip.usdc([one], METRES)[0] for one in named]
+
+
 def chain(joints):
     names = tuple(f"j{joint}" for joint in range(joints))
     offsets = np.random.default_rng(1).uniform(0.1, 0.5, (joints, 3))

@@ -47,7 +47,8 @@ class RepeatedText(NamedTuple):
 class ConstantFact:
     """Shape of a fact that is a constant of the shape.
 
-    Any fact that is neither a finite number nor a text, and a text that is also the name of a fact.
+    Any fact that is neither a finite number nor a text, and a text that the layer holds elsewhere:
+    the name of a fact, or a word of the character.
     """
 
     spelt: str
@@ -60,9 +61,12 @@ NUMBER, TEXT = "number", "text"
 NO_FACTS = SplitFacts(DictionaryShape((), ()), (), ())
 
 
-def split_facts(facts: Mapping[str, Any]) -> SplitFacts:
-    """Return facts split into shape, numbers and texts."""
-    parting = _FactSplitter(frozenset(_fact_names(facts)))
+def split_facts(facts: Mapping[str, Any], words: frozenset[str] = frozenset()) -> SplitFacts:
+    """Return facts split into shape, numbers and texts.
+
+    words: that the layer holds anyway, as the names of joints; USD stores them once.
+    """
+    parting = _FactSplitter(words.union(_fact_names(facts)))
     shape = parting.shape(facts)
     return SplitFacts(shape, tuple(parting.numbers), tuple(parting.texts))
 
@@ -76,7 +80,7 @@ def usd_dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
 class _FactSplitter:
     """Numbers and texts of facts, collected in order.
 
-    names: of all facts. texts: index by text.
+    names: of all facts, and words of the character. texts: index by text.
     """
 
     names: frozenset[str]
