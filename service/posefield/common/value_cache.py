@@ -1,7 +1,7 @@
 """Values that follow from their keys alone, kept while they are in use."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
 from typing import Generic, TypeVar
@@ -37,9 +37,32 @@ class ValueCache(Generic[Key, Value]):
                 self._values.move_to_end(key)
                 return self._values[key]
         made = make()
+        self._keep({key: made})
+        return made
+
+    def find_all(
+        self, keys: Sequence[Key], make: Callable[[list[Key]], Iterable[Value]]
+    ) -> list[Value]:
+        """Return the values of keys; `make` returns those of the keys that are not known.
+
+        It is called once at most, with each key once. Values must not depend on which other keys
+        are made with them.
+        """
         with self._lock:
-            self._values[key] = made
-            self._values.move_to_end(key)
+            known = {key: self._values[key] for key in keys if key in self._values}
+            for key in known:
+                self._values.move_to_end(key)
+        missing = [key for key in dict.fromkeys(keys) if key not in known]
+        if missing:
+            made = dict(zip(missing, make(missing), strict=True))
+            self._keep(made)
+            known |= made
+        return [known[key] for key in keys]
+
+    def _keep(self, made: Mapping[Key, Value]) -> None:
+        with self._lock:
+            for key, value in made.items():
+                self._values[key] = value
+                self._values.move_to_end(key)
             while len(self._values) > self.most:
                 self._values.popitem(last=False)
-        return made

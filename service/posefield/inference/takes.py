@@ -4,8 +4,10 @@ A take is a conditional simulation of the kriged coefficients: a seed stands for
 of the controls and labels, which is zero at captured clips up to the nugget (decision 0080).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import groupby
 from typing import Annotated
 
 import numpy as np
@@ -13,6 +15,7 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.array_shapes import PointControls, PointLabels, PointValues, Values
 from posefield.common.units import Floats, Indices
+from posefield.common.value_cache import ValueCache
 from posefield.inference.session import Session
 from posefield.kriging import kriging_model, random_field
 from posefield.kriging.random_field import ConditionalField
@@ -22,6 +25,8 @@ FIELD_CACHE, DEVIATION_CACHE = 64, 4096
 """Numbers of cached fields, of about 200 kB each, and of deviations at one point, of 300 bytes. A
 crowd asks for the same points in every frame.
 """
+POINTS_TOGETHER = 512
+"""Number of points at which a field is evaluated at once."""
 FIELDS_TOGETHER = 8
 """Number of fields that are drawn at once: more of them outgrow a core's cache."""
 EVENTFUL_TIMES = 3
@@ -43,13 +48,20 @@ class TakeSettings:
     detail: bool
 
 
+_SeedPoint = tuple[int, tuple[float, ...]]
+
+
+def _seed(asked: _SeedPoint) -> int:
+    return asked[0]
+
+
 class TakeSampler:
     """Deviations of the takes of one model."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._field_cached = lru_cache(FIELD_CACHE)(self._field)
-        self._deviations_cached = lru_cache(DEVIATION_CACHE)(self._deviations)
+        self._deviations_kept: ValueCache[_SeedPoint, Values] = ValueCache(DEVIATION_CACHE)
 
     def deviations(
         self, controls: PointControls, labels: PointLabels, seeds: Annotated[Indices, "points"]
@@ -63,11 +75,10 @@ class TakeSampler:
         points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
         rows = np.hstack([points, labels]).tolist()
         found = np.zeros((len(rows), self._count))
-        # Takes of one seed come one after another, while its field is in the cache.
-        for place in np.argsort(seeds, kind="stable").tolist():
-            if seeds[place]:
-                cancellation.check()
-                found[place] = self._deviations_cached(tuple(rows[place]), int(seeds[place]))
+        varied = np.flatnonzero(seeds).tolist()
+        keys = [(int(seeds[place]), tuple(rows[place])) for place in varied]
+        if keys:
+            found[varied] = self._deviations_kept.find_all(keys, self._deviations)
         return found
 
     def along(
@@ -93,9 +104,20 @@ class TakeSampler:
             found[some] = self._root_of_sill * own.evaluate(points[some])
         return found
 
-    def _deviations(self, point: tuple[float, ...], seed: int) -> Values:
-        found = self._field_cached(seed).evaluate(np.array([point]))
-        return np.asarray(self._root_of_sill * found[0])
+    def _deviations(self, asked: Sequence[_SeedPoint]) -> list[Values]:
+        """Return the deviations (m,) at points of seeds, each as it is alone."""
+        found: dict[_SeedPoint, Values] = {}
+        # Takes of one seed come one after another, while its field is in the cache.
+        for seed, some in groupby(sorted(asked, key=_seed), key=_seed):
+            every = list(some)
+            for first in range(0, len(every), POINTS_TOGETHER):
+                cancellation.check()
+                part = every[first : first + POINTS_TOGETHER]
+                points = np.array([point for _, point in part])
+                values = self._root_of_sill * self._field_cached(seed).evaluate_each(points)
+                # Copied: a part of an array would keep the whole in memory.
+                found.update(zip(part, map(np.copy, values), strict=True))
+        return [found[each] for each in asked]
 
     @property
     def _count(self) -> int:

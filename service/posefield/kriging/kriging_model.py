@@ -94,8 +94,13 @@ class KrigingWeights:
         """Return the matrix (n + k, n) from covariances and drift functions to sample weights."""
         return weight_matrix(self.hyper, self.samples)
 
-    def weights(self, points: Points) -> PointSamples:
-        """Return the kriging weights (B, n) of the samples: they sum to one and may be negative."""
+    def weights(
+        self, points: Annotated[Floats, "*some points coordinates"]
+    ) -> Annotated[Floats, "*some points samples"]:
+        """Return the weights (..., B, n) of the samples at points (..., B, d + p).
+
+        They sum to one and may be negative.
+        """
         return basis_functions(self.hyper, points, self.samples) @ self.weight_matrix
 
     def distances(self, points: Points) -> PointSamples:
@@ -125,21 +130,22 @@ def squared_distances(
 
 
 def stationary_covariances(
-    hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
-) -> Annotated[Floats, "a b"]:
-    """Return the part (A, B) of the covariances that depends on the points' distance."""
-    found = COVARIANCE_MODELS[hyper.covariance](squared_distances(hyper, a, b))
+    hyper: Hyper, a: Annotated[Floats, "*some a coordinates"], b: Annotated[Floats, "b coordinates"]
+) -> Annotated[Floats, "*some a b"]:
+    """Return the part (..., A, B) of the covariances that depends on the points' distance."""
+    squares = squared_distances(hyper, a.reshape(-1, a.shape[-1]), b)
+    found = COVARIANCE_MODELS[hyper.covariance](squares).reshape(*a.shape[:-1], len(b))
     for own, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
         found = found * (own.correlation + (1.0 - own.correlation) * same)
     return found
 
 
 def label_products(
-    hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
-) -> list[Annotated[Floats, "a b"]]:
-    """Return the inner products (A, B) of the points' weights of each label set's names."""
+    hyper: Hyper, a: Annotated[Floats, "*some a coordinates"], b: Annotated[Floats, "b coordinates"]
+) -> list[Annotated[Floats, "*some a b"]]:
+    """Return the inner products (..., A, B) of the points' weights of each label set's names."""
     columns = label_columns(len(hyper.scales), hyper.label_counts)
-    return [a[:, own] @ b[:, own].T for own in columns]
+    return [a[..., own] @ b[:, own].T for own in columns]
 
 
 def label_columns(first: int, counts: Sequence[int]) -> list[slice]:
@@ -149,14 +155,14 @@ def label_columns(first: int, counts: Sequence[int]) -> list[slice]:
 
 
 def covariances(
-    hyper: Hyper, a: Annotated[Floats, "a coordinates"], b: Annotated[Floats, "b coordinates"]
-) -> Annotated[Floats, "a b"]:
-    """Return the covariances (A, B) between points (A, d + p) and (B, d + p)."""
+    hyper: Hyper, a: Annotated[Floats, "*some a coordinates"], b: Annotated[Floats, "b coordinates"]
+) -> Annotated[Floats, "*some a b"]:
+    """Return the covariances (..., A, B) between points (..., A, d + p) and (B, d + p)."""
     found, d = stationary_covariances(hyper, a, b), len(hyper.scales)
     for own, same in zip(hyper.labels, label_products(hyper, a, b), strict=True):
         found = found + own.offset * same
     if hyper.trend:
-        found = found + hyper.trend * (a[:, :d] @ b[:, :d].T)
+        found = found + hyper.trend * (a[..., :d] @ b[:, :d].T)
     return found
 
 
@@ -171,13 +177,15 @@ def prior_variances(hyper: Hyper, points: Points) -> PerPoint:
     return 1.0 + sum(own.offset for own in hyper.labels) + hyper.trend * squares
 
 
-def drift(points: Points, controls: int, degree: int) -> Annotated[Floats, "points functions"]:
-    """Return the drift functions (B, k) at points (B, d + p).
+def drift(
+    points: Annotated[Floats, "*some points coordinates"], controls: int, degree: int
+) -> Annotated[Floats, "*some points functions"]:
+    """Return the drift functions (..., B, k) at points (..., B, d + p).
 
     A constant, and for degree one also the controls.
     """
-    one = np.ones((len(points), 1))
-    return np.hstack([one, points[:, :controls]]) if degree else one
+    one = np.ones((*points.shape[:-1], 1))
+    return np.concatenate([one, points[..., :controls]], axis=-1) if degree else one
 
 
 def linear_functions(hyper: Hyper, points: Points) -> Annotated[Floats, "points linear"]:
@@ -220,11 +228,11 @@ def find_required_group(
 
 
 def basis_functions(
-    hyper: Hyper, points: Points, samples: Samples
-) -> Annotated[Floats, "points system"]:
-    """Return covariances with all samples and drift functions (B, n + k) at points (B, d + p)."""
+    hyper: Hyper, points: Annotated[Floats, "*some points coordinates"], samples: Samples
+) -> Annotated[Floats, "*some points system"]:
+    """Return covariances with all samples and drift functions (..., B, n + k) at points."""
     near = covariances(hyper, points, samples)
-    return np.hstack([near, drift(points, len(hyper.scales), max(hyper.drifts))])
+    return np.concatenate([near, drift(points, len(hyper.scales), max(hyper.drifts))], axis=-1)
 
 
 def noisy(hyper: Hyper, samples: Samples) -> SampleMatrix:

@@ -95,6 +95,19 @@ class ConditionalField:
         found = self.field.evaluate(points) - kriged + self.own[..., None, :]
         return np.asarray(np.round(found, VALUE_DECIMALS))
 
+    def evaluate_each(
+        self, points: Annotated[Floats, "points coordinates"]
+    ) -> Annotated[Floats, "points values"]:
+        """Return the deviations (B, m) of one seed at points (B, d + p), each as it is alone.
+
+        A product of matrices of several rows sums in another order than one of a single row; so
+        each point has a product of its own.
+        """
+        each = points[:, None]
+        kriged = self.weights.weights(each) @ self.errors
+        found = self.field.evaluate(each) - kriged + self.own
+        return np.asarray(np.round(found[:, 0], VALUE_DECIMALS))
+
 
 def draw_field(hyper: Hyper, seed: Seeds, count: int) -> RandomField:
     """Return independent fields (count) of a seed; ValueError without distribution of frequencies.

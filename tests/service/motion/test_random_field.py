@@ -142,3 +142,15 @@ def test_a_covariance_without_frequencies_is_refused(samples):
     assert not random_field.has_features(spherical)
     with pytest.raises(ValueError, match="spherical"):
         random_field.draw_field(spherical, 7, FIELDS)
+
+
+def test_points_that_are_evaluated_together_have_the_bits_that_each_has_alone(samples, places):
+    field = random_field.simulate(KrigingWeights(HYPER, samples), 7, FIELDS)
+    alone = np.concatenate([field.evaluate(place[None]) for place in places])
+    assert field.evaluate_each(places).tobytes() == alone.tobytes()
+    assert field.evaluate_each(places[3:5]).tobytes() == alone[3:5].tobytes()
+    # Rounding hides that one product of matrices sums in another order; its weights show it.
+    weights = KrigingWeights(HYPER, samples)
+    single = np.concatenate([weights.weights(place[None]) for place in places])
+    assert weights.weights(places[:, None])[:, 0].tobytes() == single.tobytes()
+    assert weights.weights(places).tobytes() != single.tobytes()
