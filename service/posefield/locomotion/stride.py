@@ -129,6 +129,21 @@ def synthesize_poses(
 ) -> RelativePoses:
     """Return the poses of controls (K, d), labels (K, p) and phases (K,) of the cycle, 0 to 1."""
     own = strides(session, controls, labels, level)
+    return poses_of_strides(session, (controls, labels), own, phases, level)
+
+
+def poses_of_strides(
+    session: Session,
+    who: tuple[PointControls, PointLabels],
+    own: Strides,
+    phases: PerPoint,
+    level: int = 0,
+) -> RelativePoses:
+    """Return what `synthesize_poses` does, of known cycles (K,).
+
+    who: controls (K, d) and labels (K, p).
+    """
+    controls, labels = who
     times = (phases * own.durations)[:, None]
     asked = ["rotations", "root_position"] + [graph_ports.CURVES] * bool(session.card.curves)
     rotations, roots, *curves = _run_batches(session, controls, times, labels, level, *asked)
@@ -165,13 +180,21 @@ def contact_probabilities(
     labels: PointLabels,
     phases: PerPoint,
     level: int = 0,
+    durations: PerPoint | None = None,
 ) -> Annotated[Floats, "points contacts"]:
-    """Return the probabilities (K, C) of the contacts on the card, at phases (K,) of the cycle."""
+    """Return the probabilities (K, C) of the contacts on the card, at phases (K,) of the cycle.
+
+    durations: of the cycles (K,), s, as of `strides`; computed if they are not known.
+    """
     found = np.empty((len(controls), len(session.card.contacts)))
     for rows in batches(len(controls)):
         cancellation.check()
         own, names = controls[rows], labels[rows]
-        times = phases[rows] * session.durations(own, labels=names, level=level)
+        if durations is None:
+            lasting = session.durations(own, labels=names, level=level)
+        else:
+            lasting = durations[rows]
+        times = phases[rows] * lasting
         (likely,) = session.run(
             own, times[:, None], graph_ports.CONTACTS, labels=names, level=level
         )

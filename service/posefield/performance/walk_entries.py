@@ -4,18 +4,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from posefield.common.value_cache import ValueCache
 from posefield.inference.takes import TakeSettings
 from posefield.locomotion import floor_plane
+from posefield.locomotion.stride import Strides
 from posefield.model_file.model_card import PERFORMER
 from posefield.performance.joins.cut_search import Cut
-from posefield.performance.passages.passage import RATE, FloorMotion
+from posefield.performance.passages.passage import RATE, FloorMotion, Passage
 from posefield.performance.script import Script, Source
 from posefield.performance.timeline import Timeline
 from posefield.performance.walks import standing_pose, walk_passage, walker
 from posefield.performance.walks.discs import Disc
 from posefield.performance.walks.walk_passage import SynthesisSettings
 from posefield.performance.walks.walk_request import WalkRequest
+from posefield.performance.walks.walker import Walker, WalkerKey
 from posefield.question.performance_question import PerformanceQuestion, Walk
+
+# Cycles by walker, speed and take, of 80 kB each: an edited script has the same walkers again.
+KEPT_CYCLES = 64
 
 
 @dataclass(frozen=True)
@@ -88,6 +94,31 @@ def _continued(timeline: Timeline, source: Source, request: WalkRequest) -> Walk
     return WalkEntry(own, plan.end, float(plan.phases[-1] % 1.0), continues=True)
 
 
+@dataclass(frozen=True)
+class SteadyCycle:
+    """One cycle of a walker straight ahead at one speed.
+
+    stride: of it. poses: of the model. offset: mean place of the root, in the frame that travels.
+    """
+
+    stride: Strides
+    poses: Passage
+    offset: complex
+
+
+_cycles: ValueCache[tuple[WalkerKey, float, SynthesisSettings], SteadyCycle] = ValueCache(
+    KEPT_CYCLES
+)
+
+
+def _cycle(source: Source, who: Walker, speed: float, settings: SynthesisSettings) -> SteadyCycle:
+    controls = who.controls(np.clip([speed], *source.gait.region.speeds), np.zeros(1))
+    stride = who.strides(controls)
+    frames = max(round(float(stride.durations[0]) * RATE), 8)
+    cycle = walk_passage.cycle_passage(source.model, who, controls[0], frames, settings)
+    return SteadyCycle(stride, cycle, complex(who.mean_offsets(controls)[0]))
+
+
 def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
     """Return how a walk begins: at the start of the script, or at the phase most like the exit."""
     own, source = walk_of(script, index)
@@ -109,17 +140,16 @@ def find_entry(timeline: Timeline, script: Script, index: int) -> WalkEntry:
         at_rest = replace(still, motion=FloorMotion())
         return WalkEntry(request, still.motion.after(begin), first, at_rest)
     speed = request.speed if isinstance(request.speed, float | int) else request.speed[0][1]
-    controls = who.controls(np.clip([speed], *source.gait.region.speeds), np.zeros(1))
-    stride = who.strides(controls)
-    frames = max(round(float(stride.durations[0]) * RATE), 8)
-    cycle = walk_passage.cycle_passage(
-        source.model, who, controls[0], frames, synthesis_settings(script.question)
+    settings = synthesis_settings(script.question)
+    own_cycle = _cycles.find(
+        (who.key, float(speed), settings), lambda: _cycle(source, who, speed, settings)
     )
-    cut = timeline.find_cut(script.adapted(index, cycle), range(frames))
+    stride, frames = own_cycle.stride, len(own_cycle.poses)
+    cut = timeline.find_cut(script.adapted(index, own_cycle.poses), range(frames))
     phase = cut.entry / frames
     turned = phase * float(stride.turns[0])
     travelled = floor_plane.arc_displacement(phase * stride.travels[0], np.array(turned))
-    offset = who.mean_offsets(controls)[0]
+    offset = own_cycle.offset
     # The path of a walk is that of the mean root, and runs the way it travels.
     place = complex(travelled + np.exp(1j * turned) * offset)
     local = FloorMotion(turned + float(stride.drifts[0]), place)

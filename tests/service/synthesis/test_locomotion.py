@@ -223,3 +223,15 @@ def test_the_root_alone_is_where_it_is_in_whole_poses_bit_for_bit(own, count):
     assert found.tobytes() == posed.places.reshape(count, 8).tobytes()
     later = stride.synthesize_poses(opened, controls[rows], labels[rows], np.roll(whole, 1))
     assert found.tobytes() != later.places.tobytes()
+
+
+def test_contacts_at_known_durations_are_the_same_bit_for_bit(own):
+    opened, phases = own.session, np.arange(9) / 9
+    controls = np.array(opened.card.examples[:3]).repeat(3, axis=0)
+    labels = np.zeros((9, len(opened.card.clip_labels[0])))
+    done = stride.strides(opened, controls, labels)
+    found = stride.contact_probabilities(opened, controls, labels, phases)
+    known = stride.contact_probabilities(opened, controls, labels, phases, 0, done.durations)
+    assert known.tobytes() == found.tobytes()
+    longer = stride.contact_probabilities(opened, controls, labels, phases, 0, 1.1 * done.durations)
+    assert longer.tobytes() != found.tobytes()

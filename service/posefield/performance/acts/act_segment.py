@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
-from posefield.feet import contact_estimates
+from posefield.feet import contact_estimates, limbs
 from posefield.feet.stances import FootPath
 from posefield.inference.graph_ports import CONTACTS
 from posefield.locomotion import floor_plane
@@ -141,11 +141,14 @@ def _contacts(
             labels=question.labels,
             level=question.level,
         )
-    moved = skeleton.translations(answer.bone_offsets, answer.root_position)
-    paths = skeleton.positions(card.skeleton.parents, answer.rotations, moved)
+    others = [joint for joint in card.feet if joint not in known]
+    # Without a foot to detect, no joint is placed.
+    moved = answer.bone_offsets, others, answer.rotations, answer.root_position
+    placed = limbs.evaluate_joints(card.skeleton.parents, *moved) if others else None
     for foot, joint in enumerate(card.feet):
         if joint in known:
             found[:, foot] = likely[0][:, known[joint]]
-        else:
-            found[:, foot] = contact_estimates.detect(FootPath(paths[:, joint], RATE))
+        elif placed is not None:
+            path = FootPath(placed.position(joint), RATE)
+            found[:, foot] = contact_estimates.detect(path)
     return found

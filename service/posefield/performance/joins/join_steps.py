@@ -18,7 +18,7 @@ from posefield.locomotion import floor_plane
 from posefield.motion.contacts import contact_detection
 from posefield.motion.foot_contacts import FootContact
 from posefield.performance.joins.cut_search import Cut
-from posefield.performance.passages.passage import RATE, Passage
+from posefield.performance.passages.passage import RATE, Passage, concatenate
 
 FARTHEST = 0.05
 """Distance over the floor by which a foot that stands on both sides may be moved, m."""
@@ -52,7 +52,7 @@ def on_floor(
     by the median over the frames in which a foot stands, and the mean over its feet. contacts: of
     the character's legs. floor: its height, m.
     """
-    heights = _balls(character, passage, 0, len(passage)) @ UP
+    heights = _balls(character, passage) @ UP
     down = np.round(passage.contacts, DECIMALS) > STANDING
     above = [
         float(np.median(ball[own])) - foot.height - floor
@@ -74,9 +74,14 @@ def add_steps(
     it has come near the ground and its place.
     """
     end = min(cut.exit + round((LANDING + 2.0 * (SWING + SUPPORT)) * RATE), len(joined))
-    own = _balls(character, before, cut.exit, cut.exit + 1)[0]
-    there = _balls(character, after, cut.entry, cut.entry + end - cut.exit)
-    shown = _balls(character, joined, cut.exit, cut.exit + len(there))
+    left, right = (
+        before.part(cut.exit, cut.exit + 1),
+        after.part(cut.entry, cut.entry + end - cut.exit),
+    )
+    made = joined.part(cut.exit, cut.exit + len(right))
+    # All at once: for so few poses each call takes longer than the poses.
+    every = _balls(character, concatenate(left, right, made))
+    own, there, shown = every[0], every[1 : 1 + len(right)], every[1 + len(right) :]
     stands = [_standing(side, at) for side, at in ((before, cut.exit), (after, cut.entry))]
     contacts = joined.contacts.copy()
     landed = cut.exit
@@ -97,16 +102,14 @@ def add_steps(
     return replace(joined, contacts=contacts), tuple(steps)
 
 
-def _balls(
-    character: Character, passage: Passage, begin: int, end: int
-) -> Annotated[Floats, "frames feet 3"]:
-    """Return the paths of the joints that contact, of frames `begin` until before `end`."""
-    tips, rows = [leg.tip for leg in character.legs], slice(begin, end)
+def _balls(character: Character, passage: Passage) -> Annotated[Floats, "frames feet 3"]:
+    """Return the paths of the joints that contact."""
+    tips = [leg.tip for leg in character.legs]
     poses = limbs.evaluate_joints(
-        character.parents, character.bones, tips, passage.rotations[rows], passage.roots[rows]
+        character.parents, character.bones, tips, passage.rotations, passage.roots
     )
     balls = [poses.position(tip) for tip in tips]
-    return np.stack(balls, axis=1) if balls else np.zeros((len(passage.roots[rows]), 0, 3))
+    return np.stack(balls, axis=1) if balls else np.zeros((len(passage), 0, 3))
 
 
 def _standing(passage: Passage, frame: int) -> Annotated[Booleans, "feet"]:

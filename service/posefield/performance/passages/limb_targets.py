@@ -240,6 +240,8 @@ def _share(frames: Frames, own: WorldTarget, before: float, after: float) -> Fra
 def _miss(character: Character, passage: Passage, own: WorldTarget) -> float:
     """Return the largest distance of a joint from its target while it holds, m."""
     part = passage.part(own.begin, min(own.end + 1, len(passage)))
-    moved = skeleton.translations(character.bones, part.roots)
-    found = skeleton.positions(character.parents, part.rotations, moved)[:, own.joint]
+    placed = limbs.evaluate_joints(
+        character.parents, character.bones, [own.joint], part.rotations, part.roots
+    )
+    found = placed.position(own.joint)
     return float(np.linalg.norm(found - own.position, axis=-1).max())

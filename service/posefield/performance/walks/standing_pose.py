@@ -23,7 +23,7 @@ from posefield.locomotion.stride import RelativePoses
 from posefield.motion import blend, quat, skeleton
 from posefield.motion.foot_contacts import FootContact
 from posefield.performance.passages.passage import FloorMotion
-from posefield.performance.walks.walker import Walker
+from posefield.performance.walks.walker import Walker, WalkerKey
 from posefield.synthesis import walking_feet
 
 PHASES = 30
@@ -82,13 +82,10 @@ class StandingPose:
 
 def find_standing_pose(walker: Walker) -> StandingPose | None:
     """Return the standing pose of a walker; None for a model without two feet that step in turn."""
-    given = tuple(sorted(walker.given.items()))
-    key = walker.gait.session.digest, walker.weights.tobytes(), walker.offset.tobytes(), given
-    return _kept.find(key, lambda: _made(walker))
+    return _kept.find(walker.key, lambda: _made(walker))
 
 
-_Key = tuple[str, bytes, bytes, tuple[tuple[int, float], ...]]
-_kept: ValueCache[_Key, StandingPose | None] = ValueCache(KEPT)
+_kept: ValueCache[WalkerKey, StandingPose | None] = ValueCache(KEPT)
 
 
 def _made(walker: Walker) -> StandingPose | None:

@@ -9,7 +9,7 @@ from posefield.common.array_shapes import PerPoint, PointControls
 from posefield.common.units import Floats
 from posefield.inference.takes import TakeSettings
 from posefield.locomotion import floor_plane, stride
-from posefield.locomotion.stride import RelativePoses
+from posefield.locomotion.stride import RelativePoses, Strides
 from posefield.performance.passages.passage import Passage
 from posefield.performance.walks import standing_steps
 from posefield.performance.walks.standing_pose import StandingPose
@@ -43,12 +43,13 @@ def walk_passage(
     are those of the plan, wrapped.
     """
     phases = plan.phases % 1.0
-    posed = _poses(model, plan.walker, plan.controls, phases, settings)
+    done = plan.walker.strides(plan.controls, settings.level)
+    posed = _poses(model, plan.walker, plan.controls, done, (phases, settings))
     places = plan.places + posed.places * np.exp(1j * plan.headings)
     walked = Passage(
         floor_plane.turn_roots(posed.rotations, plan.headings),
         floor_plane.at_height(places, posed.heights),
-        _contacts(model, plan.walker, plan.controls, phases, settings.level),
+        _contacts(model, plan.walker, plan.controls, done, (phases, settings)),
         _sigmas(model, plan.walker, plan.controls),
         phases,
     )
@@ -72,14 +73,15 @@ def cycle_passage(
     rows = np.repeat(controls[None], frames, axis=0)
     phases = np.arange(frames) / frames
     own = walker.strides(controls[None], settings.level)
-    posed = _poses(model, walker, rows, phases, settings)
+    done = walker.strides(rows, settings.level)
+    posed = _poses(model, walker, rows, done, (phases, settings))
     turned = phases * own.turns
     places = floor_plane.arc_displacement(phases * own.travels, turned)
     places = places + posed.places * np.exp(1j * turned)
     return Passage(
         floor_plane.turn_roots(posed.rotations, turned),
         floor_plane.at_height(places, posed.heights),
-        _contacts(model, walker, rows, phases, settings.level),
+        _contacts(model, walker, rows, done, (phases, settings)),
         _sigmas(model, walker, rows),
         phases,
     )
@@ -100,13 +102,14 @@ def _poses(
     model: Synthesizer,
     walker: Walker,
     controls: PointControls,
-    phases: PerPoint,
-    settings: SynthesisSettings,
+    own: Strides,
+    asked: tuple[PerPoint, SynthesisSettings],
 ) -> RelativePoses:
+    """Return the poses (F) at controls (F, d), whose strides are known, and at phases (F,)."""
+    phases, settings = asked
     labels, level, take = walker.labels(len(controls)), settings.level, settings.take
     if take is None:
-        return stride.synthesize_poses(model.session, controls, labels, phases, level)
-    own = walker.strides(controls, level)
+        return stride.poses_of_strides(model.session, (controls, labels), own, phases, level)
     count = len(controls)
     takes = CharacterTakes(
         np.full(count, take.seed), np.full(count, take.variety), np.full(count, take.detail)
@@ -117,14 +120,21 @@ def _poses(
 
 
 def _contacts(
-    model: Synthesizer, walker: Walker, controls: PointControls, phases: PerPoint, level: int
+    model: Synthesizer,
+    walker: Walker,
+    controls: PointControls,
+    own: Strides,
+    asked: tuple[PerPoint, SynthesisSettings],
 ) -> Annotated[Floats, "frames feet"]:
+    """Return the probabilities (F, K) of the feet's contacts; arguments as for `_poses`."""
     card = model.session.card
     feet = walking_feet.foot_contacts(card)
     if not feet:
         return np.zeros((len(controls), 0))
-    labels = walker.labels(len(controls))
-    found = stride.contact_probabilities(model.session, controls, labels, phases, level)
+    labels, (phases, settings) = walker.labels(len(controls)), asked
+    found = stride.contact_probabilities(
+        model.session, controls, labels, phases, settings.level, own.durations
+    )
     return np.clip(found[:, [card.contacts.index(own) for own in feet]], 0.0, 1.0)
 
 

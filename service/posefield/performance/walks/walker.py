@@ -28,6 +28,9 @@ AVERAGED_PHASES, MEASURED_PHASES = 16, 60
 SPEED_TOLERANCE = 0.03
 
 
+WalkerKey = tuple[str, bytes, bytes, tuple[tuple[int, float], ...]]
+
+
 @dataclass(frozen=True)
 class Walker:
     """One walker.
@@ -45,6 +48,12 @@ class Walker:
     def card(self) -> ModelCard:
         """Card of the model."""
         return self.gait.session.card
+
+    @property
+    def key(self) -> WalkerKey:
+        """Key of values that follow from the walker alone."""
+        given = tuple(sorted(self.given.items()))
+        return self.gait.session.digest, self.weights.tobytes(), self.offset.tobytes(), given
 
     def is_same(self, other: "Walker") -> bool:
         """Return whether another walker has the same labels and given controls."""
