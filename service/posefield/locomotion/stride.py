@@ -191,10 +191,9 @@ def contact_probabilities(
         cancellation.check()
         own, names = controls[rows], labels[rows]
         if durations is None:
-            lasting = session.durations(own, labels=names, level=level)
+            times = phases[rows] * session.durations(own, labels=names, level=level)
         else:
-            lasting = durations[rows]
-        times = phases[rows] * lasting
+            times = phases[rows] * durations[rows]
         (likely,) = session.run(
             own, times[:, None], graph_ports.CONTACTS, labels=names, level=level
         )
