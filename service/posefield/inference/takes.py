@@ -48,7 +48,7 @@ class TakeSettings:
     detail: bool
 
 
-_SeedPoint = tuple[int, tuple[float, ...]]
+_SeedPoint = tuple[int, bytes]
 
 
 def _seed(asked: _SeedPoint) -> int:
@@ -73,10 +73,11 @@ class TakeSampler:
         """
         limited = np.asarray(self._session.bounds.limit(controls), np.float64)
         points = kriging_model.half_ranges(limited, *self._session.card.sampled_ranges)
-        rows = np.hstack([points, labels]).tolist()
+        rows = np.hstack([points, labels])
         found = np.zeros((len(rows), self._count))
         varied = np.flatnonzero(seeds).tolist()
-        keys = [(int(seeds[place]), tuple(rows[place])) for place in varied]
+        # As bytes, whose hash is computed once.
+        keys = [(int(seeds[place]), rows[place].tobytes()) for place in varied]
         if keys:
             found[varied] = self._deviations_kept.find_all(keys, self._deviations)
         return found
@@ -113,7 +114,7 @@ class TakeSampler:
             for first in range(0, len(every), POINTS_TOGETHER):
                 cancellation.check()
                 part = every[first : first + POINTS_TOGETHER]
-                points = np.array([point for _, point in part])
+                points = np.array([np.frombuffer(point) for _, point in part])
                 values = self._root_of_sill * self._field_cached(seed).evaluate_each(points)
                 # Copied: a part of an array would keep the whole in memory.
                 found.update(zip(part, map(np.copy, values), strict=True))
