@@ -24,6 +24,8 @@ FPS = 60.0
 MOST_FRAMES = 100_000
 MOST_PEAK = 3.0
 """A frame jumps if its acceleration exceeds the usual one by this factor."""
+FAST = "of captured clips of the model"
+"""Words of the warning about an act that is faster than captured clips."""
 CAPTURED_PEAK = 16.0
 """Largest mean acceleration of captured walking, m/s². Away from joins, a frame with no larger one
 does not jump: feet of slow walkers land as suddenly as those of fast ones."""
@@ -278,6 +280,10 @@ def _jumps(answer: PerformanceAnswer, found: Frames) -> Iterator[str]:
     usual = max((own.usual for own in joins), default=float(np.percentile(found, 99.0)))
     times = np.arange(len(found)) / answer.clip.rate
     free = np.ones(len(found), dtype=bool)
+    flagged = {own.pointer for own in answer.trust.script_warnings if FAST in own.message}
+    for index, segment in enumerate(answer.trust.segments):
+        if f"/segments/{index}" in flagged:
+            free &= (times < segment.begins) | (times > segment.ends)
     for own in joins:
         near = (times >= own.time - BEFORE) & (times <= own.time + AFTER)
         free &= ~near

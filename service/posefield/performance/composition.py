@@ -72,7 +72,22 @@ def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> Seq
     for made, facts in zip(timeline.joins, found, strict=True):
         if facts.hard:
             timeline.warn(f"/segments/{made.segment}", "; ".join(facts.reasons))
+    _judge_acts(script, composed, every)
     return found
+
+
+def _judge_acts(script: Script, composed: Composed, every: PlacedFrames) -> None:
+    """Warn of acts that are faster than captured clips, as extrapolated ones may be."""
+    timeline = composed.timeline
+    ends = [*(span.begin for span in timeline.spans[1:]), len(timeline.done)]
+    for index, (span, end) in enumerate(zip(timeline.spans, ends, strict=True)):
+        if span.kind != "act" or not timeline.captured:
+            continue
+        frames = (span.begin - timeline.begin, end - timeline.begin)
+        body, captured = script.character.body, timeline.captured[index]
+        said = join_quality.judge_act(body, every, frames, captured)
+        if said:
+            timeline.warn(f"/segments/{index}", said)
 
 
 def plan_document(report: PerformanceReport) -> bytes:

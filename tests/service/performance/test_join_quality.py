@@ -7,7 +7,7 @@ import pytest
 from passages import PARENTS, character, smooth
 
 from posefield.feet.foot_placement import PlacedFrames
-from posefield.motion import skeleton
+from posefield.motion import quat, skeleton
 from posefield.performance.joins import blends, cut_search, join_quality
 from posefield.performance.joins.join_quality import CutFacts, JoinFacts, UsualMotion
 from posefield.performance.passages.passage import RATE, FloorMotion
@@ -84,6 +84,50 @@ def test_the_peak_is_that_of_the_frames_near_the_join():
     # Negative control: the largest one of all is not near every frame.
     assert peak(120, 0) != pytest.approx(every.max())
     assert peak(2, 0) == 0.0
+
+
+def twitching(frame, frames=160):
+    """A still character whose joints turn in one frame."""
+    still = smooth(1, 1)
+    rotations = np.repeat(still.rotations, frames, axis=0)
+    rotations[frame] = smooth(2, 1).rotations[0]
+    return PlacedFrames(rotations, np.repeat(still.roots, frames, axis=0))
+
+
+def test_an_act_that_is_faster_than_captured_clips_is_told():
+    said = join_quality.judge_act(character(), twitching(30), (0, 160), 4.0)
+    assert (
+        said.startswith("joints accelerate by ") and " m/s2 at 0.50 s, expected at most 3" in said
+    )
+    assert said.endswith("times the 4.0 m/s2 of captured clips of the model")
+    # Negative controls: clips as fast as the act, and frames of another segment.
+    assert not join_quality.judge_act(character(), twitching(30), (0, 160), 1e5)
+    assert not join_quality.judge_act(character(), twitching(30), (60, 160), 4.0)
+    assert not join_quality.judge_act(character(), twitching(30), (28, 34), 4.0)
+
+
+def starting(frame, frames=160):
+    """A character whose root's children start to turn at a frame, and then turn evenly."""
+    angles = 0.02 * np.maximum(np.arange(frames) - frame, 0.0)
+    rotations = np.repeat(smooth(1, 1).rotations, frames, axis=0)
+    turned = quat.exp(np.stack([angles, 0.0 * angles, 0.0 * angles], axis=1))
+    rotations[:, 0] = quat.mul(turned, rotations[:, 0])
+    return PlacedFrames(rotations, np.zeros((frames, 3)))
+
+
+def test_each_frame_of_an_act_counts_for_it_or_for_its_joins():
+    joins = [(40, CUT), (120, CUT)]
+    (start,) = join_quality.judge(character(), [(60, CUT)], starting(60))
+    captured = start.peak / 2.0 / join_quality.MOST_PEAK
+    told = []
+    for frame in range(34, 156):
+        sent = starting(frame)
+        peaks = [facts.peak for facts in join_quality.judge(character(), joins, sent)]
+        act = bool(join_quality.judge_act(character(), sent, (40, 120), captured))
+        told.append((act, max(peaks) > start.peak / 2.0))
+    # Each start is seen once: no frame lies between, and none counts twice.
+    assert all(act != join for act, join in told)
+    assert 0 < sum(act for act, _ in told) < len(told)
 
 
 @pytest.mark.parametrize(

@@ -138,11 +138,39 @@ def judge(
     return [JoinFacts(cut, _peak(character, sent, frame)) for frame, cut in joins]
 
 
+def judge_act(
+    character: Character, sent: PlacedFrames, frames: tuple[int, int], captured: float
+) -> str:
+    """Return a warning about an act that is faster than captured clips of its model; else "".
+
+    sent: all frames of the performance, at `RATE`. frames: of the act, from its begin until before
+    its end; those near joins count as the joins'. captured: 99th percentile of the accelerations
+    of captured clips, m/s².
+    """
+    # The first and the last one of these frames have no acceleration of their own.
+    begin = frames[0] + round(AFTER * RATE) if frames[0] else 0
+    end = frames[1] - round(BEFORE * RATE) + 1 if frames[1] < len(sent.roots) else frames[1]
+    found = _accelerations(character, sent, slice(begin, max(end, begin)))
+    peak = float(found.max(initial=0.0))
+    if peak <= MOST_PEAK * captured:
+        return ""
+    time = (begin + 1 + int(np.argmax(found))) / RATE
+    return (
+        f"joints accelerate by {peak:.0f} m/s2 at {time:.2f} s, expected at most {MOST_PEAK:g}"
+        f" times the {captured:.1f} m/s2 of captured clips of the model"
+    )
+
+
 def _peak(character: Character, sent: PlacedFrames, frame: int) -> float:
     """Return the largest acceleration near a frame, m/s², as `JoinFacts.peak` is."""
     first = max(frame - round(BEFORE * RATE) - 1, 0)
-    rows = slice(first, frame + round(AFTER * RATE) + 2)
+    found = _accelerations(character, sent, slice(first, frame + round(AFTER * RATE) + 2))
+    return float(found.max(initial=0.0))
+
+
+def _accelerations(character: Character, sent: PlacedFrames, rows: slice) -> Frames:
+    """Return the mean accelerations of some frames without the first and the last one, m/s²."""
     rotations, roots = sent.rotations[rows], sent.roots[rows]
     count = len(roots)
     passage = Passage(rotations, roots, np.zeros((count, 0)), np.zeros(count))
-    return float(accelerations(character, passage, 0, count).max(initial=0.0))
+    return accelerations(character, passage, 0, count)
