@@ -163,3 +163,10 @@ def test_components_keep_most_of_the_variance():
     kept = np.var((values - mean) @ basis, axis=0).sum() / np.var(values, axis=0).sum()
     assert basis.shape == (6, 3) and kept >= 0.9
     np.testing.assert_allclose(basis.T @ basis, np.eye(3), atol=1e-12)
+
+
+def test_an_example_may_end_with_its_take(corpus):
+    seconds = (len(corpus.takes[0]) - 1) / corpus.takes[0].rate
+    for end in (seconds, seconds + 0.04):
+        found = example_search.find_like(corpus, [Span(0, seconds - 2.0, end)], 3)
+        assert len(found) == 3 and np.isfinite([match.cost for match in found]).all()

@@ -62,10 +62,13 @@ class JoinedFeatures:
         return float(self.values[self.owners >= 0].var(axis=0).sum())
 
     def frames(self, span: Span) -> slice:
-        """Return the frames of a part of a take."""
+        """Return the frames of a part of a take; its end may lie beyond the last one."""
         offset = self.offsets[span.take]
         first, last = (offset + round(time * SEARCH_RATE) for time in (span.start, span.end))
-        return slice(first, last + 1)
+        ends = (
+            len(self.owners) if span.take + 1 == len(self.offsets) else self.offsets[span.take + 1]
+        )
+        return slice(first, min(last + 1, ends - GAP))
 
     def clip(self, span: Span) -> Floats:
         """Return the features (L, k) of a part of a take."""

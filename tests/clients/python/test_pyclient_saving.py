@@ -13,6 +13,7 @@ import scripted
 from posefield_client import NEVER, AsyncClient, Client, Progress, Retry, archives, errors
 from posefield_client.archives import Counter
 from posefield_client.files import CLIP
+from posefield_client.generated import ManifestEntry
 from scripted import Pause, answer, chunked
 
 USDC = "model/vnd.usdc"
@@ -227,18 +228,18 @@ def test_files_are_counted_in_pieces_of_any_size(size, archive):
 
 def test_an_archive_that_breaks_off_anywhere_is_seen(archive, rng):
     ending, content = archive
-    assert len(archives.check(io.BytesIO(content), ending, 3)) == 3
+    assert len(archives.check(io.BytesIO(content), ending, 3, ManifestEntry)) == 3
     # After its last file a tar is but zeros.
     last = len(content) if ending == "zip" else content.rindex(b"}\n")
     for end in [0, 1, last - 1, *rng.integers(0, last, 40)]:
         with pytest.raises(errors.IncompleteAnswer):
-            archives.check(io.BytesIO(content[:end]), ending, 3)
+            archives.check(io.BytesIO(content[:end]), ending, 3, ManifestEntry)
 
 
 def test_an_archive_of_fewer_clips_is_not_whole(archive):
     ending, content = archive
     with pytest.raises(errors.IncompleteAnswer, match="holds 4 files, expected 5"):
-        archives.check(io.BytesIO(content), ending, 4)
+        archives.check(io.BytesIO(content), ending, 4, ManifestEntry)
 
 
 @BOTH
