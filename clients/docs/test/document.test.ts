@@ -74,7 +74,10 @@ test("bodies hold what is needed and nothing else", () => {
   const act = { segments: [{ kind: "act", model: MODEL.name, controls: CONTROLS }] };
   assert.deepEqual(found.get("/v1/performances"), act);
   const scripts = [{ name: "first", ...act }];
-  assert.deepEqual({ ...found.get("/v1/performances/batch"), format: "usdc" }, { format: "usdc", scripts });
+  assert.deepEqual(
+    { ...found.get("/v1/performances/batch"), format: "usdc" },
+    { format: "usdc", scripts },
+  );
   const gait = bodies(withExamples(CONTRACT, { ...MODEL, cyclic: true }));
   const walk = { segments: [{ kind: "walk", model: MODEL.name, seconds: 2 }] };
   assert.deepEqual(gait.get("/v1/performances.{format}"), walk);

@@ -109,7 +109,7 @@ def discover(
     families: FamilyOptions,
     json: Json = False,
 ) -> None:
-    """Find families of motions in long takes and write recipes, or a table of clips.
+    """Find families or clips in long takes, for recipes.
 
     Without --strides and --like, each family gets a recipe, which posefield train refuses until
     posefield review or an editor accepts it. In a table, each row has `accepted` false until a
