@@ -57,7 +57,7 @@ def review(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Accept, reject and merge the families of a folder of recipes, and drop clips.
+    """Accept, reject and merge found families, and drop clips.
 
     posefield train takes the recipes that are accepted. The same decisions again change nothing.
     """

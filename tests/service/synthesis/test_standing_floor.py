@@ -58,8 +58,8 @@ def test_feet_stand_on_a_slope(walker, floor):
         path = positions[inside, names.index(stance.joint)]
         assert np.abs(path - stance.position).max(initial=0.0) < 2e-6
     assert told.left == () and told.drift < 1e-6
-    # Feet skate no more than on a level floor, where low swings count a little.
-    assert told.skate < min(1.1 * level.trust.feet.skate, told.skate_before)
+    # On a slope a clip is no loop: the low parts of the swings at its ends count as skate.
+    assert told.skate < min(0.01, told.skate_before)
     heights, flat = (
         (feet[..., 1] - ground.heights(feet)).min()
         for feet, ground in (
