@@ -37,8 +37,13 @@ test("the graphics card is given back what a model took", async () => {
   await settled(page);
   const alive: number[] = [];
   for (let round = 0; round < 3; round++) {
-    for (const model of ["cmu_walk", "reaching"]) {
+    for (const [model, control] of [
+      ["cmu_walk", "speed"],
+      ["reaching", "target_height"],
+    ] as const) {
       await page.getByLabel("Model", { exact: true }).selectOption(model);
+      // A view that is chosen before the model is shown is that of the model before it.
+      await page.locator(`[data-control="${control}"]`).waitFor();
       await page.getByRole("button", { name: "Compare all" }).click();
       await page.locator(".levels-now", { hasText: "px" }).first().waitFor();
       await page.getByRole("button", { name: "Crowd" }).click();
