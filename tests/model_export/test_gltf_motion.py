@@ -51,7 +51,7 @@ def places(file):
 
 
 def hand():
-    """Where the lower joint of the swinging arm stands, (F, 3)."""
+    """Return the positions (F, 3) of the lower joint of the swinging arm."""
     return quat.rotate(swing(), np.broadcast_to(Y, (FRAMES, 3)))
 
 

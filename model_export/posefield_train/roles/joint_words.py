@@ -56,7 +56,7 @@ LIMB_WORDS: dict[str, dict[str, float]] = {
     "Foot": {"foot": 1.0, "ankle": 0.9},
     "Toes": {**dict.fromkeys(("toes", "toe", "toebase", "ball"), 1.0), "foot": 0.4},
 }
-"""How well a word names the joint of a role, 0 to 1, by role without its side.
+"""Scores of words that name the joint of a role, 0 to 1, by role without its side.
 
 Fingers are no role: they tell whether a joint before them is the hand.
 """

@@ -96,7 +96,7 @@ def test_a_join_that_is_not_hard_has_no_warning(walk):
 
 
 def test_only_feet_as_they_are_sent_count(walk):
-    """What the plan of a performance finds hard is no warning of the answer, nor the reverse."""
+    """A plan warns of its own peaks, and a performance of those with placed feet."""
     script = resolved([WALK, HOLD, CUT], {"walk": known(walk, 10.0)})
     planned = composition.plan(script, MAX_FRAMES)
     sent = composition.perform(script, MAX_FRAMES).trust

@@ -146,7 +146,7 @@ def test_a_closing_step_lifts_one_foot_and_stands_on_the_other():
     moved = np.linalg.norm(np.diff(feet[:, :, [0, 2]], axis=0), axis=-1).sum(axis=0)
     assert moved[1 - swinging] < 0.03
     assert moved[swinging] > 0.3
-    # It comes to rest.
+    # At the end neither the root nor the feet move.
     assert np.linalg.norm(np.diff(made.roots[-3:], axis=0), axis=-1).max() * RATE < 0.03
     assert np.abs(feet[-5:] - feet[-1]).max() < 1e-3
 

@@ -99,9 +99,9 @@ def come_to_rest(before: Passage) -> Passage:
 
 
 def rest_frame(frames: int, frame: int) -> int:
-    """Return the frame of a passage that has come to rest which shows best one of it before.
+    """Return the frame of a slowed passage that is nearest to a frame of the original one.
 
-    frames: number of them before it comes to rest.
+    frames: number of frames of the original passage.
     """
     places = _slowed_places(frames)
     begin = frames - 1 - len(places) // 2
@@ -111,7 +111,7 @@ def rest_frame(frames: int, frame: int) -> int:
 
 
 def _slowed_places(frames: int) -> Frames:
-    """Return the fractional frames (S,) that a passage of F frames shows while it comes to rest."""
+    """Return the fractional frames (S,) at which a passage of F frames is sampled as it slows."""
     shown = min(REST_FRAMES // 2, frames - 1)
     if not shown:
         return np.zeros(0)

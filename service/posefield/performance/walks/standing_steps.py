@@ -1,7 +1,8 @@
 """Opening and closing steps: a walk begins and ends with its feet beside each other.
 
-While one foot stands, the other one swings to its place beside it, the root comes to rest over
-both, and the pose becomes the standing pose. An opening step is a closing step backwards in time.
+In a closing step one foot stands, and the other one swings to a place beside it. Meanwhile the root
+slows down until it is at rest over both feet, and the pose is blended into the standing pose. An
+opening step is a closing step backwards in time.
 """
 
 from dataclasses import dataclass, replace

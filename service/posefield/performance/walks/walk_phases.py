@@ -20,7 +20,7 @@ that is long enough, and of a shorter one."""
 SCALED_CYCLES = 2.0
 """Smallest number of cycles before a stop over which strides are scaled, of those there are."""
 SYNTHESISED = "synthesised"
-"""How the codes of notes begin that only say how something was made."""
+"""First word of the codes of notes about motion that no capture shows."""
 
 Phases = Annotated[Floats, "phases"]
 
