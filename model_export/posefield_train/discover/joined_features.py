@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Indices
 from posefield_train.discover import subsequence_dtw
 from posefield_train.discover.motion_features import SEARCH_RATE, Corpus
 from posefield_train.discover.subsequence_dtw import Ends
@@ -53,7 +52,7 @@ class JoinedFeatures:
     """
 
     values: Floats
-    owners: NDArray[np.int64]
+    owners: Indices
     offsets: tuple[int, ...]
 
     @cached_property

@@ -8,11 +8,9 @@ section 4.4). No step stays in a frame of the query, so that a row depends on ea
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posefield.common.units import Floats
+from posefield.common.units import Floats, Indices
 
-Indices = NDArray[np.int64]
 STEPS = ((1, 1), (1, 2), (2, 1))
 """Frames of query and corpus by which a match advances."""
 
