@@ -52,13 +52,21 @@ def _clicked(node: Path, address: str, models: Path) -> list[str]:
         "POSEFIELD_MODELS": str(models),
         "POSEFIELD_COMMAND": str(Path(sys.executable).with_name("posefield")),
     }
-    # One after the other: they measure.
+    return [f"page: {file.name}" for file in tests if not _passed(node, file, told)]
+
+
+def _passed(node: Path, file: Path, told: dict[str, str]) -> bool:
+    """Whether the tests of a file pass, at the first or the second try."""
+    # One after the other: they measure. A browser that draws with the processor, beside other work,
+    # may miss a wait of some seconds; what fails twice is a fault, and what fails once is said.
     options = ("--test-concurrency=1", "--test-timeout=300000", "--test-reporter=spec")
-    command = [node, "--test", *options, *tests]
-    done = subprocess.run(command, cwd=CLIENTS, env=os.environ | told, text=True)
-    return [f"page: {len(tests)} files of tests ended with {done.returncode}"] * bool(
-        done.returncode
-    )
+    command = [node, "--test", *options, file]
+    for _ in range(2):
+        done = subprocess.run(command, cwd=CLIENTS, env=os.environ | told, text=True)
+        if done.returncode == 0:
+            return True
+        print(f"page: {file.name} ended with {done.returncode}", flush=True)
+    return False
 
 
 if __name__ == "__main__":

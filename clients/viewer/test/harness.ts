@@ -1,6 +1,6 @@
 /** A browser and the page in it; POSEFIELD_URL says where a service runs, CHROMIUM what to start. */
 
-import { type Browser, chromium, type Page } from "playwright-core";
+import { type Browser, chromium, type Page, type Request } from "playwright-core";
 
 // As on a machine without a graphics card: the processor draws, and puts the page together by itself
 // (through SwiftShader too that took 60 ms a frame).
@@ -24,11 +24,13 @@ export function browser(): Promise<Browser> {
   });
 }
 
-/** The page at that address (`/` and a hash); `faults` gathers what goes wrong in it unnoticed. */
+/** The page at that address (`/` and a hash); `faults` gathers what goes wrong in it unnoticed, and
+ * `heard` is told each request from the first on. */
 export async function opened(
   from: Browser,
   path = "/",
   size = { width: 1280, height: 720 },
+  heard: (request: Request) => void = () => {},
 ): Promise<{ page: Page; faults: string[] }> {
   const page = await from.newPage({ viewport: size });
   const faults: string[] = [];
@@ -36,6 +38,7 @@ export async function opened(
   page.on("console", (line) => {
     if (line.type() === "error") faults.push(line.text());
   });
+  page.on("request", heard);
   await page.goto(SERVICE + path);
   return { page, faults };
 }

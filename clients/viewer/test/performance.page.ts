@@ -32,9 +32,9 @@ async function on(
   act: (page: Page, asked: Script[]) => Promise<void>,
   refusals: boolean | "maybe" = false,
 ): Promise<void> {
-  const { page, faults } = await opened(chromium, path);
   const asked: Script[] = [];
-  page.on("request", (request) => {
+  // The first script may be asked for before the page is loaded.
+  const { page, faults } = await opened(chromium, path, undefined, (request) => {
     if (/\/v1\/performances/.test(request.url())) asked.push(request.postDataJSON());
   });
   try {
