@@ -4,7 +4,7 @@ import pytest
 import skeleton_tables
 
 from posefield.motion.joint_roles import ROLES
-from posefield_train.roles import body_shape, joint_recognition
+from posefield.roles import body_shape, joint_recognition
 from posefield_train.sample import noise_free
 from posefield_train.sample.figures import quadruped_walk
 

@@ -9,8 +9,8 @@ import numpy as np
 from posefield.common.errors import FileError, MotionFileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
+from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import figure, proposals
-from posefield_train.roles.joint_recognition import RoleGuess
 from posefield_train.source import motion_readers
 from posefield_train.source.motion_files import clip_conversion
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions

@@ -9,11 +9,11 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, UpAxis
+from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import figure, probe_report
 from posefield_train.probe.figure import Figure
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Proposal
-from posefield_train.roles.joint_recognition import RoleGuess
 from posefield_train.source import motion_readers
 from posefield_train.source.motion_files.motion_file import ReadOptions
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import skeleton
-from posefield_train.roles import body_shape, joint_recognition
-from posefield_train.roles.joint_recognition import RoleGuess
+from posefield.roles import body_shape, joint_recognition
+from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.source.motion_files.motion_file import MotionFile
 
 MAX_FRAMES = 200

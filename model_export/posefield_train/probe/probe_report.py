@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from posefield.roles import joint_recognition
+from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import figure, proposals
 from posefield_train.probe.figure import Figure
 from posefield_train.probe.proposals import Proposal
-from posefield_train.roles import joint_recognition
-from posefield_train.roles.joint_recognition import RoleGuess
 from posefield_train.source import motion_readers
 
 LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))

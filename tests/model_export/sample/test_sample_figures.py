@@ -5,7 +5,7 @@ import pytest
 
 from posefield.common.errors import FileError
 from posefield.motion import foot_skate
-from posefield_train.roles import joint_recognition
+from posefield.roles import joint_recognition
 from posefield_train.sample import sample_files
 from posefield_train.sample.figures import hand_grip, quadruped_walk
 from posefield_train.source import ingest, recipe

@@ -8,13 +8,14 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield_train.source.gltf import gltf_accessors, gltf_document, gltf_skeleton
-from posefield_train.source.gltf.gltf_document import Beside, GltfDocument
-from posefield_train.source.gltf.gltf_skeleton import GltfJoints
-from posefield_train.source.motion_files import key_times, motion_file, posed_joints
+from posefield.rigs.gltf import gltf_accessors, gltf_document, gltf_skeleton
+from posefield.rigs.gltf.gltf_document import Beside, GltfDocument
+from posefield.rigs.gltf.gltf_skeleton import GltfJoints
+from posefield.rigs.joints import format_faults, posed_joints
+from posefield.rigs.joints.posed_joints import PosedJoints
+from posefield_train.source.motion_files import key_times
 from posefield_train.source.motion_files.key_times import UnevenKeys
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
-from posefield_train.source.motion_files.posed_joints import PosedJoints
 
 MAX_POSES = 10_000_000
 """Limit of frames times joints, as for BVH."""
@@ -50,7 +51,7 @@ def read(content: bytes, source: str, beside: Beside, options: ReadOptions) -> M
     without a name chosen, and for keys that are no frames.
     """
     # pygltflib checks no types, so that wrong ones are found where they are used.
-    with motion_file.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
+    with format_faults.naming_faults(source, TypeError, AttributeError, LookupError, ValueError):
         return _read(content, source, beside, options)
 
 
@@ -169,23 +170,17 @@ def _posed(
     """Return the joints with their transforms at the given times; the root's in the world."""
     nodes = [_sampled(document, node, tracks, times) for node in joints.nodes]
     turns, places, scales = (np.stack(own, axis=1) for own in zip(*nodes, strict=True))
-    rest = [gltf_skeleton.node_transform(document, node) for node in joints.nodes]
-    rest_places = np.stack([own.translation for own in rest])
     for node in reversed(joints.outer):
         turn, place, scale = _sampled(document, node, tracks, times)
         places[:, 0] = place + quat.rotate(turn, scale * places[:, 0])
         turns[:, 0] = quat.mul(turn, turns[:, 0])
         scales[:, 0] *= scale
-        still = gltf_skeleton.node_transform(document, node)
-        rest_places[0] = still.translation + quat.rotate(
-            still.rotation, still.scale * rest_places[0]
-        )
     return PosedJoints(
         document.source,
         joints.names,
         joints.parents,
         joints.rest_rotations,
-        rest_places,
+        gltf_skeleton.rest_places(document, joints),
         turns,
         places,
         scales,

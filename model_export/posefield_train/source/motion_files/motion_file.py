@@ -1,7 +1,5 @@
 """Content of a motion file of any format, in the file's own unit and axes."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 from posefield.common.array_shapes import Positions, Rotations
@@ -63,13 +61,3 @@ class ReadOptions:
 
 AS_STATED = ReadOptions()
 """Nothing told: a file is read by what it states."""
-
-
-@contextmanager
-def naming_faults(source: str, *faults: type[Exception]) -> Iterator[None]:
-    """Raise faults of values of wrong types as MotionFileError with the file's name."""
-    try:
-        yield
-    except faults as fault:
-        said = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
-        raise MotionFileError(source, f"breaks its format: {said}") from fault

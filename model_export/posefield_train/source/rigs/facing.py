@@ -13,7 +13,7 @@ import numpy as np
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 from posefield.motion.clip import Clip
-from posefield_train.roles import joint_recognition
+from posefield.roles import joint_recognition
 
 Facing = Literal["+x", "-x", "+z", "-z", "travel", "hips", "roles", "none"]
 """Axis of the root, or the evidence that tells it; none for motions without a facing."""

@@ -4,28 +4,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdGeom
 
 from posefield.common.array_shapes import Positions, Rotations
-from posefield.common.errors import MotionFileError
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield_train.source.motion_files.posed_joints import PosedJoints
-
-SKEW = 1e-3
-"""Largest cosine between axes of a matrix that are perpendicular."""
+from posefield.rigs.joints.posed_joints import PosedJoints
+from posefield.rigs.usd.skel_joints import SkelJoints
 
 
 @dataclass(frozen=True)
-class SkelMotion:
+class SkelMotion(SkelJoints):
     """A skeleton with one animation.
 
-    prim: of the skeleton. query, animation: their queries of UsdSkel.
+    animation: its query of UsdSkel.
     """
 
-    source: str
-    prim: Any
-    query: Any
     animation: Any
 
     @property
@@ -33,35 +26,21 @@ class SkelMotion:
         """Return the path of the animation."""
         return str(self.animation.GetPrim().GetPath())
 
-    def error(self, message: str) -> MotionFileError:
-        """Return an error that names the file."""
-        return MotionFileError(self.source, message)
-
     def sample_codes(self) -> Floats:
         """Return the time codes (K,) of all samples of joints and of transforms above them."""
         codes = set(self.animation.GetJointTransformTimeSamples())
         if codes:
-            for above in self._moving_parents():
+            for above in self.moving_parents():
                 codes |= set(above.GetTimeSamples())
         return np.array(sorted(codes), float)
 
-    def _moving_parents(self) -> list[Any]:
-        """Return the transforms of the skeleton and its ancestors that change over time."""
-        found, prim = [], self.prim
-        while prim and not prim.IsPseudoRoot():
-            own = UsdGeom.Xformable(prim)
-            if own and own.TransformMightBeTimeVarying():
-                found.append(own)
-            prim = prim.GetParent()
-        return found
-
     def posed_joints(self, codes: Floats) -> PosedJoints:
         """Return rest pose and motion at time codes (F,), the root's in the stage's world."""
-        names, parents = self._tree()
-        rest_turns, rest_places = self._rest(parents)
+        names, parents = self.tree()
+        rest_turns, rest_places = self.rest(parents)
         rotations, translations, scales = self._samples(codes, len(names))
-        moving = bool(self._moving_parents())
-        outer = self._world(codes if moving else codes[:1])
+        moving = bool(self.moving_parents())
+        outer = self.world(codes if moving else codes[:1])
         turns, places, sizes = (np.broadcast_to(own, (len(codes), own.shape[-1])) for own in outer)
         translations[:, 0] = places + quat.rotate(turns, sizes * translations[:, 0])
         rotations[:, 0] = quat.mul(turns, rotations[:, 0])
@@ -79,35 +58,6 @@ class SkelMotion:
             scales,
         )
 
-    def _tree(self) -> tuple[tuple[str, ...], tuple[int, ...]]:
-        """Return names and parents of the joints; MotionFileError unless they are one tree."""
-        paths = [str(path) for path in self.query.GetJointOrder()]
-        valid, reason = self.query.GetTopology().Validate()
-        parents = tuple(self.query.GetTopology().GetParentIndices())
-        if not valid or not paths or parents[0] != -1:
-            raise self.error(f"skeleton {self.prim.GetPath()}: {reason or 'no joints'}")
-        roots = [path for path, parent in zip(paths, parents, strict=True) if parent < 0]
-        if len(roots) > 1:
-            raise self.error(f"found the root joints {', '.join(roots[:5])}, expected one")
-        stated = self.query.GetSkeleton().GetJointNamesAttr().Get()
-        for names in (stated or (), [path.rpartition("/")[2] for path in paths]):
-            if len(names) == len(paths) == len(set(names)):
-                return tuple(map(str, names)), parents
-        return tuple(paths), parents
-
-    def _rest(self, parents: tuple[int, ...]) -> tuple[Floats, Floats]:
-        """Return local rotations of the bind pose, and local translations of the rest pose."""
-        rest = np.array(self.query.ComputeJointLocalTransforms(0.0, atRest=True), float)
-        bind = np.array(self.query.GetJointWorldBindTransforms(), float)
-        if len(rest) != len(parents):
-            raise self.error(f"found {len(rest)} restTransforms, expected {len(parents)}")
-        turns = np.stack([self._decomposed(matrix)[0] for matrix in rest])
-        if len(bind) == len(parents):
-            world = np.stack([self._decomposed(matrix)[0] for matrix in bind])
-            turns[0] = world[0]
-            turns[1:] = quat.mul(quat.conj(world[list(parents[1:])]), world[1:])
-        return turns, rest[:, 3, :3].copy()
-
     def _samples(self, codes: Floats, joints: int) -> tuple[Rotations, Positions, Positions]:
         """Return rotations, translations and scales; joints that it does not name are at rest."""
         order = [str(path) for path in self.query.GetJointOrder()]
@@ -119,7 +69,7 @@ class SkelMotion:
         parts = [self._components(code, len(own)) for code in codes.tolist()]
         moved = [np.stack(part) for part in zip(*parts, strict=True)]
         rest = np.array(self.query.ComputeJointLocalTransforms(0.0, atRest=True), float)
-        still = [np.stack(part) for part in zip(*map(self._decomposed, rest), strict=True)]
+        still = [np.stack(part) for part in zip(*map(self.decomposed, rest), strict=True)]
         full = []
         for part, one in zip(moved, still, strict=True):
             values = np.tile(one, (len(codes), 1, 1))
@@ -145,22 +95,3 @@ class SkelMotion:
         if not np.all(np.isfinite(places)) or not np.all(lengths > 0.5):
             raise self.error(f"{self.path} has broken numbers at time code {code:g}")
         return turns / lengths, places, scales
-
-    def _world(self, codes: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return rotations, translations and scales (F, ...) of the skeleton in the world."""
-        found = []
-        for code in codes.tolist():
-            matrix = UsdGeom.XformCache(Usd.TimeCode(code)).GetLocalToWorldTransform(self.prim)
-            found.append(self._decomposed(np.array(matrix, float)))
-        turns, places, sizes = (np.stack(part) for part in zip(*found, strict=True))
-        return turns, places, sizes
-
-    def _decomposed(self, matrix: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return rotation, translation and scale of a matrix (4, 4) for row vectors."""
-        sizes = np.linalg.norm(matrix[:3, :3], axis=1)
-        axes = matrix[:3, :3] / np.maximum(sizes, 1e-30)[:, None]
-        if np.abs(axes @ axes.T - np.eye(3)).max() > SKEW or np.linalg.det(axes) < 0.0:
-            raise self.error(
-                f"a transform of {self.prim.GetPath()} skews or mirrors, expected neither"
-            )
-        return quat.from_matrix(axes.T), matrix[3, :3], sizes

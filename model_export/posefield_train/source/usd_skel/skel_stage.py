@@ -1,41 +1,23 @@
 """USD stage: its one skeleton, the animation to read, and its unit, up axis and rate."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pxr import Tf, Usd, UsdGeom, UsdSkel
+from pxr import UsdGeom, UsdSkel
 
-from posefield.common.errors import MotionFileError
 from posefield.common.units import UpAxis
-from posefield_train.source.motion_files import key_times, motion_file, posed_joints
+from posefield.rigs.joints import format_faults, posed_joints
+from posefield.rigs.usd import usd_stage
+from posefield.rigs.usd.usd_stage import MAX_JOINTS, SkelStage
+from posefield_train.source.motion_files import key_times
 from posefield_train.source.motion_files.key_times import UnevenKeys
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
 from posefield_train.source.usd_skel.skel_samples import SkelMotion
 
 MAX_POSES = 10_000_000
 """Limit of frames times joints, as for BVH."""
-MAX_JOINTS = 1000
 SHOWN = 20
 """Animations that a message lists."""
-
-
-@dataclass(frozen=True)
-class SkelStage:
-    """An open stage. cache: of UsdSkel, with the bindings of all its skeletons."""
-
-    source: str
-    stage: Any
-    cache: Any
-
-    def error(self, message: str) -> MotionFileError:
-        """Return an error that names the file."""
-        return MotionFileError(self.source, message)
-
-    def prims(self, schema: Any) -> list[Any]:
-        """Return the prims of a schema, those within instances too."""
-        seen = Usd.PrimRange.Stage(self.stage, Usd.TraverseInstanceProxies())
-        return [prim for prim in seen if prim.IsA(schema)]
 
 
 def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
@@ -47,12 +29,12 @@ def read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     """
     # usd-core finds damage of values when they are read: its own errors are RuntimeErrors, and
     # names of joints may be no text.
-    with motion_file.naming_faults(source, RuntimeError, ValueError, TypeError):
+    with format_faults.naming_faults(source, RuntimeError, ValueError, TypeError):
         return _read(path, source, options)
 
 
 def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
-    opened = _open(path, source)
+    opened = usd_stage.open_stage(path, source)
     motion = _chosen(opened, options.animation)
     codes = motion.sample_codes()
     pace, notes = _codes_per_second(opened)
@@ -87,23 +69,6 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     )
 
 
-def _open(path: Path, source: str) -> SkelStage:
-    try:
-        stage = Usd.Stage.Open(str(path))
-    except Tf.ErrorException as fault:
-        said = str(fault).rpartition(" : ")[2].strip().strip("'")[:200]
-        raise MotionFileError(source, f"does not open as USD: {said}") from fault
-    faults = stage.GetCompositionErrors()
-    if faults:
-        said = " ".join(str(faults[0]).split())[:200]
-        raise MotionFileError(source, f"refers to what cannot be read: {said}")
-    cache = UsdSkel.Cache()
-    opened = SkelStage(source, stage, cache)
-    for prim in opened.prims(UsdSkel.Root):
-        cache.Populate(UsdSkel.Root(prim), Usd.TraverseInstanceProxies())
-    return opened
-
-
 def _chosen(opened: SkelStage, wanted: str | None) -> SkelMotion:
     """Return the skeleton with the animation that is wanted, or with its only one."""
     skeletons = opened.prims(UsdSkel.Skeleton)
@@ -126,20 +91,11 @@ def _chosen(opened: SkelStage, wanted: str | None) -> SkelMotion:
     prim = (bound or skeletons)[0]
     query = opened.cache.GetSkelQuery(UsdSkel.Skeleton(prim))
     if not query:
-        raise opened.error(f"skeleton {prim.GetPath()} is not valid: {_invalid(prim)}")
+        raise opened.error(f"skeleton {prim.GetPath()} is not valid: {usd_stage.fault_of(prim)}")
     own = opened.cache.GetAnimQuery(UsdSkel.Animation(animation))
     if not own:
         raise opened.error(f"{animation.GetPath()} names no joints, expected those of a skeleton")
     return SkelMotion(opened.source, prim, query, own)
-
-
-def _invalid(skeleton: Any) -> str:
-    """Return why a skeleton has no query."""
-    joints = UsdSkel.Skeleton(skeleton).GetJointsAttr().Get()
-    if not joints:
-        return "it names no joints"
-    valid, reason = UsdSkel.Topology(joints).Validate()
-    return "its transforms are not one for each joint" if valid else reason
 
 
 def _animation(opened: SkelStage, animations: list[Any], wanted: str | None) -> Any:

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats
-from posefield_train.source.gltf.gltf_document import GltfDocument
+from posefield.rigs.gltf.gltf_document import GltfDocument
 
 COMPONENTS: dict[int, npt.DTypeLike] = {
     5120: np.int8,

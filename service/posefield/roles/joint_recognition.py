@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from posefield.motion.joint_roles import ROLES
-from posefield_train.roles.joint_words import joint_words
-from posefield_train.roles.limb_alignment import ARM, LEG, LimbJoint, align_limb
-from posefield_train.roles.trunk_roles import Tree, trunk_roles
+from posefield.roles.joint_words import joint_words
+from posefield.roles.limb_alignment import ARM, LEG, LimbJoint, align_limb
+from posefield.roles.trunk_roles import Tree, trunk_roles
 
 LOWEST_CONFIDENCE = 0.8
 """Confidence below which a role has to be confirmed in the recipe."""

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from posefield_train.roles.joint_words import HIPS, JointWord
-from posefield_train.roles.limb_alignment import LimbJoint
+from posefield.roles.joint_words import HIPS, JointWord
+from posefield.roles.limb_alignment import LimbJoint
 
 ROOTS = frozenset({"root", "spinebase"})
 CHESTS = frozenset({"chest", "thorax", "ribcage", "ribs", "rib"})

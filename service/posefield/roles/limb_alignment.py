@@ -7,7 +7,7 @@ the whole. Along a limb the order decides.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from posefield_train.roles.joint_words import JointWord
+from posefield.roles.joint_words import JointWord
 
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand", "Fingers")
 LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from posefield.common.array_shapes import Bones
 from posefield.common.units import Floats
 from posefield.motion import quat
-from posefield_train.source.gltf import gltf_accessors
-from posefield_train.source.gltf.gltf_document import GltfDocument
+from posefield.rigs.gltf import gltf_accessors
+from posefield.rigs.gltf.gltf_document import GltfDocument
 
 MAX_JOINTS = 1000
 """Limit of joints, several times those of any character."""
@@ -89,6 +90,18 @@ def joints_of(document: GltfDocument, animated: Iterable[int]) -> GltfJoints:
     outer = tuple(reversed(_ancestors(above, root)[1:]))
     rest = _rest_rotations(document, order, parents, outer)
     return GltfJoints(tuple(order), parents, names, outer, rest, notes)
+
+
+def rest_places(document: GltfDocument, joints: GltfJoints) -> Bones:
+    """Return the translations (J, 3) at rest, local to the parent, the first in the file's world.
+
+    They are in the units of the parent joint, whose scale the file may state.
+    """
+    found = np.stack([node_transform(document, node).translation for node in joints.nodes])
+    for node in reversed(joints.outer):
+        still = node_transform(document, node)
+        found[0] = still.translation + quat.rotate(still.rotation, still.scale * found[0])
+    return found
 
 
 def _parents(document: GltfDocument) -> dict[int, int]:

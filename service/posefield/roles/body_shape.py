@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.roles.joint_recognition import SIDES, RoleGuess
+from posefield.roles.joint_recognition import SIDES, RoleGuess
 
 BONES = (
     ("UpperArm", "LowerArm"),

@@ -1,0 +1,1 @@
+"""Retargeting: motions of a model on the skeleton of another character."""

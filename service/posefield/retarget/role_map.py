@@ -1,0 +1,137 @@
+"""Roles of the joints of a motion and of a rig: which joint of one follows which of the other."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.array_shapes import Bones
+from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
+from posefield.motion.skeleton import Skeleton, joint_chain
+from posefield.rigs.rig import Rig
+from posefield.rigs.rig_roles import NEEDED
+from posefield.roles import joint_recognition
+
+SIDES = joint_recognition.SIDES
+FIELD = "character"
+
+
+@dataclass(frozen=True)
+class Body:
+    """Skeleton with the roles of its joints. joints: index by role. bones (J, 3): offsets, m."""
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    bones: Bones
+    joints: Mapping[str, int]
+
+    @cached_property
+    def rest(self) -> Bones:
+        """Return the positions (J, 3) at rest, m."""
+        found = self.bones.copy()
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            found[joint] += found[parent]
+        return found
+
+    def direction(self, upper: str, lower: str) -> Floats:
+        """Return the unit vector (3,) at rest from the joint of a role to that of another."""
+        apart = self.rest[self.joints[lower]] - self.rest[self.joints[upper]]
+        return apart / max(float(np.linalg.norm(apart)), 1e-9)
+
+    def length(self, upper: str, lower: str) -> float:
+        """Return the distance at rest of the joints of two roles, m."""
+        apart = self.rest[self.joints[lower]] - self.rest[self.joints[upper]]
+        return float(np.linalg.norm(apart))
+
+    @property
+    def leg_length(self) -> float:
+        """Return the mean length of both legs from hip to ankle, m."""
+        return 0.5 * sum(
+            self.length(side + "UpperLeg", side + "LowerLeg")
+            + self.length(side + "LowerLeg", side + "Foot")
+            for side in SIDES
+        )
+
+    @property
+    def facing(self) -> float:
+        """Return the direction in which the body faces at rest, rad, to the left of +Z."""
+        left, right = (self.rest[self.joints[side + "UpperLeg"]] for side in SIDES)
+        across = left - right
+        return float(np.arctan2(-across[2], across[0]))
+
+    @cached_property
+    def spine(self) -> "Chain":
+        """Return the joints of the trunk above the hips, up to those that carry arms or neck."""
+        start = self.joints["hips"]
+        tops = [self._parent(role) for role in ("neck", "head", "leftUpperArm", "rightUpperArm")]
+        named = [self.joints.get(role) for role in ("spine", "chest", "upperChest")]
+        ends = [joint for joint in (*named, tops[0] or tops[1]) if joint is not None]
+        paths = [self._between(start, joint) for joint in ends]
+        longest = max(paths, key=len, default=())
+        return Chain(longest, _places(self.bones, longest))
+
+    @cached_property
+    def neck(self) -> "Chain":
+        """Return the joints of the neck, from its own to the one below the head."""
+        first, head = self.joints.get("neck"), self.joints.get("head")
+        if first is None:
+            return Chain((), np.zeros(0))
+        inner = () if head is None else self._between(first, self.parents[head])
+        own = (first, *inner)
+        return Chain(own, _places(self.bones, own))
+
+    def _parent(self, role: str) -> int | None:
+        joint = self.joints.get(role)
+        return None if joint is None else self.parents[joint]
+
+    def _between(self, above: int, joint: int) -> tuple[int, ...]:
+        """Return the joints below one down to another; none if it is not below."""
+        path = joint_chain(self.parents, joint)
+        return path[path.index(above) + 1 :] if above in path else ()
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Joints one below the other. places (n,): of each along the chain, 0 to 1."""
+
+    joints: tuple[int, ...]
+    places: Annotated[Floats, "joints"]
+
+
+def _places(bones: Bones, joints: tuple[int, ...]) -> Annotated[Floats, "joints"]:
+    """Return the places (n,) of joints along their chain by length; 1 for a single one."""
+    if len(joints) < 2:
+        return np.ones(len(joints))
+    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(bones[list(joints[1:])], axis=-1))])
+    if gone[-1] < 1e-6:
+        return np.linspace(0.0, 1.0, len(joints))
+    return gone / gone[-1]
+
+
+def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -> Body:
+    """Return the body of a motion's skeleton with bones (J, 3), m, of the motion.
+
+    roles: joint by role; recognised by the names without any. Raises InvalidField for a body
+    without hips and two legs.
+    """
+    named = roles or joint_recognition.roles_of(skeleton.names, skeleton.parents)
+    joints = {role: skeleton.names.index(own) for role, own in named.items()}
+    missing = [role for role in NEEDED if role not in joints]
+    if missing:
+        raise InvalidField(
+            FIELD,
+            f"given, but this model has no joint for {', '.join(missing)}: expected a body with "
+            "hips and two legs, by [roles] of its recipe or by the names of its joints",
+        )
+    own = bones.copy()
+    own[0] = 0.0
+    return Body(skeleton.names, skeleton.parents, own, joints)
+
+
+def body_of_rig(rig: Rig) -> Body:
+    """Return the body of a rig."""
+    own = rig.skeleton
+    return Body(own.names, own.parents, own.offsets, rig.joints)

@@ -1,0 +1,1 @@
+"""Rigs: skeletons of characters in USD and glTF files, with the roles of their joints."""

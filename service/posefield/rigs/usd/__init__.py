@@ -1,0 +1,1 @@
+"""Stages of USD: their skeletons and the joints at rest."""
