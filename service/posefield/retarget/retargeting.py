@@ -1,6 +1,6 @@
 """Retargeting of a clip to a rig: orientations by role, then pelvis, feet and hands."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,10 +10,22 @@ from posefield.common.units import UP
 from posefield.motion import clip as clips
 from posefield.motion import skeleton
 from posefield.motion.clip import Clip
-from posefield.retarget import copied_pose, role_map
-from posefield.retarget.retarget_report import USUAL, RetargetReport, RetargetSettings
+from posefield.retarget import (
+    copied_pose,
+    foot_paths,
+    hand_goals,
+    planted_legs,
+    retarget_measures,
+    role_map,
+)
+from posefield.retarget.foot_paths import FLOOR, SourceFeet
+from posefield.retarget.planted_legs import PlantedLegs, PosedRig
+from posefield.retarget.retarget_report import USUAL, HandGoal, RetargetReport, RetargetSettings
 from posefield.retarget.role_map import SIDES, Body
 from posefield.rigs.rig import Rig
+
+MISSED = 1e-3
+"""Distance of a hand from its target, m, from which on it is told."""
 
 
 @dataclass(frozen=True)
@@ -37,35 +49,111 @@ def retarget(
     """
     source = role_map.body_of_motion(clip.skeleton, clip.translations[0], roles)
     body = role_map.body_of_rig(rig)
-    places, turns = skeleton.forward_kinematics(
-        clip.skeleton.parents, clip.rotations, clip.translations
+    motion = PosedRig(
+        source,
+        clip.rotations,
+        clip.root_path,
+        *skeleton.forward_kinematics(clip.skeleton.parents, clip.rotations, clip.translations),
     )
-    rotations = copied_pose.copy_orientations(source, body, turns)
     scale = body.leg_length / source.leg_length
-    hips = places[:, [source.joints[side + "UpperLeg"] for side in SIDES]].mean(axis=1)
-    roots = _roots(body, rotations, _scaled(hips, scale))
-    made = clips.assemble(rig.skeleton, rotations, roots, rig.skeleton.offsets, clip.rate)
-    mapped = tuple(role for role in source.joints if role in body.joints)
-    missing = tuple(role for role in source.joints if role not in body.joints)
+    motion = _scaled(motion, scale, scale if settings.travel == "scaled" else 1.0)
+    feet = _feet(motion, body, clip, settings)
+    made = _planted(motion, body, feet, clip.rate)
+    hand_goals.check_goals(settings.hands, made.rig, clip.rate)
+    final = hand_goals.meet_goals(made.rig, settings.hands, clip.rate)
+    found = clips.assemble(
+        rig.skeleton, final.rotations, final.roots, rig.skeleton.offsets, clip.rate
+    )
+    report = _report(motion, feet, made, scale, clip.rate)
+    missed = hand_goals.misses(final, settings.hands, clip.rate)
+    warnings = (*rig.notes, *_warnings(report, settings.hands, missed))
     return Retargeted(
-        replace(made, curves=clip.curves),
-        RetargetReport(mapped, missing, scale, warnings=rig.notes),
+        replace(found, curves=clip.curves),
+        replace(report, hands_missed=missed, warnings=warnings),
     )
 
 
-def _scaled(path: RootPath, scale: float) -> RootPath:
-    """Return a path (F, 3), m, in another proportion about the floor below its start."""
-    start = path[0] * (1.0 - UP)
-    found: RootPath = start + scale * (path - start)
-    return found
+def _scaled(motion: PosedRig, scale: float, travel: float) -> PosedRig:
+    """Return poses in another proportion: the body by `scale`, the way of its hips by `travel`.
+
+    Both about the floor below the hips in the first frame.
+    """
+    hips = _hips(motion)
+    level = hips * FLOOR
+    moved = level[:1] + travel * (level - level[:1])
+    places = moved[:, None] + scale * (motion.places - level[:, None])
+    return replace(motion, places=places)
 
 
-def _roots(body: Body, rotations: np.ndarray, hips: RootPath) -> RootPath:
-    """Return the root's path (F, 3), m, that brings the middle of both hips to a path (F, 3)."""
-    still = np.zeros((len(rotations), 1, 3))
-    offsets = body.bones.copy()
-    offsets[0] = 0.0
-    placed = skeleton.positions(body.parents, rotations, offsets + 0.0 * still)
-    own = placed[:, [body.joints[side + "UpperLeg"] for side in SIDES]].mean(axis=1)
-    found: RootPath = hips - own
-    return found
+def _hips(rig: PosedRig) -> RootPath:
+    """Return the path (F, 3), m, of the middle between both hips."""
+    left, right = (rig.of_role(side + "UpperLeg") for side in SIDES)
+    return 0.5 * (left + right)
+
+
+def _feet(motion: PosedRig, body: Body, clip: Clip, settings: RetargetSettings) -> SourceFeet:
+    """Return the feet of a motion in the rig's proportion."""
+    roles = foot_paths.contact_roles(motion.body, body)
+    left, right = (motion.body.joints[role] for role in roles)
+    names = clip.skeleton.names[left], clip.skeleton.names[right]
+    paths = motion.places[:, [left, right]]
+    return foot_paths.feet_of(paths, clip.rate, roles, names, settings.stances)
+
+
+def _planted(motion: PosedRig, body: Body, feet: SourceFeet, rate: float) -> PlantedLegs:
+    """Return the rig with copied orientations, and its feet on their paths."""
+    rotations = copied_pose.copy_orientations(motion.body, body, motion.turns)
+    still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
+    # At rest, ankles are above the joints that stand: by more or less than in proportion.
+    heights = foot_paths.standing_heights(feet, body)
+    higher = (
+        np.mean(heights - feet.heights)
+        + _ankle_height(body, feet)
+        - (_ankle_height(motion.body, feet) * body.leg_length / motion.body.leg_length)
+    )
+    rig = planted_legs.posed(body, rotations, _hips(motion) + higher * UP - _hips(still))
+    scale = body.leg_length / motion.body.leg_length
+    heels = planted_legs.heel_depths(motion, feet.heights, scale)
+    return planted_legs.plant(rig, feet, heels, rate)
+
+
+def _ankle_height(body: Body, feet: SourceFeet) -> float:
+    """Return the mean height at rest of ankles above the joints that stand, m."""
+    apart = [
+        body.rest[body.joints[side + "Foot"]] - body.rest[body.joints[role]]
+        for side, role in zip(SIDES, feet.roles, strict=True)
+    ]
+    return float(np.mean(apart, axis=0) @ UP)
+
+
+def _report(
+    motion: PosedRig, feet: SourceFeet, made: PlantedLegs, scale: float, rate: float
+) -> RetargetReport:
+    """Return the facts about a motion with planted feet."""
+    paths = [
+        np.stack([own.of_role(role) for role in feet.roles], axis=1)
+        for own in (made.copied, made.rig)
+    ]
+    skates = [retarget_measures.skate(own, feet.standing, rate) for own in (feet.paths, *paths)]
+    heights = foot_paths.standing_heights(feet, made.rig.body)
+    theirs, ours = motion.body.joints, made.rig.body.joints
+    return RetargetReport(
+        tuple(role for role in theirs if role in ours),
+        tuple(role for role in theirs if role not in ours),
+        scale,
+        *skates,
+        retarget_measures.legs_turned(made.copied, made.rig),
+        float(made.lowered.max()),
+        retarget_measures.penetration(made.rig, paths[1], heights),
+    )
+
+
+def _warnings(
+    report: RetargetReport, goals: Sequence[HandGoal], missed: Sequence[float]
+) -> Iterator[str]:
+    """Yield sentences on what the character lacks or does not reach."""
+    if report.missing:
+        yield f"the character has no joint for {', '.join(report.missing)}: they do not move"
+    for goal, miss in zip(goals, missed, strict=True):
+        if miss > MISSED:
+            yield f"{goal.role} at {goal.time:g} s: {miss:.3f} m from its target, out of reach"

@@ -1,0 +1,52 @@
+"""Measures of a retargeted motion: foot skate, turned legs and depth below the floor."""
+
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.units import UP, Booleans, Floats
+from posefield.feet.two_bone import shortest_turn
+from posefield.motion import quat
+from posefield.retarget import planted_legs
+from posefield.retarget.planted_legs import PosedRig
+from posefield.retarget.role_map import SIDES
+
+PERCENTILE = 99.0
+
+
+def skate(
+    paths: Annotated[Floats, "frames feet 3"],
+    standing: Annotated[Booleans, "frames feet"],
+    rate: float,
+) -> float:
+    """Return the mean speed of feet over the floor while they stand, m/s; 0 if they never do.
+
+    paths (F, 2, 3), m. standing (F, 2): of the motion's feet.
+    """
+    both = standing[1:] & standing[:-1]
+    speeds = rate * np.linalg.norm(np.diff(paths, axis=0) * (1.0 - UP), axis=-1)
+    return float(np.sum(speeds * both) / max(int(both.sum()), 1))
+
+
+def legs_turned(copied: PosedRig, made: PosedRig) -> float:
+    """Return the mean angle between the bones of legs in two poses, rad."""
+    angles = []
+    for side in SIDES:
+        for upper, lower in (("UpperLeg", "LowerLeg"), ("LowerLeg", "Foot")):
+            ends = [own.of_role(side + lower) - own.of_role(side + upper) for own in (copied, made)]
+            angles.append(np.linalg.norm(quat.log(shortest_turn(*ends)), axis=-1))
+    return float(np.mean(angles))
+
+
+def penetration(
+    rig: PosedRig,
+    paths: Annotated[Floats, "frames feet 3"],
+    heights: Annotated[Floats, "feet"],
+) -> float:
+    """Return the 99th percentile of the depth of heels and balls below the floor, m.
+
+    paths (F, 2, 3): of the joints that stand, m, at heights (2,) above their soles.
+    """
+    balls = heights - paths @ UP
+    depths = np.maximum(np.concatenate([balls, planted_legs.heel_depths(rig, heights)]), 0.0)
+    return float(np.percentile(depths, PERCENTILE))
