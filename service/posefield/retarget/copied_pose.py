@@ -10,17 +10,21 @@ from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.motion.skeleton import joint_chain
 from posefield.retarget import rest_alignment
+from posefield.retarget.rest_alignment import Soles
 from posefield.retarget.role_map import Body, Chain
 
 
-def copy_orientations(source: Body, rig: Body, turns: Annotated[Floats, "frames _ 4"]) -> Rotations:
+def copy_orientations(
+    source: Body, rig: Body, turns: Annotated[Floats, "frames _ 4"], soles: Soles
+) -> Rotations:
     """Return the local rotations (F, J, 4) of the rig.
 
-    turns (F, S, 4): orientations of the motion's joints. Joints of spine and neck follow the
-    motion's by their places along the chain. Others without a role follow a joint of the same name,
-    as its part of the body does; without one they keep their rest against their parents.
+    turns (F, S, 4): orientations of the motion's joints. soles: as of `align_rests`. Joints of
+    spine and neck follow the motion's by their places along the chain. Others without a role follow
+    a joint of the same name, as its part of the body does; without one they keep their rest against
+    their parents.
     """
-    aligned = rest_alignment.align_rests(source, rig)
+    aligned = rest_alignment.align_rests(source, rig, soles)
     world: dict[int, Floats] = {
         rig.joints[role]: quat.mul(turns[:, source.joints[role]], own)
         for role, own in aligned.items()

@@ -45,6 +45,25 @@ class SourceFeet:
         found = [stances.mask(own, len(self.paths)) for own in self.stances]
         return np.stack(found, axis=1)
 
+    @property
+    def floors(self) -> Annotated[Floats, "frames feet"]:
+        """Return the height of the floor below each foot (F, 2), m.
+
+        As each stance has it; between two the lower one, so that feet may step up and down.
+        """
+        found = np.empty(self.paths.shape[:2])
+        for foot, own in enumerate(self.stances):
+            heights = self.paths[:, foot] @ UP
+            level = [float(np.median(heights[s.begin : s.end])) for s in own]
+            level = level or [float(self.heights[foot])]
+            edges = [0, *(s.end for s in own[:-1]), len(heights)]
+            begins = [s.begin for s in own] or [0]
+            for index, (first, last) in enumerate(pairwise(edges)):
+                found[first:last, foot] = level[index]
+                swing = slice(first, begins[index])
+                found[swing, foot] = min(level[max(index - 1, 0)], level[index])
+        return found - self.heights
+
 
 def contact_roles(source: Body, rig: Body) -> tuple[str, str]:
     """Return the roles of the joints that stand: toes where both bodies have them, or feet."""
@@ -95,9 +114,8 @@ def standing_heights(feet: SourceFeet, rig: Body) -> Annotated[Floats, "feet"]:
     """
     rest = np.array([rig.rest[rig.joints[role]][1] for role in feet.roles])
     known = 0.0 <= rest.min() and rest.max() <= HIGHEST_FOOT * rig.leg_length
-    if not known or np.ptp(rest) > UNEVEN:
-        return feet.heights
-    return np.where(np.abs(rest - feet.heights) <= UNEVEN, feet.heights, rest)
+    same = abs(float(np.mean(rest - feet.heights))) <= UNEVEN
+    return feet.heights if same or not known or np.ptp(rest) > UNEVEN else rest
 
 
 def plan_paths(

@@ -18,6 +18,8 @@ SMOOTHING = 0.12
 """Width, s, of the Gaussian with which the height of the pelvis follows the feet that stand."""
 DEEPEST = 0.1
 """Most by which the pelvis is lowered so that the legs reach, as a share of their length."""
+FREE_DEPTH, MOST_DEPTH = 0.007, 0.01
+"""Depths of soles below the floor that stay as they are, and that none exceeds, m: soles give."""
 SAME = 1e-6
 """Distance, m, up to which the end of a limb is where it is wanted, and the limb stays."""
 
@@ -59,38 +61,48 @@ def posed(body: Body, rotations: Rotations, roots: RootPath) -> PosedRig:
     )
 
 
-def raised(rig: PosedRig, height: Frames) -> PosedRig:
-    """Return poses whose root is raised by a height (F,), m."""
-    shift = height[:, None] * UP
+def moved(rig: PosedRig, shift: RootPath) -> PosedRig:
+    """Return poses whose root is moved by (F, 3), m."""
     places = rig.places + shift[:, None]
     return PosedRig(rig.body, rig.rotations, rig.roots + shift, places, rig.turns)
 
 
 @dataclass(frozen=True)
 class PlantedLegs:
-    """Poses whose feet follow their paths. copied: before. lowered: of the pelvis (F,), m."""
+    """Poses whose feet follow their paths.
+
+    copied: before. depths (F, 2): of soles below the floor, m. lowered: of the pelvis (F,), m.
+    """
 
     rig: PosedRig
     copied: PosedRig
-    paths: Annotated[Floats, "frames feet 3"]
+    depths: Annotated[Floats, "frames feet"]
     lowered: Frames
 
 
-def plant(
-    rig: PosedRig, feet: SourceFeet, heels: Annotated[Floats, "frames feet"], rate: float
-) -> PlantedLegs:
-    """Return the poses with the feet on their paths.
+@dataclass(frozen=True)
+class RigSoles:
+    """Soles of a rig's feet.
 
-    feet: of the motion, in proportion. heels (F, 2): depth below the floor of the motion's heels,
-    m, which the rig's may have too.
+    heights (2,): of the joints that stand above the soles, m. heels (2, 3): vectors at rest from
+    the ankles to the soles below, m. limited: whether their depth below the floor is limited.
     """
-    heights = foot_paths.standing_heights(feet, rig.body)
+
+    heights: Annotated[Floats, "feet"]
+    heels: Annotated[Floats, "feet 3"]
+    limited: bool = True
+
+
+def plant(rig: PosedRig, feet: SourceFeet, soles: RigSoles, rate: float) -> PlantedLegs:
+    """Return the poses with the feet on their paths. feet: of the motion, in proportion."""
     copied = _at(rig, feet.roles)
-    wanted = feet.paths @ UP + heights - feet.heights
-    rig = raised(rig, _pelvis_height(wanted - copied @ UP, feet.standing, rate))
+    wanted = feet.paths @ UP + soles.heights - feet.heights
+    rig = moved(rig, _pelvis_height(wanted - copied @ UP, feet.standing, rate)[:, None] * UP)
     copied = _at(rig, feet.roles)
-    paths = foot_paths.plan_paths(feet, copied, heights, rate)
-    paths += _heel_lifts(rig, paths - copied, heights, heels)[..., None] * UP
+    paths = foot_paths.plan_paths(feet, copied, soles.heights, rate)
+    depths = sole_depths(rig, soles, feet.floors, paths, paths - copied)
+    if soles.limited:
+        paths += limited_lifts(depths)[..., None] * UP
     legs = [
         rig.limb((side + "UpperLeg", side + "LowerLeg", side + "Foot", role))
         if role != side + "Foot"
@@ -111,7 +123,10 @@ def plant(
     shift = -lowered[:, None] * UP
     for (leg, poses), target in zip(legs, targets, strict=True):
         turn_limb(rotations, leg, poses, shift, target)
-    return PlantedLegs(posed(rig.body, rotations, rig.roots + shift), rig, paths, lowered)
+    made = posed(rig.body, rotations, rig.roots + shift)
+    still = np.zeros(paths.shape)
+    depths = sole_depths(made, soles, feet.floors, _at(made, feet.roles), still)
+    return PlantedLegs(made, rig, depths, lowered)
 
 
 def turn_limb(
@@ -139,53 +154,47 @@ def _pelvis_height(
     apart: Annotated[Floats, "frames feet"], standing: Annotated[Floats, "frames feet"], rate: float
 ) -> Frames:
     """Return how much higher the pelvis has to be (F,), m, for the feet that stand, smoothly."""
-    weights = standing.sum(axis=1)
+    weights = standing.sum(axis=1).astype(float)
     if not weights.any():
         return np.full(len(apart), float(np.median(apart)))
-    reach = len(apart)
-    steps = np.arange(-reach, reach + 1) / (SMOOTHING * rate)
-    # Far from all stances the nearest one counts.
-    kernel = np.exp(-0.5 * np.square(steps)) + 1e-12 / (1.0 + np.square(steps))
+    half = max(1, round(4.0 * SMOOTHING * rate))
+    kernel = np.exp(-0.5 * np.square(np.arange(-half, half + 1) / (SMOOTHING * rate)))
     wanted, known = (
-        np.convolve(values, kernel, mode="valid")
-        for values in (_padded((apart * standing).sum(axis=1), reach), _padded(weights, reach))
+        np.convolve(np.pad(values, half), kernel, mode="valid")
+        for values in ((apart * standing).sum(axis=1), weights)
     )
-    found: Frames = wanted / known
-    return found
+    near = np.flatnonzero(known > 0.0)
+    # Far from all stances those before and after count.
+    return np.asarray(np.interp(np.arange(len(apart)), near, wanted[near] / known[near]))
 
 
-def _padded(values: Frames, reach: int) -> Frames:
-    return np.pad(values.astype(float), reach)
-
-
-def _heel_lifts(
+def sole_depths(
     rig: PosedRig,
-    moved: Annotated[Floats, "frames feet 3"],
-    heights: Annotated[Floats, "feet"],
-    heels: Annotated[Floats, "frames feet"],
+    soles: RigSoles,
+    floors: Annotated[Floats, "frames feet"],
+    paths: Annotated[Floats, "frames feet 3"],
+    shift: Annotated[Floats, "frames feet 3"],
 ) -> Annotated[Floats, "frames feet"]:
-    """Return how much each foot is lifted (F, 2), m, so that its heel is not below the floor.
+    """Return how deep the sole of each foot is below its floor (F, 2), m; negative above it.
 
-    moved: from the copied feet to their paths, m. The motion's own depth stays.
+    The deeper of ball and heel. floors (F, 2): heights, m. paths: of the joints that stand, m.
+    shift: of the ankles against the poses (F, 2, 3), m.
     """
-    depths = heel_depths(rig, heights) - moved @ UP
-    found: Floats = np.maximum(depths - np.maximum(heels, 0.0), 0.0)
+    found = floors + soles.heights - paths @ UP
+    for foot, side in enumerate(SIDES):
+        ankle = rig.body.joints[side + "Foot"]
+        heel = rig.places[:, ankle] + quat.rotate(rig.turns[:, ankle], soles.heels[foot])
+        below = floors[:, foot] - (heel + shift[:, foot]) @ UP
+        found[:, foot] = np.maximum(found[:, foot], below)
     return found
 
 
-def heel_depths(
-    rig: PosedRig, heights: Annotated[Floats, "feet"], scale: float = 1.0
-) -> Annotated[Floats, "frames feet"]:
-    """Return how deep below the floor each heel is (F, 2), m; negative above it.
+def limited_lifts(depths: Floats) -> Floats:
+    """Return by how much feet are lifted (F, 2), m, so that no sole is deeper than the limit.
 
-    The heel is the point below the ankle that is on the floor at rest, in which the joint that
-    stands, toes or the foot, is at its height (2,), m. scale: of the places against the rest.
+    Depths up to FREE_DEPTH stay as they are; deeper ones approach the limit.
     """
-    joints, rest, found = rig.body.joints, rig.body.rest, []
-    for side, height in zip(SIDES, heights.tolist(), strict=True):
-        ankle = joints[side + "Foot"]
-        tip = joints.get(side + "Toes", ankle)
-        sole = (scale * (rest[tip] - rest[ankle]) - height) * UP
-        heel = rig.places[:, ankle] + quat.rotate(rig.turns[:, ankle], sole)
-        found.append(-heel @ UP)
-    return np.stack(found, axis=1)
+    soft = MOST_DEPTH - FREE_DEPTH
+    beyond = np.maximum(depths - FREE_DEPTH, 0.0)
+    found: Floats = beyond - soft * -np.expm1(-beyond / soft)
+    return found

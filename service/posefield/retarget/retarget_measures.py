@@ -7,7 +7,6 @@ import numpy as np
 from posefield.common.units import UP, Booleans, Floats
 from posefield.feet.two_bone import shortest_turn
 from posefield.motion import quat
-from posefield.retarget import planted_legs
 from posefield.retarget.planted_legs import PosedRig
 from posefield.retarget.role_map import SIDES
 
@@ -38,15 +37,6 @@ def legs_turned(copied: PosedRig, made: PosedRig) -> float:
     return float(np.mean(angles))
 
 
-def penetration(
-    rig: PosedRig,
-    paths: Annotated[Floats, "frames feet 3"],
-    heights: Annotated[Floats, "feet"],
-) -> float:
-    """Return the 99th percentile of the depth of heels and balls below the floor, m.
-
-    paths (F, 2, 3): of the joints that stand, m, at heights (2,) above their soles.
-    """
-    balls = heights - paths @ UP
-    depths = np.maximum(np.concatenate([balls, planted_legs.heel_depths(rig, heights)]), 0.0)
-    return float(np.percentile(depths, PERCENTILE))
+def penetration(depths: Annotated[Floats, "frames feet"]) -> float:
+    """Return the 99th percentile of the depths (F, 2) of soles below the floor, m."""
+    return float(np.percentile(np.maximum(depths, 0.0), PERCENTILE))

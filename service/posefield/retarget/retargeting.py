@@ -15,15 +15,19 @@ from posefield.retarget import (
     foot_paths,
     hand_goals,
     planted_legs,
+    reference_pose,
     retarget_measures,
     role_map,
 )
 from posefield.retarget.foot_paths import FLOOR, SourceFeet
-from posefield.retarget.planted_legs import PlantedLegs, PosedRig
+from posefield.retarget.planted_legs import PlantedLegs, PosedRig, RigSoles
+from posefield.retarget.rest_alignment import Soles
 from posefield.retarget.retarget_report import USUAL, HandGoal, RetargetReport, RetargetSettings
 from posefield.retarget.role_map import SIDES, Body
 from posefield.rigs.rig import Rig
 
+SAME_BONE = 1e-4
+"""Difference of the lengths of bones up to which they are the same, m."""
 MISSED = 1e-3
 """Distance of a hand from its target, m, from which on it is told."""
 
@@ -55,16 +59,18 @@ def retarget(
         clip.root_path,
         *skeleton.forward_kinematics(clip.skeleton.parents, clip.rotations, clip.translations),
     )
+    motion = reference_pose.with_upright_rest(motion)
     scale = body.leg_length / source.leg_length
     motion = _scaled(motion, scale, scale if settings.travel == "scaled" else 1.0)
     feet = _feet(motion, body, clip, settings)
-    made = _planted(motion, body, feet, clip.rate)
+    ground = _ground(motion, body, feet, scale)
+    made = _planted(motion, body, feet, ground, clip.rate)
     hand_goals.check_goals(settings.hands, made.rig, clip.rate)
     final = hand_goals.meet_goals(made.rig, settings.hands, clip.rate)
     found = clips.assemble(
         rig.skeleton, final.rotations, final.roots, rig.skeleton.offsets, clip.rate
     )
-    report = _report(motion, feet, made, scale, clip.rate)
+    report = _report(motion, feet, ground, made, clip.rate)
     missed = hand_goals.misses(final, settings.hands, clip.rate)
     warnings = (*rig.notes, *_warnings(report, settings.hands, missed))
     return Retargeted(
@@ -100,34 +106,55 @@ def _feet(motion: PosedRig, body: Body, clip: Clip, settings: RetargetSettings) 
     return foot_paths.feet_of(paths, clip.rate, roles, names, settings.stances)
 
 
-def _planted(motion: PosedRig, body: Body, feet: SourceFeet, rate: float) -> PlantedLegs:
-    """Return the rig with copied orientations, and its feet on their paths."""
-    rotations = copied_pose.copy_orientations(motion.body, body, motion.turns)
-    still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
-    # At rest, ankles are above the joints that stand: by more or less than in proportion.
-    heights = foot_paths.standing_heights(feet, body)
-    higher = (
-        np.mean(heights - feet.heights)
-        + _ankle_height(body, feet)
-        - (_ankle_height(motion.body, feet) * body.leg_length / motion.body.leg_length)
-    )
-    rig = planted_legs.posed(body, rotations, _hips(motion) + higher * UP - _hips(still))
-    scale = body.leg_length / motion.body.leg_length
-    heels = planted_legs.heel_depths(motion, feet.heights, scale)
-    return planted_legs.plant(rig, feet, heels, rate)
+@dataclass(frozen=True)
+class _Ground:
+    """How feet stand.
+
+    scale: length of the rig's legs over that of the motion's. soles: of the motion's and the rig's
+    left and right foot. higher: ankles of the rig above those of the motion in proportion, m.
+    below: heights and heels of the rig.
+    """
+
+    scale: float
+    soles: Soles
+    higher: float
+    below: RigSoles
 
 
-def _ankle_height(body: Body, feet: SourceFeet) -> float:
-    """Return the mean height at rest of ankles above the joints that stand, m."""
-    apart = [
-        body.rest[body.joints[side + "Foot"]] - body.rest[body.joints[role]]
-        for side, role in zip(SIDES, feet.roles, strict=True)
+def _ground(motion: PosedRig, body: Body, feet: SourceFeet, scale: float) -> _Ground:
+    """Return how the feet of a motion and of a rig stand."""
+    heights, standing = foot_paths.standing_heights(feet, body), feet.standing
+    ours = [reference_pose.sole_at_rest(body, side) for side in SIDES]
+    theirs = [
+        reference_pose.sole_of_motion(motion, side, standing[:, foot], ours[foot])
+        for foot, side in enumerate(SIDES)
     ]
-    return float(np.mean(apart, axis=0) @ UP)
+    left, right = zip(theirs, ours, strict=True)
+    drops = [(scale * before.flat_toes - after.toes) @ UP for before, after in (left, right)]
+    on_toes = feet.roles[0].endswith("Toes")
+    higher = float(np.mean(heights - feet.heights) + on_toes * np.mean(drops))
+    heels = [
+        (on_toes * sole.toes @ UP - height) * UP for sole, height in zip(ours, heights, strict=True)
+    ]
+    # A character of the same bones has the motion as it is.
+    bones = motion.body.leg_bones, body.leg_bones
+    limited = len(bones[0]) != len(bones[1]) or not np.allclose(*bones, rtol=0.0, atol=SAME_BONE)
+    below = RigSoles(heights, np.stack(heels), limited)
+    return _Ground(scale, (left, right), higher, below)
+
+
+def _planted(
+    motion: PosedRig, body: Body, feet: SourceFeet, ground: _Ground, rate: float
+) -> PlantedLegs:
+    """Return the rig with copied orientations, and its feet on their paths."""
+    rotations = copied_pose.copy_orientations(motion.body, body, motion.turns, ground.soles)
+    still = planted_legs.posed(body, rotations, np.zeros((len(rotations), 3)))
+    rig = planted_legs.moved(still, _hips(motion) + ground.higher * UP - _hips(still))
+    return planted_legs.plant(rig, feet, ground.below, rate)
 
 
 def _report(
-    motion: PosedRig, feet: SourceFeet, made: PlantedLegs, scale: float, rate: float
+    motion: PosedRig, feet: SourceFeet, ground: _Ground, made: PlantedLegs, rate: float
 ) -> RetargetReport:
     """Return the facts about a motion with planted feet."""
     paths = [
@@ -135,16 +162,15 @@ def _report(
         for own in (made.copied, made.rig)
     ]
     skates = [retarget_measures.skate(own, feet.standing, rate) for own in (feet.paths, *paths)]
-    heights = foot_paths.standing_heights(feet, made.rig.body)
     theirs, ours = motion.body.joints, made.rig.body.joints
     return RetargetReport(
         tuple(role for role in theirs if role in ours),
         tuple(role for role in theirs if role not in ours),
-        scale,
+        ground.scale,
         *skates,
         retarget_measures.legs_turned(made.copied, made.rig),
         float(made.lowered.max()),
-        retarget_measures.penetration(made.rig, paths[1], heights),
+        retarget_measures.penetration(made.depths),
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -17,6 +18,7 @@ from posefield.roles import joint_recognition
 
 SIDES = joint_recognition.SIDES
 FIELD = "character"
+LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,12 @@ class Body:
             + self.length(side + "LowerLeg", side + "Foot")
             for side in SIDES
         )
+
+    @property
+    def leg_bones(self) -> list[float]:
+        """Return the lengths of the bones of both legs and feet, m."""
+        chains = [[side + part for part in LEG if side + part in self.joints] for side in SIDES]
+        return [self.length(*pair) for chain in chains for pair in pairwise(chain)]
 
     @property
     def facing(self) -> float:

@@ -58,6 +58,8 @@ def find_roles(
     positions = skeleton.at_rest(skeleton.offsets)[None]
     checked = body_shape.check_shape(guesses, skeleton.names, positions)
     checked |= told
+    if told:
+        _check_order(source, skeleton, checked)
     _refuse_unsure(source, checked, skeleton.names)
     unsure = {role: own for role, own in checked.items() if not own.is_sure}
     found = {role: own for role, own in checked.items() if own.is_sure}

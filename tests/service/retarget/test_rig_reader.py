@@ -1,0 +1,124 @@
+"""Tests of rigs: characters' files of all formats, their rest poses, roles and refusals."""
+
+import numpy as np
+import pytest
+import rig_files
+
+from posefield.common.errors import MotionFileError
+from posefield.motion import quat, skeleton
+from posefield.rigs.rig_reader import read_rig
+
+
+@pytest.fixture
+def files(figure, tmp_path):
+    """One figure with any axes of its joints, in four files."""
+    own = figure.framed(3)
+    return {
+        "glb": rig_files.write_glb(tmp_path / "a.glb", own),
+        "usda": rig_files.write_usd(tmp_path / "a.usda", own),
+        "cm, z up": rig_files.write_usd(tmp_path / "b.usdc", own, 0.01, "z"),
+        "inches": rig_files.write_usd(tmp_path / "c.usda", own, 0.0254),
+    }
+
+
+@pytest.mark.parametrize("kind", ["glb", "usda", "cm, z up", "inches"])
+def test_all_formats_give_the_same_skeleton(figure, files, kind):
+    rig = read_rig(files[kind])
+    assert rig.skeleton.names == figure.names
+    assert np.abs(rig.skeleton.offsets - figure.offsets).max() < 1e-6
+    assert {role: own.joint for role, own in rig.roles.items()}["leftLowerLeg"] == "LeftLeg"
+    assert abs(rig.facing) < 0.05 and rig.notes == ()
+    assert rig.joint_paths[1] == ("1" if kind == "glb" else "/".join(figure.names[:2]))
+
+
+@pytest.mark.parametrize("kind", ["glb", "usda", "cm, z up"])
+def test_values_of_a_file_pose_its_joints_as_the_clip(walk, files, kind):
+    """Forward kinematics in the file's own joints, unit and axes against that of the clip."""
+    rig = read_rig(files[kind])
+    turns, places = rig.file_rotations(walk), rig.file_translations(walk)
+    found = skeleton.positions(walk.skeleton.parents, turns, places)
+    unit = {"glb": 0.01, "usda": 1.0, "cm, z up": 0.01}[kind]
+    found = unit * found
+    if kind == "cm, z up":
+        found = found[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
+    assert np.abs(found - walk.positions()).max() < 1e-6
+    # At rest, they are those of the file.
+    still = quat.IDENTITY + np.zeros((1, len(walk.skeleton), 1))
+    rest = rig.rest.file_rotations(still)[0]
+    assert np.abs(np.abs(np.sum(rest * rig.rest.rotations, axis=-1)) - 1.0).max() < 1e-9
+    # The axes matter: the clip's own rotations pose other joints.
+    wrong = skeleton.positions(walk.skeleton.parents, walk.rotations, places)
+    assert np.abs(unit * wrong - walk.positions()).max() > 0.1
+
+
+def renamed(figure, **names):
+    return rig_files.Figure(
+        tuple(names.get(name, name) for name in figure.names),
+        figure.parents,
+        figure.offsets,
+        figure.frames,
+    )
+
+
+def test_stated_roles_are_taken(figure, tmp_path):
+    own = renamed(figure, LeftUpLeg="bone_7", RightUpLeg="bone_9")
+    path = rig_files.write_usd(tmp_path / "a.usda", own)
+    with pytest.raises(MotionFileError, match=r"found no .*leftUpperLeg.*state them by role"):
+        read_rig(path)
+    joint = own.index("bone_7")
+    named = read_rig(path, {"leftUpperLeg": "bone_7", "rightUpperLeg": "bone_9"})
+    assert named.joints["leftUpperLeg"] == joint
+    assert named.roles["leftUpperLeg"].confidence == 1.0
+    places = {"leftUpperLeg": named.joint_paths[joint], "rightUpperLeg": "bone_9"}
+    assert read_rig(path, places).joints == named.joints
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ({"leftUperLeg": "LeftUpLeg"}, "the role 'leftUperLeg'.*did you mean 'leftUpperLeg'"),
+        ({"leftUpperLeg": "LeftUpLegs"}, "no joint 'LeftUpLegs' for leftUpperLeg"),
+        ({"leftLowerLeg": "LeftArm"}, "leftLowerLeg at 'LeftArm', which is not below"),
+    ],
+)
+def test_wrong_statements_are_refused(figure, tmp_path, stated, said):
+    path = rig_files.write_glb(tmp_path / "a.glb", figure)
+    with pytest.raises(MotionFileError, match=said):
+        read_rig(path, stated)
+
+
+def test_files_that_are_no_rig_are_refused(figure, tmp_path):
+    scaled = {"path": "scale", "node": 3}
+    moved = {"animations": [{"channels": [{"sampler": 0, "target": scaled}], "samplers": [{}]}]}
+    animated = rig_files.write_glb(tmp_path / "a.glb", figure, **moved)
+    cases = {
+        tmp_path / "a.fbx": "suffix '.fbx', expected one of .usd",
+        tmp_path / "none.glb": "cannot be read",
+        rig_files.write_empty_usd(tmp_path / "empty.usda"): "found no Skeleton",
+        rig_files.write_usd(tmp_path / "two.usda", figure, skeletons=2): "found 2 skeletons",
+        rig_files.write_glb(tmp_path / "b.glb", figure, skins=[]): "found no skin",
+        animated: "changes the scale of .*no animated scale",
+    }
+    for path, said in cases.items():
+        with pytest.raises(MotionFileError, match=said):
+            read_rig(path)
+
+
+def test_bodies_without_legs_are_refused(figure, tmp_path):
+    kept = [j for j, name in enumerate(figure.names) if "Leg" not in name and "Foot" not in name]
+    kept = [j for j in kept if "Toe" not in figure.names[j] and "Hip" not in figure.names[j][1:]]
+    kept = sorted({0, *kept})
+    own = rig_files.Figure(
+        tuple(figure.names[j] for j in kept),
+        tuple(kept.index(figure.parents[j]) if figure.parents[j] >= 0 else -1 for j in kept),
+        figure.offsets[kept],
+        figure.frames[kept],
+    )
+    with pytest.raises(MotionFileError, match="expected hips and two legs"):
+        read_rig(rig_files.write_usd(tmp_path / "a.usda", own))
+
+
+def test_an_unusual_size_is_told(figure, tmp_path):
+    path = rig_files.write_usd(tmp_path / "a.usda", figure.longer(100.0, *figure.names))
+    (note,) = read_rig(path).notes
+    assert "is the unit of the file right?" in note
