@@ -12,8 +12,8 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath
-from posefield.common.units import UP, Booleans, Floats
+from posefield.common.array_shapes import RootPath
+from posefield.common.units import UP, Booleans, Floats, Indices
 from posefield.feet import contact_estimates, stances
 from posefield.feet.stances import UNEVEN, FootPath, Interval
 from posefield.question.results import StanceResult
@@ -163,7 +163,7 @@ def _correction(apart: RootPath, found: Sequence[Interval], rate: float) -> Root
 
 def _cubic(
     ends: tuple[Floats, Floats], ways: tuple[Floats, Floats], share: Floats
-) -> Annotated[Floats, "frames 3"]:
+) -> Annotated[Floats, "some 3"]:
     """Return the cubic (S, 3) between two values with slopes, at shares (S, 1)."""
     s = share
     found: Floats = (
@@ -175,8 +175,10 @@ def _cubic(
     return found
 
 
-def _settled(value: Floats, slope: Floats, steps: Frames, rate: float) -> RootPath:
+def _settled(
+    value: Floats, slope: Floats, steps: Annotated[Indices, "some"], rate: float
+) -> Annotated[Floats, "some 3"]:
     """Return values (S, 3) some steps away from one with a slope by step, which fades."""
     fade = FADE * rate
-    found: RootPath = value + slope * (fade * -np.expm1(-steps / fade))[:, None]
+    found: Floats = value + slope * (fade * -np.expm1(-steps / fade))[:, None]
     return found

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames
+from posefield.common.array_shapes import Frames, RootPath, Vector
 from posefield.common.errors import InvalidField
 from posefield.motion import blend
 from posefield.retarget import planted_legs
@@ -20,8 +20,7 @@ ARMS = {
 
 
 def check_goals(goals: Sequence[HandGoal], rig: PosedRig, rate: float) -> None:
-    """Raise InvalidField for a goal of another part than a hand, of a hand that the rig lacks, or
-    outside the motion."""
+    """Raise InvalidField for a goal of no hand of the rig, or outside the motion."""
     last = (len(rig.roots) - 1) / rate
     for goal in goals:
         lacking = [role for role in ARMS.get(goal.role, ()) if role not in rig.body.joints]
@@ -57,11 +56,11 @@ def meet_goals(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> PosedRi
     return planted_legs.posed(rig.body, rotations, rig.roots)
 
 
-def _at(path: np.ndarray, frame: float) -> np.ndarray:
+def _at(path: RootPath, frame: float) -> Vector:
     """Return a point (3,) of a path (F, 3) at a fractional frame."""
     if len(path) < 2:
         return path[0]
-    found: np.ndarray = blend.interpolate_rows(path, np.clip(np.array(frame), 0, len(path) - 1))
+    found: Vector = blend.interpolate_rows(path, np.clip(np.array(frame), 0, len(path) - 1))
     return found
 
 

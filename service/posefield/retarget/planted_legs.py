@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Frames, RootPath, Rotations
-from posefield.common.units import UP, Floats
+from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import pelvis, two_bone
 from posefield.feet.limbs import Limb, LimbPoses
 from posefield.motion import quat, skeleton
@@ -146,12 +146,15 @@ def turn_limb(
     rotations[~moved] = before[~moved]
 
 
-def _at(rig: PosedRig, roles: tuple[str, ...]) -> Annotated[Floats, "frames roles 3"]:
+def _at(rig: PosedRig, roles: tuple[str, str]) -> Annotated[Floats, "frames feet 3"]:
+    """Return the positions (F, 2, 3), m, of the joints of two roles."""
     return np.stack([rig.of_role(role) for role in roles], axis=1)
 
 
 def _pelvis_height(
-    apart: Annotated[Floats, "frames feet"], standing: Annotated[Floats, "frames feet"], rate: float
+    apart: Annotated[Floats, "frames feet"],
+    standing: Annotated[Booleans, "frames feet"],
+    rate: float,
 ) -> Frames:
     """Return how much higher the pelvis has to be (F,), m, for the feet that stand, smoothly."""
     weights = standing.sum(axis=1).astype(float)

@@ -11,6 +11,7 @@ import numpy as np
 from posefield.common.array_shapes import Vector
 from posefield.common.units import UP, Booleans, Floats
 from posefield.motion import quat
+from posefield.retarget.foot_paths import FLOOR
 from posefield.retarget.planted_legs import PosedRig
 from posefield.retarget.role_map import SIDES, Body
 
@@ -20,7 +21,6 @@ SAME_SLOPE = np.radians(10.0)
 """Difference of the slopes of two feet at rest up to which both are taken as flat."""
 FLAT_SHARE = 30.0
 """Percentile of the heights of an ankle in stances up to which its foot is flat."""
-FLOOR = 1.0 - UP
 
 
 def with_upright_rest(motion: PosedRig) -> PosedRig:

@@ -7,10 +7,33 @@ import numpy as np
 from posefield.common.units import UP, Booleans, Floats
 from posefield.feet.two_bone import shortest_turn
 from posefield.motion import quat
-from posefield.retarget.planted_legs import PosedRig
+from posefield.retarget.foot_paths import SourceFeet
+from posefield.retarget.planted_legs import PlantedLegs, PosedRig
+from posefield.retarget.retarget_report import RetargetReport
 from posefield.retarget.role_map import SIDES
 
 PERCENTILE = 99.0
+
+
+def measure(feet: SourceFeet, made: PlantedLegs, scale: float, rate: float) -> RetargetReport:
+    """Return the report on a motion with planted feet, without its roles, hands and warnings.
+
+    feet: of the motion, in proportion. scale: length of the rig's legs over the motion's.
+    """
+    paths = [
+        np.stack([own.of_role(role) for role in feet.roles], axis=1)
+        for own in (made.copied, made.rig)
+    ]
+    before, copied, after = (skate(own, feet.standing, rate) for own in (feet.paths, *paths))
+    return RetargetReport(
+        scale=scale,
+        skate_source=before,
+        skate_copied=copied,
+        skate=after,
+        legs_turned=legs_turned(made.copied, made.rig),
+        lowered=float(made.lowered.max()),
+        penetration=penetration(made.depths),
+    )
 
 
 def skate(

@@ -53,9 +53,9 @@ class RetargetReport:
     distance of each hand from its goal, m. warnings: sentences for the user.
     """
 
-    mapped: tuple[str, ...]
-    missing: tuple[str, ...]
-    scale: float
+    mapped: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
+    scale: float = 1.0
     skate_source: float = 0.0
     skate_copied: float = 0.0
     skate: float = 0.0

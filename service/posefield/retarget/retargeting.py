@@ -70,12 +70,13 @@ def retarget(
     found = clips.assemble(
         rig.skeleton, final.rotations, final.roots, rig.skeleton.offsets, clip.rate
     )
-    report = _report(motion, feet, ground, made, clip.rate)
+    report = retarget_measures.measure(feet, made, ground.scale, clip.rate)
+    mapped, missing = _mapped(source, body)
     missed = hand_goals.misses(final, settings.hands, clip.rate)
-    warnings = (*rig.notes, *_warnings(report, settings.hands, missed))
+    warnings = (*rig.notes, *_warnings(missing, settings.hands, missed))
     return Retargeted(
         replace(found, curves=clip.curves),
-        replace(report, hands_missed=missed, warnings=warnings),
+        replace(report, mapped=mapped, missing=missing, hands_missed=missed, warnings=warnings),
     )
 
 
@@ -108,7 +109,7 @@ def _feet(motion: PosedRig, body: Body, clip: Clip, settings: RetargetSettings) 
 
 @dataclass(frozen=True)
 class _Ground:
-    """How feet stand.
+    """Ground contact of a motion's and of a rig's feet.
 
     scale: length of the rig's legs over that of the motion's. soles: of the motion's and the rig's
     left and right foot. higher: ankles of the rig above those of the motion in proportion, m.
@@ -153,33 +154,18 @@ def _planted(
     return planted_legs.plant(rig, feet, ground.below, rate)
 
 
-def _report(
-    motion: PosedRig, feet: SourceFeet, ground: _Ground, made: PlantedLegs, rate: float
-) -> RetargetReport:
-    """Return the facts about a motion with planted feet."""
-    paths = [
-        np.stack([own.of_role(role) for role in feet.roles], axis=1)
-        for own in (made.copied, made.rig)
-    ]
-    skates = [retarget_measures.skate(own, feet.standing, rate) for own in (feet.paths, *paths)]
-    theirs, ours = motion.body.joints, made.rig.body.joints
-    return RetargetReport(
-        tuple(role for role in theirs if role in ours),
-        tuple(role for role in theirs if role not in ours),
-        ground.scale,
-        *skates,
-        retarget_measures.legs_turned(made.copied, made.rig),
-        float(made.lowered.max()),
-        retarget_measures.penetration(made.depths),
-    )
+def _mapped(source: Body, rig: Body) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the roles of a motion that a rig has, and those that it lacks."""
+    found = tuple(role for role in source.joints if role in rig.joints)
+    return found, tuple(role for role in source.joints if role not in rig.joints)
 
 
 def _warnings(
-    report: RetargetReport, goals: Sequence[HandGoal], missed: Sequence[float]
+    missing: Sequence[str], goals: Sequence[HandGoal], missed: Sequence[float]
 ) -> Iterator[str]:
     """Yield sentences on what the character lacks or does not reach."""
-    if report.missing:
-        yield f"the character has no joint for {', '.join(report.missing)}: they do not move"
+    if missing:
+        yield f"the character has no joint for {', '.join(missing)}: they do not move"
     for goal, miss in zip(goals, missed, strict=True):
         if miss > MISSED:
             yield f"{goal.role} at {goal.time:g} s: {miss:.3f} m from its target, out of reach"

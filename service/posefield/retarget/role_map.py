@@ -106,10 +106,10 @@ class Chain:
     """Joints one below the other. places (n,): of each along the chain, 0 to 1."""
 
     joints: tuple[int, ...]
-    places: Annotated[Floats, "joints"]
+    places: Annotated[Floats, "chain"]
 
 
-def _places(bones: Bones, joints: tuple[int, ...]) -> Annotated[Floats, "joints"]:
+def _places(bones: Bones, joints: tuple[int, ...]) -> Annotated[Floats, "chain"]:
     """Return the places (n,) of joints along their chain by length; 1 for a single one."""
     if len(joints) < 2:
         return np.ones(len(joints))
