@@ -222,3 +222,11 @@ def models(labelled_path, walk_path, tmp_path_factory) -> Path:
     shutil.copy(labelled_path, folder / "reach.onnx")
     shutil.copy(walk_path, folder / "walk.onnx")
     return folder
+
+
+@pytest.fixture(scope="session")
+def shipped_walk():
+    """The shipped model of walks, whose skeleton has roles."""
+    from posefield.registry import shipped_models
+
+    return shipped_models.with_shipped([]).find("cmu_walk")

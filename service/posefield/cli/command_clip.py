@@ -7,8 +7,9 @@ import typer
 
 from posefield.common import atomic_files
 from posefield.console.arguments import Json, ModelPath, encoder_for, open_model
+from posefield.console.character_options import CharacterOptions
 from posefield.console.output import print_warnings, written_message
-from posefield.console.question_options import with_question_options
+from posefield.console.question_options import with_option_groups, with_question_options
 from posefield.encode.formats import POSE_ENCODERS
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
@@ -26,23 +27,33 @@ def pose(model: ModelPath, question: PoseQuestion, json: Json = False) -> None:
 
 
 @with_question_options(FileQuestion)
+@with_option_groups
 def clip(
     model: ModelPath,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="output file; its extension selects the format")
     ],
     question: FileQuestion,
+    whom: CharacterOptions,
     json: Json = False,
 ) -> None:
     """Write a clip to a file: USD, glTF, BVH or numbers.
 
     The file's extension is usda, usdc, usdz, glb, bvh, json, npz, arrow or msgpack; bvh carries no
-    curves. Blender plays USD files at the scene's frame rate, 24 by default: write them with
-    --fps 24, or set the scene's rate.
+    curves. With --character, the character of another file moves: USD files refer to it, glTF files
+    animate its nodes, others have its skeleton. Blender plays USD files at the scene's frame rate,
+    24 by default: write them with --fps 24, or set the scene's rate.
     """
-    found = encoder_for(output)
-    convention = found.convention(question.unit, question.up, question.body)
-    answer = found.noted(clips.synthesize_clip(open_model(model), question))
-    atomic_files.write(found.encode(answer, convention), output)
+    found, opened = encoder_for(output), open_model(model)
+    delivery = whom.delivery(found, question, output)
+    if delivery is None:
+        convention = found.convention(question.unit, question.up, question.body)
+        answer = found.noted(clips.synthesize_clip(opened, question))
+        content = found.encode(answer, convention)
+    else:
+        predicted = clips.synthesize_clip(opened, question)
+        answer = delivery.clip(predicted, question, opened.session.card.roles)
+        content = delivery.encode(answer)
+    atomic_files.write(content, output)
     print_warnings(answer.trust)
     typer.echo(written_message(output, answer, json))

@@ -2,22 +2,27 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
 from posefield.console.arguments import Json, encoder_for
+from posefield.console.character_options import CharacterOptions
 from posefield.console.output import as_json
 from posefield.console.question_options import with_option_groups, with_question_options
 from posefield.encode import performance_files
 from posefield.question import json_decoding
 from posefield.question.performance_batch_question import CrowdStageQuestion, PerformanceLayout
 from posefield.question.performance_question import PerformanceQuestion
-from posefield.question.performance_report import PerformanceReport
+from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 from posefield.registry import shipped_models
 from posefield.synthesis.frame_times import MAX_POSES
+
+if TYPE_CHECKING:
+    from posefield.characters.user_character import UserCharacter
+    from posefield.performance.script import Script
 
 MAX_FRAMES = 10 * MAX_POSES
 
@@ -81,6 +86,7 @@ def perform(
     one: OneArguments,
     many: ManyArguments,
     question: CrowdStageQuestion,
+    whom: CharacterOptions,
     model: Annotated[
         list[Path] | None,
         typer.Option(
@@ -103,7 +109,7 @@ def perform(
     _check_stage(question, many)
     if script_rows.are_many(script):
         perform_them = _perform_crowd if many.crowd else _perform_many
-        perform_them(script, one, many, _Stage(tuple(model or ()), question, json))
+        perform_them(script, one, many, _Stage(tuple(model or ()), question, whom, json))
         return
     for option in ("crowd", "format", "workers"):
         if getattr(many, option) not in (None, False):
@@ -116,25 +122,43 @@ def perform(
     asked = json_decoding.decode_question(PerformanceQuestion, _read(script))
     find = shipped_models.with_shipped(model or []).find
     if one.output is None:
+        whom.refuse("with --plan, expected with an output file")
         report = composition.plan(resolve_script(asked, find), MAX_FRAMES)
         typer.echo(as_json(report.document()) if json else report_text(report))
         return
     path = Path(one.output)
-    encoder = encoder_for(path)
-    encode = performance_files.encoder(encoder, one.layout)
-    convention = encoder.convention(asked.unit, asked.up, asked.body)
-    answer = composition.perform(resolve_script(asked, find), MAX_FRAMES)
-    atomic_files.write(encode(answer, convention), path)
+    found = resolve_script(asked, find)
+    answer, content = _performed(found, path, one.layout, whom)
+    atomic_files.write(content, path)
     facts = {"file": str(path), **answer.trust.document()}
     typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
 
 
+def _performed(
+    script: "Script", path: Path, layout: PerformanceLayout, whom: CharacterOptions
+) -> tuple[PerformanceAnswer, bytes]:
+    """Return the performance of a script, and its file."""
+    from posefield.performance import composition
+
+    form, question = encoder_for(path), script.question
+    encode = performance_files.encoder(form, layout)
+    order = whom.delivery(form, question, path)
+    if order is None:
+        convention = form.convention(question.unit, question.up, question.body)
+        answer = composition.perform(script, MAX_FRAMES)
+        return answer, encode(answer, convention)
+    order.check_layout(layout)
+    made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
+    return made, order.encode(made)
+
+
 @dataclass(frozen=True)
 class _Stage:
-    """Models of many scripts, the stage of a crowd, and whether the result is told as JSON."""
+    """Models and character of many scripts, the stage of a crowd, and whether to print JSON."""
 
     models: tuple[Path, ...]
     question: CrowdStageQuestion
+    whom: CharacterOptions
     json: bool
 
 
@@ -173,10 +197,21 @@ def _perform_many(scripts: Path, one: OneArguments, many: ManyArguments, stage: 
     output = _output(one, "a folder for the files of many scripts")
     form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
     workers, rows = _workers(many), script_rows.read_scripts(scripts)
-    batch = performance_batch.PerformanceBatch(stage.models, output, form, one.layout)
+    whom = _batch_character(output, stage.whom)
+    batch = performance_batch.PerformanceBatch(stage.models, output, form, one.layout, whom)
     with ProgressBar("performances", len(rows), 0) as bar:
         outcome = performance_batch.run(batch, rows, workers, bar.advance)
     typer.echo(as_json(outcome.facts(output)) if stage.json else f"{output}: {outcome.sentence}")
+
+
+def _batch_character(output: str, whom: CharacterOptions) -> "UserCharacter | None":
+    """Return the character of many scripts, to which files in the folder of performances refer."""
+    from posefield.batch import target
+    from posefield.batch.scripts import performance_batch
+
+    if target.URL.match(output):
+        whom.refuse("with the URL of an object store, expected a folder: files refer to its file")
+    return whom.open(Path(output) / performance_batch.FOLDER)
 
 
 def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
@@ -184,6 +219,7 @@ def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage:
     from posefield.console.progress import ProgressBar
 
     output = Path(_output(one, "a file for the crowd"))
+    stage.whom.refuse("with --crowd, expected without: a crowd has the characters of its models")
     if one.layout != "whole":
         raise InvalidField("layout", f"{one.layout!r} with --crowd, expected 'whole'")
     crowd = performance_crowd.from_question(stage.models, output, stage.question)

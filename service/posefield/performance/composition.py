@@ -12,7 +12,7 @@ from posefield.feet import foot_placement, footsteps
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import FeetPlan, SampledMotion
 from posefield.motion import joint_roles, quat
-from posefield.motion.clip import assemble
+from posefield.motion.clip import Clip, assemble
 from posefield.performance import act_steps, hold_steps, reporting, walk_steps
 from posefield.performance.acts.staged_act import StagedAct
 from posefield.performance.joins import join_quality
@@ -22,7 +22,11 @@ from posefield.performance.passages.passage import RATE, Passage
 from posefield.performance.script import Script, errors_under
 from posefield.performance.timeline import Composed, Timeline, from_poses, resample
 from posefield.question.performance_question import Act, Hold, Segment, Walk
-from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
+from posefield.question.performance_report import (
+    HeldJoint,
+    PerformanceAnswer,
+    PerformanceReport,
+)
 from posefield.question.results import FeetResult
 from posefield.synthesis import standing_feet
 
@@ -58,7 +62,20 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
     joints = joint_roles.rename_joints(character.skeleton, character.roles, script.question.names)
     turns = quat.normalize(rotations)
     clip = assemble(joints, turns, roots, character.bones, script.question.fps)
-    return PerformanceAnswer(clip, reporting.report(script, composed, judged, len(clip), told))
+    report = reporting.report(script, composed, judged, len(clip), told)
+    return PerformanceAnswer(clip, report, _held_joints(composed.timeline, clip))
+
+
+def _held_joints(timeline: Timeline, clip: Clip) -> tuple[HeldJoint, ...]:
+    """Return the targets within a performance."""
+    found = []
+    for own in timeline.targets:
+        begins, ends = ((frame - timeline.begin) / RATE for frame in (own.begin, own.end))
+        if ends >= 0.0 and begins <= clip.duration:
+            x, y, z = own.position.tolist()
+            times = max(begins, 0.0), min(ends, clip.duration)
+            found.append(HeldJoint(clip.skeleton.names[own.joint], *times, (x, y, z)))
+    return tuple(found)
 
 
 def _judge_joins(script: Script, composed: Composed, every: PlacedFrames) -> Sequence[JoinFacts]:

@@ -93,7 +93,8 @@ class PerformanceReport:
 
     models: name@contenthash, in the order of the script. character: of the bones. sigma: expected
     distance from captured motion, m, root mean square over frames. supported: whether similar clips
-    were captured for all segments. feet: None for feet as predicted.
+    were captured for all segments. feet: None for feet as predicted. retargeting: report on the
+    motion of a user's character; empty for that of the script.
     """
 
     models: tuple[str, ...]
@@ -106,6 +107,7 @@ class PerformanceReport:
     joins: tuple[JoinReport, ...]
     feet: FeetResult | None
     script_warnings: tuple[ScriptWarning, ...] = ()
+    retargeting: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def model(self) -> str:
@@ -134,14 +136,26 @@ class PerformanceReport:
             "joins": [asdict(each) for each in self.joins],
             "warnings": [asdict(each) for each in self.script_warnings],
         }
-        return found | ({} if self.feet is None else {"feet": _listed(self.feet.facts())})
+        found |= {} if self.feet is None else {"feet": _listed(self.feet.facts())}
+        return found | ({"retargeting": dict(self.retargeting)} if self.retargeting else {})
+
+
+@dataclass(frozen=True)
+class HeldJoint:
+    """Target of a joint: its position in the world, m, from one time until another, s."""
+
+    joint: str
+    begins: float
+    ends: float
+    position: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class PerformanceAnswer(SampledClip):
-    """A performance as one clip."""
+    """A performance as one clip. held: targets of its joints."""
 
     trust: PerformanceReport
+    held: tuple[HeldJoint, ...] = ()
 
 
 def _plain(each: Any) -> dict[str, Any]:

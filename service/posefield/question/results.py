@@ -156,7 +156,7 @@ class Trust:
     requested. deviations: requested controls whose value the motion does not have. labels:
     requested names or weights besides the performer, by label set. feet: of a clip that were made
     to stand; None for feet as predicted. take: seed, variety and detail of the take; empty for the
-    prediction.
+    prediction. retargeting: report on the motion of a user's character; empty for the model's own.
     """
 
     model: str
@@ -176,6 +176,7 @@ class Trust:
     labels: Mapping[str, LabelValue] = field(default_factory=dict)
     feet: FeetResult | None = None
     take: Mapping[str, float] = field(default_factory=dict)
+    retargeting: Mapping[str, Any] = field(default_factory=dict)
 
     def document(self) -> dict[str, Any]:
         """Return the Trust (schema of the contract): the facts and the band of sigma."""
@@ -206,6 +207,7 @@ class Trust:
             "labels": dict(self.labels),
             "feet": {} if self.feet is None else self.feet.facts(),
             "take": dict(self.take),
+            "retargeting": dict(self.retargeting),
         }
         return seen | {name: fact for name, fact in more.items() if fact}
 

@@ -31,6 +31,8 @@ from posefield.batch.target import (
     put_file,
     read_lines,
 )
+from posefield.characters import delivery
+from posefield.characters.user_character import UserCharacter
 from posefield.common.errors import FileError, QueryError
 from posefield.encode import performance_files
 from posefield.encode.formats import CLIP_ENCODERS
@@ -38,11 +40,14 @@ from posefield.encode.performance_files import PerformanceEncoder
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question.performance_batch_question import PerformanceLayout
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_report import PerformanceAnswer
 from posefield.registry import shipped_models
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.frame_times import MAX_POSES
 
 MAX_FRAMES = 10 * MAX_POSES
+FOLDER = "performances"
 MANIFEST, PARTS = "manifest.jsonl", f"{STATE_FOLDER}/performances"
 MARK = f"{STATE_FOLDER}/performances.json"
 """File of a target whose performances are not finished."""
@@ -55,15 +60,36 @@ class PerformanceBatch:
 
     models: files and folders of models besides the shipped ones. place: folder or URL. form:
     extension of the files. layout: of USD files; InvalidField for a form without layouts.
+    character: that moves instead of those of the scripts.
     """
 
     models: tuple[Path, ...]
     place: str
     form: str
     layout: PerformanceLayout = "whole"
+    character: UserCharacter | None = None
 
     def __post_init__(self) -> None:
         performance_files.encoder(CLIP_ENCODERS[self.form], self.layout)
+
+    def file(self, script: Script) -> tuple[PerformanceAnswer, bytes]:
+        """Return the performance of a script, and its file."""
+        form, question = CLIP_ENCODERS[self.form], script.question
+        if self.character is None:
+            convention = form.convention(question.unit, question.up, question.body)
+            answer = composition.perform(script, MAX_FRAMES)
+            return answer, self.encode(answer, convention)
+        order = delivery.deliver(self.character, form, question)
+        made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
+        return made, order.encode(made)
+
+    def check(self, question: PerformanceQuestion) -> None:
+        """Raise InvalidField for what a file of the form cannot hold."""
+        form = CLIP_ENCODERS[self.form]
+        if self.character is None:
+            form.convention(question.unit, question.up, question.body)
+        else:
+            delivery.deliver(self.character, form, question).check_layout(self.layout)
 
     @property
     def encode(self) -> PerformanceEncoder:
@@ -128,12 +154,12 @@ def run(
 
 def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, str]:
     """Return the digest of each script with its models; InvalidField for scripts without answer."""
-    registry, encoder = open_models(batch.models), CLIP_ENCODERS[batch.form]
+    registry = open_models(batch.models)
     digests: dict[str, str] = {}
     faults: list[str] = []
     for row in rows:
         try:
-            encoder.convention(row.script.unit, row.script.up, row.script.body)
+            batch.check(row.script)
             script = resolve_script(row.script, registry.find)
             digests[row.name] = _digest(batch, script, registry)
         except QueryError as fault:
@@ -145,7 +171,7 @@ def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, st
 
 def _digest(batch: PerformanceBatch, script: Script, registry: ModelRegistry) -> str:
     """Return a digest of all that determines the bytes of a performance."""
-    chosen = script.question.character
+    chosen, whom = script.question.character, batch.character
     facts = [
         batch.form,
         batch.layout,
@@ -153,6 +179,7 @@ def _digest(batch: PerformanceBatch, script: Script, registry: ModelRegistry) ->
         *(version(name) for name in VERSIONED_PACKAGES),
         *script.identities,
         "" if chosen is None else registry.find(chosen.model).identity,
+        *([] if whom is None else [whom.name, whom.digest, whom.target.reference]),
     ]
     content = msgspec.json.encode(script.question)
     return hashlib.sha256(orjson.dumps(facts) + content).hexdigest()
@@ -203,16 +230,12 @@ def make_one(batch: PerformanceBatch, job: tuple[ScriptRow, str]) -> Entry:
     """
     row, digest = job
     script = row.script
-    encoder = CLIP_ENCODERS[batch.form]
     try:
-        convention = encoder.convention(script.unit, script.up, script.body)
-        resolved = resolve_script(script, open_models(batch.models).find)
-        answer = composition.perform(resolved, MAX_FRAMES)
+        answer, content = batch.file(resolve_script(script, open_models(batch.models).find))
     except QueryError as fault:
         raise script_rows.faulty_scripts([f"{row.place}: {fault}"]) from fault
-    path = f"performances/{row.name}.{batch.form}"
+    path = f"{FOLDER}/{row.name}.{batch.form}"
     target = open_target(batch.place)
-    content = batch.encode(answer, convention)
     put_file(target, path, [content])
     entry = {
         **performance_archive.entry(row.name, path, content, answer),

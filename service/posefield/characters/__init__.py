@@ -1,0 +1,1 @@
+"""Characters of users: rigs in USD or glTF files to which motions are delivered."""

@@ -1,0 +1,149 @@
+"""Delivery of motions to a user's character: retargeted, reported and written to files."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from posefield.characters.user_character import UserCharacter
+from posefield.common.errors import InvalidField
+from posefield.encode.files.file_convention import Convention
+from posefield.encode.formats import ClipEncoder
+from posefield.motion.clip import Clip
+from posefield.question.motion_question import FileQuestion, Target
+from posefield.question.performance_batch_question import PerformanceLayout
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.performance_report import HeldJoint, PerformanceAnswer, ScriptWarning
+from posefield.question.results import ClipAnswer, FeetResult, SampledClip, StanceResult
+from posefield.retarget.retarget_report import HandGoal, RetargetSettings
+from posefield.retarget.retargeting import Retargeted, retarget
+
+HANDS = ("leftHand", "rightHand")
+NO_GOAL = (
+    "the target of {} is met by the body of the model: of a character, only hands meet targets"
+)
+POINTER = "/character"
+"""Place of the warnings about a character among those of a script."""
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """Delivery of motions to a character in one format. convention: of its files."""
+
+    character: UserCharacter
+    form: ClipEncoder
+    convention: Convention
+
+    def clip(
+        self, answer: ClipAnswer, question: FileQuestion, roles: Mapping[str, str]
+    ) -> ClipAnswer:
+        """Return a clip of a model as one of the character, with the report in its trust.
+
+        roles: joint of the model by role. Raises InvalidField for a model without legs.
+        """
+        trust = answer.trust
+        hands, others = _hand_goals(answer.clip, question.targets, roles)
+        settings = RetargetSettings(
+            _stances(trust.feet, question), hands, "kept" if question.targets else "scaled"
+        )
+        made, facts, told = self._retargeted(answer.clip, roles, settings)
+        notes = (*told, *others, *self.character.target.notes(self.form, made.clip))
+        told_trust = replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
+        return ClipAnswer(made.clip, told_trust)
+
+    def performance(self, answer: PerformanceAnswer, roles: Mapping[str, str]) -> PerformanceAnswer:
+        """Return a performance as one of the character, with the retargeting in its report.
+
+        roles: joint of the character of the script by role. Places of the script stay where they
+        are in the world.
+        """
+        report = answer.trust
+        stances = None if report.feet is None else report.feet.stances
+        hands, others = _held_hands(answer.held, roles)
+        made, facts, told = self._retargeted(
+            answer.clip, roles, RetargetSettings(stances, hands, "kept")
+        )
+        notes = (*told, *others, *self.character.target.notes(self.form, made.clip))
+        warnings = tuple(ScriptWarning(POINTER, sentence) for sentence in notes)
+        own = replace(
+            report, script_warnings=(*report.script_warnings, *warnings), retargeting=facts
+        )
+        return PerformanceAnswer(made.clip, own)
+
+    def check_layout(self, layout: PerformanceLayout) -> None:
+        """Raise InvalidField for a layout that files of a character do not have."""
+        if layout != "whole":
+            raise InvalidField("layout", f"{layout!r} with a character, expected 'whole'")
+
+    def encode(self, answer: SampledClip) -> bytes:
+        """Return the file of a motion of the character."""
+        return self.character.target.encode(self.form, answer, self.convention)
+
+    def _retargeted(
+        self, clip: Clip, roles: Mapping[str, str], settings: RetargetSettings
+    ) -> tuple[Retargeted, dict[str, Any], tuple[str, ...]]:
+        """Return the motion of the character, the facts of the report, and its warnings."""
+        made = retarget(clip, self.character.rig, roles, settings)
+        facts = {"character": self.character.name, "file": self.character.target.file}
+        facts |= {name: _listed(value) for name, value in made.report.facts().items()}
+        return made, facts, tuple(facts.pop("warnings"))
+
+
+def deliver(
+    character: UserCharacter, form: ClipEncoder, question: FileQuestion | PerformanceQuestion
+) -> Delivery:
+    """Return the delivery of answers of a question.
+
+    Raises InvalidField for what the files of a character cannot hold.
+    """
+    return Delivery(character, form, character.target.check(form, question))
+
+
+def _stances(feet: FeetResult | None, question: FileQuestion) -> Sequence[StanceResult] | None:
+    """Return the stances in the time of a clip; none for feet that slide in place."""
+    if question.root == "in_place":
+        return ()
+    if feet is None:
+        return None
+    start = question.start
+    return [replace(own, begin=own.begin - start, end=own.end - start) for own in feet.stances]
+
+
+def _held_hands(
+    held: Sequence[HeldJoint], roles: Mapping[str, str]
+) -> tuple[list[HandGoal], list[str]]:
+    """Return the targets of hands as goals at their begin and end, and sentences on others."""
+    named = {joint: role for role, joint in roles.items() if role in HANDS}
+    goals = [
+        HandGoal(named[own.joint], time, np.array(own.position))
+        for own in held
+        if own.joint in named
+        for time in dict.fromkeys((own.begins, own.ends))
+    ]
+    others = dict.fromkeys(own.joint for own in held if own.joint not in named)
+    return goals, [NO_GOAL.format(joint) for joint in others]
+
+
+def _hand_goals(
+    clip: Clip, targets: Sequence[Target], roles: Mapping[str, str]
+) -> tuple[list[HandGoal], list[str]]:
+    """Return the targets of hands as goals, and a sentence for each other target.
+
+    A goal is at the frame in which the joint of the model is nearest to the target, its moment.
+    """
+    goals, notes = [], []
+    named = {joint: role for role, joint in roles.items() if role in HANDS}
+    places = clip.positions() if targets else None
+    for own in targets:
+        if own.joint not in named or places is None:
+            notes.append(NO_GOAL.format(own.joint))
+            continue
+        position = np.array(own.position)
+        apart = np.linalg.norm(places[:, clip.skeleton.names.index(own.joint)] - position, axis=-1)
+        goals.append(HandGoal(named[own.joint], float(np.argmin(apart)) / clip.rate, position))
+    return goals, notes
+
+
+def _listed(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,1 @@
+"""Motions of a user's own character: layers that refer to its file, and named animations."""

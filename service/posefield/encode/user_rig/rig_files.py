@@ -1,0 +1,146 @@
+"""Files of motions of a user's character in every format, and refusals of what they cannot hold."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+from posefield.common.errors import InvalidField
+from posefield.encode.files.file_convention import METRES, Convention
+from posefield.encode.formats import ClipEncoder
+from posefield.encode.user_rig import metre_joints, rig_glb
+from posefield.encode.user_rig.rig_stage import RigStage
+from posefield.motion.clip import Clip
+from posefield.question.motion_question import FileQuestion
+from posefield.question.performance_question import PerformanceQuestion
+from posefield.question.results import SampledClip
+from posefield.rigs.rig import Rig
+
+LAYERS = ("usda", "usdc", "usdz")
+"""Formats of USD."""
+TABLES = ("json", "npz", "arrow", "msgpack")
+"""Formats of numbers, which hold the curves of the model beside the joints."""
+
+
+@dataclass(frozen=True)
+class RigTarget:
+    """Rig for which files are written.
+
+    file: its name. reference: path by which USD files refer to it. stage: place of its skeleton in
+    a USD file; None for glTF.
+    """
+
+    rig: Rig
+    file: str
+    reference: str
+    stage: RigStage | None
+
+    @classmethod
+    def of(cls, rig: Rig, path: Path, reference: str) -> Self:
+        """Return the target of a rig in a file; UsdError if no layer can bind its skeleton."""
+        if rig.format != "USD":
+            return cls(rig, path.name, reference, None)
+        # usd-core takes 0.12 CPU seconds to import.
+        from posefield.encode.user_rig import rig_stage_reader
+
+        stage = rig_stage_reader.read_stage(path, rig.skeleton_path, rig.joint_paths)
+        return cls(rig, path.name, reference, stage)
+
+    def check(self, form: ClipEncoder, question: FileQuestion | PerformanceQuestion) -> Convention:
+        """Return the convention of a file in a format.
+
+        Raises InvalidField for what the file of a user's character cannot hold.
+        """
+        if question.names != "own":
+            raise InvalidField(
+                "names",
+                f"{question.names!r} with a character, expected 'own': joints have the names of "
+                "its file",
+            )
+        if question.body is not None:
+            raise InvalidField(
+                "body",
+                f"{question.body!r} with a character, expected none given: the body is in its file",
+            )
+        if isinstance(question, FileQuestion) and question.joint_sigma:
+            raise InvalidField(
+                "joint_sigma",
+                "true with a character, expected false: sigma is of the joints of the model",
+            )
+        if form.extension == "usdz" and self.stage is not None:
+            raise InvalidField(
+                "character",
+                "a USD file with the format usdz, expected usda or usdc: a package holds all its "
+                f"files, and {self.file} is referred to, not copied",
+            )
+        return self._convention(form, question)
+
+    def _convention(
+        self, form: ClipEncoder, question: FileQuestion | PerformanceQuestion
+    ) -> Convention:
+        asked = form.convention(question.unit, question.up)
+        if form.extension not in LAYERS:
+            return asked
+        own = METRES
+        if self.stage is not None:
+            own = Convention(self.rig.rest.metres_per_unit, self.rig.rest.up)
+        if question.unit is not None and asked.metres_per_unit != own.metres_per_unit:
+            raise InvalidField("unit", f"{question.unit!r}, {self._expected(own)}")
+        if question.up is not None and asked.up != own.up:
+            raise InvalidField("up", f"{question.up!r}, {self._expected(own)}")
+        return own
+
+    def _expected(self, own: Convention) -> str:
+        return (
+            f"expected none given: the layer has the unit, {own.metres_per_unit:g} m, and the up "
+            f"axis, {own.up}, of the character {self.file}"
+        )
+
+    def notes(self, form: ClipEncoder, clip: Clip) -> tuple[str, ...]:
+        """Return a sentence for each thing that a file in a format lacks."""
+        found = []
+        if form.extension in LAYERS and self.stage is None:
+            found.append(
+                f"USD cannot refer to glTF files: the layer has the skeleton of {self.file} "
+                "without its skin; glb binds to the file by the names of its joints"
+            )
+        if form.extension in LAYERS and self.stage is not None:
+            found += self.stage.notes
+        if form.extension == "glb":
+            found.append(
+                "glTF cannot refer to the skin of another file: this one has the animation alone, "
+                f"which binds to {self.file} by the names of its joints"
+            )
+        curves = clip.curves
+        if curves is not None and form.extension not in TABLES:
+            found.append(
+                f"files of a character in {form.extension} carry no curves: {len(curves.curves)} "
+                f"are left out ({', '.join(curves.names)}); {', '.join(TABLES)} have them"
+            )
+        return tuple(found)
+
+    def encode(self, form: ClipEncoder, answer: SampledClip, convention: Convention) -> bytes:
+        """Return the file of a motion of the rig's skeleton, in the convention of `check`."""
+        if form.extension in LAYERS:
+            return _layer_bytes(form.extension, self._layer(answer))
+        if form.extension == "glb":
+            own = self.rig.rest if self.stage is None else metre_joints.in_metres(self.rig.rest)
+            return rig_glb.animation_glb(answer, own)
+        return form.encode(answer, replace(convention, body="none"))
+
+    def _layer(self, answer: SampledClip) -> Any:
+        # usd-core takes 0.12 CPU seconds to import.
+        from posefield.encode.user_rig import rig_layer
+
+        if self.stage is None:
+            return rig_layer.skeleton_layer(answer, self.rig.rest)
+        return rig_layer.referring_layer(answer, self.rig.rest, self.stage, self.reference)
+
+
+def _layer_bytes(extension: str, layer: Any) -> bytes:
+    from posefield.encode.usd import layer_metadata, usd_clip
+
+    if extension == "usda":
+        text: str = layer.ExportToString()
+        return text.encode()
+    binary = layer_metadata.crate_bytes(layer)
+    return binary if extension == "usdc" else usd_clip.usdz_package(binary)

@@ -1,0 +1,128 @@
+"""USD layers that animate a user's character.
+
+    /Hero                     the root prim of the user's file, by a reference
+      …/Skeleton              the same, bound to the animation of this layer
+      Anim                    SkelAnimation of all joints
+
+Bind pose, meshes, skin weights and materials stay in the user's file. For a file in glTF, to which
+USD cannot refer, the layer has a skeleton of the same joints without a skin.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pxr import Gf, Sdf, Vt
+
+from posefield.common.array_shapes import Bones, JointRotations
+from posefield.common.units import Floats, Singles
+from posefield.encode.character import joint_names
+from posefield.encode.files.file_convention import METRES, Convention
+from posefield.encode.usd import character_prims, custom_data, layer_metadata, prim_specs
+from posefield.encode.usd.prim_specs import ValueTypes
+from posefield.encode.user_rig import metre_joints
+from posefield.encode.user_rig.rig_stage import RigStage
+from posefield.motion import quat
+from posefield.question.results import SampledClip
+from posefield.rigs.joints.rest_joints import RestJoints
+
+SKELETON_ROOT, ANIMATION = "Character", "Anim"
+
+
+def referring_layer(answer: SampledClip, rest: RestJoints, stage: RigStage, reference: str) -> Any:
+    """Return a layer that refers to a file and binds its skeleton to a motion of its joints.
+
+    reference: path of the file, as the layer states it.
+    """
+    made = Sdf.Layer.CreateAnonymous("clip.usda")
+    with Sdf.ChangeBlock():
+        _set_metadata(made, answer, stage.root, Convention(rest.metres_per_unit, rest.up))
+        root = Sdf.PrimSpec(made, stage.root, Sdf.SpecifierDef)
+        root.referenceList.prependedItems = [Sdf.Reference(reference, root.path)]
+        _set_extent(made, answer, rest, stage)
+        skeleton = Sdf.CreatePrimInLayer(made, stage.skeleton)
+        schemas = Sdf.TokenListOp.Create(prependedItems=list(character_prims.BINDING_SCHEMAS))
+        skeleton.SetInfo("apiSchemas", schemas)
+        animation = Sdf.Path(stage.animation)
+        prim_specs.add_relationship(skeleton, "skel:animationSource", animation)
+        _add_animation(root, animation.name, stage.joints, answer, rest)
+    return made
+
+
+def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
+    """Return a layer of the same joints in metres with Y up and their motion, without a skin."""
+    own = metre_joints.in_metres(rest)
+    made = Sdf.Layer.CreateAnonymous("clip.usda")
+    paths = joint_names.joint_paths(joint_names.legal_names(own.names), own.parents)
+    schemas = character_prims.BINDING_SCHEMAS
+    with Sdf.ChangeBlock():
+        _set_metadata(made, answer, SKELETON_ROOT, METRES)
+        root = prim_specs.prim(made, SKELETON_ROOT, "SkelRoot", schemas)
+        root.kind = "component"
+        places = answer.clip.positions().reshape(-1, 3)
+        box = np.stack([places.min(axis=0), places.max(axis=0)])
+        _add_extent(root, box)
+        _add_skeleton(root, paths, own)
+        _add_animation(root, ANIMATION, paths, answer, own)
+        character_prims.bind_animation(root, root.path.AppendChild(ANIMATION))
+    return made
+
+
+def _set_metadata(made: Any, answer: SampledClip, root: str, convention: Convention) -> None:
+    clip = answer.clip
+    layer_metadata.set_layer_metadata(made, root, len(clip), clip.rate, convention)
+    layer_metadata.set_custom_data(made, custom_data.usd_dictionary(answer.trust.facts()))
+
+
+def _set_extent(made: Any, answer: SampledClip, rest: RestJoints, stage: RigStage) -> None:
+    """Set the extent of the whole motion instead of that of the file's rest pose."""
+    clip = answer.clip
+    rotations = quat.normalize(rest.file_rotations(clip.rotations))
+    box = stage.extent(rest, rotations, rest.file_translations(clip.translations))
+    _add_extent(Sdf.CreatePrimInLayer(made, stage.skel_root), box)
+
+
+def _add_extent(root: Any, box: Floats) -> None:
+    value = prim_specs.float3_array(box)
+    prim_specs.varying_attribute(root, "extent", ValueTypes.Float3Array, value)
+
+
+def _add_skeleton(root: Any, paths: Sequence[str], rest: RestJoints) -> None:
+    """Add a skeleton, whose bind pose is its rest pose."""
+    skeleton = prim_specs.prim(root, "Skel", "Skeleton", character_prims.BINDING_SCHEMAS)
+    prim_specs.add_relationship(root, "skel:skeleton", skeleton.path)
+    places = rest.skeleton.at_rest(rest.skeleton.offsets)
+    tokens = {"joints": list(paths), "jointNames": list(rest.names)}
+    for name, values in tokens.items():
+        prim_specs.uniform_attribute(skeleton, name, ValueTypes.TokenArray, Vt.TokenArray(values))
+    for name, poses in (
+        ("bindTransforms", (rest.orientations, places)),
+        ("restTransforms", (rest.rotations, rest.translations)),
+    ):
+        prim_specs.uniform_attribute(
+            skeleton, name, ValueTypes.Matrix4dArray, _matrix_array(*poses)
+        )
+
+
+def _matrix_array(rotations: JointRotations, translations: Bones) -> Any:
+    return Vt.Matrix4dArray.FromNumpy(metre_joints.matrices(rotations, translations))
+
+
+def _add_animation(
+    root: Any, name: str, joints: Sequence[str], answer: SampledClip, rest: RestJoints
+) -> None:
+    clip = answer.clip
+    rotations = quat.unroll(quat.normalize(rest.file_rotations(clip.rotations)))
+    samples = {
+        "rotations": _as_float32(rotations[..., [1, 2, 3, 0]]),
+        "translations": _as_float32(rest.file_translations(clip.translations)),
+    }
+    made = character_prims.animation(root, name, tuple(joints))
+    sizes = Vt.Vec3hArray([Gf.Vec3h(*size) for size in rest.scales.tolist()])
+    made.attributes["scales"].default = sizes
+    prim_specs.set_time_samples(made, samples)
+
+
+def _as_float32(values: Floats) -> Singles:
+    # USD's deduplication does not distinguish -0 from 0.
+    return np.ascontiguousarray(values, dtype=np.float32) + np.float32(0.0)

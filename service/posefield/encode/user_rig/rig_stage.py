@@ -1,0 +1,50 @@
+"""Place of a skeleton in a user's USD file, as a layer that refers to the file needs it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.array_shapes import JointWeights, Positions, Rotations
+from posefield.common.units import Floats
+from posefield.encode.user_rig import metre_joints
+from posefield.rigs.joints.rest_joints import RestJoints
+
+
+@dataclass(frozen=True, eq=False)
+class RigStage:
+    """Place of a skeleton in a USD file.
+
+    skeleton, skel_root: paths of prims. animation: free path for the animation. joints: tokens in
+    the order of the rig. to_root (4, 4): for row vectors, from the space of the skeleton to that of
+    the SkelRoot. radii (J,): largest distance of a point from a joint that moves it, in the space
+    of the skeleton. notes: on what a reference to the root prim lacks.
+    """
+
+    skeleton: str
+    skel_root: str
+    animation: str
+    joints: tuple[str, ...]
+    to_root: Floats
+    radii: JointWeights
+    notes: tuple[str, ...] = ()
+
+    @property
+    def root(self) -> str:
+        """Return the name of the root prim, to which layers refer."""
+        return self.skeleton.split("/")[1]
+
+    def extent(self, rest: RestJoints, rotations: Rotations, translations: Positions) -> Floats:
+        """Return the lowest and highest corner (2, 3) of the character in the space of its root.
+
+        rotations (F, J, 4), translations (F, J, 3): of the file's joints. A skinned point is a mean
+        of points, each as far from a joint as at rest, so it lies within spheres about the joints.
+        """
+        placed = np.zeros((len(rotations), len(rest.names), 4, 4))
+        local = metre_joints.matrices(rotations, translations)
+        local[..., :3, :3] *= rest.scales[:, :, None]
+        for joint, parent in enumerate(rest.parents):
+            own = local[:, joint]
+            placed[:, joint] = own @ (self.to_root if parent < 0 else placed[:, parent])
+        sizes = np.linalg.norm(self.to_root[:3, :3], axis=1).max()
+        places, reach = placed[..., 3, :3], (sizes * self.radii)[:, None]
+        return np.stack([(places - reach).min(axis=(0, 1)), (places + reach).max(axis=(0, 1))])
