@@ -10,18 +10,21 @@ from posefield.characters.user_character import UserCharacter
 from posefield.common.errors import InvalidField
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import ClipEncoder
+from posefield.encode.user_rig.rig_files import FileAxes
 from posefield.motion.clip import Clip
-from posefield.question.motion_question import FileQuestion, Target
+from posefield.motion.skeleton import Skeleton
+from posefield.question.motion_question import ClipQuestion, Target
 from posefield.question.performance_batch_question import PerformanceLayout
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.performance_report import HeldJoint, PerformanceAnswer, ScriptWarning
 from posefield.question.results import ClipAnswer, FeetResult, SampledClip, StanceResult
+from posefield.retarget import role_map
 from posefield.retarget.retarget_report import HandGoal, RetargetSettings
 from posefield.retarget.retargeting import Retargeted, retarget
 
-HANDS = ("leftHand", "rightHand")
+SIDES, ARM = ("left", "right"), ("UpperArm", "LowerArm", "Hand")
 NO_GOAL = (
-    "the target of {} is met by the body of the model: of a character, only hands meet targets"
+    "the target of {} is met by the body of the model: of a character, only hands with arms do"
 )
 POINTER = "/character"
 """Place of the warnings about a character among those of a script."""
@@ -36,14 +39,14 @@ class Delivery:
     convention: Convention
 
     def clip(
-        self, answer: ClipAnswer, question: FileQuestion, roles: Mapping[str, str]
+        self, answer: ClipAnswer, question: ClipQuestion, roles: Mapping[str, str]
     ) -> ClipAnswer:
         """Return a clip of a model as one of the character, with the report in its trust.
 
         roles: joint of the model by role. Raises InvalidField for a model without legs.
         """
         trust = answer.trust
-        hands, others = _hand_goals(answer.clip, question.targets, roles)
+        hands, others = _hand_goals(answer.clip, question.targets, self._hands(roles))
         settings = RetargetSettings(
             _stances(trust.feet, question), hands, "kept" if question.targets else "scaled"
         )
@@ -60,7 +63,7 @@ class Delivery:
         """
         report = answer.trust
         stances = None if report.feet is None else report.feet.stances
-        hands, others = _held_hands(answer.held, roles)
+        hands, others = _held_hands(answer.held, self._hands(roles))
         made, facts, told = self._retargeted(
             answer.clip, roles, RetargetSettings(stances, hands, "kept")
         )
@@ -71,6 +74,19 @@ class Delivery:
         )
         return PerformanceAnswer(made.clip, own)
 
+    def check(
+        self,
+        question: ClipQuestion | PerformanceQuestion,
+        skeleton: Skeleton,
+        roles: Mapping[str, str],
+    ) -> None:
+        """Raise InvalidField for a question whose answer cannot be delivered.
+
+        skeleton, roles: of the model, joints by role.
+        """
+        self.character.target.check(question)
+        role_map.body_of_motion(skeleton, skeleton.offsets, roles)
+
     def check_layout(self, layout: PerformanceLayout) -> None:
         """Raise InvalidField for a layout that files of a character do not have."""
         if layout != "whole":
@@ -79,6 +95,14 @@ class Delivery:
     def encode(self, answer: SampledClip) -> bytes:
         """Return the file of a motion of the character."""
         return self.character.target.encode(self.form, answer, self.convention)
+
+    def _hands(self, roles: Mapping[str, str]) -> dict[str, str]:
+        """Return the role of each joint of the model that is a hand which the character has."""
+        own = self.character.rig.joints
+        arms = {side + "Hand": {side + part for part in ARM} for side in SIDES}
+        return {
+            roles[hand]: hand for hand, arm in arms.items() if hand in roles and arm <= own.keys()
+        }
 
     def _retargeted(
         self, clip: Clip, roles: Mapping[str, str], settings: RetargetSettings
@@ -90,17 +114,15 @@ class Delivery:
         return made, facts, tuple(facts.pop("warnings"))
 
 
-def deliver(
-    character: UserCharacter, form: ClipEncoder, question: FileQuestion | PerformanceQuestion
-) -> Delivery:
-    """Return the delivery of answers of a question.
+def deliver(character: UserCharacter, form: ClipEncoder, asked: FileAxes) -> Delivery:
+    """Return the delivery of answers in files of a format.
 
     Raises InvalidField for what the files of a character cannot hold.
     """
-    return Delivery(character, form, character.target.check(form, question))
+    return Delivery(character, form, character.target.convention(form, asked))
 
 
-def _stances(feet: FeetResult | None, question: FileQuestion) -> Sequence[StanceResult] | None:
+def _stances(feet: FeetResult | None, question: ClipQuestion) -> Sequence[StanceResult] | None:
     """Return the stances in the time of a clip; none for feet that slide in place."""
     if question.root == "in_place":
         return ()
@@ -111,10 +133,12 @@ def _stances(feet: FeetResult | None, question: FileQuestion) -> Sequence[Stance
 
 
 def _held_hands(
-    held: Sequence[HeldJoint], roles: Mapping[str, str]
+    held: Sequence[HeldJoint], named: Mapping[str, str]
 ) -> tuple[list[HandGoal], list[str]]:
-    """Return the targets of hands as goals at their begin and end, and sentences on others."""
-    named = {joint: role for role, joint in roles.items() if role in HANDS}
+    """Return the targets of hands as goals at their begin and end, and sentences on others.
+
+    named: role of each joint that is a hand.
+    """
     goals = [
         HandGoal(named[own.joint], time, np.array(own.position))
         for own in held
@@ -126,14 +150,15 @@ def _held_hands(
 
 
 def _hand_goals(
-    clip: Clip, targets: Sequence[Target], roles: Mapping[str, str]
+    clip: Clip, targets: Sequence[Target], named: Mapping[str, str]
 ) -> tuple[list[HandGoal], list[str]]:
     """Return the targets of hands as goals, and a sentence for each other target.
+
+    named: role of each joint that is a hand.
 
     A goal is at the frame in which the joint of the model is nearest to the target, its moment.
     """
     goals, notes = [], []
-    named = {joint: role for role, joint in roles.items() if role in HANDS}
     places = clip.positions() if targets else None
     for own in targets:
         if own.joint not in named or places is None:

@@ -51,8 +51,10 @@ def clip(
         answer = found.noted(clips.synthesize_clip(opened, question))
         content = found.encode(answer, convention)
     else:
+        card = opened.session.card
+        delivery.check(question, card.skeleton, card.roles)
         predicted = clips.synthesize_clip(opened, question)
-        answer = delivery.clip(predicted, question, opened.session.card.roles)
+        answer = found.noted(delivery.clip(predicted, question, card.roles))
         content = delivery.encode(answer)
     atomic_files.write(content, output)
     print_warnings(answer.trust)

@@ -148,6 +148,7 @@ def _performed(
         answer = composition.perform(script, MAX_FRAMES)
         return answer, encode(answer, convention)
     order.check_layout(layout)
+    order.check(question, script.character.skeleton, script.character.roles)
     made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
     return made, order.encode(made)
 

@@ -52,7 +52,7 @@ class CharacterOptions:
         return user_character.open_character(self.character, reference, roles)
 
     def delivery(
-        self, form: ClipEncoder, question: FileQuestion | PerformanceQuestion, output: Path
+        self, form: ClipEncoder, asked: FileQuestion | PerformanceQuestion, output: Path
     ) -> "Delivery | None":
         """Return the delivery of answers to a file; None without a character.
 
@@ -63,7 +63,7 @@ class CharacterOptions:
             return None
         from posefield.characters import delivery
 
-        return delivery.deliver(opened, form, question)
+        return delivery.deliver(opened, form, asked)
 
     def refuse(self, reason: str) -> None:
         """Raise InvalidField with a reason if a character or roles are given."""

@@ -48,7 +48,7 @@ def motion(character):
 
 def written(character, motion, form):
     target, encoder = character.target, CLIP_ENCODERS[form]
-    return target.encode(encoder, motion, target.check(encoder, ASKED))
+    return target.encode(encoder, motion, target.convention(encoder, ASKED))
 
 
 def usd_file(character, motion, form="usda"):
@@ -160,7 +160,8 @@ def test_other_formats_have_the_skeleton_of_the_rig(character, motion):
 def test_what_a_file_cannot_hold_is_refused(character, form, asked, said):
     question = replace_question(asked)
     with pytest.raises(InvalidField, match=said):
-        character.target.check(CLIP_ENCODERS[form], question)
+        character.target.check(question)
+        character.target.convention(CLIP_ENCODERS[form], question)
 
 
 def replace_question(asked):

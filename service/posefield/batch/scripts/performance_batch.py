@@ -40,7 +40,6 @@ from posefield.encode.performance_files import PerformanceEncoder
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question.performance_batch_question import PerformanceLayout
-from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.registry import shipped_models
 from posefield.registry.model_registry import ModelRegistry
@@ -83,13 +82,15 @@ class PerformanceBatch:
         made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
         return made, order.encode(made)
 
-    def check(self, question: PerformanceQuestion) -> None:
+    def check(self, script: Script) -> None:
         """Raise InvalidField for what a file of the form cannot hold."""
-        form = CLIP_ENCODERS[self.form]
+        form, question, own = CLIP_ENCODERS[self.form], script.question, script.character
         if self.character is None:
             form.convention(question.unit, question.up, question.body)
         else:
-            delivery.deliver(self.character, form, question).check_layout(self.layout)
+            order = delivery.deliver(self.character, form, question)
+            order.check_layout(self.layout)
+            order.check(question, own.skeleton, own.roles)
 
     @property
     def encode(self) -> PerformanceEncoder:
@@ -159,8 +160,8 @@ def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, st
     faults: list[str] = []
     for row in rows:
         try:
-            batch.check(row.script)
             script = resolve_script(row.script, registry.find)
+            batch.check(script)
             digests[row.name] = _digest(batch, script, registry)
         except QueryError as fault:
             faults.append(f"{row.place}: {fault}")

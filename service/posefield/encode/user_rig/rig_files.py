@@ -2,15 +2,17 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from posefield.common.errors import InvalidField
+from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.formats import ClipEncoder
 from posefield.encode.user_rig import metre_joints, rig_glb
 from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion.clip import Clip
-from posefield.question.motion_question import FileQuestion
+from posefield.question.body_kind import BodyKind
+from posefield.question.motion_question import ClipQuestion
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.results import SampledClip
 from posefield.rigs.rig import Rig
@@ -19,6 +21,22 @@ LAYERS = ("usda", "usdc", "usdz")
 """Formats of USD."""
 TABLES = ("json", "npz", "arrow", "msgpack")
 """Formats of numbers, which hold the curves of the model beside the joints."""
+
+
+class FileAxes(Protocol):
+    """Question with the unit, up axis and body of its files."""
+
+    @property
+    def unit(self) -> LengthUnit | None:
+        """Return the unit of length; None for the format's."""
+
+    @property
+    def up(self) -> UpAxis | None:
+        """Return the up axis; None for the format's."""
+
+    @property
+    def body(self) -> BodyKind | None:
+        """Return the body; None for the format's."""
 
 
 @dataclass(frozen=True)
@@ -45,26 +63,30 @@ class RigTarget:
         stage = rig_stage_reader.read_stage(path, rig.skeleton_path, rig.joint_paths)
         return cls(rig, path.name, reference, stage)
 
-    def check(self, form: ClipEncoder, question: FileQuestion | PerformanceQuestion) -> Convention:
-        """Return the convention of a file in a format.
-
-        Raises InvalidField for what the file of a user's character cannot hold.
-        """
+    def check(self, question: ClipQuestion | PerformanceQuestion) -> None:
+        """Raise InvalidField for what no file of a user's character holds."""
         if question.names != "own":
             raise InvalidField(
                 "names",
                 f"{question.names!r} with a character, expected 'own': joints have the names of "
                 "its file",
             )
-        if question.body is not None:
-            raise InvalidField(
-                "body",
-                f"{question.body!r} with a character, expected none given: the body is in its file",
-            )
-        if isinstance(question, FileQuestion) and question.joint_sigma:
+        if isinstance(question, ClipQuestion) and question.joint_sigma:
             raise InvalidField(
                 "joint_sigma",
                 "true with a character, expected false: sigma is of the joints of the model",
+            )
+
+    def convention(self, form: ClipEncoder, asked: FileAxes) -> Convention:
+        """Return the convention of files in a format.
+
+        Raises InvalidField for a body, for a package, and for another unit or up axis than that of
+        the character's file.
+        """
+        if asked.body is not None:
+            raise InvalidField(
+                "body",
+                f"{asked.body!r} with a character, expected none given: the body is in its file",
             )
         if form.extension == "usdz" and self.stage is not None:
             raise InvalidField(
@@ -72,21 +94,16 @@ class RigTarget:
                 "a USD file with the format usdz, expected usda or usdc: a package holds all its "
                 f"files, and {self.file} is referred to, not copied",
             )
-        return self._convention(form, question)
-
-    def _convention(
-        self, form: ClipEncoder, question: FileQuestion | PerformanceQuestion
-    ) -> Convention:
-        asked = form.convention(question.unit, question.up)
+        found = form.convention(asked.unit, asked.up)
         if form.extension not in LAYERS:
-            return asked
+            return found
         own = METRES
         if self.stage is not None:
             own = Convention(self.rig.rest.metres_per_unit, self.rig.rest.up)
-        if question.unit is not None and asked.metres_per_unit != own.metres_per_unit:
-            raise InvalidField("unit", f"{question.unit!r}, {self._expected(own)}")
-        if question.up is not None and asked.up != own.up:
-            raise InvalidField("up", f"{question.up!r}, {self._expected(own)}")
+        if asked.unit is not None and found.metres_per_unit != own.metres_per_unit:
+            raise InvalidField("unit", f"{asked.unit!r}, {self._expected(own)}")
+        if asked.up is not None and found.up != own.up:
+            raise InvalidField("up", f"{asked.up!r}, {self._expected(own)}")
         return own
 
     def _expected(self, own: Convention) -> str:
@@ -111,7 +128,7 @@ class RigTarget:
                 f"which binds to {self.file} by the names of its joints"
             )
         curves = clip.curves
-        if curves is not None and form.extension not in TABLES:
+        if curves is not None and form.has_curves and form.extension not in TABLES:
             found.append(
                 f"files of a character in {form.extension} carry no curves: {len(curves.curves)} "
                 f"are left out ({', '.join(curves.names)}); {', '.join(TABLES)} have them"
@@ -119,7 +136,7 @@ class RigTarget:
         return tuple(found)
 
     def encode(self, form: ClipEncoder, answer: SampledClip, convention: Convention) -> bytes:
-        """Return the file of a motion of the rig's skeleton, in the convention of `check`."""
+        """Return the file of a motion of the rig's skeleton, in the convention of `convention`."""
         if form.extension in LAYERS:
             return _layer_bytes(form.extension, self._layer(answer))
         if form.extension == "glb":
