@@ -102,7 +102,9 @@ def test_roles_are_stated_where_names_do_not_tell(posefield, shipped_path, rigs,
     code, _, err = posefield(*words)
     assert code != 0 and "leftUpperLeg" in err
     roles = tmp_path / "roles.toml"
-    roles.write_text('[roles]\nleftUpperLeg = "mixamorig:QftQxPzzw"\n')
+    roles.write_text(
+        '[roles]\nleftUpperLeg = "mixamorig:QftQxPzzw"\nrightUpperLeg = "mixamorig:RightUpLeg"\n'
+    )
     assert posefield(*words, "--roles", roles)[0] == 0
     roles.write_text("[other]\n")
     assert "no table [roles]" in posefield(*words, "--roles", roles)[2]

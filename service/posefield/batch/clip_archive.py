@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from posefield.batch import manifest
 from posefield.batch.rows.row_query import ClipQuery
+from posefield.characters.delivery import Delivery
 from posefield.common import cancellation
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import ClipEncoder, left_out
@@ -22,7 +23,8 @@ CLIPS, POSES = 16, 4096
 class ArchiveOrder:
     """Validated clips of one format.
 
-    queries: of the clips. prospects: frames and warnings of each, known before synthesis.
+    queries: of the clips. prospects: frames and warnings of each, known before synthesis. delivery:
+    to a character of a user; None for that of the model.
     """
 
     model: Synthesizer
@@ -30,6 +32,7 @@ class ArchiveOrder:
     convention: Convention
     queries: Sequence[ClipQuery]
     prospects: Sequence[ClipPreview]
+    delivery: Delivery | None = None
 
     @property
     def warnings(self) -> list[str]:
@@ -67,17 +70,23 @@ def archive_members(order: ArchiveOrder) -> Iterator[tuple[str, bytes]]:
 def _files(
     order: ArchiveOrder, queries: Sequence[ClipQuery], lines: bytearray
 ) -> Iterator[tuple[str, bytes]]:
-    answers = [order.encoder.noted(_clip(order.model, query)) for query in queries]
-    contents = order.encoder.write(answers, order.convention)
+    answers = [order.encoder.noted(_clip(order, query)) for query in queries]
+    if order.delivery is None:
+        contents = order.encoder.write(answers, order.convention)
+    else:
+        contents = [order.delivery.encode(answer) for answer in answers]
     for query, answer, content in zip(queries, answers, contents, strict=True):
         file = f"{query.name}.{query.format}"
         lines += manifest.line(manifest.entry(query.name, file, content, answer))
         yield file, content
 
 
-def _clip(model: Synthesizer, query: ClipQuery) -> ClipAnswer:
+def _clip(order: ArchiveOrder, query: ClipQuery) -> ClipAnswer:
     cancellation.check()
-    return clips.synthesize_clip(model, query.question)
+    answer = clips.synthesize_clip(order.model, query.question)
+    if order.delivery is None:
+        return answer
+    return order.delivery.clip(answer, query.question, order.model.session.card.roles)
 
 
 def _batches(frames: Sequence[int]) -> Iterator[slice]:

@@ -38,6 +38,11 @@ class Delivery:
     form: ClipEncoder
     convention: Convention
 
+    @property
+    def joints(self) -> int:
+        """Return the number of joints of the character."""
+        return len(self.character.rig.skeleton)
+
     def clip(
         self, answer: ClipAnswer, question: ClipQuestion, roles: Mapping[str, str]
     ) -> ClipAnswer:

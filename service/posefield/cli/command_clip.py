@@ -26,7 +26,7 @@ def pose(model: ModelPath, question: PoseQuestion, json: Json = False) -> None:
     typer.echo(POSE_ENCODERS["json"].encode(answer).decode())
 
 
-@with_question_options(FileQuestion)
+@with_question_options(FileQuestion, without={"character"})
 @with_option_groups
 def clip(
     model: ModelPath,

@@ -91,7 +91,7 @@ class RunArguments:
     ] = False
 
 
-@with_question_options(FileQuestion, without={"controls", "targets", "joint_sigma"})
+@with_question_options(FileQuestion, without={"controls", "targets", "joint_sigma", "character"})
 @with_option_groups
 def export(
     model: ModelPath,

@@ -1,11 +1,15 @@
 """ASGI application of the contract's operations."""
 
+import logging
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, nullcontext
 from functools import partial
+from pathlib import Path
 
 from starlette.types import Receive, Scope, Send
 
+from posefield.characters import character_folder
+from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.common.errors import UnknownFormat
 from posefield.common.name_suggestion import did_you_mean
 from posefield.http import pages, request_cycle
@@ -26,6 +30,7 @@ from posefield.http.telemetry.telemetry import NO_TELEMETRY, Telemetry
 from posefield.registry.model_registry import ModelRegistry
 from posefield.registry.model_reload import FixedRegistry
 
+log = logging.getLogger(__name__)
 Lifespan = Callable[[ServerState], AbstractAsyncContextManager[None]]
 
 
@@ -59,7 +64,7 @@ def build_app(
 
     handlers: by operationId. Raises ValueError for an operation without a handler, a handler
     without an operation and formats that differ from the handler's, and InvalidField or FileError
-    for invalid settings of access, origins or hosts.
+    for invalid settings of access, origins, hosts or characters.
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
     readiness = Readiness(FixedRegistry(models)) if isinstance(models, ModelRegistry) else models
@@ -67,7 +72,14 @@ def build_app(
     access_policy.check_exposure(settings, rules)
     origins = cors.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
     service = Service(
-        readiness, settings, agreed.version, pages.static_pages(agreed), rules, origins, telling
+        readiness,
+        settings,
+        agreed.version,
+        pages.static_pages(agreed),
+        rules,
+        origins,
+        telling,
+        characters=_characters(settings),
     )
     places = RouteTree(
         route
@@ -77,6 +89,16 @@ def build_app(
     hosts = request_head.names(settings.hosts, f"{PREFIX}HOSTS")
     limits = HeadLimits(settings.url_limit, settings.head_limit, hosts)
     return App(ServerState(places, service, partial(_missing, places), limits), lifespan)
+
+
+def _characters(settings: Settings) -> CharacterFolder:
+    """Return the characters of users; a file that cannot be used is logged and stops no other."""
+    if not settings.characters:
+        return EMPTY
+    found = character_folder.read_folder(Path(settings.characters), settings.character_prefix)
+    for fault in found.faults:
+        log.warning("character %s cannot be used: %s", fault.file, fault.reason)
+    return found
 
 
 def _routes(operation: Operation, handler: Handler) -> Iterator[Route]:

@@ -10,6 +10,8 @@ from starlette.responses import Response
 
 from posefield.batch import clip_archive
 from posefield.batch.clip_archive import ArchiveOrder
+from posefield.characters import delivery
+from posefield.characters.delivery import Delivery
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
@@ -31,34 +33,55 @@ class ClipTask:
     """A question for a clip within the limits.
 
     most: largest number of frames. convention: unit and up axis of the file. corrected: true if
-    the constraint solver answers or feet are placed.
+    the constraint solver answers or feet are placed. delivery: to a character of a user.
     """
 
     question: FileQuestion
     most: int
     convention: Convention
     corrected: bool
+    delivery: Delivery | None = None
 
 
 async def validate(context: Clips, question: FileQuestion) -> ClipTask:
     """Return the question with the limits that its format sets; synthesis checks the rest."""
     encoder, model = context.form, context.model
-    convention = encoder.convention(question.unit, question.up, question.body)
     card = model.session.card
-    sizes = len(card.skeleton), encoder.bytes_per_joint, len(card.curves)
+    joints, delivery = len(card.skeleton), _delivery(context, question)
+    if delivery is None:
+        convention = encoder.convention(question.unit, question.up, question.body)
+    else:
+        convention, joints = delivery.convention, max(joints, delivery.joints)
+    sizes = joints, encoder.bytes_per_joint, len(card.curves)
     fits = max_poses(context.service.settings.output_limit, *sizes)
     stands = standing_feet.wants_standing_feet(card, question)
     corrected = bool(model.solver.measures or question.has_constraints or stands)
-    return ClipTask(question, min(fits, MAX_POSES), convention, corrected)
+    return ClipTask(question, min(fits, MAX_POSES), convention, corrected, delivery)
+
+
+def _delivery(context: Clips, question: FileQuestion) -> Delivery | None:
+    """Return the delivery to a character of a user; None for the character of the model."""
+    if question.character is None:
+        return None
+    character, card = (
+        context.service.characters.find(question.character),
+        context.model.session.card,
+    )
+    found = delivery.deliver(character, context.form, question)
+    found.check(question, card.skeleton, card.roles)
+    return found
 
 
 def places(context: Clips, task: ClipTask) -> AbstractAsyncContextManager[None]:
     """Return the limit on requests that the constraint solver answers."""
-    return worker_threads.SOLVER_LIMITER if task.corrected else nullcontext()
+    long = task.corrected or task.delivery is not None
+    return worker_threads.SOLVER_LIMITER if long else nullcontext()
 
 
 async def synthesise(context: Clips, task: ClipTask) -> ClipAnswer:
     """Return the clip."""
+    if task.delivery is not None:
+        return await worker_threads.within(_delivered, context, task, task.delivery)
     if task.corrected:
         # A correction takes milliseconds, which would block the event loop.
         return await worker_threads.within(
@@ -67,9 +90,16 @@ async def synthesise(context: Clips, task: ClipTask) -> ClipAnswer:
     return clips.synthesize_clip(context.model, task.question, task.most)
 
 
+def _delivered(context: Clips, task: ClipTask, order: Delivery) -> ClipAnswer:
+    answer = clips.synthesize_clip(context.model, task.question, task.most)
+    return order.clip(answer, task.question, context.model.session.card.roles)
+
+
 async def encode(context: Clips, task: ClipTask, answer: ClipAnswer) -> bytes:
     """Return the clip as a file; long ones and those of templates in a thread."""
     encoder = context.form
+    if task.delivery is not None:
+        return await worker_threads.within(task.delivery.encode, answer)
     if len(answer.clip) <= encoder.inline_limit:
         return encoder.encode(answer, task.convention)
     return await context.service.clip_batcher.file(encoder, task.convention, answer)
@@ -110,6 +140,7 @@ async def validate_clips(
         encoders,
         content,
         context.service.settings,
+        context.service.characters,
         places=worker_threads.ARCHIVE_LIMITER,
     )
 

@@ -40,6 +40,11 @@ async def get_character(service: Service, request: Request) -> Response:
     return responses.attachment(content, CLIP_ENCODERS["glb"], model.name)
 
 
+async def list_characters(service: Service, request: Request) -> Response:
+    """Return the characters of users, and files that cannot be used."""
+    return responses.json_document(service.characters.document())
+
+
 async def live(service: Service, request: Request) -> Response:
     """Return the liveness of the process."""
     return responses.json_document({"status": "live", "contract": service.contract})
@@ -85,6 +90,7 @@ OPERATIONS: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
     "getCharacter": get_character,
+    "listCharacters": list_characters,
     "getWhy": trust_operations.GET_WHY,
     "queryWhy": trust_operations.QUERY_WHY,
     "getSuggestions": trust_operations.GET_SUGGESTIONS,

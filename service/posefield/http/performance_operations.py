@@ -10,6 +10,8 @@ from starlette.responses import Response
 
 from posefield.batch.scripts import performance_archive
 from posefield.batch.scripts.performance_archive import PerformanceOrder
+from posefield.characters import delivery
+from posefield.characters.delivery import Delivery
 from posefield.common.errors import InvalidField
 from posefield.encode import performance_files
 from posefield.encode.archives import ARCHIVE_WRITERS, ArchiveWriter
@@ -38,11 +40,16 @@ Packs = Context[ArchiveWriter]
 
 @dataclass(frozen=True)
 class ScriptRequest:
-    """A decoded script. plan: whether the answer is the plan alone. layout: of USD files."""
+    """A decoded script.
+
+    plan: whether the answer is the plan alone. layout: of USD files. character: of a user; None for
+    that of the script.
+    """
 
     question: PerformanceQuestion
     plan: bool
     layout: PerformanceLayout
+    character: str | None = None
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,7 @@ class PerformanceTask:
     """A script whose models are known, and the limits of its format.
 
     most: largest number of frames. convention: unit and up axis of the file. encode: writes it.
+    delivery: to a character of a user.
     """
 
     script: Script
@@ -57,6 +65,7 @@ class PerformanceTask:
     most: int
     convention: Convention
     encode: PerformanceEncoder
+    delivery: Delivery | None = None
 
 
 async def decode(context: Performances, request: Request) -> ScriptRequest:
@@ -65,7 +74,11 @@ async def decode(context: Performances, request: Request) -> ScriptRequest:
     plan, layout = _wants_plan(context, query), _layout(query)
     content = await request_body.read_body(request, MAX_SCRIPT_BYTES, context.service.bodies)
     question = json_decoding.decode_question(PerformanceQuestion, content)
-    return ScriptRequest(question, plan, layout)
+    character = query.get("character")
+    if plan and character is not None:
+        detail = "character: given with plan=true, expected without: a plan moves no character"
+        raise RequestError(BAD_PARAMETER, detail, {"parameter": "character"})
+    return ScriptRequest(question, plan, layout, character)
 
 
 def _wants_plan(context: Performances, query: dict[str, str]) -> bool:
@@ -93,11 +106,33 @@ async def validate(context: Performances, asked: ScriptRequest) -> PerformanceTa
     """Return the script with its models; raises QueryError with a pointer into the script."""
     question, encoder = asked.question, context.form
     write = _encoder(encoder, asked.layout)
-    convention = encoder.convention(question.unit, question.up, question.body)
+    order = _delivery(context, asked)
+    if order is None:
+        convention = encoder.convention(question.unit, question.up, question.body)
+    else:
+        convention = order.convention
     script = resolve_script(question, context.library.find)
     joints = len(script.character.skeleton)
+    if order is not None:
+        order.check(question, script.character.skeleton, script.character.roles)
+        joints = max(joints, order.joints)
     most = max_poses(context.service.settings.output_limit, joints, encoder.bytes_per_joint)
-    return PerformanceTask(script, asked.plan, most, convention, write)
+    return PerformanceTask(script, asked.plan, most, convention, write, order)
+
+
+def _delivery(context: Performances, asked: ScriptRequest) -> Delivery | None:
+    """Return the delivery to a character of a user; None for the character of the script."""
+    if asked.character is None:
+        return None
+    try:
+        character = context.service.characters.find(asked.character)
+        found = delivery.deliver(character, context.form, asked.question)
+        found.check_layout(asked.layout)
+    except InvalidField as fault:
+        if fault.field in ("character", "layout"):
+            raise problems.parameter_error(fault) from None
+        raise
+    return found
 
 
 def _encoder(form: ClipEncoder, layout: PerformanceLayout) -> PerformanceEncoder:
@@ -118,7 +153,14 @@ async def synthesise(
     """Return the performance as a clip, or its plan."""
     if task.plan:
         return await worker_threads.within(composition.plan, task.script, task.most)
-    return await worker_threads.within(composition.perform, task.script, task.most)
+    return await worker_threads.within(_performed, task)
+
+
+def _performed(task: PerformanceTask) -> PerformanceAnswer:
+    answer = composition.perform(task.script, task.most)
+    if task.delivery is None:
+        return answer
+    return task.delivery.performance(answer, task.script.character.roles)
 
 
 async def encode(
@@ -127,6 +169,8 @@ async def encode(
     """Return the performance as a file, or its plan as JSON."""
     if isinstance(answer, PerformanceReport):
         return composition.plan_document(answer)
+    if task.delivery is not None:
+        return await worker_threads.within(task.delivery.encode, answer)
     return await worker_threads.within(task.encode, answer, task.convention)
 
 
@@ -162,6 +206,7 @@ async def plan_scripts(context: Packs, content: bytes) -> PerformanceOrder:
         context.library,
         content,
         context.service.settings,
+        context.service.characters,
         places=worker_threads.ARCHIVE_LIMITER,
     )
 

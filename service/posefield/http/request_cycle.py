@@ -222,9 +222,12 @@ def revalidate(exchange: Exchange, route: Route) -> None:
     if key := scope["path_params"].get("model"):
         scope["model"] = model = scope["library"].find(key)
         if operation.pure:
-            exchange.lifetime = service.lifetime(key)
+            delivered = "character" in exchange.request.query_params
+            # The file of a character may change under the hash of a model too.
+            exchange.lifetime = service.lifetime(key.partition("@")[0] if delivered else key)
             chosen = (scope["format"] or "").encode()
-            parts = model.fingerprint, route.name, scope["query_string"], chosen
+            whom = service.characters.digest if delivered else b""
+            parts = model.fingerprint, route.name, scope["query_string"], chosen, whom
             _check_tag(exchange, service.code, *parts)
     elif page := service.pages.get(operation.id):
         exchange.lifetime = caching.PUBLIC + caching.NO_CACHE

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.http.access.access_policy import AccessPolicy
 from posefield.http.api.settings import Settings
 from posefield.http.concurrency.clip_batching import ClipBatcher
@@ -22,7 +23,7 @@ class Service:
 
     contract: version of the contract. pages: by operationId. rules: access policy. origins: for
     CORS. telling: log and traces. code: digest for entity tags. batcher: of pose requests. desk: of
-    file requests.
+    file requests. characters: of users.
     """
 
     readiness: Readiness
@@ -35,6 +36,7 @@ class Service:
     code: bytes = field(default_factory=caching.code_digest)
     pose_batcher: PoseBatcher = field(default_factory=PoseBatcher)
     clip_batcher: ClipBatcher = field(default_factory=ClipBatcher)
+    characters: CharacterFolder = EMPTY
 
     @cached_property
     def bodies(self) -> BodyMemory:

@@ -50,6 +50,9 @@ Performer = Annotated[
 ]
 
 
+Character = Annotated[
+    str | None, Meta(description="character of a user that moves; default: that of the model")
+]
 LabelValue = str | dict[str, float]
 """One name of a label set, or weights of several."""
 Labels = Annotated[
@@ -200,7 +203,10 @@ class ClipQuestion(MotionQuestion, frozen=True, kw_only=True):
 
 
 class FileQuestion(ClipQuestion, frozen=True, kw_only=True):
-    """Query for a clip in a file; unit, up and body are None for the format's defaults."""
+    """Query for a clip in a file; unit, up and body are None for the format's defaults.
+
+    character: name of a character of the service.
+    """
 
     unit: Annotated[
         LengthUnit | None, Meta(description="unit of length in the file; default: the format's")
@@ -209,6 +215,7 @@ class FileQuestion(ClipQuestion, frozen=True, kw_only=True):
         None
     )
     body: Body = None
+    character: Character = None
 
 
 class NamedClipQuestion(ClipQuestion, frozen=True, kw_only=True):
@@ -225,6 +232,7 @@ class ClipsQuestion(Struct, frozen=True, forbid_unknown_fields=True):
     unit: LengthUnit | None = None
     up: UpAxis | None = None
     body: Body = None
+    character: Character = None
 
 
 replace = msgspec.structs.replace

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 from posefield.question.body_kind import Body
-from posefield.question.motion_question import Name
+from posefield.question.motion_question import Character, Name
 from posefield.question.performance_question import PerformanceQuestion
 from posefield.question.walk_question import Instancing
 
@@ -25,6 +25,7 @@ class PerformancesQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_o
     format: str
     scripts: list[NamedScript]
     layout: PerformanceLayout = "whole"
+    character: Character = None
 
 
 class CrowdStageQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

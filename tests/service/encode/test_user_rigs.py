@@ -150,7 +150,7 @@ def test_other_formats_have_the_skeleton_of_the_rig(character, motion):
 @pytest.mark.parametrize(
     ("form", "asked", "said"),
     [
-        ("usda", {"names": "unreal"}, "names: 'unreal' with a character, expected 'own'"),
+        ("usda", {"names": "ue5"}, "names: 'ue5' with a character, expected 'own'"),
         ("glb", {"body": "bones"}, "body: 'bones' with a character, expected none given"),
         ("json", {"joint_sigma": True}, "joint_sigma: true with a character, expected false"),
         ("usdc", {"unit": "m", "up": "z"}, "expected none given: the layer has the unit"),

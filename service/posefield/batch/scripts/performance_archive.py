@@ -6,10 +6,11 @@ refuses the whole archive. The motions are not kept: each is made again when its
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from posefield.batch import manifest
+from posefield.characters.delivery import Delivery
 from posefield.common import cancellation
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.performance_files import PerformanceEncoder
@@ -38,10 +39,23 @@ class ArchivedScript:
 
 @dataclass(frozen=True)
 class PerformanceOrder:
-    """Planned scripts of one format. encode: writes their files."""
+    """Planned scripts of one format.
+
+    encode: writes their files. delivery: to a character of a user; None for those of the scripts.
+    """
 
     scripts: Sequence[ArchivedScript]
     encode: PerformanceEncoder
+    delivery: Delivery | None = None
+
+    def file(self, one: ArchivedScript) -> tuple[PerformanceAnswer, bytes]:
+        """Return the performance of a script, and its file."""
+        answer = composition.perform(one.script, one.most)
+        if self.delivery is None:
+            return answer, self.encode(answer, one.convention)
+        own = replace(self.delivery, convention=one.convention)
+        made = own.performance(answer, one.script.character.roles)
+        return made, own.encode(made)
 
     @property
     def warnings(self) -> list[str]:
@@ -60,8 +74,7 @@ def archive_members(order: PerformanceOrder) -> Iterator[tuple[str, bytes]]:
     lines = bytearray()
     for own in order.scripts:
         cancellation.check()
-        answer = composition.perform(own.script, own.most)
-        content = order.encode(answer, own.convention)
+        answer, content = order.file(own)
         lines += manifest.line(entry(own.name, own.file, content, answer))
         yield own.file, content
     yield MANIFEST, bytes(lines)

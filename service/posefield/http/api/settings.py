@@ -44,6 +44,11 @@ class Settings:
     alias_seconds: time for which caches may use a response for a model's plain name without
     revalidation.
 
+    characters: folder of USD and .glb files of characters, to which motions are delivered, read at
+    start; a file NAME.toml beside NAME.glb states its roles. character_prefix: path before the name
+    of a character's file by which USD files refer to it, such as ../rigs/ or
+    https://example.com/rigs/.
+
     hosts: accepted host names, comma-separated, such as poses.example.com,*.example.org, or *;
     without any, localhost. IP addresses are always accepted. origins: origins that CORS allows,
     comma-separated, or *.
@@ -99,6 +104,9 @@ class Settings:
     # Longer than the default of common proxies: the proxy should close idle connections.
     idle_time: int = 75
     bodies_memory: int = 128 * 1024 * 1024
+    characters: str = ""
+    # USD searches for paths that do not begin with a dot in other places too.
+    character_prefix: str = "./"
     hosts: str = ""
     # Long work runs in threads, so half a minute is a fault of the event loop, not load.
     unresponsive: int = 30

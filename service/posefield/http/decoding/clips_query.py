@@ -5,6 +5,9 @@ from collections.abc import Mapping, Sequence
 from posefield.batch.clip_archive import ArchiveOrder
 from posefield.batch.rows import clip_names
 from posefield.batch.rows.row_query import ClipQuery
+from posefield.characters import delivery
+from posefield.characters.character_folder import EMPTY, CharacterFolder
+from posefield.characters.delivery import Delivery
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError
 from posefield.common.name_suggestion import did_you_mean
@@ -24,7 +27,11 @@ REPEATED_NAME = "expected a name of its own: an earlier clip has it, capitals co
 
 
 def decode_order(
-    model: Synthesizer, encoders: Mapping[str, ClipEncoder], content: bytes, settings: Settings
+    model: Synthesizer,
+    encoders: Mapping[str, ClipEncoder],
+    content: bytes,
+    settings: Settings,
+    characters: CharacterFolder = EMPTY,
 ) -> ArchiveOrder:
     """Return the validated order of a JSON body, which later steps do not refuse.
 
@@ -40,15 +47,41 @@ def decode_order(
         expected = f"expected 1 to {settings.clips_limit}"
         raise InvalidField("clips", f"{len(body.clips)} clips, {expected}")
     encoder = encoders[body.format]
-    convention = encoder.convention(body.unit, body.up, body.body)
+    order = _delivery(characters, encoder, body)
+    if order is None:
+        convention = encoder.convention(body.unit, body.up, body.body)
+    else:
+        convention = order.convention
     queries = [_clip_query(index, clip, body.format) for index, clip in enumerate(body.clips)]
     _check_names(queries)
     _check_targets(model, queries, settings.clips_targets)
     card = model.session.card
-    sizes = len(card.skeleton), encoder.bytes_per_joint, len(card.curves)
+    joints = len(card.skeleton)
+    if order is not None:
+        _check_delivery(model, queries, order)
+        joints = max(joints, order.joints)
+    sizes = joints, encoder.bytes_per_joint, len(card.curves)
     within = max_poses(settings.output_limit, *sizes)
     prospects = _check_prospects(model, queries, min(within, MAX_POSES), settings.clips_poses)
-    return ArchiveOrder(model, encoder, convention, queries, prospects)
+    return ArchiveOrder(model, encoder, convention, queries, prospects, order)
+
+
+def _delivery(
+    characters: CharacterFolder, encoder: ClipEncoder, body: ClipsQuestion
+) -> Delivery | None:
+    """Return the delivery to a character of a user; None for the character of the model."""
+    if body.character is None:
+        return None
+    return delivery.deliver(characters.find(body.character), encoder, body)
+
+
+def _check_delivery(model: Synthesizer, queries: Sequence[ClipQuery], order: Delivery) -> None:
+    card = model.session.card
+    for each in queries:
+        try:
+            order.check(each.question, card.skeleton, card.roles)
+        except QueryError as error:
+            raise problems.nested_error(error, each.place) from None
 
 
 def _clip_query(index: int, asked: NamedClipQuestion, extension: str) -> ClipQuery:

@@ -4,6 +4,10 @@ from collections.abc import Iterator, Sequence
 
 from posefield.batch.rows import clip_names
 from posefield.batch.scripts.performance_archive import ArchivedScript, PerformanceOrder
+from posefield.characters import delivery
+from posefield.characters.character_folder import EMPTY, CharacterFolder
+from posefield.characters.delivery import Delivery
+from posefield.characters.user_character import UserCharacter
 from posefield.common import cancellation
 from posefield.common.errors import FormError, InvalidField, QueryError
 from posefield.common.name_suggestion import did_you_mean
@@ -21,7 +25,12 @@ from posefield.registry.model_registry import ModelRegistry
 REPEATED_NAME = "expected a name of its own: an earlier script has it, capitals count for nothing"
 
 
-def decode_order(library: ModelRegistry, content: bytes, settings: Settings) -> PerformanceOrder:
+def decode_order(
+    library: ModelRegistry,
+    content: bytes,
+    settings: Settings,
+    characters: CharacterFolder = EMPTY,
+) -> PerformanceOrder:
     """Return the planned order of a JSON body, which later steps do not refuse.
 
     Raises FormError for a malformed body, RequestError for an invalid script and InvalidField for a
@@ -36,8 +45,43 @@ def decode_order(library: ModelRegistry, content: bytes, settings: Settings) -> 
     encode = performance_files.encoder(encoder, body.layout)
     _check_counts(body.scripts, settings)
     names = _names(body.scripts)
+    character = None if body.character is None else characters.find(body.character)
+    if character is not None:
+        _check_character(body, encoder, character)
     planned = tuple(_planned(library, encoder, zip(names, body.scripts, strict=True), settings))
-    return PerformanceOrder(planned, encode)
+    if character is None:
+        return PerformanceOrder(planned, encode)
+    return PerformanceOrder(planned, encode, _delivery(planned, encoder, character))
+
+
+def _check_character(
+    body: PerformancesQuestion, encoder: ClipEncoder, character: UserCharacter
+) -> None:
+    """Raise InvalidField, or RequestError for one script, for what a character's files lack."""
+    for index, script in enumerate(body.scripts):
+        try:
+            order = delivery.deliver(character, encoder, script)
+            character.target.check(script)
+        except InvalidField as error:
+            if error.field == "character":
+                raise
+            raise problems.nested_error(error, json_pointer("scripts", str(index))) from None
+        order.check_layout(body.layout)
+
+
+def _delivery(
+    planned: Sequence[ArchivedScript], encoder: ClipEncoder, character: UserCharacter
+) -> Delivery:
+    """Return the delivery of planned scripts, whose characters are checked."""
+    found = delivery.deliver(character, encoder, planned[0].script.question)
+    for index, own in enumerate(planned):
+        try:
+            found.check(
+                own.script.question, own.script.character.skeleton, own.script.character.roles
+            )
+        except InvalidField as error:
+            raise problems.nested_error(error, json_pointer("scripts", str(index))) from None
+    return found
 
 
 def _check_counts(scripts: Sequence[NamedScript], settings: Settings) -> None:
