@@ -50,6 +50,7 @@ QUESTIONS = (
 )
 ANSWERS = (
     "ModelList",
+    "CharacterList",
     "ModelCard",
     "Trust",
     "Reasons",

@@ -120,6 +120,7 @@ class AsyncClient:
         return f"AsyncClient({self._place.address!r})"
 
     models = _ask(questions.models)
+    characters = _ask(questions.characters)
     live = _ask(questions.live)
     ready = _ask(questions.ready)
     plan = _ask(performances.plan)

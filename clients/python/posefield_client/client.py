@@ -123,6 +123,7 @@ class Client:
         return f"Client({self._place.address!r})"
 
     models = _ask(questions.models)
+    characters = _ask(questions.characters)
     live = _ask(questions.live)
     ready = _ask(questions.ready)
     plan = _ask(performances.plan)

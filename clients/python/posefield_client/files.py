@@ -87,6 +87,7 @@ def clip(
     unit: Literal["m", "cm"] | None = None,
     up: Literal["y", "z"] | None = None,
     body: Body | None = None,
+    character: str | None = None,
     extrapolate: Extrapolate | None = None,
     exact: Exact | None = None,
     targets: Targets | None = None,
@@ -103,7 +104,9 @@ def clip(
         controls=asking.controls(controls, named),
         **asking.said(fps=fps, start=start, end=end, extrapolate=extrapolate, performer=performer),
         **asking.said(level=level, names=names, root=root, loop=loop, unit=unit, up=up),
-        **asking.said(body=body, joint_sigma=joint_sigma, feet=feet, labels=labels),
+        **asking.said(
+            body=body, joint_sigma=joint_sigma, feet=feet, labels=labels, character=character
+        ),
         **asking.said(take=take, variety=variety, detail=detail),
         **holding.said(exact, targets),
         **holding.floor(floor),
@@ -121,6 +124,7 @@ def clips(
     unit: Literal["m", "cm"] | None = None,
     up: Literal["y", "z"] | None = None,
     body: Body | None = None,
+    character: str | None = None,
 ) -> Files:
     """Return an archive of many clips of one format, with a manifest."""
     if format not in CLIP:
@@ -128,7 +132,9 @@ def clips(
         raise WrongQuestion(f"format {format!r}{hint}, expected one of {', '.join(CLIP)}")
     listed = tuple(_named(place, each) for place, each in enumerate(clips))
     question = ClipsQuestion(
-        format=format, clips=listed, **asking.said(unit=unit, up=up, body=body)
+        format=format,
+        clips=listed,
+        **asking.said(unit=unit, up=up, body=body, character=character),
     )
     ask = partial(asking.body, "queryClipsInFormat", model, question)
     return Files(CLIPS, ask, len(listed), f"{model!r}, {len(listed)} clips as {format}")

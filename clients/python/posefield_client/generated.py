@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "4.2.0"
+CONTRACT = "4.3.0"
 """Version of the contract that this client was made for."""
 
 
@@ -98,6 +98,7 @@ class ClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
     body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
+    character: str | UnsetType | None = UNSET
 
 
 class NamedClipQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -134,6 +135,7 @@ class ClipsQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     unit: Literal["m", "cm"] | UnsetType | None = UNSET
     up: Literal["y", "z"] | UnsetType | None = UNSET
     body: Literal["none", "mannequin", "bones"] | UnsetType | None = UNSET
+    character: str | UnsetType | None = UNSET
     clips: tuple[NamedClipQuestion, ...]
 
 
@@ -353,6 +355,7 @@ class PerformancesQuestion(Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     format: Literal["usda", "usdc", "usdz", "json", "bvh", "glb", "npz", "arrow", "msgpack"]
     layout: Literal["whole", "segments"] | UnsetType = UNSET
+    character: str | UnsetType | None = UNSET
     scripts: tuple[NamedScript, ...]
 
 
@@ -369,6 +372,41 @@ class ModelList(Struct, frozen=True, kw_only=True):
     """Schema ModelList of the contract."""
 
     models: tuple[ModelSummary, ...]
+
+
+class JointRole(Struct, frozen=True, kw_only=True):
+    """Role of a joint of a character."""
+
+    role: str
+    joint: str
+    confidence: float
+
+
+class UserCharacter(Struct, frozen=True, kw_only=True):
+    """Character of a user's file."""
+
+    name: str
+    file: str
+    format: str
+    digest: str
+    joints: int
+    height: float
+    roles: tuple[JointRole, ...]
+    warnings: tuple[str, ...]
+
+
+class CharacterFault(Struct, frozen=True, kw_only=True):
+    """File that cannot be used as a character."""
+
+    file: str
+    reason: str
+
+
+class CharacterList(Struct, frozen=True, kw_only=True):
+    """Characters of users, and files that cannot be used."""
+
+    characters: tuple[UserCharacter, ...]
+    faults: tuple[CharacterFault, ...]
 
 
 class Measure(Struct, frozen=True, kw_only=True):
@@ -584,6 +622,25 @@ class FeetResult(Struct, frozen=True, kw_only=True):
     floor: Floor | None = None
 
 
+class Retargeting(Struct, frozen=True, kw_only=True):
+    """Report on the motion of a user's character. Absent for the character of the model. Since
+    4.3.0.
+    """
+
+    character: str
+    file: str
+    mapped: tuple[str, ...]
+    missing: tuple[str, ...]
+    scale: float
+    skate_source: float
+    skate_copied: float
+    skate: float
+    legs_turned: float
+    lowered: float
+    penetration: float
+    hands_missed: tuple[float, ...]
+
+
 class Trust(Struct, frozen=True, kw_only=True):
     """Provenance and uncertainty of a response."""
 
@@ -605,6 +662,7 @@ class Trust(Struct, frozen=True, kw_only=True):
     measured: dict[str, float] = {}
     targets: tuple[Met, ...] = ()
     feet: FeetResult | None = None
+    retargeting: Retargeting | None = None
 
 
 class Backing(Struct, frozen=True, kw_only=True):
@@ -704,6 +762,7 @@ class ManifestEntry(Struct, frozen=True, kw_only=True):
     inferred: tuple[str, ...] = ()
     measured: dict[str, float] = {}
     targets: tuple[Met, ...] = ()
+    retargeting: Retargeting | None = None
 
 
 class Liveness(Struct, frozen=True, kw_only=True):
@@ -800,6 +859,7 @@ class PerformanceReport(Struct, frozen=True, kw_only=True):
     joins: tuple[JoinReport, ...]
     feet: FeetResult | None = None
     warnings: tuple[ScriptWarning, ...]
+    retargeting: Retargeting | None = None
 
 
 class PerformanceEntry(Struct, frozen=True, kw_only=True):
@@ -819,6 +879,7 @@ class PerformanceEntry(Struct, frozen=True, kw_only=True):
     joins: tuple[JoinReport, ...]
     feet: FeetResult | None = None
     warnings: tuple[ScriptWarning, ...]
+    retargeting: Retargeting | None = None
 
 
 class ProblemErrors(Struct, frozen=True, kw_only=True):
@@ -1114,6 +1175,7 @@ OPERATIONS = {
                 "arrow": "application/vnd.apache.arrow.stream",
             },
         ),
+        Operation("listCharacters", "GET", "/v1/characters", ("application/json",), {}),
         Operation(
             "queryPerformance",
             "POST",

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Any, Literal, TypedDict, TypeVar, Unpack, get_type_hints
-from urllib.parse import quote_plus
+from urllib.parse import urlencode
 
 import msgspec
 from msgspec import Struct, structs
@@ -61,14 +61,21 @@ class FileOptions(ScriptOptions, total=False):
 
 
 def performance(
-    script: AnyScript, /, *, layout: Layout | None = None, **options: Unpack[FileOptions]
+    script: AnyScript,
+    /,
+    *,
+    layout: Layout | None = None,
+    user_character: str | None = None,
+    **options: Unpack[FileOptions],
 ) -> Files:
     """Return a performance; the request is sent when it is saved or its numbers are read.
 
-    layout: "segments" adds an animation of each segment to USD files.
+    layout: "segments" adds an animation of each segment to USD files. user_character: name of a
+    character of the service, one of `characters()`, that moves instead of that of the script.
     """
     question = read_script(script, _said(options, FileOptions))
-    query = "" if layout is None else f"?layout={quote_plus(layout)}"
+    said = asking.said(layout=layout, character=user_character)
+    query = "?" + urlencode(said) if said else ""
     ask = partial(_request, question, query)
     return Files(PERFORMANCE, ask, about=repr(Script(question.segments)))
 
@@ -96,16 +103,19 @@ def performances(
     format: ClipFormat,  # noqa: A002  # the contract's own word
     *,
     layout: Layout | None = None,
+    user_character: str | None = None,
 ) -> Files:
     """Return an archive of many performances of one format, with a manifest.
 
-    A script may have a `name`, that of its file. layout: as for `performance`.
+    A script may have a `name`, that of its file. layout, user_character: as for `performance`.
     """
     if format not in PERFORMANCE:
         hint = asking.did_you_mean(format, PERFORMANCE)
         raise WrongQuestion(f"format {format!r}{hint}, expected one of {', '.join(PERFORMANCE)}")
     listed = tuple(_named(place, script) for place, script in enumerate(scripts))
-    question = PerformancesQuestion(format=format, scripts=listed, **asking.said(layout=layout))
+    question = PerformancesQuestion(
+        format=format, scripts=listed, **asking.said(layout=layout, character=user_character)
+    )
     about = f"{len(listed)} performances as {format}"
     return Files(ARCHIVES, partial(_archive, question), len(listed), about, PerformanceEntry)
 

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from posefield_client import asking, holding, numbers
 from posefield_client.generated import (
     OPERATIONS,
+    CharacterList,
     Liveness,
     ModelCard,
     ModelList,
@@ -40,6 +41,11 @@ Times = float | Sequence[float] | npt.NDArray[Any]
 def models() -> Call[tuple[ModelSummary, ...]]:
     """Return the models of the service."""
     return Call(Request(OPERATIONS["listModels"], "/v1/models"), _models)
+
+
+def characters() -> Call[CharacterList]:
+    """Return the characters of users, to which motions are delivered."""
+    return Call(Request(OPERATIONS["listCharacters"], "/v1/characters"), _CHARACTERS)
 
 
 def live() -> Call[Liveness]:
@@ -161,6 +167,7 @@ class _Json:
 
 
 _LIVENESS, _READINESS = _Json(Liveness), _Json(Readiness)
+_CHARACTERS = _Json(CharacterList)
 _CARD, _REASONS, _LIST = _Json(ModelCard), _Json(Reasons), _Json(ModelList)
 _SUGGESTIONS = _Json(Suggestions)
 

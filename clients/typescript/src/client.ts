@@ -172,10 +172,10 @@ export class Client {
   async performanceFile(
     format: ClipFormat,
     script: Script | PerformanceQuestion,
-    { layout, ...options }: PerformanceFileOptions = {},
+    { layout, character, ...options }: PerformanceFileOptions = {},
   ): Promise<Download> {
     checkTransferOptions(options);
-    const path = link(`/v1/performances.${format}`, { layout });
+    const path = link(`/v1/performances.${format}`, { layout, character });
     const asked = asFile(post(path, scriptQuestion(script)), format);
     return this.#file(asked, `performance.${format}`, options);
   }
@@ -184,12 +184,13 @@ export class Client {
   async performanceArchive(
     format: ClipFormat,
     scripts: readonly (Script | NamedScript)[],
-    { as = "zip", layout, ...options }: PerformanceArchiveOptions = {},
+    { as = "zip", layout, character, ...options }: PerformanceArchiveOptions = {},
   ): Promise<PerformanceArchive> {
     checkTransferOptions(options);
     const question = {
       format,
       layout,
+      character,
       scripts: scripts.map((script) => scriptQuestion(script, "NamedScript")),
     };
     const asked = asFile(post(`/v1/performances/batch.${as}`, question), as);

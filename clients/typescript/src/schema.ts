@@ -437,6 +437,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/characters": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List the characters of users
+         * @description Rigs in USD and glTF files of the folder of the operator, read when the service starts, and the files that could not be read. Since 4.3.0.
+         */
+        get: operations["listCharacters"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/performances": {
         parameters: {
             query?: never;
@@ -844,6 +864,12 @@ export interface components {
          */
         Body: "none" | "mannequin" | "bones" | null;
         /**
+         * @description Character of a user that moves, one of `/v1/characters`; null for the character of the model. `names`, `body`, `unit` and `up` follow from its file. Since 4.3.0.
+         * @default null
+         * @example hero
+         */
+        CharacterName: string | null;
+        /**
          * @description Policy for controls without similar captured clips and for targets out of reach. `ok`
          *     reports the controls only in `supported`. `warn` adds one sentence for each control outside
          *     its sampled range, or one sentence if the controls lie in a gap between the samples, and one
@@ -951,6 +977,7 @@ export interface components {
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
+            character?: components["schemas"]["CharacterName"];
         };
         /** @default 10 */
         Nearest: number;
@@ -1296,6 +1323,7 @@ export interface components {
              */
             format: "usda" | "usdc" | "usdz" | "json" | "bvh" | "glb" | "npz" | "arrow" | "msgpack";
             layout?: components["schemas"]["PerformanceLayout"];
+            character?: components["schemas"]["CharacterName"];
             scripts: components["schemas"]["NamedScript"][];
         };
         /** @description One performance of an archive, with its report. */
@@ -1320,6 +1348,7 @@ export interface components {
             joins: components["schemas"]["JoinReport"][];
             feet?: components["schemas"]["FeetResult"];
             warnings: components["schemas"]["ScriptWarning"][];
+            retargeting?: components["schemas"]["Retargeting"];
         };
         /**
          * @description One animation of the whole performance, or besides it one of each segment.
@@ -1363,6 +1392,7 @@ export interface components {
             joins: components["schemas"]["JoinReport"][];
             feet?: components["schemas"]["FeetResult"];
             warnings: components["schemas"]["ScriptWarning"][];
+            retargeting?: components["schemas"]["Retargeting"];
         };
         /** @description A segment in the time of the performance. */
         SegmentReport: {
@@ -1589,6 +1619,7 @@ export interface components {
             unit?: components["schemas"]["Unit"];
             up?: components["schemas"]["Up"];
             body?: components["schemas"]["Body"];
+            character?: components["schemas"]["CharacterName"];
             clips: components["schemas"]["NamedClipQuestion"][];
         };
         /** @description A ClipQuestion with the name of its file. */
@@ -1665,6 +1696,7 @@ export interface components {
             };
             /** @description As in Trust. */
             targets?: components["schemas"]["Met"][];
+            retargeting?: components["schemas"]["Retargeting"];
         };
         /** @description The take of a response; absent if it is the prediction. Since 3.3.0. */
         TakeFacts: {
@@ -1672,6 +1704,71 @@ export interface components {
             variety: number;
             /** @description Whether details that no control predicts were sampled. */
             detail: boolean;
+        };
+        /** @description Report on the motion of a user's character. Absent for the character of the model. Since 4.3.0. */
+        Retargeting: {
+            /** @description Name of the character. */
+            character: string;
+            /** @description Name of its file. */
+            file: string;
+            /** @description Roles of the motion that the character follows. */
+            mapped: string[];
+            /** @description Roles of the motion that the character lacks. */
+            missing: string[];
+            /** @description Length of its legs over that of the motion's. */
+            scale: number;
+            /** @description Foot skate of the motion in proportion to the legs, in metres a second. */
+            skate_source: number;
+            /** @description Foot skate of its copied orientations, in metres a second. */
+            skate_copied: number;
+            /** @description Foot skate of the result, in metres a second. */
+            skate: number;
+            /** @description Mean angle between the bones of the legs as copied and as given, in radians. */
+            legs_turned: number;
+            /** @description Largest distance by which the pelvis was lowered so that the legs reach, in metres. */
+            lowered: number;
+            /** @description 99th percentile of the depth of soles below the floor, in metres. */
+            penetration: number;
+            /** @description Distance of each hand from its target, in metres. */
+            hands_missed: number[];
+        };
+        /** @description Characters of users, and files that cannot be used. */
+        CharacterList: {
+            characters: components["schemas"]["UserCharacter"][];
+            faults: components["schemas"]["CharacterFault"][];
+        };
+        /** @description Character of a user's file. */
+        UserCharacter: {
+            /** @description Name of the character, for the parameter `character`. */
+            name: string;
+            /** @description Name of its file. */
+            file: string;
+            /** @description USD or glTF. */
+            format: string;
+            /** @description SHA-256 of the rig, its file and stated roles. */
+            digest: string;
+            /** @description Number of joints. */
+            joints: number;
+            /** @description Height of its joints at rest, in metres. */
+            height: number;
+            roles: components["schemas"]["JointRole"][];
+            /** @description One sentence for each thing that was assumed or left out. */
+            warnings: string[];
+        };
+        /** @description Role of a joint of a character. */
+        JointRole: {
+            /** @description Such as leftUpperLeg. */
+            role: string;
+            /** @description Name of the joint. */
+            joint: string;
+            /** @description 1 for a role that was stated. */
+            confidence: number;
+        };
+        /** @description File that cannot be used as a character. */
+        CharacterFault: {
+            file: string;
+            /** @description In words. */
+            reason: string;
         };
         /** @description Provenance and uncertainty of a response. */
         Trust: {
@@ -1704,6 +1801,7 @@ export interface components {
             targets?: components["schemas"]["Met"][];
             /** @description Feet that were made to stand. Absent for feet as predicted. Since 4.0.0. */
             feet?: components["schemas"]["FeetResult"];
+            retargeting?: components["schemas"]["Retargeting"];
         };
         /** @description Feet that were made to stand, over the whole motion. */
         FeetResult: {
@@ -2852,6 +2950,11 @@ export interface components {
         up: "y" | "z";
         /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
         body: "none" | "mannequin" | "bones";
+        /**
+         * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
+         * @example hero
+         */
+        character: components["schemas"]["CharacterName"];
         /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
         crowdBody: "none" | "mannequin" | "bones";
         /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
@@ -3539,6 +3642,11 @@ export interface operations {
                 up?: components["parameters"]["up"];
                 /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
                 body?: components["parameters"]["body"];
+                /**
+                 * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
+                 * @example hero
+                 */
+                character?: components["parameters"]["character"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -3693,6 +3801,11 @@ export interface operations {
                 up?: components["parameters"]["up"];
                 /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
                 body?: components["parameters"]["body"];
+                /**
+                 * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
+                 * @example hero
+                 */
+                character?: components["parameters"]["character"];
             };
             header?: {
                 /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
@@ -4440,6 +4553,37 @@ export interface operations {
             503: components["responses"]["Overloaded"];
         };
     };
+    listCharacters: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The characters of this service. */
+            200: {
+                headers: {
+                    "X-Request-Id": components["headers"]["RequestId"];
+                    "Cache-Control": components["headers"]["CacheControl"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CharacterList"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthenticated"];
+            403: components["responses"]["Forbidden"];
+            405: components["responses"]["MethodNotAllowed"];
+            414: components["responses"]["UrlTooLong"];
+            421: components["responses"]["UnknownHost"];
+            431: components["responses"]["HeadTooLarge"];
+            500: components["responses"]["InternalError"];
+            503: components["responses"]["Overloaded"];
+        };
+    };
     queryPerformance: {
         parameters: {
             query?: {
@@ -4447,6 +4591,11 @@ export interface operations {
                 plan?: components["parameters"]["plan"];
                 /** @description Animations in USD files; other formats refuse `segments`. With `segments`, each segment has a SkelAnimation under `/Performance/Segments` beside the whole one, which alone is bound. Since 4.2.0. */
                 layout?: components["parameters"]["layout"];
+                /**
+                 * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
+                 * @example hero
+                 */
+                character?: components["parameters"]["character"];
             };
             header?: never;
             path?: never;
@@ -4478,6 +4627,11 @@ export interface operations {
                 plan?: components["parameters"]["plan"];
                 /** @description Animations in USD files; other formats refuse `segments`. With `segments`, each segment has a SkelAnimation under `/Performance/Segments` beside the whole one, which alone is bound. Since 4.2.0. */
                 layout?: components["parameters"]["layout"];
+                /**
+                 * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
+                 * @example hero
+                 */
+                character?: components["parameters"]["character"];
             };
             header?: never;
             path: {
@@ -4763,7 +4917,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "4.2.0";
+export const CONTRACT = "4.3.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
@@ -4979,7 +5133,8 @@ export const KEYS = {
     "detail",
     "unit",
     "up",
-    "body"
+    "body",
+    "character"
   ],
   "NamedClipQuestion": [
     "name",

@@ -192,6 +192,8 @@ export interface TransferOptions {
 /** Animations in USD files: of the whole performance, or besides it of each segment. */
 export interface PerformanceFileOptions extends TransferOptions {
   readonly layout?: Schemas["PerformanceLayout"] | undefined;
+  /** Character of a user that moves, one of `/v1/characters`; that of the script without it. */
+  readonly character?: Schemas["CharacterName"] | undefined;
 }
 
 /** What may be said of an archive of performances; `as` zip, unless another is said. */
