@@ -24,7 +24,15 @@ SETTINGS_INTRO = """\
 The service reads its settings once, from environment variables. Options of `posefield serve` take
 precedence. A value that cannot be used ends the start with exit code 2 and a sentence. Limits are
 maxima; times are in seconds, sizes in bytes."""
-SETTINGS_SECTIONS = ("Process", "Sizes", "Work of a request", "Models", "Host names", "Access")
+SETTINGS_SECTIONS = (
+    "Process",
+    "Sizes",
+    "Work of a request",
+    "Models",
+    "Characters",
+    "Host names",
+    "Access",
+)
 """Headings of the paragraphs of the docstring of Settings that describe settings."""
 COMMANDS_INTRO = """\
 `posefield COMMAND --help` prints the same. `train`, `sample`, `adapt` and `evaluate` need `pip

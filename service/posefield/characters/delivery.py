@@ -11,6 +11,7 @@ from posefield.common.errors import InvalidField
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import ClipEncoder
 from posefield.encode.user_rig.rig_files import FileAxes
+from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion, Target
@@ -23,6 +24,8 @@ from posefield.retarget.retarget_report import HandGoal, RetargetSettings
 from posefield.retarget.retargeting import Retargeted, retarget
 
 SIDES, ARM = ("left", "right"), ("UpperArm", "LowerArm", "Hand")
+CLOSED = 1e-3
+"""Largest distance of a joint between both ends of a loop that is not told, m."""
 NO_GOAL = (
     "the target of {} is met by the body of the model: of a character, only hands with arms do"
 )
@@ -56,6 +59,8 @@ class Delivery:
             _stances(trust.feet, question), hands, "kept" if question.targets else "scaled"
         )
         made, facts, told = self._retargeted(answer.clip, roles, settings)
+        if question.loop:
+            others += _loop_note(made.clip)
         notes = (*told, *others, *self.character.target.notes(self.form, made.clip))
         told_trust = replace(trust, warnings=(*trust.warnings, *notes), retargeting=facts)
         return ClipAnswer(made.clip, told_trust)
@@ -173,6 +178,21 @@ def _hand_goals(
         apart = np.linalg.norm(places[:, clip.skeleton.names.index(own.joint)] - position, axis=-1)
         goals.append(HandGoal(named[own.joint], float(np.argmin(apart)) / clip.rate, position))
     return goals, notes
+
+
+def _loop_note(clip: Clip) -> list[str]:
+    """Return a sentence if the last pose of a loop is not the first, as seen from the root."""
+    ends = replace(
+        clip,
+        rotations=clip.rotations[[0, -1]].copy(),
+        translations=clip.translations[[0, -1]].copy(),
+    )
+    ends.rotations[:, 0], ends.translations[:, 0] = quat.IDENTITY, 0.0
+    first, last = ends.positions()
+    apart = float(np.linalg.norm(last - first, axis=-1).max())
+    if apart <= CLOSED:
+        return []
+    return [f"the last pose of the loop differs from the first by {1000.0 * apart:.1f} mm"]
 
 
 def _listed(value: Any) -> Any:

@@ -49,8 +49,8 @@ class ManyArguments:
 
 
 @dataclass(frozen=True)
-class OneArguments:
-    """Options for what is written of each script."""
+class OneArguments(CharacterOptions):
+    """Options for what is written of each script, and for whom."""
 
     output: Annotated[
         str | None,
@@ -86,7 +86,6 @@ def perform(
     one: OneArguments,
     many: ManyArguments,
     question: CrowdStageQuestion,
-    whom: CharacterOptions,
     model: Annotated[
         list[Path] | None,
         typer.Option(
@@ -109,7 +108,7 @@ def perform(
     _check_stage(question, many)
     if script_rows.are_many(script):
         perform_them = _perform_crowd if many.crowd else _perform_many
-        perform_them(script, one, many, _Stage(tuple(model or ()), question, whom, json))
+        perform_them(script, one, many, _Stage(tuple(model or ()), question, json))
         return
     for option in ("crowd", "format", "workers"):
         if getattr(many, option) not in (None, False):
@@ -122,32 +121,30 @@ def perform(
     asked = json_decoding.decode_question(PerformanceQuestion, _read(script))
     find = shipped_models.with_shipped(model or []).find
     if one.output is None:
-        whom.refuse("with --plan, expected with an output file")
+        one.refuse("with --plan, expected with an output file")
         report = composition.plan(resolve_script(asked, find), MAX_FRAMES)
         typer.echo(as_json(report.document()) if json else report_text(report))
         return
     path = Path(one.output)
     found = resolve_script(asked, find)
-    answer, content = _performed(found, path, one.layout, whom)
+    answer, content = _performed(found, path, one)
     atomic_files.write(content, path)
     facts = {"file": str(path), **answer.trust.document()}
     typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
 
 
-def _performed(
-    script: "Script", path: Path, layout: PerformanceLayout, whom: CharacterOptions
-) -> tuple[PerformanceAnswer, bytes]:
+def _performed(script: "Script", path: Path, one: OneArguments) -> tuple[PerformanceAnswer, bytes]:
     """Return the performance of a script, and its file."""
     from posefield.performance import composition
 
     form, question = encoder_for(path), script.question
-    encode = performance_files.encoder(form, layout)
-    order = whom.delivery(form, question, path)
+    encode = performance_files.encoder(form, one.layout)
+    order = one.delivery(form, question, path)
     if order is None:
         convention = form.convention(question.unit, question.up, question.body)
         answer = composition.perform(script, MAX_FRAMES)
         return answer, encode(answer, convention)
-    order.check_layout(layout)
+    order.check_layout(one.layout)
     order.check(question, script.character.skeleton, script.character.roles)
     made = order.performance(composition.perform(script, MAX_FRAMES), script.character.roles)
     return made, order.encode(made)
@@ -155,11 +152,10 @@ def _performed(
 
 @dataclass(frozen=True)
 class _Stage:
-    """Models and character of many scripts, the stage of a crowd, and whether to print JSON."""
+    """Models of many scripts, the stage of a crowd, and whether to print JSON."""
 
     models: tuple[Path, ...]
     question: CrowdStageQuestion
-    whom: CharacterOptions
     json: bool
 
 
@@ -198,7 +194,7 @@ def _perform_many(scripts: Path, one: OneArguments, many: ManyArguments, stage: 
     output = _output(one, "a folder for the files of many scripts")
     form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
     workers, rows = _workers(many), script_rows.read_scripts(scripts)
-    whom = _batch_character(output, stage.whom)
+    whom = _batch_character(output, one)
     batch = performance_batch.PerformanceBatch(stage.models, output, form, one.layout, whom)
     with ProgressBar("performances", len(rows), 0) as bar:
         outcome = performance_batch.run(batch, rows, workers, bar.advance)
@@ -220,7 +216,7 @@ def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage:
     from posefield.console.progress import ProgressBar
 
     output = Path(_output(one, "a file for the crowd"))
-    stage.whom.refuse("with --crowd, expected without: a crowd has the characters of its models")
+    one.refuse("with --crowd, expected without: a crowd has the characters of its models")
     if one.layout != "whole":
         raise InvalidField("layout", f"{one.layout!r} with --crowd, expected 'whole'")
     crowd = performance_crowd.from_question(stage.models, output, stage.question)
