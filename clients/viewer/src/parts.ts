@@ -16,6 +16,7 @@ import * as levels from "./levels.ts";
 import * as map from "./map.ts";
 import * as options from "./options.ts";
 import * as performance from "./performance/part.ts";
+import * as probe from "./probe/part.ts";
 import type { Session } from "./session.ts";
 import * as takes from "./takes-panel.ts";
 import * as target from "./target.ts";
@@ -52,6 +53,7 @@ const PLACES: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<st
     feet: feet.mount,
     files: files.mount,
     detail: detail.mount,
+    probe: probe.mount,
   },
   transport: { time: transport.mount },
 };

@@ -31,7 +31,8 @@ def page_headers(script: str, style: str) -> dict[str, str]:
     script, style: sources of a Content-Security-Policy.
     """
     sources = f"default-src 'none'; script-src {script}; style-src {style}; connect-src 'self'"
-    more = "img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'none'"
+    # Workers come from the page itself, which reads motion files in them.
+    more = "worker-src blob:; img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'none'"
     return {
         "Content-Security-Policy": f"{sources}; {more}; frame-ancestors 'none'",
         "Referrer-Policy": "no-referrer",
