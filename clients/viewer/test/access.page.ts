@@ -1,16 +1,14 @@
 /** Everybody can use it: axe finds nothing serious, in light and dark, on a desk and on a tablet. */
 
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
 
+import { broken } from "./axe.ts";
 import { browser, SERVICE } from "./harness.ts";
 import { settled, slider } from "./look.ts";
 
-const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const REACH =
   "/#reaching?stature=1.75&hip_height=0.9&turn=20&target_height=1.1&~playing=no&~ghost=yes&~feet=yes";
 const SIZES = { desk: { width: 1280, height: 720 }, tablet: { width: 768, height: 1024 } };
@@ -31,19 +29,6 @@ async function shown(scheme: "light" | "dark", size: keyof typeof SIZES): Promis
   await page.goto(SERVICE + REACH);
   await settled(page);
   return page;
-}
-
-/** Rules that are broken seriously, and where. */
-async function broken(page: Page): Promise<string[]> {
-  await page.evaluate(AXE);
-  return page.evaluate(async () => {
-    const { axe } = window as unknown as { axe: { run(): Promise<{ violations: Violation[] }> } };
-    type Violation = { id: string; impact: string; nodes: { target: string[] }[] };
-    const { violations } = await axe.run();
-    return violations
-      .filter(({ impact }) => impact === "serious" || impact === "critical")
-      .map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target.join(" ")).join(", ")}`);
-  });
 }
 
 for (const scheme of ["light", "dark"] as const)
