@@ -39,6 +39,7 @@ def test_every_answer_is_data_and_nothing_to_run(method, path, status, ask):
 def test_a_page_of_our_own_says_what_it_loads():
     policy = security_headers.page_headers("'self'", "'self'")["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "http" not in policy and "*" not in policy
+    assert "worker-src blob:;" in policy
     assert b"content-security-policy" not in dict(security_headers.headers_for("text/html"))
     assert b"content-security-policy" in dict(security_headers.headers_for("application/json"))
 

@@ -15,6 +15,7 @@ import {
 } from "./motion.ts";
 import { general } from "./numbers.ts";
 import { Layer, type Specs } from "./usd-layer.ts";
+import { checkUsdc } from "./usdc-check.ts";
 import { firstEntry } from "./zip.ts";
 
 const SHOWN = 20;
@@ -84,8 +85,11 @@ async function specsOf(file: Blob): Promise<Specs> {
   }
   const magic = start.startsWith("PK") ? await mark(content) : start;
   try {
-    if (magic === "PXR-USDC")
-      return new USDCParser().parseData(await content.arrayBuffer()).specsByPath;
+    if (magic === "PXR-USDC") {
+      const bytes = await content.arrayBuffer();
+      checkUsdc(bytes);
+      return new USDCParser().parseData(bytes).specsByPath;
+    }
     if (magic.startsWith("#usda")) {
       const text = await content.text();
       refuseUnclosed(text);
