@@ -32,8 +32,9 @@ def page_headers(script: str, style: str) -> dict[str, str]:
     """
     sources = f"default-src 'none'; script-src {script}; style-src {style}; connect-src 'self'"
     # Workers come from the page itself, which reads motion files in them.
-    more = "worker-src blob:; img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'none'"
+    workers = "worker-src blob:"
+    more = "img-src 'self' data:; font-src 'self'; base-uri 'none'; form-action 'none'"
     return {
-        "Content-Security-Policy": f"{sources}; {more}; frame-ancestors 'none'",
+        "Content-Security-Policy": f"{sources}; {workers}; {more}; frame-ancestors 'none'",
         "Referrer-Policy": "no-referrer",
     }
