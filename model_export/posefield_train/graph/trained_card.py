@@ -39,6 +39,7 @@ from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.source import measured_controls
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
+from posefield_train.source.topology import common_topology
 from posefield_train.tensor import truncation_error
 
 # A control with more distinct values than this is continuous, and they are not listed.
@@ -73,7 +74,7 @@ def build_card(
         provenance=_provenance(recipe, examples),
         sources=tuple(example.row.source for example in examples),
         kriging=plain_parameters(trained.pose.hyper),
-        roles={str(role): joint for role, joint in recipe.roles.items()},
+        roles=_roles(recipe, trained),
         left_out=tuple(map(rounded, np.sqrt(trained.left_out_errors))),
         event=truncation_error.event(recipe, examples),
         beside=_covariance_root(trained),
@@ -86,6 +87,13 @@ def build_card(
         contacts=trained.contacts.statistics if trained.contacts else (),
         captured_acceleration=captured_acceleration(examples),
     )
+
+
+def _roles(recipe: Recipe, trained: TrainedModel) -> dict[str, str]:
+    """Return the joints by role."""
+    if recipe.skeleton.is_unified:
+        return common_topology.model_roles(trained.skeleton.names)
+    return {str(role): joint for role, joint in recipe.roles.items()}
 
 
 def captured_acceleration(examples: Sequence[Example]) -> CapturedAcceleration | None:

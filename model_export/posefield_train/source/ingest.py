@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import get_args
 
 from posefield.common.array_shapes import Positions
 from posefield.common.units import Floats
 from posefield.motion.clip import Clip
+from posefield.motion.joint_roles import Role
 from posefield_train.source import (
     clip_joints,
     clip_landmarks,
@@ -29,6 +31,8 @@ from posefield_train.source.recipe_sections.data_sections import Source
 from posefield_train.source.rigs import rig_normalization
 from posefield_train.source.rigs.rig_normalization import RigError, RiggedClips, RigSettings
 from posefield_train.source.takes import take_groups
+from posefield_train.source.topology import recipe_topology
+from posefield_train.source.topology.role_joints import TopologyError
 
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
 # second, which take 2.4 GB.
@@ -81,9 +85,14 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     if recipe.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
     files.clear()
-    cuts = [_cut(recipe, _whole_clip(recipe, wholes, curves, row), row) for row in rows]
-    clip_joints.expect_same_skeleton(rows, [clip for clip, _ in cuts])
-    rigged = _normalize_rigs(recipe, rows, [clip for clip, _ in cuts])
+    cuts = [cut_frames(_whole_clip(recipe, wholes, curves, row), row) for row in rows]
+    clips, said = _on_one_topology(recipe, rows, [clip for clip, _ in cuts])
+    notes += said
+    clips = [
+        clip_joints.drop_joints(clip, recipe, row) for clip, row in zip(clips, rows, strict=True)
+    ]
+    clip_joints.expect_same_skeleton(rows, clips)
+    rigged = _normalize_rigs(recipe, rows, clips)
     found = [
         _example(recipe, row, clip, last, rigged.facing)
         for row, clip, (_, last) in zip(rows, rigged.clips, cuts, strict=True)
@@ -157,16 +166,26 @@ def _whole_clip(
     return curve_files.with_curves(clip, values, row) if values else clip
 
 
-def _cut(recipe: Recipe, whole: Clip, row: ClipRow) -> tuple[Clip, int]:
-    """Return the clip of a row without dropped joints, and the index of its last frame."""
-    own, last = cut_frames(whole, row)
-    return clip_joints.drop_joints(own, recipe, row), last
+def _on_one_topology(
+    recipe: Recipe, rows: Sequence[ClipRow], clips: Sequence[Clip]
+) -> tuple[Sequence[Clip], list[str]]:
+    """Return the clips on the topology of roles and notes, or as they are; RecipeError as above."""
+    if not recipe.skeleton.is_unified:
+        return clips, []
+    files = [row.place.name for row in rows]
+    stretches = recipe.motion.bones == "stretch"
+    try:
+        return recipe_topology.unify(clips, files, recipe.skeleton.stated, stretches)
+    except TopologyError as fault:
+        row = rows[fault.clip]
+        raise row.error(f"{row.place}: {fault}") from fault
 
 
 def _normalize_rigs(recipe: Recipe, rows: Sequence[ClipRow], clips: Sequence[Clip]) -> RiggedClips:
     """Return the clips with normalized skeletons; RecipeError names the row at fault."""
     motion = recipe.motion
-    roles = {str(role): joint for role, joint in recipe.roles.items()}
+    known = {role: recipe.joint_with(role) for role in get_args(Role)}
+    roles = {str(role): joint for role, joint in known.items() if joint}
     named = frozenset(clip_joints.named_joints(recipe))
     directions = {"left", "forward", "step_length"}
     directed = any(control.auto.quantity in directions for control in recipe.measured)

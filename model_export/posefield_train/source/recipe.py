@@ -27,7 +27,12 @@ from posefield_train.source.recipe_sections.control_sources import (
     RecipePart,
     Text,
 )
-from posefield_train.source.recipe_sections.data_sections import Clips, Motion, Source
+from posefield_train.source.recipe_sections.data_sections import (
+    Clips,
+    Motion,
+    SkeletonSettings,
+    Source,
+)
 from posefield_train.source.recipe_sections.training_sections import (
     Alignment,
     Contacts,
@@ -56,6 +61,7 @@ class Recipe(RecipePart):
     )
     source: Source
     clips: Clips
+    skeleton: SkeletonSettings = SkeletonSettings()
     controls: Annotated[list[Control], Field(min_length=1)]
     motion: Motion
     alignment: Alignment = Alignment()
@@ -101,12 +107,16 @@ class Recipe(RecipePart):
         found = [self.event.at] if self.event and self.event.is_found else []
         return [*self.clips.landmarks, *found]
 
+    def joint_with(self, role: Role) -> str | None:
+        """Return the joint with a role; None if the recipe does not tell it."""
+        return role if self.skeleton.is_unified else self.roles.get(role)
+
     def leg_ends(self, auto: Auto) -> list[str]:
         """Return the two feet of a step, or the ends of a leg; empty for other quantities."""
         if auto.quantity == "step_length":
             return list(auto.joints or self.motion.feet)
         if auto.quantity == "leg_length":
-            leg = [self.roles.get("leftUpperLeg"), self.roles.get("leftFoot")]
+            leg = [self.joint_with("leftUpperLeg"), self.joint_with("leftFoot")]
             return list(auto.joints or filter(None, leg))
         return []
 
@@ -130,6 +140,7 @@ class Recipe(RecipePart):
 
     @model_validator(mode="after")
     def _check_sections(self) -> "Recipe":
+        recipe_checks.check_skeleton(self.skeleton, self.roles)
         recipe_checks.check_label_sets(self.clips, self.kriging)
         recipe_checks.check_label_names(self.controls, self.kriging)
         recipe_checks.check_presets(self.presets, self.controls, self.kriging)

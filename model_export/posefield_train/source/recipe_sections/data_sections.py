@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from posefield.common.units import UpAxis
+from posefield.motion.joint_roles import Role
 from posefield_train.source.recipe_sections.control_sources import Name, RecipePart, Text
 from posefield_train.source.rigs.facing import Facing
 
@@ -80,6 +81,36 @@ class Clips(RecipePart):
         "that alignment moves to the same time in all clips; such as ['contact_frame']",
     )
     where: dict[str, Condition] = Field(default={}, description="conditions on rows, by column")
+
+
+class SkeletonSettings(RecipePart):
+    """Topology of the skeleton."""
+
+    topology: Literal["files", "roles"] = Field(
+        default="files",
+        description="files: all clips have the joints of their files, which must be equal; roles: "
+        "clips of different skeletons become one of people, with the joints of the roles that all "
+        "have, the longest common chains of spine and neck, one rest pose and their own "
+        "proportions. Joints are then named by their roles: hips, spine1, neck1, leftHand",
+    )
+    roles: dict[Role, Text | Annotated[list[Text], Field(min_length=1)]] = Field(
+        default={},
+        description="joints of the files by role, for topology = 'roles': one name, or a list of "
+        "which each file has at most one; default: recognised by names and structure",
+    )
+
+    @property
+    def is_unified(self) -> bool:
+        """Return whether clips are brought onto the topology of roles."""
+        return self.topology == "roles"
+
+    @property
+    def stated(self) -> dict[str, list[str]]:
+        """Return the stated joints by role."""
+        return {
+            str(role): [names] if isinstance(names, str) else names
+            for role, names in self.roles.items()
+        }
 
 
 class Motion(RecipePart):

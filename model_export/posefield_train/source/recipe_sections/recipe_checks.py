@@ -11,11 +11,32 @@ from posefield_train.source.recipe_sections.control_sources import (
     Control,
     KeyFault,
 )
-from posefield_train.source.recipe_sections.data_sections import PERFORMER, Clips, Motion
+from posefield_train.source.recipe_sections.data_sections import (
+    PERFORMER,
+    Clips,
+    Motion,
+    SkeletonSettings,
+)
 from posefield_train.source.recipe_sections.training_sections import Event, Kriging, Preset, Size
 
 # Quantities that only a whole cycle has.
 CYCLE_QUANTITIES = (*measures.TRAVEL_QUANTITIES, "step_length")
+
+
+def check_skeleton(skeleton: SkeletonSettings, roles: Mapping[str, str]) -> None:
+    """Raise KeyFault for roles that the topology does not use."""
+    if skeleton.is_unified and roles:
+        raise KeyFault(
+            "found roles and skeleton.topology = 'roles', whose joints are named by their roles, "
+            "expected those of the files as [skeleton.roles], if any",
+            "roles",
+        )
+    if not skeleton.is_unified and skeleton.roles:
+        raise KeyFault(
+            "found roles and skeleton.topology = 'files', expected topology = 'roles', or the "
+            "joints as [roles]",
+            *("skeleton", "roles"),
+        )
 
 
 def check_label_sets(clips: Clips, kriging: Kriging) -> None:

@@ -1,0 +1,146 @@
+"""Topology that skeletons have in common: roles of all, and the longest common chains."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion.joint_roles import ROLES
+from posefield_train.source.topology.role_joints import ARM, LEG, SIDES, RoleJoints
+
+
+@dataclass(frozen=True)
+class Topology:
+    """Joints of a family. names, parents: as of a skeleton. spine, neck: number of joints."""
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    spine: int
+    neck: int
+
+    def index(self, name: str) -> int:
+        """Return the index of a joint."""
+        return self.names.index(name)
+
+    @property
+    def trunk(self) -> tuple[str, ...]:
+        """Return the joints of spine and neck and the head, upwards."""
+        return (*numbered("spine", self.spine), *numbered("neck", self.neck), "head")
+
+
+@dataclass(frozen=True)
+class JointPoint:
+    """Place of a joint of the topology in a skeleton.
+
+    It lies on the bone from `joint` to `following`, at a share of it, and turns with `joint`.
+    """
+
+    joint: int
+    following: int
+    share: float = 0.0
+
+
+def numbered(name: str, count: int) -> tuple[str, ...]:
+    """Return the names of a chain's joints, such as spine1 and spine2."""
+    return tuple(f"{name}{number}" for number in range(1, count + 1))
+
+
+def common_topology(bodies: Sequence[RoleJoints]) -> Topology:
+    """Return the topology of roles that all bodies have, with the longest common chains."""
+    spine, neck = (min(len(part(body)) for body in bodies) for part in (_spine, _neck))
+    shared = set.intersection(*(set(body.limbs) for body in bodies))
+    links: list[tuple[str, str]] = [("hips", "")]
+    for side in SIDES:
+        links += _links("hips", [side + role for role in LEG if side + role in shared])
+    chain = numbered("spine", spine)
+    links += _links("hips", chain)
+    links += _links(chain[-1], [*numbered("neck", neck), "head"])
+    for side in SIDES:
+        links += _links(chain[-1], [side + role for role in ARM if side + role in shared])
+    names = tuple(name for name, _ in links)
+    parents = tuple(names.index(parent) if parent else -1 for _, parent in links)
+    return Topology(names, parents, spine, neck)
+
+
+def _spine(body: RoleJoints) -> tuple[int, ...]:
+    return body.spine
+
+
+def _neck(body: RoleJoints) -> tuple[int, ...]:
+    return body.neck
+
+
+def _links(first: str, names: Sequence[str]) -> list[tuple[str, str]]:
+    return list(zip(names, (first, *names), strict=False))
+
+
+def model_roles(names: Sequence[str]) -> dict[str, str]:
+    """Return the joint of each role among the joints of a topology, for the names of other tools.
+
+    names: some of its joints; others may have been dropped.
+    """
+    chain = [name for name in names if name.startswith("spine")]
+    trunk = dict(zip(("spine", "chest"), chain, strict=False))
+    if len(chain) > 2:
+        trunk = {"spine": chain[0], "chest": chain[len(chain) // 2], "upperChest": chain[-1]}
+    known = {role: role for role in ROLES if role in names} | trunk
+    if "neck1" in names:
+        known["neck"] = "neck1"
+    return {role: known[role] for role in ROLES if role in known}
+
+
+def joint_points(
+    bodies: Sequence[RoleJoints], lengths: Sequence[Floats], topology: Topology
+) -> list[dict[str, JointPoint]]:
+    """Return the place of each joint of the topology in each body, by name.
+
+    lengths: of the bones that lead to each joint (J,), m. First and last joint of a chain are
+    joints of every body: the first moves with the joint below the chain, the last carries what
+    follows. Those between are at the same share of the length in all bodies, that of the bodies
+    with no more joints than the family, which keep theirs.
+    """
+    counts = topology.spine, topology.neck + 1
+    chains = [(body.spine, (*body.neck, body.head)) for body in bodies]
+    shares = [
+        np.median(
+            [
+                _shares(own[part], bones)
+                for own, bones in zip(chains, lengths, strict=True)
+                if len(own[part]) == counts[part]
+            ],
+            axis=0,
+        )
+        for part in (0, 1)
+    ]
+    names = numbered("spine", topology.spine), (*numbered("neck", topology.neck), "head")
+    found = []
+    for body, own, bones in zip(bodies, chains, lengths, strict=True):
+        limbs = {role: joint for role, joint in body.limbs.items() if role in topology.names}
+        points = {name: JointPoint(at, at) for name, at in {"hips": body.hips, **limbs}.items()}
+        for part in (0, 1):
+            placed = _sample(own[part], bones, shares[part])
+            points |= dict(zip(names[part], placed, strict=True))
+        found.append({name: points[name] for name in topology.names})
+    return found
+
+
+def _shares(chain: Sequence[int], bones: Floats) -> Floats:
+    """Return the share of a chain's length at each of its joints."""
+    along = np.concatenate([[0.0], np.cumsum(bones[list(chain[1:])])])
+    return np.asarray(along / along[-1] if along[-1] > 0.0 else np.linspace(0.0, 1.0, len(along)))
+
+
+def _sample(chain: Sequence[int], bones: Floats, shares: Floats) -> list[JointPoint]:
+    """Return the points of a chain at shares of its length; its own joints if it has as many."""
+    if len(chain) == len(shares):
+        return [JointPoint(joint, joint) for joint in chain]
+    if len(shares) == 1:
+        return [JointPoint(chain[-1], chain[-1])]
+    own = _shares(chain, bones)
+    found = [JointPoint(chain[0], chain[0])]
+    for share in shares[1:-1]:
+        at = int(np.clip(np.searchsorted(own, share, side="right") - 1, 0, len(chain) - 2))
+        along = float((share - own[at]) / (own[at + 1] - own[at])) if own[at + 1] > own[at] else 0.0
+        found.append(JointPoint(chain[at], chain[at + 1], along))
+    return [*found, JointPoint(chain[-1], chain[-1])]
