@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,11 +105,18 @@ def test_unit_and_up_can_be_stated(posefield, takes, tmp_path):
     assert "# stated by an option of posefield discover" in text
 
 
-def test_clips_with_other_joints_are_named_and_left_out(posefield, takes, tmp_path):
-    folder = tmp_path / "takes"
+def with_a_hat(takes, folder, head="Head"):
+    """Return a folder of the takes and of one more, of a performer with one joint more."""
     shutil.copytree(takes, folder)
     hat = rigid_takes.clip("FSSFFS", 9, extra=True)
+    names = tuple(head if name == "Head" else name for name in hat.skeleton.names)
+    hat = replace(hat, skeleton=replace(hat.skeleton, names=names))
     (folder / "cid_9.bvh").write_bytes(bvh_writer.dumps(hat, metres_per_unit=0.01))
+    return folder
+
+
+def test_clips_without_the_roles_of_the_others_are_named_and_left_out(posefield, takes, tmp_path):
+    folder = with_a_hat(takes, tmp_path / "takes", head="Top")
     assert posefield("discover", folder, "-o", tmp_path / "recipes", *LICENCE, *FEW)[0] == 0
     facts = json.loads((tmp_path / "recipes/discover.json").read_text())
     left_out = {name: why for one in facts["families"] for name, why in one["left_out"].items()}
@@ -116,6 +124,29 @@ def test_clips_with_other_joints_are_named_and_left_out(posefield, takes, tmp_pa
     assert all(name.startswith("cid_9.bvh@") for name in left_out)
     tables = "".join(path.read_text() for path in (tmp_path / "recipes").glob("*.csv"))
     assert "cid_9" not in tables and facts["takes"]["cid_9.bvh"]["performer"] == "performer_1"
+
+
+def test_clips_of_several_skeletons_get_a_recipe_with_one_topology(posefield, takes, tmp_path):
+    folder, out = with_a_hat(takes, tmp_path / "takes"), tmp_path / "recipes"
+    words = ("discover", folder, "-o", out, *LICENCE, *FEW)
+    assert posefield(*words)[0] == 0
+    facts = json.loads((out / "discover.json").read_text())
+    assert not any(one["left_out"] for one in facts["families"])
+    mixed = [one for one in facts["families"] if "cid_9" in table_of(out, one)]
+    assert mixed and all(one["roles"]["rightHand"] == "rightHand" for one in mixed)
+    for one in mixed:
+        text = (out / f"family_{one['number']:02d}.toml").read_text()
+        assert "# The files have 2 kinds of skeletons, of 17, 18 joints: clips get the" in text
+        own = recipe.read(out / f"family_{one['number']:02d}.toml")
+        assert own.skeleton.is_unified and not own.roles
+        assert own.motion.feet == ["leftToes", "rightToes"]
+        examples, notes = ingest.ingest(own, folder)
+        assert {"cid_9.bvh"} < {example.row.place.name for example in examples}
+        assert any("18 joints became 17 by their roles, without Hat;" in note for note in notes)
+
+
+def table_of(folder, family):
+    return (folder / f"family_{family['number']:02d}.csv").read_text()
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def _write_recipes(
         kinds = body_kinds.find_kinds(folder, names, statements, bar.update)
     with ProgressBar("candidates", wanted.candidates) as bar:
         listed = found_families.find_families(read.takes, kinds, wanted.candidates, bar.update)
-    found = recipe_folder.offer(listed, kinds, folder, wanted.licence)
+    found = recipe_folder.offer(listed, folder, wanted.licence)
     facts = recipe_folder.summary(found, folder, read, kinds, wanted.candidates)
     page = contact_sheet.render(found, read.takes, output.as_posix(), read.refused)
     files = recipe_folder.contents(found, facts) | {recipe_folder.PAGE: page}

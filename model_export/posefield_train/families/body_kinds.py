@@ -9,6 +9,7 @@ import numpy as np
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, UpAxis
+from posefield.motion.skeleton import Skeleton
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import figure, probe_report
 from posefield_train.probe.figure import Figure
@@ -40,12 +41,15 @@ class FileStatements:
 class BodyKind:
     """Takes with the same joints in the same order.
 
-    report: proposals, with statements in place of guesses. performers: by file.
+    report: proposals, with statements in place of guesses. performers: by file. skeleton: of the
+    first file. stated: joints by role that were stated.
     """
 
     joints: tuple[str, ...]
     report: ProbeReport
     performers: Mapping[str, str]
+    skeleton: Skeleton
+    stated: Mapping[str, str]
 
 
 def find_kinds(
@@ -80,7 +84,9 @@ def _kind(
             raise InvalidField(key, f"not told by {files[0]} ({said}), expected a statement")
     unit = float(found.proposed["metres_per_unit"].value)
     names = name_performers(files, [unit * own.bones[1:] for own in figures])
-    return BodyKind(joints, found, dict(zip(files, names, strict=True)))
+    own = {role: joint for role, joint in stated.roles.items() if joint in joints}
+    performers = dict(zip(files, names, strict=True))
+    return BodyKind(joints, found, performers, figures[0].file.skeleton, own)
 
 
 def _stated(found: ProbeReport, stated: FileStatements) -> ProbeReport:

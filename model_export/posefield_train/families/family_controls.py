@@ -10,6 +10,7 @@ from posefield_train.families import family_table
 from posefield_train.families.family_table import FamilyRow
 from posefield_train.source import ingest, measured_controls, recipe
 from posefield_train.source.recipe import Recipe
+from posefield_train.source.topology import common_topology
 
 
 def propose(text: str, name: str, rows: Sequence[FamilyRow], data: Path) -> ControlProposal:
@@ -33,8 +34,11 @@ def propose(text: str, name: str, rows: Sequence[FamilyRow], data: Path) -> Cont
 
 def _family_clips(own: Recipe, examples: Sequence[ingest.Example]) -> FamilyClips:
     names = examples[0].clip.skeleton.names
+    roles = {str(role): joint for role, joint in own.roles.items()}
+    if own.skeleton.is_unified:
+        roles = common_topology.model_roles(names)
     joints: Mapping[str, int] = {
-        str(role): names.index(joint) for role, joint in own.roles.items() if joint in names
+        role: names.index(joint) for role, joint in roles.items() if joint in names
     }
     return FamilyClips(
         tuple(measured_controls.measured_quantities(one.clip) for one in examples),

@@ -37,7 +37,7 @@ class RecipeFacts:
 
     name: of the files. description: of the motions. licence: empty for one that has to be written.
     report: on the motion files. cyclic: of strides. labelled: whether performers are told apart.
-    evidence: comment lines.
+    evidence: comment lines. skeleton: lines of the section [skeleton]; empty for equal joints.
     """
 
     name: str
@@ -47,6 +47,7 @@ class RecipeFacts:
     cyclic: bool = False
     labelled: bool = True
     evidence: tuple[str, ...] = field(default=())
+    skeleton: tuple[str, ...] = ()
 
 
 def recipe_text(facts: RecipeFacts, proposal: ControlProposal, accepted: bool = False) -> str:
@@ -70,8 +71,9 @@ def recipe_text(facts: RecipeFacts, proposal: ControlProposal, accepted: bool = 
             *_clips(facts.name),
             *proposal_lines(proposal, facts.report.roles),
             "",
+            *facts.skeleton,
             *recipe_draft.motion_lines(facts.report, facts.cyclic),
-            *recipe_draft.role_lines(facts.report),
+            *([] if facts.skeleton else recipe_draft.role_lines(facts.report)),
             *(["[kriging]", 'label = "performer"', ""] if facts.labelled else []),
             "[size]",
             "rms_budget_cm = 1.0",

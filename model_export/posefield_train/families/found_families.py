@@ -16,6 +16,7 @@ from posefield_train.discover.family_quality import FamilyQuality
 from posefield_train.discover.family_search import FEWEST
 from posefield_train.discover.motion_features import Corpus
 from posefield_train.discover.take_reading import Take
+from posefield_train.families import mixed_bodies
 from posefield_train.families.body_kinds import BodyKind
 from posefield_train.families.family_table import FamilyRow
 
@@ -28,14 +29,15 @@ class FoundFamily:
     """Clips that may be a family.
 
     kind: motions or strides. rows: the most similar first. example: row that the others are like;
-    None for strides. joints: of the bodies. seconds: median duration. quality: None for strides.
-    left_out: reason by clip, such as "a.bvh@3.2". reasons: why it is not offered.
+    None for strides. kinds: of the bodies, the most common first. seconds: median duration.
+    quality: None for strides. left_out: reason by clip, such as "a.bvh@3.2". reasons: why it is not
+    offered.
     """
 
     kind: str
     rows: tuple[FamilyRow, ...]
     example: FamilyRow | None
-    joints: tuple[str, ...]
+    kinds: tuple[BodyKind, ...]
     seconds: float
     quality: FamilyQuality | None
     left_out: Mapping[str, str]
@@ -62,7 +64,7 @@ def find_families(
         own = FoundFamily(
             "motions", tuple(rows), example, (), family.seconds, quality, {}, quality.reasons
         )
-        found.append(_of_one_kind(own, kinds, takes))
+        found.append(_of_one_topology(own, kinds, takes))
     strides = _strides(takes, kinds)
     return found if strides is None else [*found, strides]
 
@@ -92,26 +94,32 @@ def _strides(takes: Sequence[Take], kinds: Sequence[BodyKind]) -> FoundFamily | 
     rows = [_clip(take.file, one.first, one.last, None, kinds) for take, one in found]
     seconds = sorted((one.last - one.first) / take.rate for take, one in found)
     own = FoundFamily("strides", tuple(rows), None, (), seconds[len(seconds) // 2], None, {}, ())
-    return _of_one_kind(own, kinds, takes)
+    return _of_one_topology(own, kinds, takes)
 
 
-def _of_one_kind(
+def _of_one_topology(
     family: FoundFamily, kinds: Sequence[BodyKind], takes: Sequence[Take]
 ) -> FoundFamily:
-    """Return the family with the clips of its most common joints, the others named."""
-    joints = {file: kind.joints for kind in kinds for file in kind.performers}
+    """Return the family with the clips whose bodies share a topology, the others named.
+
+    Without one, the clips of the most common joints remain.
+    """
+    numbers = {file: at for at, kind in enumerate(kinds) for file in kind.performers}
     rates = {take.file: take.rate for take in takes}
-    counts = Counter(joints[row.file] for row in family.rows)
-    ((common, _),) = counts.most_common(1)
-    kept = tuple(row for row in family.rows if joints[row.file] == common)
+    counts = Counter(numbers[row.file] for row in family.rows)
+    common = [at for at, _ in counts.most_common()]
+    if len(common) > 1 and not mixed_bodies.can_share([kinds[at] for at in common]):
+        common = common[:1]
+    kept = tuple(row for row in family.rows if numbers[row.file] in common)
     left_out = {
         f"{row.file}@{row.first_frame / rates[row.file]:.1f}": "other joints than most clips"
         for row in family.rows
-        if joints[row.file] != common
+        if numbers[row.file] not in common
     }
     reasons = family.reasons
     if len(kept) < FEWEST:
         reasons = (*reasons, f"{len(kept)} clips of one skeleton, expected {FEWEST} or more")
     if len({row.take for row in kept}) < 2:
         reasons = (*reasons, "clips of one take, expected two takes or more")
-    return replace(family, rows=kept, joints=common, left_out=left_out, reasons=reasons)
+    own = tuple(kinds[at] for at in common)
+    return replace(family, rows=kept, kinds=own, left_out=left_out, reasons=reasons)

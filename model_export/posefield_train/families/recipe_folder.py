@@ -13,7 +13,12 @@ from posefield.common.errors import FileError, MotionError
 from posefield_train.discover import family_quality, family_search
 from posefield_train.discover.control_proposals import ControlProposal
 from posefield_train.discover.take_reading import ReadTakes
-from posefield_train.families import family_controls, family_recipe, family_table
+from posefield_train.families import (
+    family_controls,
+    family_recipe,
+    family_table,
+    mixed_bodies,
+)
 from posefield_train.families.body_kinds import BodyKind
 from posefield_train.families.family_recipe import RecipeFacts
 from posefield_train.families.found_families import FoundFamily
@@ -47,9 +52,7 @@ class FoundFamilies:
     refused: tuple[FoundFamily, ...]
 
 
-def offer(
-    found: Sequence[FoundFamily], kinds: Sequence[BodyKind], data: Path, licence: str
-) -> FoundFamilies:
+def offer(found: Sequence[FoundFamily], data: Path, licence: str) -> FoundFamilies:
     """Return the families with recipes, in the order found, numbered from 1.
 
     data: folder of the takes. A family whose clips cannot be read together, or that no control
@@ -61,7 +64,7 @@ def offer(
         if family.reasons:
             refused.append(family)
             continue
-        facts = _facts(family, kinds, len(offered) + 1, licence)
+        facts = _facts(family, len(offered) + 1, licence)
         draft = replace(facts, licence="not stated yet")
         text = family_recipe.recipe_text(draft, family_recipe.PLACEHOLDER)
         try:
@@ -74,10 +77,9 @@ def offer(
     return FoundFamilies(tuple(offered), tuple(refused))
 
 
-def _facts(
-    family: FoundFamily, kinds: Sequence[BodyKind], number: int, licence: str
-) -> RecipeFacts:
-    (kind,) = (kind for kind in kinds if kind.joints == family.joints)
+def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
+    kind, own = family.kinds[0], family.kinds
+    is_mixed = len(own) > 1
     performers = {row.performer for row in family.rows}
     what = "Strides" if family.kind == "strides" else "Similar motions"
     evidence = [
@@ -93,10 +95,11 @@ def _facts(
         family_name(number),
         f"{what} found in long takes, family {number}",
         licence,
-        kind.report,
+        mixed_bodies.shared_report(kind.report, own) if is_mixed else kind.report,
         family.kind == "strides",
         len(performers) > 1,
         tuple(evidence),
+        tuple(mixed_bodies.skeleton_lines(own)) if is_mixed else (),
     )
 
 

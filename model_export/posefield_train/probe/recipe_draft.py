@@ -88,7 +88,8 @@ def quote(text: str) -> str:
     return json.dumps(text, ensure_ascii=False)
 
 
-def _list(words: Sequence[str]) -> str:
+def names(words: Sequence[str]) -> str:
+    """Return texts as a TOML array."""
     return f"[{', '.join(map(quote, words))}]"
 
 
@@ -149,7 +150,7 @@ def _clips(table: ClipTable | None) -> list[str]:
         lines.append(f"take = {quote(take)}  # clips of one take are left out together")
     marks = frame_columns(table)
     lines.append("# Columns that may hold the frame of an event; those that do become landmarks:")
-    lines.append(f"# landmarks = {_list(marks or ['contact_frame'])}")
+    lines.append(f"# landmarks = {names(marks or ['contact_frame'])}")
     return [*lines, ""]
 
 
@@ -215,7 +216,7 @@ def motion_lines(report: ProbeReport, cyclic: bool = False) -> list[str]:
         f"cyclic = {json.dumps(cyclic)}",
         'root = "travelling"  # or "in_place"',
         *[f"# {said} (confidence: {feet.confidence})" for said in feet.evidence],
-        f"feet = {_list(feet.value)}",
+        f"feet = {names(feet.value)}",
         *[f"# facing: {said} (confidence: {facing.confidence})" for said in facing.evidence],
         *(['facing = "hips"'] if abs(facing.value or 0.0) > LARGEST_ANGLE else []),
         "",

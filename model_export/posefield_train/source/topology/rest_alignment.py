@@ -74,9 +74,7 @@ class _RestAlignment:
 
     def local(self, joint: int, vectors: Floats) -> Floats:
         """Return the mean (3,) of world vectors (F, 3) in the frame of a joint."""
-        return np.asarray(
-            quat.rotate(quat.conj(self.motion.turns[:, joint]), vectors).mean(axis=0)
-        )
+        return np.asarray(quat.rotate(quat.conj(self.motion.turns[:, joint]), vectors).mean(axis=0))
 
     def towards(self, joint: int, target: int) -> Floats:
         """Return the mean vector (3,) from a joint to another in the former's frame."""
@@ -124,7 +122,9 @@ class _RestAlignment:
             return None
         limb = ELBOWS if role in ELBOWS else KNEES
         ends = (*limb, HINGES[role])
-        first, middle, last = (self.motion.positions[:, self.topology.index(side + r)] for r in ends)
+        first, middle, last = (
+            self.motion.positions[:, self.topology.index(side + r)] for r in ends
+        )
         normals = quat.cross(_units(middle - first), _units(last - middle))
         axis = self.local(joint, normals)
         if np.linalg.norm(axis) < LEAST_BEND:
@@ -155,9 +155,7 @@ def _other(direction: Floats) -> Floats:
 
 
 def _units(vectors: Floats) -> Floats:
-    return np.asarray(
-        vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
-    )
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12))
 
 
 Directions = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]

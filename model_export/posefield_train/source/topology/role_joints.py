@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from posefield.motion import skeleton
 from posefield.motion.joint_roles import ROLES
 from posefield.motion.skeleton import Skeleton
-from posefield_train.roles import joint_recognition
+from posefield.roles import joint_recognition
 
 SIDES = ("left", "right")
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
@@ -97,7 +98,7 @@ def _indices(own: Skeleton, stated: StatedRoles) -> dict[str, int]:
     if lacking:
         told = [
             f"{role} ({guesses[role].joint}? {'; '.join(guesses[role].reasons)})"
-            if role in guesses
+            if role in guesses and guesses[role].reasons
             else role
             for role in lacking
         ]
@@ -110,8 +111,10 @@ def _indices(own: Skeleton, stated: StatedRoles) -> dict[str, int]:
 
 def _spine_length(own: Skeleton, between: Sequence[int], found: Mapping[str, int]) -> int:
     """Return the number of joints between hips and head that belong to the spine."""
-    if found.get("neck") in between:
-        return between.index(found["neck"])
+    neck = found.get("neck")
+    # Of a body without a spine the joint that carries the arms is one.
+    if neck in between[1:]:
+        return between.index(neck)
     arms = [found.get(side + "Shoulder", found[side + "UpperArm"]) for side in SIDES]
     paths = [set(skeleton.joint_chain(own.parents, arm)) for arm in arms]
     return sum(joint in paths[0] & paths[1] for joint in between)
@@ -119,8 +122,7 @@ def _spine_length(own: Skeleton, between: Sequence[int], found: Mapping[str, int
 
 def _without_repeats(own: Skeleton, chain: Sequence[int]) -> tuple[int, ...]:
     """Return a chain without joints at the place of the next one, whose turns that one has too."""
-    following = zip(chain, chain[1:], strict=False)
-    same = {a for a, b in following if own.parents[b] == a and not own.offsets[b].any()}
+    same = {a for a, b in pairwise(chain) if own.parents[b] == a and not own.offsets[b].any()}
     return tuple(joint for joint in chain if joint not in same)
 
 
