@@ -307,7 +307,7 @@ def test_clips_of_other_skeletons_are_refused_with_both_files(read, tmp_path):
     assert caught.value.line == 4
     assert caught.value.message == (
         f"{tmp_path / '2.bvh'} has other joints than {tmp_path / '0.bvh'} of line 2: "
-        "only one of them has ['LeftHand', 'LeftPaw']"
+        "only one of them has ['LeftHand', 'LeftPaw']; of people, say skeleton.topology = 'roles'"
     )
 
 

@@ -94,7 +94,8 @@ def expect_same_skeleton(rows: Sequence[ClipRow], clips: Sequence[Clip]) -> None
         if not clip.skeleton.same_tree(first):
             raise row.error(
                 f"{row.place} has other joints than {rows[0].place} of line "
-                f"{rows[0].line}: {_difference(clip.skeleton, first)}"
+                f"{rows[0].line}: {_difference(clip.skeleton, first)}; of people, say "
+                "skeleton.topology = 'roles'"
             )
 
 
