@@ -207,6 +207,33 @@ def test_sample_writes_other_figures(posefield, refused, tmp_path, family):
     assert said == f"truth: found for '{family}', expected for reaching only"
 
 
+def test_sample_writes_any_number_of_clips(posefield, tmp_path, reaching_folder):
+    """The seed changes the noise alone; without a number the family has 92 clips."""
+    for name, words in {"a": (), "b": ("--seed", 7), "c": ("--seed", 7)}.items():
+        posefield("sample", "reaching", "-o", tmp_path / name, "--clips", 8, *words)
+    tables = [(tmp_path / name / "clips.csv").read_text() for name in "abc"]
+    controls = [[row.rpartition(",")[0] for row in table.splitlines()] for table in tables]
+    assert len(controls[0]) == 9
+    assert controls[0] == controls[1]
+    clips = [(tmp_path / name / "bvh" / "reach_008.bvh").read_bytes() for name in "abc"]
+    assert clips[0] != clips[1] == clips[2]
+    assert not {row.split(",", 1)[1] for row in controls[0][1:]} & {
+        row.split(",", 1)[1].rpartition(",")[0]
+        for row in (reaching_folder / "clips.csv").read_text().splitlines()
+    }
+
+
+@pytest.mark.parametrize("option", ["clips", "seed"])
+def test_sample_has_numbers_for_families_of_reaching_alone(refused, tmp_path, option):
+    words = (f"--{option}", 5, "-o", tmp_path / "x")
+    assert refused(2, "sample", "hand", *words) == (
+        f"{option}: found for 'hand', expected for reaching only"
+    )
+    assert refused(2, "sample", "reaching", "--truth", *words) == (
+        f"{option}: found with --truth, expected for a family of clips"
+    )
+
+
 def test_sample_of_another_family_is_refused(refused, tmp_path):
     said = refused(2, "sample", "dancing", "-o", tmp_path / "x")
     assert said == "family: 'dancing', expected one of reaching, quadruped, hand, face"

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from posefield_train.sample.face.face_motion import FaceTrial
     from posefield_train.sample.sample_family import SampleTrial
 
+MOST_CLIPS = 20_000
+"""Largest number of clips of one family: as many files as a folder is used with."""
+
 
 def sample(
     family: Annotated[
@@ -46,12 +49,20 @@ def sample(
         ),
     ] = None,
     fps: Annotated[float, typer.Option(help="frame rate with --truth, frames a second")] = 120.0,
+    clips: Annotated[
+        int | None,
+        typer.Option(help="number of clips of reaching; default: 92", min=1, max=MOST_CLIPS),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(help="random seed of the noise of reaching; default: 2006", min=0),
+    ] = None,
     json: Json = False,
 ) -> None:
     """Write a procedural family of motions, or its noise-free motion.
 
-    reaching: people who reach; its noise-free motion exists at any control point. quadruped: two
-    animals that walk. hand: two hands that grip. face: a head with a jaw and blend shapes.
+    reaching: people who reach, in any number of clips; its noise-free motion exists at any control
+    point. quadruped: two animals that walk. hand: two hands that grip. face: a head with a jaw and blend shapes.
     """
     from posefield_train.sample import noise_free as truths
 
@@ -60,10 +71,11 @@ def sample(
         raise InvalidField(
             "family", f"{family!r}{did_you_mean(family, WRITERS)}, expected one of {known}"
         )
-    if truth and family != "reaching":
-        raise InvalidField("truth", f"found for {family!r}, expected for reaching only")
+    numbers = {"clips": clips, "seed": seed}
+    _check_options(family, truth, [name for name, own in numbers.items() if own is not None])
     if not truth:
-        path = WRITERS[family](output)
+        reaching = family == "reaching"
+        path = _write_reaching(output, clips, seed) if reaching else WRITERS[family](output)
         typer.echo(
             as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )
@@ -76,15 +88,32 @@ def sample(
     typer.echo(written_message(output, answer, json))
 
 
-def _write_family(output: Path) -> Path:
-    """Write the procedural family with a progress bar, and return the path of its recipe."""
+def _check_options(family: str, truth: bool, numbers: list[str]) -> None:
+    """Raise InvalidField for an option that reaching alone has, or that --truth does not use.
+
+    numbers: names of the given options of a family's size and noise.
+    """
+    own = ["truth", *numbers] if truth else numbers
+    if own and family != "reaching":
+        raise InvalidField(own[0], f"found for {family!r}, expected for reaching only")
+    if truth and numbers:
+        raise InvalidField(numbers[0], "found with --truth, expected for a family of clips")
+
+
+def _write_reaching(output: Path, clips: int | None = None, seed: int | None = None) -> Path:
+    """Write the procedural family with a progress bar, and return the path of its recipe.
+
+    clips: 92 if None. seed: of the noise; that of the 92 if None.
+    """
     from posefield.console.progress import ProgressBar
     from posefield_train.sample import sample_family, sample_files
 
-    with ProgressBar("motions", len(list(sample_family.design()))) as bar:
+    count = sample_family.COUNT if clips is None else clips
+    own_seed = sample_family.SEED if seed is None else seed
+    with ProgressBar("motions", count) as bar:
 
         def watched() -> "Iterator[SampleTrial]":
-            for each in sample_family.samples():
+            for each in sample_family.samples(count, own_seed):
                 bar.advance(1)
                 yield each
 
@@ -121,7 +150,7 @@ def _write_face(output: Path) -> Path:
 
 
 WRITERS = {
-    "reaching": _write_family,
+    "reaching": _write_reaching,
     "quadruped": _write_quadruped,
     "hand": _write_hand,
     "face": _write_face,

@@ -1,4 +1,4 @@
-"""The 92 samples: their control points, and trials with noise."""
+"""Samples of the family, 92 or any number: their control points, and trials with noise."""
 
 from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
@@ -68,11 +68,14 @@ def _trial_controls(stature: float, standing: bool, spread: Floats) -> SampleCon
     return SampleControls(stature, hip, turn, height)
 
 
-def design() -> Iterator[tuple[str, SampleControls]]:
-    """Yield performer and controls of each sample: by stature, each standing, then sitting."""
+def design(count: int = COUNT) -> Iterator[tuple[str, SampleControls]]:
+    """Yield performer and controls of each of `count` samples.
+
+    By stature, each standing, then sitting. Families of different sizes share no control points.
+    """
     groups = product(STATURES, (True, False))
     for group, (name, standing) in enumerate(groups):
-        size = len(range(group, COUNT, _GROUPS))
+        size = len(range(group, count, _GROUPS))
         for index in range(size):
             yield name, _trial_controls(STATURES[name], standing, _spread(group, index, size))
 
@@ -113,8 +116,11 @@ def noisy_trial(where: SampleControls, rng: Generator) -> Clip:
     return _add_noise(played, rng)
 
 
-def samples() -> Iterator[SampleTrial]:
-    """Yield all samples in order; every call yields the same."""
-    rng = Generator(PCG64(SEED))
-    for performer, where in design():
+def samples(count: int = COUNT, seed: int = SEED) -> Iterator[SampleTrial]:
+    """Yield `count` samples in order; every call yields the same.
+
+    seed: of the noise; the control points do not depend on it.
+    """
+    rng = Generator(PCG64(seed))
+    for performer, where in design(count):
         yield SampleTrial(performer, where, noisy_trial(where, rng))
