@@ -26,6 +26,7 @@ from posefield_train.kriging import (
     event_kriging,
     kriging_tuning,
     power_law,
+    sample_kriging,
     sample_points,
     universal_kriging,
 )
@@ -269,12 +270,11 @@ def _assemble(
     reduced: TuckerTensor,
 ) -> FloatModel:
     """Assemble the model of controls (N, d) from the tuned models and the truncated tensor."""
-    points = moved.samples.points
-    solved = universal_kriging.solve(fits.pose.hyper, points, reduced.bases[2])
+    solved = sample_kriging.solve(fits.pose.hyper, moved.samples, reduced.bases[2])
     event, blend = None, _event_blend(recipe, judge, fits, reduced)
     if fits.event and blend:
         values = reduced.bases[2][:, : blend.count]
-        event = universal_kriging.solve(fits.event.hyper, points, values)
+        event = sample_kriging.solve(fits.event.hyper, moved.samples, values)
     others = {name: found.field for name, found in fits.beside.items()}
     ends, own_tensor = (controls.min(axis=0), controls.max(axis=0)), judge.own_tensor
     timing = CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames)

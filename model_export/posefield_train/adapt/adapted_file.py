@@ -141,7 +141,10 @@ def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> Level
     bank = thinning.sort_samples(adapted.model.bank)
     offsets = adapted.model.proportions.numpy(adapted.model.bank.sample_values("offsets"))
     whole = truncation_error.positions(extended.tensor, extended.tensor.values, parents, offsets)
-    uncut = level_errors.untruncated(adapted.model, extended.full)
+    pose = adapted.model.bank.pose.samples
+    labels = tuple(map(len, adapted.model.bank.labels.values()))
+    samples = SamplePoints(pose, len(adapted.model.bank.low), np.arange(len(pose)), labels)
+    uncut = level_errors.untruncated(adapted.model, extended.full, samples)
 
     def exam(questions: int) -> LevelTest:
         return level_errors.level_test_against(uncut, parents, moment, questions)

@@ -31,6 +31,8 @@ from posefield_train.source.ingest import Example
 COARSE, FINE = 25, 100
 # A landmark is one of 501 samples; the weight makes the fitted warp pass through it.
 LANDMARK_WEIGHT = 200.0
+# Clips up to which each is compared with all others for the medoid, and as many of more clips.
+LARGEST_COMPARED, MEDOID_SAMPLE = 300, 200
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,11 @@ def _align_piecewise(
 
 
 def _medoid(traces: Traces) -> int:
+    """Return the index of the medoid of traces (N, F, features), in large families of a sample."""
+    if len(traces) > LARGEST_COMPARED:
+        mixed = np.random.Generator(np.random.PCG64(len(traces))).permutation(len(traces))
+        some = np.sort(mixed[:MEDOID_SAMPLE])
+        return int(some[_medoid(traces[some])])
     totals = [float(np.sum(np.sqrt(dtw.total_cost(traces, reference)))) for reference in traces]
     return int(np.argmin(np.round(totals, 9)))
 

@@ -62,7 +62,8 @@ def sample(
     """Write a procedural family of motions, or its noise-free motion.
 
     reaching: people who reach, in any number of clips; its noise-free motion exists at any control
-    point. quadruped: two animals that walk. hand: two hands that grip. face: a head with a jaw and blend shapes.
+    point. quadruped: two animals that walk. hand: two hands that grip. face: a head with a jaw
+    and blend shapes.
     """
     from posefield_train.sample import noise_free as truths
 

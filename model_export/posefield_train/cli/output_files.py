@@ -37,7 +37,7 @@ def facts(exported: "ExportedModel", output: Path) -> dict[str, Any]:
     return {
         "file": str(output),
         "bytes": len(exported.content),
-        "clips": card.samples,
+        "clips": card.provenance["clips"],
         "ranks": list(card.levels[0].ranks),
         **card.diagnostics,
     }

@@ -12,7 +12,7 @@ from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.contacts import contact_labels, contact_statistics, contact_table
 from posefield_train.contacts.contact_labels import ClipContacts
 from posefield_train.contacts.contact_table import ContactTable
-from posefield_train.kriging import universal_kriging
+from posefield_train.kriging import sample_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.source.ingest import Example
@@ -88,7 +88,7 @@ def fit_contacts(
     timing, logs = warps
     labels = contact_labels.canonical_labels(clips, logs, timing.basis, timing.frames)[..., kept]
     table, coefficients = contact_table.reduce_labels(labels)
-    solved = universal_kriging.solve(pose, samples.points, coefficients)
+    solved = sample_kriging.solve(pose, samples, coefficients)
     accuracy = left_out_accuracy(labels, table.labels(coefficients), pose, samples)
     statistics = tuple(own for own in every if own is not None)
     fitted = FittedContacts(table, solved, statistics, accuracy)
@@ -100,7 +100,7 @@ def left_out_accuracy(
 ) -> ContactAccuracy:
     """Return the errors of labels (N, T, K) predicted from the reduced ones of the other takes."""
     rows, known = labels.reshape(len(labels), -1), reduced.reshape(len(labels), -1)
-    left_out = universal_kriging.leave_out(pose, samples.points, samples.groups)
+    left_out = sample_kriging.leave_out(pose, samples)
     predicted = np.clip(known - left_out @ known, 0.0, 1.0)
     return ContactAccuracy.measure(predicted, rows, samples.from_mean(rows))
 

@@ -10,7 +10,8 @@ from posefield.common.units import Floats
 from posefield.motion import skeleton
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.kriging import thinning, universal_kriging
+from posefield_train.kriging import sample_kriging, thinning
+from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import event_blend, truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
@@ -121,7 +122,7 @@ class LevelOutputs:
 def level_test(recipe: Recipe, trained: TrainedModel, questions: int) -> LevelTest:
     """Return an exam of a trained model's levels with the given number of inputs."""
     moment = truncation_error.event_frame(recipe, trained.examples)
-    whole = untruncated(trained.model, trained.full)
+    whole = untruncated(trained.model, trained.full, trained.samples)
     return level_test_against(whole, trained.skeleton.parents, moment, questions)
 
 
@@ -157,14 +158,14 @@ def _event_positions(
     return model.joint_at_frame(fields, chain, moment.frame, level)
 
 
-def untruncated(model: FloatModel, full: TuckerTensor) -> FloatModel:
-    """Return the model with the tensor before truncation."""
+def untruncated(model: FloatModel, full: TuckerTensor, samples: SamplePoints) -> FloatModel:
+    """Return the model with the tensor before truncation. samples: of the tensor's clips."""
     bank = model.bank
-    pose = universal_kriging.solve(bank.pose.hyper, bank.pose.samples, full.bases[2])
+    pose = sample_kriging.solve(bank.pose.hyper, samples, full.bases[2])
     decoder = replace(model.decoder, reduced=full)
     event, blend = bank.event, model.decoder.event
     if event and blend:
         whole = event_blend.build_blend(blend.count, blend.weights, full.core, full.bases[1])
         decoder = replace(decoder, event=whole)
-        event = universal_kriging.solve(event.hyper, event.samples, full.bases[2][:, : whole.count])
+        event = sample_kriging.solve(event.hyper, samples, full.bases[2][:, : whole.count])
     return replace(model, bank=replace(bank, pose=pose, event=event), decoder=decoder)

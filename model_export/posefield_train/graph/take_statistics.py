@@ -8,9 +8,9 @@ from posefield.common.array_shapes import ClipPositions, PerClip
 from posefield.common.units import Floats
 from posefield.inference import motion_detail
 from posefield.inference.motion_detail import Deviations
-from posefield.kriging import leave_one_out
 from posefield.model_file.model_card import ModelCard, rounded
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.kriging import sample_kriging
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.hosvd import TuckerTensor
 
@@ -108,8 +108,7 @@ def fit_detail(trained: TrainedModel) -> DetailFit | None:
 
 def _left_out(trained: TrainedModel) -> Floats:
     """Return the matrix (N, N) from sample values to leave-one-out residuals."""
-    samples = trained.samples
-    return leave_one_out.leave_out(trained.pose.hyper, samples.points, samples.groups)
+    return sample_kriging.leave_out(trained.pose.hyper, trained.samples)
 
 
 def _predictions(trained: TrainedModel) -> Floats:

@@ -34,6 +34,7 @@ from posefield_train.graph import truncation_cost
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.kriging.kriging_bank import EVENT
+from posefield_train.kriging.projected import inducing_clips
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.source import measured_controls
@@ -54,7 +55,8 @@ def build_card(
     parity: float,
 ) -> ModelCard:
     """Return the card of a trained model. parity: largest joint error of the parity check, m."""
-    examples, durations = trained.examples, trained.aligned.durations
+    examples, durations, listed = trained.examples, trained.aligned.durations, trained.listed
+    shown = [examples[clip] for clip in listed]
     return ModelCard(
         name=recipe.name,
         description=recipe.description,
@@ -64,18 +66,18 @@ def build_card(
         root=recipe.motion.root,
         rate=float(np.median([example.clip.rate for example in examples])),
         frames=recipe.motion.frames,
-        samples=len(examples),
+        samples=len(shown),
         levels=ladder,
         durations=(float(durations.min()), float(durations.max())),
-        examples=tuple(tuple(map(float, example.controls)) for example in examples),
-        labels=card_labels(trained.model.bank.labels, trained.samples),
+        examples=tuple(tuple(map(float, example.controls)) for example in shown),
+        labels=card_labels(trained.model.bank.labels, trained.samples.subset(listed)),
         feet=tuple(map(trained.skeleton.names.index, recipe.motion.feet)),
         diagnostics=_diagnostics(trained, notes, parity),
         provenance=_provenance(recipe, examples),
-        sources=tuple(example.row.source for example in examples),
+        sources=tuple(example.row.source for example in shown),
         kriging=plain_parameters(trained.pose.hyper),
         roles=_roles(recipe, trained),
-        left_out=tuple(map(rounded, np.sqrt(trained.left_out_errors))),
+        left_out=tuple(map(rounded, np.sqrt(trained.left_out_errors[listed]))),
         event=truncation_error.event(recipe, examples),
         beside=_covariance_root(trained),
         joint_sigma=tuple(round(float(share), 2) for share in trained.joints),
@@ -156,7 +158,7 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
         dict(zip(recipe.landmark_names, map(float, times), strict=True)),
         {joint: weight for joint, weight in recipe.motion.joint_weights.items() if weight != 1.0},
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
-        _takes(trained.examples),
+        _takes([trained.examples[clip] for clip in trained.listed]),
         trained.examples[0].facing,
     )
 
@@ -183,7 +185,7 @@ def kriging_settings(hyper: Hyper) -> tuple[float, ...]:
 
 
 def _controls(recipe: Recipe, trained: TrainedModel) -> tuple[Control, ...]:
-    values = np.stack([example.controls for example in trained.examples])
+    values = np.stack([trained.examples[clip].controls for clip in trained.listed])
     landmarks = np.array([example.landmarks for example in trained.examples])
     controls = []
     typical = typical_controls(values)
@@ -234,11 +236,23 @@ def _diagnostics(trained: TrainedModel, notes: list[str], parity: float) -> dict
             name: {"correlation": rounded(own.correlation), "offset": rounded(own.offset)}
             for name, own in zip(trained.model.bank.labels, hyper.labels, strict=True)
         },
-        "tensor": list(trained.tensor.values.shape),
+        "tensor": [*trained.tensor.values.shape[:2], len(trained.listed)],
+        **_large_family(trained),
         "parity_m": float(f"{parity:.1e}"),
         "notes": list(notes),
         **_contact_accuracy(trained.contacts),
     }
+
+
+def _large_family(trained: TrainedModel) -> dict[str, Any]:
+    """Return the numbers of inducing and tuned clips of a large family; empty for others."""
+    if trained.samples.inducing is None:
+        return {}
+    apart = trained.pose.disagreement
+    tuned = {} if apart is None else {"disagreement": rounded(apart)}
+    clips = len(trained.examples)
+    counts = {"clips": clips, "tuned": min(clips, inducing_clips.LARGEST_TUNED)}
+    return {"projected": {**counts, "inducing": len(trained.listed), **tuned}}
 
 
 def _contact_accuracy(found: FittedContacts | None) -> dict[str, Any]:

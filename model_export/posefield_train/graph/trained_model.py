@@ -1,8 +1,11 @@
 """A trained model with its training data and diagnostics."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from posefield.common.units import Floats
+import numpy as np
+
+from posefield.common.units import Floats, Indices
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.contacts.contact_model import FittedContacts
@@ -69,6 +72,12 @@ class TrainedModel:
     outliers: tuple[Outlier, ...] = ()
     contacts: FittedContacts | None = None
     contact_notes: tuple[str, ...] = ()
+
+    @property
+    def listed(self) -> Annotated[Indices, "listed"]:
+        """Return the clips that the model card lists: the inducing ones of a large family."""
+        own = self.samples.inducing
+        return np.arange(len(self.examples)) if own is None else own
 
     def outlier_notes(self) -> list[str]:
         """Return one note per clip with evidence against it, the worst kinds first.

@@ -11,6 +11,7 @@ import numpy as np
 from posefield_train.align import phase_alignment
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
+from posefield_train.kriging.projected import inducing_clips
 from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
@@ -21,6 +22,9 @@ SAME_MOTION = 0.7
 """Share of the differences between any clips from which clips of equal controls differ as much."""
 LEAST_DIFFERENCE = 0.01
 """Smallest differences between clips of equal controls that are noted, m."""
+
+LARGEST_DISAGREEMENT = 0.02
+"""Difference of the errors of two tunings of a large family from which it is noted."""
 
 MEANINGS = {
     "far": "close to half a turn from the family's mean",
@@ -40,11 +44,25 @@ def training_notes(recipe: Recipe, trained: TrainedModel, imported: Sequence[str
     return [
         *trained.outlier_notes(),
         *repeat_notes(trained),
+        *disagreement_notes(trained),
         *sample_points.data_notes(recipe, trained.examples),
         *imported,
         *finding_notes(trained.findings, trained.examples, trained.skeleton.names),
         *phase_alignment.shift_notes(trained.examples),
         *trained.contact_notes,
+    ]
+
+
+def disagreement_notes(trained: TrainedModel) -> list[str]:
+    """Return a note if parameters tuned on two draws of a large family predict unequally well."""
+    apart = trained.pose.disagreement
+    if apart is None or apart <= LARGEST_DISAGREEMENT:
+        return []
+    tuned = inducing_clips.LARGEST_TUNED
+    return [
+        f"parameters tuned on two draws of {tuned} of {len(trained.examples)} clips differ: with "
+        f"one a clip left out lies {100 * apart:.1f} % farther away than with the other, which is "
+        "used"
     ]
 
 

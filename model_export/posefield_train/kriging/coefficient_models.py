@@ -1,20 +1,22 @@
 """Coefficient models of the quantities besides the pose: bone offsets, duration, warp, travel."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
 from posefield.common.array_shapes import ClipBones, SampleControls, SampleValues
 from posefield.common.units import Floats
-from posefield_train.kriging import kriging_tuning, universal_kriging
+from posefield_train.kriging import kriging_tuning, sample_kriging
 from posefield_train.kriging.kriging_bank import CoefficientModel, ConstantModel
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.power_law import PowerLawFit
+from posefield_train.kriging.projected import inducing_clips
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     OTHER_STRENGTH,
     POSE_STRENGTH,
+    TINY,
     UNNAMED_STRENGTH,
     LeaveOneOutLoss,
     PredictiveDensityLoss,
@@ -65,7 +67,18 @@ def choose_covariance(
         kriging_tuning.tune(problem, name, settings.fixed_degree) for name in settings.covariances
     )
     best = min(others, key=lambda field: field.unexplained, default=first)
-    return best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
+    chosen = best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
+    if len(samples.points) <= inducing_clips.LARGEST_TUNED:
+        return chosen
+    return _better_draw(problem, settings.fixed_degree, chosen)
+
+
+def _better_draw(problem: TuningProblem, degree: int | None, first: TunedKriging) -> TunedKriging:
+    """Return the better of a model and of one tuned on other clips, with their disagreement."""
+    second = kriging_tuning.tune(problem, first.hyper.covariance, degree, draw=1)
+    better = min(first, second, key=lambda own: own.unexplained)
+    errors = np.sqrt([first.unexplained, second.unexplained])
+    return replace(better, disagreement=float(errors.max() / max(errors.min(), TINY) - 1.0))
 
 
 def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleValues) -> FittedModel:
@@ -90,9 +103,7 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
     residuals = from_mean - share * predicted
     explained = 1.0 - float(np.sum(np.square(residuals)) / np.sum(np.square(from_mean)))
     shrunk = mean + share * (values - mean)
-    return FittedModel(
-        universal_kriging.solve(found.hyper, samples.points, shrunk), explained, residuals
-    )
+    return FittedModel(sample_kriging.solve(found.hyper, samples, shrunk), explained, residuals)
 
 
 def factor_of(
@@ -105,7 +116,7 @@ def factor_of(
     left = logs - found.law.logarithms(controls)
     total = float(np.sum(np.square(samples.from_mean(logs))))
     explained = 1.0 - float(np.sum(np.square(found.residuals))) / total
-    solved = universal_kriging.solve(found.hyper, samples.points, left)
+    solved = sample_kriging.solve(found.hyper, samples, left)
     return FittedModel(solved, explained, found.residuals)
 
 

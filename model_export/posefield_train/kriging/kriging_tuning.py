@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from posefield.common.array_shapes import PerSample, SampleValues
 from posefield.common.units import Floats
 from posefield.kriging.kriging_model import LabelKernel
-from posefield_train.kriging import universal_kriging
+from posefield_train.kriging import sample_kriging, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     PRIORS,
@@ -31,7 +31,9 @@ class TunedKriging:
 
     residuals: leave-one-out residuals (n, m). unexplained: their squared sum relative to that of
     the mean of the other samples; at one or above the controls explain nothing. variances: of the
-    residuals (n,), as shares of the sill. sill: of the sum over values.
+    residuals (n,), as shares of the sill. sill: of the sum over values. disagreement: between
+    parameters tuned on two draws of a large family, the relative difference of their leave-one-out
+    errors over all clips; None for one.
     """
 
     hyper: Hyper
@@ -39,11 +41,12 @@ class TunedKriging:
     unexplained: float
     variances: PerSample
     sill: float
+    disagreement: float | None = None
 
 
 def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) -> TunedKriging:
     """Return the model of given parameters with its leave-one-out residuals."""
-    left_out = universal_kriging.leave_out(hyper, samples.points, samples.groups)
+    left_out = sample_kriging.leave_out(hyper, samples)
     variances = universal_kriging.left_out_variances(hyper, samples.points, left_out)
     residuals, from_mean = left_out @ values, samples.from_mean(values)
     total = float(np.sum(np.square(from_mean)))
@@ -56,18 +59,21 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) ->
     )
 
 
-def tune(problem: TuningProblem, covariance: str, degree: int | None) -> TunedKriging:
+def tune(
+    problem: TuningProblem, covariance: str, degree: int | None, draw: int = 0
+) -> TunedKriging:
     """Return the model whose parameters minimize the leave-one-out loss.
 
-    degree: of the drift; None for a constant and a trend within the covariance.
+    degree: of the drift; None for a constant and a trend within the covariance. draw: of the clips
+    of a large family, 0 or 1.
     """
     labels = tuple(LabelKernel(count, 1.0, 0.0) for count in problem.samples.labels)
     scales = np.ones(problem.samples.controls)
     hyper = Hyper(covariance, (degree or 0,), scales, 0.0, 0.0, labels)
     names = _free(problem, trend=degree is None)
     starts = [(np.log(scale), np.log(nugget)) for scale, nugget in STARTS]
-    loss = LeaveOneOutLoss(problem, hyper, names, own_scales=True)
-    return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts])
+    loss = LeaveOneOutLoss(problem.drawn(draw), hyper, names, own_scales=True)
+    return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts], problem)
 
 
 def tune_beside(
@@ -90,8 +96,8 @@ def _tune_at_scales(
     problem: TuningProblem, hyper: Hyper, trend: bool, loss: type[LeaveOneOutLoss]
 ) -> TunedKriging:
     names = tuple(own for own in _free(problem, trend) if own[0] != "correlation")
-    own = loss(problem, hyper.without_offsets(), names, own_scales=False)
-    return _best(own, [own.start(0.0, np.log(nugget)) for _, nugget in STARTS])
+    own = loss(problem.drawn(0), hyper.without_offsets(), names, own_scales=False)
+    return _best(own, [own.start(0.0, np.log(nugget)) for _, nugget in STARTS], problem)
 
 
 def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
@@ -102,10 +108,13 @@ def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
     return tuple((name, index) for name in PRIORS for index in range(counts[name]))
 
 
-def _best(loss: LeaveOneOutLoss, starts: Sequence[Floats]) -> TunedKriging:
-    """Return the model at the least loss that searches from the starts find."""
+def _best(loss: LeaveOneOutLoss, starts: Sequence[Floats], whole: TuningProblem) -> TunedKriging:
+    """Return the model at the least loss that searches from the starts find.
+
+    whole: the problem that the loss is of, or of some of whose clips it is.
+    """
     if not len(starts[0]):
-        return evaluate_fixed(loss.read(starts[0]), loss.problem.samples, loss.problem.values)
+        return evaluate_fixed(loss.read(starts[0]), whole.samples, whole.values)
     bounds = [(prior.low, prior.high) for prior in loss.priors]
     found = [
         minimize(
@@ -119,4 +128,4 @@ def _best(loss: LeaveOneOutLoss, starts: Sequence[Floats]) -> TunedKriging:
         for start in starts
     ]
     best = min(found, key=lambda result: float(result.fun))
-    return evaluate_fixed(loss.read(best.x), loss.problem.samples, loss.problem.values)
+    return evaluate_fixed(loss.read(best.x), whole.samples, whole.values)

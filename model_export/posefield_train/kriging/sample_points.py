@@ -1,7 +1,7 @@
 """Sample points: controls and labels of the examples."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Annotated
 
@@ -12,6 +12,7 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import half_ranges
+from posefield_train.kriging.projected import inducing_clips
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections.data_sections import PERFORMER
@@ -27,7 +28,8 @@ class SamplePoints:
     points: (n, d + p), controls in half-ranges, then the weights of labels. controls: d. groups:
     group (n,) of each sample; a group is left out together. labels: number of names of each label
     set, p together. unnamed: there are several performers, and their names are not among the
-    labels.
+    labels. inducing: indices of the clips whose covariances a large family is predicted by; None
+    where each clip's are.
     """
 
     points: Samples
@@ -35,6 +37,7 @@ class SamplePoints:
     groups: Annotated[Indices, "samples"]
     labels: tuple[int, ...] = ()
     unnamed: bool = False
+    inducing: Annotated[Indices, "inducing"] | None = None
 
     def __post_init__(self) -> None:
         if self.points.shape[1] != self.controls + sum(self.labels):
@@ -51,6 +54,10 @@ class SamplePoints:
         """Return the index (n,) of each sample's name in each label set."""
         columns = kriging_model.label_columns(self.controls, self.labels)
         return [np.argmax(self.points[:, own], axis=1) for own in columns]
+
+    def subset(self, rows: Annotated[Indices, "rows"]) -> "SamplePoints":
+        """Return some of the samples, none of them inducing."""
+        return replace(self, points=self.points[rows], groups=self.groups[rows], inducing=None)
 
     def from_mean(self, values: SampleValues) -> SampleValues:
         """Return the differences of values (n, m) from the mean of all other groups."""
@@ -94,7 +101,11 @@ def make_samples(recipe: Recipe, examples: Sequence[Example]) -> tuple[SamplePoi
     groups = _groups(recipe, examples, points)
     several = len({example.row.performer for example in examples}) > 1
     unnamed = several and PERFORMER not in known
-    return SamplePoints(both, points.shape[1], groups, counts, unnamed), known
+    # Without a nugget a model passes through every clip.
+    exact = recipe.kriging.nugget == 0
+    d = points.shape[1]
+    inducing = None if exact else inducing_clips.choose_inducing(both, d, counts)
+    return SamplePoints(both, d, groups, counts, unnamed, inducing), known
 
 
 def data_notes(recipe: Recipe, examples: Sequence[Example]) -> list[str]:

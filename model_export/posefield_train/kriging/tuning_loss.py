@@ -19,6 +19,7 @@ from posefield.kriging import kriging_model, leave_one_out
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
+from posefield_train.kriging.projected import inducing_clips
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 
@@ -91,6 +92,22 @@ class TuningProblem:
     effector: Annotated[Floats, "samples _ _"] | None = None
     strength: float = POSE_STRENGTH
     unnamed: bool = False
+
+    def drawn(self, draw: int) -> "TuningProblem":
+        """Return the problem of some clips of a large family; itself for others.
+
+        draw: 0 or 1. The values keep their inner products, and the first those that the effector
+        moves.
+        """
+        own = self.samples
+        if len(own.points) <= inducing_clips.LARGEST_TUNED:
+            return self
+        rows = inducing_clips.choose_tuned(own.points, own.controls, own.labels, draw)
+        effector = None if self.effector is None else self.effector[rows]
+        first = 0 if effector is None else effector.shape[2]
+        some = self.values[rows]
+        values = np.hstack([some[:, :first], _compact(some[:, first:])])
+        return replace(self, samples=own.subset(rows), values=values, effector=effector)
 
     def prior(self, name: str) -> ParameterPrior:
         """Return the prior of a parameter besides the scales."""
@@ -203,13 +220,11 @@ class LeaveOneOutLoss:
         return found
 
     @cached_property
-    def values(self) -> SampleValues:
+    def values(self) -> Annotated[Floats, "samples _"]:
         """Values (n, m) in at most n coordinates, which keep their inner products."""
+        # An effector moves the first of them, which `drawn` keeps as they are.
         values = self.problem.values
-        if values.shape[1] <= len(values):
-            return values
-        left, lengths, _ = np.linalg.svd(values, full_matrices=False)
-        return np.asarray(left * lengths)
+        return values if self.problem.effector is not None else _compact(values)
 
     @cached_property
     def takes(self) -> list[Annotated[Indices, "_ _"]]:
@@ -257,6 +272,14 @@ class LeaveOneOutLoss:
             "trend": lambda _: hyper.trend * (controls @ controls.T),
         }
         return found + [by_name[name](index) for name, index in self.names]
+
+
+def _compact(values: SampleValues) -> Annotated[Floats, "samples _"]:
+    """Return values (n, m) in at most n coordinates, which keep their inner products."""
+    if values.shape[1] <= len(values):
+        return values
+    left, lengths, _ = np.linalg.svd(values, full_matrices=False)
+    return np.asarray(left * lengths)
 
 
 NUGGET, TREND = ("nugget", 0), ("trend", 0)

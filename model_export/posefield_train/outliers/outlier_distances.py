@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats, Indices
-from posefield_train.kriging import universal_kriging
+from posefield_train.kriging import sample_kriging, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 
@@ -87,4 +87,4 @@ def _measure(
 
 
 def _left_out(hyper: Hyper, laid: SamplePoints, kept: Indices) -> Floats:
-    return universal_kriging.leave_out(hyper, laid.points[kept], laid.groups[kept])
+    return sample_kriging.leave_out(hyper, laid, kept)

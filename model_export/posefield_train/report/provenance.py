@@ -37,7 +37,7 @@ class Provenance:
             "name": card.name,
             "description": card.description,
             "bytes": len(self.exported.content),
-            "clips": card.samples,
+            "clips": card.provenance["clips"],
             "joints": len(card.skeleton),
             "cyclic": card.cyclic,
             "root": card.root,
@@ -82,7 +82,7 @@ class Provenance:
         card = self.exported.card
         found = card.diagnostics
         return [
-            (f"clips, {len(card.skeleton)} joints each", str(card.samples)),
+            (f"clips, {len(card.skeleton)} joints each", str(card.provenance["clips"])),
             ("size of the model file", f"{len(self.exported.content) / 1000:.1f} kB"),
             (f"ranks kept of {_times(found['tensor'])}", _times(card.levels[0].ranks)),
             ("error by truncation (RMS)", f"{100 * found['truncation_rms_m']:.2f} cm"),

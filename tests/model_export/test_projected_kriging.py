@@ -1,0 +1,188 @@
+"""Tests of projected-process kriging: its theorems, and the clips that it is made with."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from posefield.kriging import kriging_model, leave_one_out
+from posefield_train.kriging import sample_kriging, universal_kriging
+from posefield_train.kriging.projected import inducing_clips
+from posefield_train.kriging.projected.projected_kriging import ProjectedProcess
+from posefield_train.kriging.sample_points import SamplePoints
+from posefield_train.kriging.tuning_loss import TuningProblem
+from posefield_train.kriging.universal_kriging import Hyper
+
+SAME = 1e-8
+NONE = 1e-12
+"""Jitter of a system of known condition."""
+
+
+@pytest.fixture(params=[0, 1], ids=["constant", "linear"])
+def hyper(request):
+    return Hyper("matern52", (request.param,), np.array([0.5, 0.9, 1.4]), 0.1, 0.7)
+
+
+@pytest.fixture
+def samples(rng):
+    return rng.uniform(-1.0, 1.0, size=(60, 3))
+
+
+@pytest.fixture
+def values(rng, samples):
+    return np.cos(samples @ rng.normal(size=(3, 4))) + 0.1 * rng.normal(size=(60, 4))
+
+
+@pytest.fixture
+def points(rng):
+    return rng.uniform(-1.5, 1.5, size=(20, 3))
+
+
+def large(samples, inducing):
+    """Samples of a family without labels, each a group of its own."""
+    return SamplePoints(samples, samples.shape[1], np.arange(len(samples)), inducing=inducing)
+
+
+def test_with_all_samples_inducing_it_is_universal_kriging(hyper, samples, values):
+    dense = universal_kriging.solve(hyper, samples, values)
+    own = ProjectedProcess(hyper, samples, samples, NONE)
+    assert np.abs(own.dual(values) - dense.dual).max() < SAME
+    assert np.abs(own.form - dense.form).max() < SAME
+    fewer = ProjectedProcess(hyper, samples, samples[:59], NONE)
+    assert np.abs(fewer.dual(values)[:59] - dense.dual[:59]).max() > 1e-3
+
+
+def test_residuals_of_left_out_groups_are_those_of_a_model_without_them(hyper, samples, values):
+    groups, inducing = np.repeat(np.arange(20), 3), samples[:25]
+    residuals = ProjectedProcess(hyper, samples, inducing).leave_out(groups) @ values
+    for group in range(20):
+        own = groups == group
+        others = ProjectedProcess(hyper, samples[~own], inducing)
+        basis = kriging_model.basis_functions(hyper, samples[own], inducing)
+        expected = values[own] - basis @ others.dual(values[~own])
+        assert np.abs(residuals[own] - expected).max() < SAME
+    whole = ProjectedProcess(hyper, samples, samples, NONE).leave_out(groups)
+    assert np.abs(whole - leave_one_out.leave_out(hyper, samples, groups)).max() < SAME
+    # Negative control: residuals of the fit itself are smaller.
+    assert np.abs(residuals[own] - expected).max() < 0.1 * np.abs(residuals[own]).max()
+
+
+def test_the_drift_is_reproduced_exactly(hyper, samples, points):
+    slopes = np.array([[1.0], [-3.0], [0.5]]) if hyper.drifts == (1,) else np.zeros((3, 1))
+    field = sample_kriging.solve(hyper, large(samples, np.arange(20)), 2.0 + samples @ slopes)
+    assert np.abs(field.predict(points) - 2.0 - points @ slopes).max() < SAME
+    curved = sample_kriging.solve(hyper, large(samples, np.arange(20)), np.square(samples))
+    assert np.abs(curved.predict(points) - np.square(points)).max() > 1e-3
+
+
+def test_its_sample_values_give_its_weights(hyper, samples, values, points):
+    """What adaptation reads from a file, and weights of clips: a dense model of inducing clips."""
+    field = sample_kriging.solve(hyper, large(samples, np.arange(20)), values)
+    again = universal_kriging.solve(hyper, field.samples, field.values)
+    assert np.abs(again.dual - field.dual).max() < SAME
+    weights = field.weights(points)
+    assert np.abs(weights.sum(axis=1) - 1.0).max() < SAME
+    assert np.abs(weights @ field.values - field.predict(points)).max() < SAME
+    assert np.abs(field.values - values[:20]).max() > 1e-2
+
+
+def test_variance_is_nearer_to_that_of_all_samples_and_grows_away_from_them(hyper, samples, points):
+    inducing, nothing = np.arange(30), np.zeros((60, 1))
+    own = sample_kriging.solve(hyper, large(samples, inducing), nothing)
+    every = universal_kriging.solve(hyper, samples, nothing)
+    few = universal_kriging.solve(hyper, samples[inducing], nothing[:30])
+    apart, before = (
+        np.abs(field.variance(points) - every.variance(points)).mean() for field in (own, few)
+    )
+    assert apart < 0.8 * before
+    away = np.array([[0.0, 0.0, 0.0], [3.0, 3.0, 3.0], [9.0, 9.0, 9.0]])
+    grown = own.variance(away)
+    assert grown[0] < grown[1] < grown[2]
+    assert grown[2] > 1.0 > grown[0]
+
+
+def test_more_inducing_points_predict_as_the_dense_model(hyper, samples, values, points):
+    dense = universal_kriging.solve(hyper, samples, values).predict(points)
+    apart = [
+        float(
+            np.abs(
+                sample_kriging.solve(hyper, large(samples, chosen), values).predict(points) - dense
+            ).mean()
+        )
+        for chosen in (np.arange(10), np.arange(40), np.arange(60))
+    ]
+    assert apart[0] > apart[1] > apart[2]
+    assert apart[2] < 1e-3
+
+
+@pytest.mark.parametrize("wrong", [{"drifts": (0, 1)}, {"nugget": 0.0}])
+def test_other_parameters_are_refused(hyper, samples, wrong):
+    with pytest.raises(ValueError, match="expected one drift and a nugget above zero"):
+        ProjectedProcess(replace(hyper, **wrong), samples, samples[:9])
+
+
+# --- choice of clips ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def family(rng):
+    """Points of 700 clips: three controls, one of three values, and two performers."""
+    controls = np.column_stack([rng.uniform(-1.0, 1.0, (700, 2)), rng.integers(-1, 2, 700)])
+    return np.hstack([controls, np.eye(2)[rng.integers(0, 2, 700)]])
+
+
+def test_families_of_300_clips_have_no_inducing_clips(family):
+    assert inducing_clips.choose_inducing(family[:300], 3, (2,)) is None
+    assert len(inducing_clips.choose_inducing(family[:301], 3, (2,))) == inducing_clips.INDUCING
+
+
+def test_ends_values_and_names_are_inducing(family):
+    # One performer of the first name alone.
+    family[:, 3:] = [0.0, 1.0]
+    family[77, 3:] = [1.0, 0.0]
+    chosen = inducing_clips.choose_inducing(family, 3, (2,))
+    assert {77, int(np.argmin(family[:, 0])), int(np.argmax(family[:, 0]))} <= {*chosen.tolist()}
+    assert set(family[chosen, 2]) == {-1.0, 0.0, 1.0}
+    assert (np.diff(chosen) > 0).all()
+
+
+def test_clips_of_equal_controls_are_inducing_once(family):
+    repeated = np.repeat(family[:40], 10, axis=0)
+    chosen = inducing_clips.choose_inducing(repeated, 3, (2,))
+    assert len(np.unique(repeated[chosen], axis=0)) == len(chosen)
+    assert 38 <= len(chosen) <= 40
+
+
+def test_inducing_clips_lie_apart(family):
+    """The largest distance to the nearest of them is less than that of as many random clips."""
+    chosen = inducing_clips.choose_inducing(family, 3, (2,))
+
+    def gap(own):
+        apart = np.linalg.norm(family[:, None] - family[own], axis=-1)
+        return apart.min(axis=1).max()
+
+    rng = np.random.Generator(np.random.PCG64(3))
+    others = [rng.choice(700, len(chosen), replace=False) for _ in range(9)]
+    assert gap(chosen) < min(map(gap, others))
+
+
+def test_two_draws_for_tuning_share_no_clip(family):
+    assert inducing_clips.choose_tuned(family[:500], 3, (2,), 0).tolist() == list(range(500))
+    draws = [inducing_clips.choose_tuned(family, 3, (2,), draw) for draw in (0, 1)]
+    assert not {*draws[0].tolist()} & {*draws[1].tolist()}
+    large_family = np.vstack([family, family + 0.01, family - 0.01])
+    assert len(inducing_clips.choose_tuned(large_family, 3, (2,), 0)) == 500
+
+
+def test_a_draw_keeps_inner_products_and_the_coordinates_of_the_effector(family, rng):
+    samples = SamplePoints(family, 3, np.arange(700), (2,))
+    values, effector = rng.normal(size=(700, 900)), rng.normal(size=(700, 3, 15))
+    drawn = TuningProblem(samples, values, None, effector).drawn(1)
+    rows = inducing_clips.choose_tuned(family, 3, (2,), 1)
+    assert drawn.values.shape == (len(rows), 15 + len(rows))
+    assert (drawn.values[:, :15] == values[rows, :15]).all()
+    assert (drawn.effector == effector[rows]).all()
+    gram = drawn.values @ drawn.values.T
+    assert np.abs(gram - values[rows] @ values[rows].T).max() < 1e-9
+    small = TuningProblem(samples.subset(np.arange(500)), values[:500], None)
+    assert small.drawn(0) is small
