@@ -125,6 +125,11 @@ audit: $(ENV) ## ask OSV for known vulnerabilities of what the lock file names; 
 bench: $(ENV) ## print the benchmark table and write build/bench.json
 	$(BIN)/python benchmarks/bench.py
 
+.PHONY: bench-scale
+bench-scale: $(ENV) ## train procedural families of 92 to 2,000 clips, and write the figures and their curve; minutes to half an hour
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/scale.py --record
+	$(BIN)/python docs/generate.py
+
 .PHONY: lock
 lock: $(ENV) ## choose versions anew
 	$(BIN)/uv lock --upgrade

@@ -205,17 +205,23 @@ def _fit_models(
         fitted["duration"] = coefficient_models.factor_of(law, laid, moved.controls, durations)
     values = {"pose": full.motions, **beside}
     missed = _left_out_errors(own_tensor, pose, fitted)
-    predicted = warped_errors.predicted_positions(
-        CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
-        own_tensor,
-        proportions,
-        full.slices(full.motions - pose.residuals),
-        {name: values[name] - found.residuals for name, found in fitted.items()},
-        judge.parents,
-    )
-    warped = warped_errors.mean_squared_errors(
-        warped_errors.captured_positions(examples), predicted, len(own_tensor.curves)
-    )
+    motions = full.motions - pose.residuals
+    expected = {name: values[name] - found.residuals for name, found in fitted.items()}
+
+    def block_errors(rows: slice) -> Floats:
+        predicted = warped_errors.predicted_positions(
+            CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
+            own_tensor,
+            proportions,
+            full.slices(motions[rows]),
+            {name: own[rows] for name, own in expected.items()},
+            judge.parents,
+        )
+        captured = warped_errors.captured_positions(examples[rows])
+        return warped_errors.mean_squared_errors(captured, predicted, len(own_tensor.curves))
+
+    blocks = truncation_error.clip_blocks(len(examples))
+    warped = np.concatenate([block_errors(rows) for rows in blocks])
     event = _fit_event(recipe, laid, judge, full, pose, effector)
     return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law, event)
 
@@ -385,9 +391,14 @@ def joint_error_shares(
     kinematics.
     """
     own = judge.own_tensor
-    predicted = own.values - full.slices(pose.residuals)
-    apart = truncation_error.positions(own, predicted, judge.parents, judge.offsets) - judge.whole
-    squares = np.mean(np.sum(np.square(apart), axis=-1), axis=1)
+
+    def block_squares(rows: slice) -> Floats:
+        predicted = own.values[:, :, rows] - full.slices(pose.residuals[rows])
+        places = truncation_error.positions(own, predicted, judge.parents, judge.offsets[rows])
+        return np.mean(np.sum(np.square(places - judge.whole[rows]), axis=-1), axis=1)
+
+    blocks = truncation_error.clip_blocks(len(judge.whole))
+    squares = np.concatenate([block_squares(rows) for rows in blocks])
     if travels is not None:
         squares[:, : len(judge.parents)] += travel.mean_squared_distance(travels)[:, None]
     usual = np.mean(squares / pose.variances[:, None], axis=0)

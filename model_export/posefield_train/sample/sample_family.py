@@ -60,12 +60,20 @@ def _trial_controls(stature: float, standing: bool, spread: Floats) -> SampleCon
         if standing
         else (low, low + 2 * sample_controls.SEAT_RANGE)
     )
-    hip = round(float(np.interp(spread[2], (0, 1), band)), 4)
-    turn, height = (
-        round(float(np.interp(part, (0, 1), sample_controls.limits(name, stature, hip))), 4)
-        for name, part in zip(("turn", "target_height"), spread, strict=False)
-    )
-    return SampleControls(stature, hip, turn, height)
+    hip = _rounded(float(np.interp(spread[2], (0, 1), band)), low, high)
+    places = []
+    for name, part in zip(("turn", "target_height"), spread, strict=False):
+        ends = sample_controls.limits(name, stature, hip)
+        places.append(_rounded(float(np.interp(part, (0, 1), ends)), *ends))
+    return SampleControls(stature, hip, *places)
+
+
+def _rounded(value: float, low: float, high: float) -> float:
+    """Return a value of a control with the table's four decimals, within its limits."""
+    found, step = round(value, 4), 1e-4
+    if found > high:
+        return round(found - step, 4)
+    return round(found + step, 4) if found < low else found
 
 
 def design(count: int = COUNT) -> Iterator[tuple[str, SampleControls]]:

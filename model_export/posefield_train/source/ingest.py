@@ -79,29 +79,36 @@ def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
     alone = recipe.curves is not None and recipe.curves.alone
     files = {} if alone else read_files(rows, recipe.source)
     curves = curve_files.reader(recipe.curves, rows) if recipe.curves else None
-    # Converted once for all rows: a long file may have hundreds.
-    wholes = {motion: clip_of_file(file, recipe.source) for motion, file in files.items()}
     notes = [*shipped_recipes.table_notes(rows[0].table), *clip_notes.reader_notes(files)]
     if recipe.source.root_offset is None:
         notes += clip_notes.offset_notes(files)
-    files.clear()
+    # Converted once for all rows: a long file may have hundreds. Of thousands of clips each stage
+    # takes hundreds of megabytes, so that the stage before is released.
+    wholes = {motion: clip_of_file(files.pop(motion), recipe.source) for motion in list(files)}
     cuts = [cut_frames(_whole_clip(recipe, wholes, curves, row), row) for row in rows]
-    clips, said = _on_one_topology(recipe, rows, [clip for clip, _ in cuts])
+    wholes.clear()
+    clips, lasts = [clip for clip, _ in cuts], [last for _, last in cuts]
+    cuts.clear()
+    clips, said = _on_one_topology(recipe, rows, clips)
     notes += said
     clips = [
         clip_joints.drop_joints(clip, recipe, row) for clip, row in zip(clips, rows, strict=True)
     ]
     clip_joints.expect_same_skeleton(rows, clips)
     rigged = _normalize_rigs(recipe, rows, clips)
+    clips, facing = list(rigged.clips), rigged.facing
+    notes_of_rigs = rigged.notes
+    del rigged
+    clips.reverse()
     found = [
-        _example(recipe, row, clip, last, rigged.facing)
-        for row, clip, (_, last) in zip(rows, rigged.clips, cuts, strict=True)
+        _example(recipe, row, clips.pop(), last, facing)
+        for row, last in zip(rows, lasts, strict=True)
     ]
     examples = [own.example for own in found]
     clip_landmarks.expect_same_order(
         recipe.landmark_names, rows, [own.landmarks for own in examples]
     )
-    notes += [*rigged.notes, *clip_notes.stretch_notes(rows, [own.stretch for own in found])]
+    notes += [*notes_of_rigs, *clip_notes.stretch_notes(rows, [own.stretch for own in found])]
     takes, said = _takes(rows, found)
     examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]
     return examples, [*said, *notes]

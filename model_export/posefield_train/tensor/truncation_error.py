@@ -38,6 +38,16 @@ class TruncationErrors:
     effector: float | None
 
 
+CLIPS_TOGETHER = 300
+"""Clips whose whole motions are restored at once; more would take gigabytes."""
+
+
+def clip_blocks(clips: int) -> list[slice]:
+    """Return the blocks of at most CLIPS_TOGETHER clips that motions are restored in."""
+    starts = range(0, clips, CLIPS_TOGETHER)
+    return [slice(start, min(start + CLIPS_TOGETHER, clips)) for start in starts]
+
+
 @dataclass(frozen=True)
 class EventFrame:
     """A joint and the canonical frame of its event."""
@@ -75,13 +85,21 @@ class TruncationReference:
         return max(getattr(found, name) / budget for name, budget in budgets.items())
 
     def _distances(self, reduced: TuckerTensor) -> "_Distances":
-        first, *others = reduced.bases
-        # Restore pose vectors directly: the whitened tensor would be as large again.
-        unwhitened = TuckerTensor(reduced.core, (self.own_tensor.unwhiten @ first, *others))
-        gaps = _joint_positions(self.own_tensor, unwhitened.restored(), self.parents, self.offsets)
-        gaps -= self.whole
-        distances = np.sqrt(np.sum(np.square(gaps, out=gaps), axis=-1))
+        parts = [self._block_distances(reduced, rows) for rows in clip_blocks(len(self.whole))]
+        distances = parts[0] if len(parts) == 1 else np.concatenate(parts)
         return _Distances(distances, self.weights, self.event_frame)
+
+    def _block_distances(
+        self, reduced: TuckerTensor, rows: slice
+    ) -> Annotated[Floats, "rows frames points"]:
+        """Return the distances of some clips: all at once would take as much memory as reading."""
+        first, times, samples = reduced.bases
+        # Restore pose vectors directly: the whitened tensor would be as large again.
+        bases = self.own_tensor.unwhiten @ first, times, samples[rows]
+        restored = TuckerTensor(reduced.core, bases).restored()
+        gaps = _joint_positions(self.own_tensor, restored, self.parents, self.offsets[rows])
+        gaps -= self.whole[rows]
+        return np.sqrt(np.sum(np.square(gaps, out=gaps), axis=-1))
 
 
 @dataclass(frozen=True)

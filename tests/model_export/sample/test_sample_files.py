@@ -130,6 +130,16 @@ def test_there_are_92_clips_of_94_channels_at_120_hz(folder, rows):
         assert int(row["event_frame"]) == len(values) - 1
 
 
+@pytest.mark.parametrize("count", [92, 2_000, 10_000])
+def test_samples_of_any_number_can_be_reached(count):
+    """Rounding to the table's decimals leaves no control point outside the body's limits."""
+    found = [where for _, where in sample_family.design(count)]
+    assert len(found) == count
+    for where in found:
+        values = [where.stature, where.hip_height, where.turn, where.target_height]
+        assert sample_controls.parse_controls(values) == where
+
+
 def test_every_channel_moves_within_the_clips_and_between_them(folder, rows):
     clips = [motion_of(folder / row["file"])[2] for row in rows]
     assert (np.mean([np.ptp(clip, axis=0) for clip in clips], axis=0) > 5e-3).all()

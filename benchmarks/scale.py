@@ -1,0 +1,199 @@
+"""Scale of training: time, memory, file and errors of procedural families of 92 to 2,000 clips.
+
+make bench-scale, or python benchmarks/scale.py [--clips 92 300] [--record]
+
+Each family is trained in a process of its own. Finished families are kept in build/scale, so that a
+run that was stopped goes on; remove the folder to measure anew.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rows import Row, record, table
+
+from posefield_train.evaluate import compared_motion, ground_truth, methods, motion_errors
+from posefield_train.evaluate.methods import Queries
+from posefield_train.graph import onnx_export
+from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.kriging.kriging_bank import VARIANCE
+from posefield_train.parallel import single_thread
+from posefield_train.sample import sample_family, sample_files
+from posefield_train.sample.sample_controls import parse_controls
+from posefield_train.source import ingest, recipe
+from posefield_train.train import train
+
+ROOT = Path(__file__).parents[1]
+FOLDER = ROOT / "build/scale"
+CLIPS = (92, 300, 1_000, 2_000)
+ASKED, SEED = 200, 7
+"""Points at which models are compared with the truth, and the seed of new clips there."""
+GOALS = {92: ("cpu_s", 15.0), 1_000: ("cpu_s", 600.0), 2_000: ("cpu_s", 1_200.0)}
+PICTURE = ROOT / "docs/scale.png"
+
+
+def measure(clips: int) -> dict[str, Any]:
+    """Return the figures of a family of some clips: this process trains it and nothing else."""
+    place = FOLDER / f"reaching_{clips}"
+    file = sample_files.write_family(place, sample_family.samples(clips))
+    before, start = _cpu(), time.perf_counter()
+    own = recipe.read(file)
+    examples, notes = ingest.ingest(own, file.parent)
+    trained = train(own, examples, lambda _: None)
+    exported = onnx_export.export_model(own, trained, notes)
+    spent, wall = _cpu() - before, time.perf_counter() - start
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    with single_thread.single_threaded():
+        truth, ratio = compare(own, trained)
+    return {
+        "clips": clips,
+        "listed": exported.card.samples,
+        "cpu_s": round(spent, 1),
+        "wall_s": round(wall, 1),
+        "memory_mb": round(memory / 1e6),
+        "file_kb": round(len(exported.content) / 1e3, 1),
+        "left_out_cm": round(100 * exported.card.diagnostics["leave_one_out_rms_m"], 3),
+        "truth_cm": round(100 * truth, 3),
+        "sigma_ratio": round(ratio, 3),
+        "disagreement": exported.card.diagnostics.get("projected", {}).get("disagreement"),
+    }
+
+
+def compare(own: recipe.Recipe, trained: TrainedModel) -> tuple[float, float]:
+    """Return the mean distance to the truth, m, and the error of new clips over their sigma.
+
+    Distances are of joints after time warping, with the root's position; new clips have the noise
+    of the family, and errors and sigma are root mean squares.
+    """
+    points = ground_truth.truth_points(ASKED)
+    found = methods.predict_posefield(own, trained, Queries(points, [{}] * len(points)))
+    truths = ground_truth.truth_motions(points, None)
+    pairs = zip(found, truths, strict=True)
+    errors = [motion_errors.compare_motions(made, true, ()) for made, true in pairs]
+    rng = np.random.Generator(np.random.PCG64(SEED))
+    clips = [sample_family.noisy_trial(parse_controls(list(point)), rng) for point in points]
+    captured = [compared_motion.motion_of_clip(clip, None) for clip in clips]
+    squares = [
+        motion_errors.compare_motions(made, one, ()).mean_squared_error
+        for made, one in zip(found, captured, strict=True)
+    ]
+    bank = trained.model.bank
+    places = bank.points(points, np.zeros((len(points), bank.label_count)))
+    sigma = bank.sigma(bank.numpy(places)[VARIANCE])
+    mean = motion_errors.mean(errors)
+    return mean.absolute.mean, float(np.sqrt(np.mean(squares) / np.mean(np.square(sigma))))
+
+
+def _cpu() -> float:
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    return own.ru_utime + own.ru_stime
+
+
+def curve(counts: Sequence[int]) -> list[dict[str, Any]]:
+    """Return the figures of families, those that are not kept measured in processes."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    found = []
+    for clips in counts:
+        kept = FOLDER / f"{clips}.json"
+        if not kept.exists():
+            words = [sys.executable, __file__, "--one", str(clips)]
+            told = subprocess.run(words, check=True, capture_output=True, text=True).stdout
+            kept.write_text(told, encoding="utf-8")
+        found.append(json.loads(kept.read_text(encoding="utf-8")))
+    return found
+
+
+def rows(found: Sequence[dict[str, Any]]) -> list[Row]:
+    """Return the rows of the documentation's table."""
+    first = found[0]
+    return [row for own in found for row in _rows(own, first)]
+
+
+def _rows(own: dict[str, Any], first: dict[str, Any]) -> list[Row]:
+    clips = own["clips"]
+    name = f"{clips:,} clips"
+    goal = GOALS.get(clips, (None, None))[1]
+    listed = "all" if own["listed"] == clips else f"{own['listed']} inducing"
+    twice = own["disagreement"]
+    said = "" if twice is None else f"; two tunings {100 * twice:.1f} % apart"
+    large, largest = clips >= 300, clips == 2_000
+    return [
+        Row(f"{name}: processor time", own["cpu_s"], "s", f"{listed}{said}", None, goal),
+        Row(
+            f"{name}: peak memory",
+            own["memory_mb"],
+            "MB",
+            "",
+            None,
+            2_000.0 if largest else None,
+        ),
+        Row(f"{name}: file", own["file_kb"], "kB", "", None, 350.0 if large else None),
+        Row(
+            f"{name}: distance to the truth",
+            own["truth_cm"],
+            "cm",
+            f"{first['truth_cm']} cm of {first['clips']} clips",
+            None,
+            0.5 if largest else None,
+        ),
+        Row(
+            f"{name}: error of new clips over sigma",
+            own["sigma_ratio"],
+            "",
+            "at least 0.6" if largest else "",
+            None,
+            1.4 if largest else None,
+        ),
+    ]
+
+
+def draw(found: Sequence[dict[str, Any]], path: Path) -> None:
+    """Draw processor time, memory, file and distance to the truth over the number of clips."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    panels = (
+        ("cpu_s", "processor time, s"),
+        ("memory_mb", "peak memory, MB"),
+        ("file_kb", "file, kB"),
+        ("truth_cm", "distance to the truth, cm"),
+    )
+    figure, axes = pyplot.subplots(1, len(panels), figsize=(11.0, 2.6), layout="constrained")
+    clips = [own["clips"] for own in found]
+    for ax, (key, title) in zip(axes, panels, strict=True):
+        ax.plot(clips, [own[key] for own in found], "o-", color="#2d64c8")
+        ax.set(xlabel="clips", title=title, ylim=(0.0, None), xscale="log")
+        ax.set_xticks(clips, [f"{own:,}" for own in clips])
+        ax.minorticks_off()
+        ax.grid(alpha=0.3)
+    figure.savefig(path, dpi=90, metadata={"Software": None})
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the figures; write them where the documentation reads them if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--clips", type=int, nargs="+", default=CLIPS)
+    parser.add_argument("--record", action="store_true")
+    parser.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    given = parser.parse_args(arguments)
+    if given.one:
+        print(json.dumps(measure(given.one)))
+        return
+    found = curve(given.clips)
+    print(table(rows(found)))
+    if given.record:
+        record({"scaled": rows(found)}, "make bench-scale", ROOT / "docs/results")
+        draw(found, PICTURE)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
