@@ -10,6 +10,7 @@ from posefield.common.array_shapes import PerSample, SampleValues
 from posefield.common.units import Floats
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train.kriging import sample_kriging, universal_kriging
+from posefield_train.kriging.projected import inducing_clips
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     PRIORS,
@@ -23,6 +24,8 @@ from posefield_train.kriging.universal_kriging import Hyper
 STARTS = ((0.5, 0.1), (0.25, 0.03), (1.0, 0.3))
 """Scale and nugget at which searches start."""
 ITERATIONS = 80
+# Columns of the values of large families that are summed up at once.
+COLUMNS_TOGETHER = 1_000
 
 
 @dataclass(frozen=True)
@@ -48,14 +51,24 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) ->
     """Return the model of given parameters with its leave-one-out residuals."""
     left_out = sample_kriging.leave_out(hyper, samples)
     variances = universal_kriging.left_out_variances(hyper, samples.points, left_out)
-    residuals, from_mean = left_out @ values, samples.from_mean(values)
-    total = float(np.sum(np.square(from_mean)))
+    residuals, total = left_out @ values, _total(samples, values)
     return TunedKriging(
         hyper,
         residuals,
         float(np.sum(np.square(residuals))) / total if total > 0 else 1.0,
         variances,
         float(np.mean(np.sum(np.square(residuals), axis=1) / variances)),
+    )
+
+
+def _total(samples: SamplePoints, values: SampleValues) -> float:
+    """Return the squared sum of the differences of values (n, m) from the mean of all others."""
+    width = values.shape[1]
+    # Whole motions of many clips are gigabytes in some copies.
+    step = width if len(values) <= inducing_clips.LARGEST_DENSE else COLUMNS_TOGETHER
+    return sum(
+        float(np.sum(np.square(samples.from_mean(values[:, start : start + step]))))
+        for start in range(0, width, step)
     )
 
 
