@@ -26,6 +26,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "results/support.md": lambda: data_pages.results("support"),
     "results/performances.md": lambda: data_pages.results("performances"),
     "results/discovery.md": lambda: data_pages.results("discovery"),
+    "results/scale.md": lambda: data_pages.results("scale"),
     "results/speed.md": lambda: data_pages.results("speed"),
 }
 

@@ -1,7 +1,7 @@
 """Tables of figures with a value that they must have and one that is wished for.
 
 `performed.json` is written by benchmarks/performances.py, `joins.json` by benchmarks/joins.py,
-`discovered.json` by benchmarks/discovery.py.
+`discovered.json` by benchmarks/discovery.py, `scaled.json` by benchmarks/scale.py.
 """
 
 from collections.abc import Iterator
@@ -21,6 +21,11 @@ DISCOVERY_WISHES = {
     "one example: missed by the best R": 5.0,
     "processor time of reading and features": 10.0,
 }
+SCALE_WISHES = {
+    "92 clips: processor time": 8.0,
+    "2,000 clips: distance to the truth": 0.4,
+    "2,000 clips: error of new clips over sigma": 1.2,
+} | {f"{clips} clips: file": 200.0 for clips in ("300", "1,000", "2,000")}
 Rows = Iterator[list[str]]
 
 
@@ -42,6 +47,12 @@ def discovered() -> Rows:
     """Yield the figures of clips found in long takes."""
     for row in measured_tables.read("discovered")["rows"]:
         yield from _rows([row | {"wish": DISCOVERY_WISHES.get(row["name"])}])
+
+
+def scaled() -> Rows:
+    """Yield the figures of families of any number of clips."""
+    for row in measured_tables.read("scaled")["rows"]:
+        yield from _rows([row | {"wish": SCALE_WISHES.get(row["name"])}])
 
 
 def _rows(found: list[dict[str, Any]]) -> Rows:

@@ -62,6 +62,7 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "performed": lambda: (performed_tables.COLUMNS, performed_tables.performed()),
     "joins": lambda: (performed_tables.COLUMNS, performed_tables.joins()),
     "discovered": lambda: (performed_tables.COLUMNS, performed_tables.discovered()),
+    "scaled": lambda: (performed_tables.COLUMNS, performed_tables.scaled()),
     **{
         name: lambda name=name: (measured_tables.SPEED_COLUMNS, measured_tables.speed(name))
         for name in SPEED
@@ -77,6 +78,6 @@ REMARKS: dict[str, Callable[[], str]] = {
 """A sentence made of the rows of a table, for some of them."""
 
 ORIGINS: dict[str, str] = {"recipes": "models", "levels": "models", "learning": "learning"} | {
-    name: name for name in (*SPEED, "performed", "joins", "discovered")
+    name: name for name in (*SPEED, "performed", "joins", "discovered", "scaled")
 }
 """File of docs/results that names the command and the date of a table's figures."""

@@ -1,6 +1,7 @@
 """Command `posefield sample`: procedural motions."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +12,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.console.arguments import Json, encoder_for
 from posefield.console.output import as_json, written_message
-from posefield.console.question_options import parse_controls
+from posefield.console.question_options import parse_controls, with_option_groups
 from posefield.question.results import ClipAnswer, Trust
 
 if TYPE_CHECKING:
@@ -22,6 +23,26 @@ MOST_CLIPS = 20_000
 """Largest number of clips of one family: as many files as a folder is used with."""
 
 
+@dataclass(frozen=True)
+class FamilySize:
+    """Size of the family of reaching: number of clips, and seed of their noise."""
+
+    clips: Annotated[
+        int | None,
+        typer.Option(help="number of clips of reaching; default: 92", min=1, max=MOST_CLIPS),
+    ] = None
+    seed: Annotated[
+        int | None,
+        typer.Option(help="random seed of the noise of reaching; default: 2006", min=0),
+    ] = None
+
+    @property
+    def given(self) -> list[str]:
+        """Return the names of the options that are given."""
+        return [each.name for each in fields(self) if getattr(self, each.name) is not None]
+
+
+@with_option_groups
 def sample(
     family: Annotated[
         str,
@@ -32,6 +53,7 @@ def sample(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="output folder; with --truth, output file")
     ],
+    size: FamilySize,
     truth: Annotated[
         bool,
         typer.Option(
@@ -49,14 +71,6 @@ def sample(
         ),
     ] = None,
     fps: Annotated[float, typer.Option(help="frame rate with --truth, frames a second")] = 120.0,
-    clips: Annotated[
-        int | None,
-        typer.Option(help="number of clips of reaching; default: 92", min=1, max=MOST_CLIPS),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(help="random seed of the noise of reaching; default: 2006", min=0),
-    ] = None,
     json: Json = False,
 ) -> None:
     """Write a procedural family of motions, or its noise-free motion.
@@ -72,11 +86,12 @@ def sample(
         raise InvalidField(
             "family", f"{family!r}{did_you_mean(family, WRITERS)}, expected one of {known}"
         )
-    numbers = {"clips": clips, "seed": seed}
-    _check_options(family, truth, [name for name, own in numbers.items() if own is not None])
+    _check_options(family, truth, size.given)
     if not truth:
         reaching = family == "reaching"
-        path = _write_reaching(output, clips, seed) if reaching else WRITERS[family](output)
+        path = (
+            _write_reaching(output, size.clips, size.seed) if reaching else WRITERS[family](output)
+        )
         typer.echo(
             as_json({"recipe": str(path)}) if json else f"{path}: train it with posefield train"
         )

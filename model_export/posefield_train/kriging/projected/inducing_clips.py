@@ -15,7 +15,7 @@ from posefield.common.units import Floats, Indices
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import Hyper, LabelKernel
 
-LARGEST_DENSE = 300
+LARGEST_DENSE = 299
 """Clips up to which each clip has weights of its own (decision 0064)."""
 INDUCING = 160
 """Inducing clips of a larger family, at most."""
