@@ -1,6 +1,6 @@
 """Checks between the sections of a recipe; each raises KeyFault with the key at fault."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from posefield.common.name_suggestion import did_you_mean
 from posefield.motion import measures
@@ -23,7 +23,7 @@ from posefield_train.source.recipe_sections.training_sections import Event, Krig
 CYCLE_QUANTITIES = (*measures.TRAVEL_QUANTITIES, "step_length")
 
 
-def check_skeleton(skeleton: SkeletonSettings, roles: Mapping[str, str]) -> None:
+def check_skeleton(skeleton: SkeletonSettings, roles: Collection[str]) -> None:
     """Raise KeyFault for roles that the topology does not use."""
     if skeleton.is_unified and roles:
         raise KeyFault(
