@@ -1,5 +1,6 @@
 """Command `posefield discover`: clips found in long takes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -18,6 +19,11 @@ if TYPE_CHECKING:
     from posefield_train.discover.found_clips import FoundClip
     from posefield_train.discover.take_reading import ReadTakes
     from posefield_train.families.recipe_folder import FoundFamilies
+    from posefield_train.source.motion_readers import MotionFiles
+
+KEPT_POSES = 8_000_000
+"""Frames times joints of motion files that are kept for the families, 450 MB: an hour of 31 joints
+at 60 frames a second is 6.7 million. More files are read a second time."""
 
 EXAMPLES = [
     "discover takes -o recipes --licence 'CC BY 4.0, by us'",
@@ -131,18 +137,20 @@ def _write_recipes(
 ) -> None:
     from posefield.console.progress import ProgressBar
     from posefield_train.families import body_kinds, contact_sheet, found_families, recipe_folder
+    from posefield_train.source.motion_readers import MotionFiles
 
     if output.suffix in (".csv", ".toml", ".json"):
         raise InvalidField("output", f"{output.name!r}, expected a folder of recipes")
     replaced = recipe_folder.expect_free(output, wanted.overwrite)
-    read = _read(folder, stated)
+    files = MotionFiles(KEPT_POSES)
+    read = _read(folder, stated, files)
     names = [take.file for take in read.takes]
     statements = body_kinds.FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
     with ProgressBar("bodies", len(names)) as bar:
-        kinds = body_kinds.find_kinds(folder, names, statements, bar.update)
+        kinds = body_kinds.find_kinds(folder, names, statements, bar.update, read.figures)
     with ProgressBar("candidates", wanted.candidates) as bar:
         listed = found_families.find_families(read.takes, kinds, wanted.candidates, bar.update)
-    found = recipe_folder.offer(listed, folder, wanted.licence)
+    found = recipe_folder.offer(listed, folder, wanted.licence, files)
     facts = recipe_folder.summary(found, folder, read, kinds, wanted.candidates)
     page = contact_sheet.render(found, read.takes, output.as_posix(), read.refused)
     files = recipe_folder.contents(found, facts) | {recipe_folder.PAGE: page}
@@ -182,7 +190,7 @@ def _write_table(
     atomic_files.write(found_clips.table(found), output)
     if json:
         own = {"table": str(output), "clips": len(found), "takes": len(read.takes)}
-        typer.echo(as_json({**own, **facts, "refused": read.refused}))
+        typer.echo(as_json({**own, **facts, "refused": read.refused, "notes": read.notes}))
         return
     kind = "strides" if search.like is None else f"{search.name}, examples first"
     typer.echo(
@@ -211,20 +219,28 @@ def _search(
     return found, {"not_compared": lacking}
 
 
-def _read(folder: Path, stated: StatementOptions) -> "ReadTakes":
-    """Return the takes of a folder; files that were refused are named on standard error."""
+def _read(
+    folder: Path, stated: StatementOptions, files: "MotionFiles | None" = None
+) -> "ReadTakes":
+    """Return the takes of a folder; standard error names files that were refused, and faults."""
     from posefield.console.progress import ProgressBar
     from posefield_train.discover import take_reading
     from posefield_train.source import motion_readers
 
     with ProgressBar("files", len(motion_readers.find_files(folder))) as bar:
         known = take_reading.Stated(stated.up, _roles(stated), stated.rate)
-        read = take_reading.read_takes(folder, known, bar.update)
-    for file, reason in list(read.refused.items())[:MAX_NOTES]:
-        typer.echo(f"left out: {file}: {reason}", err=True)
-    if len(read.refused) > MAX_NOTES:
-        typer.echo(f"left out: {len(read.refused) - MAX_NOTES} further files: see --json", err=True)
+        read = take_reading.read_takes(folder, known, bar.update, files)
+    _tell_files("left out", list(read.refused.items()))
+    _tell_files("note", [(file, said) for file, own in read.notes.items() for said in own])
     return read
+
+
+def _tell_files(what: str, said: Sequence[tuple[str, str]]) -> None:
+    """Print a line for each of a bounded number of files to standard error."""
+    for file, reason in said[:MAX_NOTES]:
+        typer.echo(f"{what}: {file}: {reason}", err=True)
+    if len(said) > MAX_NOTES:
+        typer.echo(f"{what}: {len(said) - MAX_NOTES} further files: see --json", err=True)
 
 
 def _roles(stated: StatementOptions) -> dict[str, str]:

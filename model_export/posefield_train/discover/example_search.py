@@ -24,7 +24,8 @@ def find_like(
     """Return the clips that are most like examples, the best first, without the examples.
 
     Clips overlap neither the examples nor each other by more than LARGEST_OVERLAP, and no rejected
-    part by more than half. Costs are relative to the median over all places where a clip may end.
+    part by more than half; within them no joint leaps. Costs are relative to the median over all
+    places where a clip may end.
     """
     joined = joined_features.join_features(corpus)
     ends = _nearest([joined.ends(one) for one in examples])
@@ -34,6 +35,8 @@ def find_like(
         if len(found) == most:
             break
         span = joined.span(int(ends.starts[end]), end)
+        if not corpus.is_whole(span.take, span.start, span.end):
+            continue
         if any(span.overlap(other) > REJECTED_OVERLAP for other in rejected):
             continue
         if all(span.overlap(other) <= LARGEST_OVERLAP for other in kept):

@@ -57,8 +57,9 @@ def find_families(
 ) -> list[Family]:
     """Return the families of a corpus, that first which explains most of it.
 
-    count: of candidates that are searched, evenly spread over all. report: called with the number
-    of candidates that were searched. Clips of different families share few frames.
+    count: of candidates that are searched, evenly spread over all; those within which a joint leaps
+    are not. report: called with the number of candidates that were searched. Clips of different
+    families share few frames.
     """
     joined = joined_features.join_features(corpus)
     listed = _moving(joined, candidates(corpus))
@@ -69,7 +70,9 @@ def find_families(
     )
     found = []
     for searched, span in enumerate(picked, 1):
-        found.append(_matches(joined, span))
+        # Left out after they were picked, so that a leap of one take changes no other's candidates.
+        if corpus.is_whole(span.take, span.start, span.end):
+            found.append(_matches(joined, span))
         report(searched)
     return _cover(joined, found)
 

@@ -40,7 +40,8 @@ class FoundClip:
     """A row of the table.
 
     file: below the folder. first_frame, last_frame: inclusive. seconds: duration. cost: of a match,
-    None for a stride. accepted: by a person; "false" until then.
+    None for a stride. accepted: by a person; "false" until then. take: without the ending, that
+    of the recording of which the file may be a copy.
     """
 
     file: str
@@ -50,9 +51,10 @@ class FoundClip:
     seconds: float
     cost: float | None = None
     accepted: Verdict = "false"
+    take: str = ""
 
 
-COLUMNS = ("file", "name", "first_frame", "last_frame", "seconds", "cost", "accepted")
+COLUMNS = ("file", "name", "take", "first_frame", "last_frame", "seconds", "cost", "accepted")
 
 
 def strides(takes: Sequence[Take]) -> tuple[list[FoundClip], int]:
@@ -92,7 +94,7 @@ def table(clips: Sequence[FoundClip]) -> bytes:
     for one in clips:
         cost = "" if one.cost is None else f"{one.cost:.4f}"
         frames = (one.first_frame, one.last_frame, f"{one.seconds:.3f}")
-        writer.writerow([one.file, one.name, *frames, cost, one.accepted])
+        writer.writerow([one.file, one.name, one.take, *frames, cost, one.accepted])
     return lines.getvalue().encode()
 
 
@@ -104,7 +106,8 @@ def _clip(
     cost: float | None = None,
     accepted: Verdict = "false",
 ) -> FoundClip:
-    return FoundClip(take.file, name, first, last, (last - first) / take.rate, cost, accepted)
+    seconds = (last - first) / take.rate
+    return FoundClip(take.file, name, first, last, seconds, cost, accepted, take.recording_name)
 
 
 def parse_examples(takes: Sequence[Take], text: str) -> Examples:

@@ -8,7 +8,7 @@ import numpy as np
 from posefield.common.units import Floats, Indices
 from posefield_train.discover import subsequence_dtw
 from posefield_train.discover.motion_features import SEARCH_RATE, Corpus
-from posefield_train.discover.subsequence_dtw import Ends
+from posefield_train.discover.subsequence_dtw import Ends, SearchedFrames
 
 GAP = 2
 """Frames between two takes, so that no match leads from one to the next."""
@@ -60,6 +60,10 @@ class JoinedFeatures:
         """Variance of all features, summed over the directions."""
         return float(self.values[self.owners >= 0].var(axis=0).sum())
 
+    @cached_property
+    def _searched(self) -> SearchedFrames:
+        return subsequence_dtw.searched_frames(self.values)
+
     def frames(self, span: Span) -> slice:
         """Return the frames of a part of a take; its end may lie beyond the last one."""
         offset = self.offsets[span.take]
@@ -84,7 +88,7 @@ class JoinedFeatures:
 
         Costs are shares of the median over all places where a clip may end.
         """
-        apart = subsequence_dtw.distances(self.clip(span), self.values)
+        apart = subsequence_dtw.distances(self.clip(span), self._searched)
         found = subsequence_dtw.match_ends(apart)
         usual = float(np.median(found.costs[np.isfinite(found.costs)]))
         return Ends(found.costs / usual, found.starts)

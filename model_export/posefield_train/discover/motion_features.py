@@ -59,7 +59,11 @@ class Corpus:
     def frame(self, take: int, at: float) -> int:
         """Return the recorded frame of a take at a time, s."""
         own = self.takes[take]
-        return min(round(at * own.rate), len(own) - 1)
+        return max(min(round(at * own.rate), len(own) - 1), own.first)
+
+    def is_whole(self, take: int, start: float, end: float) -> bool:
+        """Return whether no joint leaps between two times of a take, s."""
+        return self.takes[take].is_whole(self.frame(take, start), self.frame(take, end))
 
 
 def build_corpus(takes: Sequence[Take]) -> Corpus:

@@ -46,14 +46,18 @@ class Stride:
 
 
 def find_strides(take: Take) -> list[Stride]:
-    """Return the strides of a take, in order, those in place too; two in a row share a frame."""
+    """Return the strides of a take, in order, those in place too; two in a row share a frame.
+
+    Within them no joint leaps.
+    """
     signal = feet_distance(take)
     found = []
     for (first, kind), (middle, _), (last, _) in _triples(alternating_extrema(signal)):
         share = (middle - first) / (last - first)
         is_far = min(signal[first], -signal[middle], signal[last]) > LEAST
         lasts = SHORTEST <= (last - first) / take.rate <= LONGEST
-        if kind > 0 and is_far and lasts and EARLIEST <= share <= LATEST:
+        is_one = lasts and EARLIEST <= share <= LATEST and take.is_whole(first, last)
+        if kind > 0 and is_far and is_one:
             swing = signal[first] + signal[last] - 2.0 * signal[middle]
             found.append(Stride(first, last, _way(take, first, last) / swing))
     return found

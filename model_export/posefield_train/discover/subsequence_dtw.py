@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posefield.common.units import Floats, Indices
+from posefield.common.units import Booleans, Floats, Indices
 
 STEPS = ((1, 1), (1, 2), (2, 1))
 """Frames of query and corpus by which a match advances."""
@@ -27,18 +27,35 @@ class Ends:
     starts: Indices
 
 
-def distances(query: Floats, corpus: Floats) -> Floats:
-    """Return the distances (L, F) of features (L, k) of a query from those (F, k) of a corpus.
+@dataclass(frozen=True)
+class SearchedFrames:
+    """Features of a corpus as every search needs them.
 
-    A frame of the corpus whose features are NaN stands between two takes; its distance is inf.
+    values (F, k): zero where frames stand between two takes. squares (F,): of their lengths.
+    between (F,): whether a frame stands between two takes.
     """
+
+    values: Floats
+    squares: Floats
+    between: Booleans
+
+
+def searched_frames(corpus: Floats) -> SearchedFrames:
+    """Return the features (F, k) of a corpus for searches; NaN stands between two takes."""
     known = np.nan_to_num(corpus)
-    square = (
-        np.sum(np.square(query), axis=1)[:, None]
-        + np.sum(np.square(known), axis=1)
-        - 2.0 * query @ known.T
-    )
-    return np.where(np.isnan(corpus[:, 0]), np.inf, np.sqrt(np.maximum(square, 0.0)))
+    return SearchedFrames(known, np.sum(np.square(known), axis=1), np.isnan(corpus[:, 0]))
+
+
+def distances(query: Floats, corpus: SearchedFrames) -> Floats:
+    """Return the distances (L, F) of features (L, k) of a query from those of a corpus.
+
+    The distance of a frame between two takes is inf.
+    """
+    found = np.sum(np.square(query), axis=1)[:, None] + corpus.squares
+    found -= 2.0 * query @ corpus.values.T
+    np.sqrt(np.maximum(found, 0.0, out=found), out=found)
+    found[:, corpus.between] = np.inf
+    return found
 
 
 def match_ends(apart: Floats) -> Ends:
@@ -48,26 +65,30 @@ def match_ends(apart: Floats) -> Ends:
     """
     length, frames = apart.shape
     starts = np.arange(frames)
-    rows = [(apart[0], starts)]
+    before: tuple[Floats, Indices] | None = None
+    last = apart[0], starts
     for at in range(1, length):
         own = apart[at]
-        choices = [_before(rows[-1], 1, own), _before(rows[-1], 2, own)]
-        if at > 1:
-            choices.append(_before(rows[-2], 1, own + apart[at - 1]))
-        costs = np.stack([cost for cost, _ in choices])
-        best = np.argmin(costs, axis=0)
-        columns = np.arange(frames)
-        origin = np.stack([start for _, start in choices])[best, columns]
-        rows = [rows[-1], (costs[best, columns], origin)]
-    costs, starts = rows[-1]
+        costs = np.full(frames, np.inf)
+        costs[1:] = last[0][:-1] + own[1:]
+        origin = np.zeros(frames, dtype=np.int64)
+        origin[1:] = last[1][:-1]
+        _take_better((costs, origin), last, 2, own)
+        if before is not None:
+            _take_better((costs, origin), before, 1, own + apart[at - 1])
+        before, last = last, (costs, origin)
+    costs, starts = last
     return Ends(costs / length, starts)
 
 
-def _before(row: tuple[Floats, Indices], step: int, added: Floats) -> tuple[Floats, Indices]:
-    """Return costs and starts of a row, `step` frames of the corpus later, with a cost added."""
-    costs, starts = np.full(len(added), np.inf), np.zeros(len(added), dtype=np.int64)
-    costs[step:], starts[step:] = row[0][:-step], row[1][:-step]
-    return costs + added, starts
+def _take_better(
+    best: tuple[Floats, Indices], row: tuple[Floats, Indices], step: int, added: Floats
+) -> None:
+    """Replace the best costs and starts where those of a row, `step` frames later, cost less."""
+    costs = row[0][:-step] + added[step:]
+    better = costs < best[0][step:]
+    np.copyto(best[0][step:], costs, where=better)
+    np.copyto(best[1][step:], row[1][:-step], where=better)
 
 
 def align(apart: Floats) -> Indices:

@@ -1,19 +1,27 @@
 """Long takes of a folder: joints with a role, in leg lengths, with Y up."""
 
-from collections.abc import Callable, Mapping
+from bisect import bisect_left
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
+from itertools import pairwise
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from posefield.common.errors import FileError, MotionFileError
+from posefield.common.errors import FileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
 from posefield.roles.joint_recognition import RoleGuess
+from posefield_train.discover import take_copies
 from posefield_train.probe import figure, proposals
+from posefield_train.probe.proposals import ADULT_LEG, Proposal
 from posefield_train.source import motion_readers
 from posefield_train.source.motion_files import clip_conversion
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
+from posefield_train.source.motion_readers import MotionFiles
+from posefield_train.source.takes import frame_faults
+from posefield_train.source.takes.frame_faults import NO_FAULTS, FrameFaults
 
 LEG = ("UpperLeg", "LowerLeg", "Foot")
 SEARCHED = frozenset(
@@ -30,7 +38,10 @@ NEEDED = ("hips", *(side + role for side in ("left", "right") for role in LEG))
 MOST_FRAMES = 5_000_000
 """Frames of all takes together, which take 2 GB: eleven hours at 120 frames a second."""
 MOST_FIGURES = 50
-"""Bodies of one kind that tell the up axis."""
+"""Bodies of one kind that tell the up axis, and that are kept with all measured frames."""
+OTHER_UNIT = 2.1
+"""Least ratio of the legs of two bodies with the same joints that are in different units: legs of a
+child and an adult differ by less, any two units by more."""
 
 
 @dataclass(frozen=True)
@@ -38,15 +49,37 @@ class Take:
     """A motion file as recorded.
 
     file: its path below the folder. rate: frames a second. places: positions (F, 3) by role, in
-    leg lengths, Y up.
+    leg lengths, Y up; a rest pose before the motion is replaced by the frame after it. faults: of
+    the frames. copy_of: file of the first take of the same recording; None for the take itself.
     """
 
     file: str
     rate: float
     places: dict[str, Floats]
+    faults: FrameFaults = NO_FAULTS
+    copy_of: str | None = None
 
     def __len__(self) -> int:
         return len(self.places["hips"])
+
+    @property
+    def recording(self) -> str:
+        """Return the file of the recording, which copies of a take share."""
+        return self.copy_of or self.file
+
+    @property
+    def recording_name(self) -> str:
+        """Return the name of the recording, its file without the ending."""
+        return PurePosixPath(self.recording).with_suffix("").as_posix()
+
+    @property
+    def first(self) -> int:
+        """Return the first frame of the motion."""
+        return int(self.faults.rests_first)
+
+    def is_whole(self, first: int, last: int) -> bool:
+        """Return whether no joint leaps between two frames."""
+        return not any(first <= leap.frame < last for leap in self.faults.leaps)
 
     def across(self, role: str) -> Floats:
         """Return the vectors (F, 3) from the right to the left joint of a role."""
@@ -63,11 +96,14 @@ class Take:
 class ReadTakes:
     """Takes of a folder in the order of their names, and the files that were left out.
 
-    refused: reason by file.
+    refused: reason by file. notes: by file, on frames that were left out, and on copies. figures:
+    of the takes' bodies, by file.
     """
 
     takes: tuple[Take, ...]
     refused: dict[str, str]
+    notes: dict[str, list[str]]
+    figures: dict[str, figure.Figure]
 
 
 @dataclass(frozen=True)
@@ -84,24 +120,30 @@ class Stated:
 
 
 def read_takes(
-    folder: Path, stated: Stated | None = None, report: Callable[[int], None] = lambda _: None
+    folder: Path,
+    stated: Stated | None = None,
+    report: Callable[[int], None] = lambda _: None,
+    files: MotionFiles | None = None,
 ) -> ReadTakes:
     """Return the takes of all motion files below a folder.
 
-    report: called with the number of files that are read. A file that cannot be read or searched is
-    refused with its reason; FileError if none is left.
+    report: called with the number of files that are read. files: keep what is read. A file that
+    cannot be read or searched is refused with its reason; FileError if none is left.
     """
     if not folder.is_dir():
         raise FileError(folder, "not a folder, expected one with motion files")
     bodies, refused, frames = [], dict[str, str](), 0
     known = stated or Stated()
+    read = motion_readers.read if files is None else files.read
+    measured: Counter[tuple[str, ...]] = Counter()
     for count, path in enumerate(motion_readers.find_files(folder), 1):
         name = path.relative_to(folder).as_posix()
         try:
-            file = motion_readers.read(path, ReadOptions(rate=known.rate))
-            bodies.append(_body(name, file, known))
-            frames += len(bodies[-1].take)
-        except (MotionFileError, UnusableTake) as fault:
+            body = _body(name, read(path, ReadOptions(rate=known.rate)), known)
+            frames += len(body.take)
+            measured[body.joints] += 1
+            bodies.append(body if measured[body.joints] <= MOST_FIGURES else body.light())
+        except (FileError, UnusableTake) as fault:
             refused[name] = str(fault)
         if frames > MOST_FRAMES:
             raise FileError(
@@ -109,12 +151,14 @@ def read_takes(
                 f"found more than {MOST_FRAMES} frames, expected a smaller part of the files",
             )
         report(count)
-    takes = _turned(bodies, known.up, refused)
+    kept = _of_one_unit(bodies, refused)
+    takes, notes = _recordings(_turned(kept, known.up, refused))
     if not takes:
         first = next(iter(refused.items()), None)
         said = f"such as {first[0]}: {first[1]}" if first else "it has no motion files"
         raise FileError(folder, f"no take that can be searched; {said}")
-    return ReadTakes(tuple(takes), refused)
+    figures = {body.take.file: body.figure for body in kept}
+    return ReadTakes(tuple(takes), refused, notes, figures)
 
 
 class UnusableTake(ValueError):
@@ -123,13 +167,21 @@ class UnusableTake(ValueError):
 
 @dataclass(frozen=True)
 class Body:
-    """A take before its up axis is known. joints: names of all, which bodies of one kind share.
-    figure: its measurements, without the frames of the file.
+    """A take before its up axis is known.
+
+    joints: names of all, which bodies of one kind share. figure: its measurements, without the
+    frames of the file. leg: length in the file's unit. up: axis that the file or the body tells.
     """
 
     take: Take
     joints: tuple[str, ...]
     figure: figure.Figure
+    leg: float
+    up: Proposal
+
+    def light(self) -> "Body":
+        """Return the body with few of its measured frames."""
+        return replace(self, figure=self.figure.with_few_frames())
 
 
 def _body(name: str, file: MotionFile, stated: Stated) -> Body:
@@ -147,14 +199,64 @@ def _body(name: str, file: MotionFile, stated: Stated) -> Body:
     joints = file.skeleton
     positions = skeleton.positions(joints.parents, file.rotations, file.translations)
     index = {joint: at for at, joint in enumerate(joints.names)}
-    places = {
-        role: positions[:, index[joint]] / leg
-        for role, joint in measured.sure_roles.items()
-        if role in SEARCHED
-    }
-    first = replace(file, rotations=file.rotations[:1], translations=file.translations[:1])
-    light = replace(measured, file=first)
-    return Body(Take(name, file.rate, places), tuple(measured.names), light)
+    searched = {role: index[own] for role, own in measured.sure_roles.items() if role in SEARCHED}
+    columns = list(searched.values())
+    moved, rest = positions[:, columns] / leg, joints.at_rest(joints.offsets)[columns] / leg
+    faults = frame_faults.find_faults(ADULT_LEG * moved, file.rate, ADULT_LEG * rest)
+    if faults.rests_first:
+        moved[0] = moved[1]
+    places = {role: np.ascontiguousarray(moved[:, at]) for at, role in enumerate(searched)}
+    take = Take(name, file.rate, places, faults)
+    up = proposals.propose_up([measured])
+    return Body(take, tuple(measured.names), measured.without_frames(), leg, up)
+
+
+def _of_one_unit(bodies: Sequence[Body], refused: dict[str, str]) -> list[Body]:
+    """Return the bodies whose legs are as long as those of most with the same joints.
+
+    Files in another unit are added to those that were refused.
+    """
+    kinds: dict[tuple[str, ...], list[Body]] = {}
+    for body in bodies:
+        kinds.setdefault(body.joints, []).append(body)
+    kept = set()
+    for alike in kinds.values():
+        groups = _groups_of_legs(alike)
+        usual = max(groups, key=len)
+        kept.update(body.take.file for body in usual)
+        for body in (own for group in groups if group is not usual for own in group):
+            refused[body.take.file] = (
+                f"its legs are {body.leg:.4g} units long, those of {usual[0].take.file} and most "
+                f"files with its joints {usual[0].leg:.4g}: search files of one unit together"
+            )
+    return [body for body in bodies if body.take.file in kept]
+
+
+def _groups_of_legs(bodies: Sequence[Body]) -> list[list[Body]]:
+    """Return bodies in groups between whose legs the lengths leap, each in the bodies' order."""
+    ordered = sorted({body.leg for body in bodies})
+    tops = [low for low, high in pairwise(ordered) if high > OTHER_UNIT * low]
+    groups: dict[int, list[Body]] = {}
+    for body in bodies:
+        groups.setdefault(bisect_left(tops, body.leg), []).append(body)
+    return list(groups.values())
+
+
+def _recordings(takes: Sequence[Take]) -> tuple[list[Take], dict[str, list[str]]]:
+    """Return the takes with the recordings of which they are copies, and notes by file."""
+    files = [take.file for take in takes]
+    copies = take_copies.find_copies(files, [take.places for take in takes])
+    found, notes = [], {}
+    for take in takes:
+        joints = list(take.places)
+        said = frame_faults.describe(take.faults, joints, take.rate)
+        if take.file in copies:
+            said += [copies[take.file].note]
+        if said:
+            notes[take.file] = said
+        first = copies[take.file].recording if take.file in copies else None
+        found.append(replace(take, copy_of=first))
+    return found, notes
 
 
 def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> list[Take]:
@@ -176,6 +278,13 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
         if axis is None:
             said = f"its up axis is unclear ({reasons[body.joints]}): say it with --up"
             refused[body.take.file] = said
+            continue
+        own_axis = body.up.value if body.up.confidence in ("certain", "high") else axis
+        if up is None and own_axis != axis:
+            refused[body.take.file] = (
+                f"its up axis is {own_axis}, that of most files with its joints {axis}: search "
+                "files of one up axis together"
+            )
             continue
         places = {r: clip_conversion.to_y_up(own, axis) for r, own in body.take.places.items()}
         found.append(replace(body.take, places=places))

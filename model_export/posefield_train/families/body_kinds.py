@@ -57,17 +57,23 @@ def find_kinds(
     files: Sequence[str],
     stated: FileStatements,
     report: Callable[[int], None] = lambda _: None,
+    figures: Mapping[str, Figure] | None = None,
 ) -> list[BodyKind]:
     """Return the kinds of bodies of a folder's files, in the order of their first files.
 
-    Raises InvalidField for files whose unit or up axis is neither stated nor told by the bodies.
+    figures: of files that were read before. Raises InvalidField for files whose unit or up axis is
+    neither stated nor told by the bodies.
     """
     groups: dict[tuple[str, ...], list[tuple[str, Figure]]] = {}
     for count, file in enumerate(files, 1):
-        own = figure.measure(motion_readers.read(folder / file, ReadOptions(rate=stated.rate)))
+        own = figures[file] if figures else _measured(folder / file, stated.rate)
         groups.setdefault(tuple(own.names), []).append((file, own))
         report(count)
     return [_kind(folder, joints, group, stated) for joints, group in groups.items()]
+
+
+def _measured(path: Path, rate: float | None) -> Figure:
+    return figure.measure(motion_readers.read(path, ReadOptions(rate=rate))).without_frames()
 
 
 def _kind(

@@ -1,5 +1,6 @@
 """Page with the families that were found: figures of their clips, and buttons for decisions."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -108,5 +109,8 @@ def _facts(one: OfferedFamily) -> tuple[tuple[str, str], ...]:
     else:
         facts.append(("Why", "from one left foot most forward to the next, and the body travels"))
     if family.left_out:
-        facts.append(("Left out", f"{len(family.left_out)} clips with other joints"))
+        said = ", ".join(
+            f"{count} clips, {why}" for why, count in Counter(family.left_out.values()).items()
+        )
+        facts.append(("Left out", said))
     return tuple(facts)

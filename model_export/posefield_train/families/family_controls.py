@@ -9,23 +9,31 @@ from posefield_train.discover.control_proposals import ControlProposal, FamilyCl
 from posefield_train.families import family_table
 from posefield_train.families.family_table import FamilyRow
 from posefield_train.source import ingest, measured_controls, recipe
+from posefield_train.source.motion_readers import MotionFiles
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.topology import common_topology
 
 
-def propose(text: str, name: str, rows: Sequence[FamilyRow], data: Path) -> ControlProposal:
+def propose(
+    text: str,
+    name: str,
+    rows: Sequence[FamilyRow],
+    data: Path,
+    known: MotionFiles | None = None,
+) -> ControlProposal:
     """Return the proposed controls of a family.
 
     text: of a recipe with any control. name: of its table without the ending. data: folder of the
-    takes. Raises RecipeError, BvhError or TrainingError for clips that cannot be read as one
-    family, and ValueError for those that no control can be proposed for.
+    takes. known: files that were read before. Raises RecipeError, BvhError or TrainingError for
+    clips that cannot be read as one family, and ValueError for those that no control can be
+    proposed for.
     """
     with tempfile.TemporaryDirectory() as folder:
         place = Path(folder)
         (place / f"{name}.csv").write_bytes(family_table.table(rows))
         (place / f"{name}.toml").write_text(text, encoding="utf-8")
         own = recipe.read(place / f"{name}.toml")
-        examples, _ = ingest.ingest(own, data)
+        examples, _ = ingest.ingest(own, data, known)
     found = control_proposals.propose_controls(_family_clips(own, examples))
     if not found.controls:
         raise ValueError("no measure of the clips predicts those of takes that are left out")

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import PurePosixPath
 
 from posefield_train.discover import (
     family_quality,
@@ -73,15 +72,16 @@ def _row(
     corpus: Corpus, span: joined_features.Span, cost: float, kinds: Sequence[BodyKind]
 ) -> FamilyRow:
     first, last = corpus.frame(span.take, span.start), corpus.frame(span.take, span.end)
-    return _clip(corpus.takes[span.take].file, first, last, cost, kinds)
+    return _clip(corpus.takes[span.take], first, last, cost, kinds)
 
 
 def _clip(
-    file: str, first: int, last: int, cost: float | None, kinds: Sequence[BodyKind]
+    take: Take, first: int, last: int, cost: float | None, kinds: Sequence[BodyKind]
 ) -> FamilyRow:
-    performer = next(kind.performers[file] for kind in kinds if file in kind.performers)
-    take = PurePosixPath(file).with_suffix("").as_posix()
-    return FamilyRow(file, first, last, performer, take, cost)
+    # A mirrored copy swaps the bones of both sides, but its performer is that of the recording.
+    who = take.recording
+    performer = next(kind.performers[who] for kind in kinds if who in kind.performers)
+    return FamilyRow(take.file, first, last, performer, take.recording_name, cost)
 
 
 def _strides(takes: Sequence[Take], kinds: Sequence[BodyKind]) -> FoundFamily | None:
@@ -91,7 +91,7 @@ def _strides(takes: Sequence[Take], kinds: Sequence[BodyKind]) -> FoundFamily | 
     ]
     if len(found) < STRIDE_CLIPS:
         return None
-    rows = [_clip(take.file, one.first, one.last, None, kinds) for take, one in found]
+    rows = [_clip(take, one.first, one.last, None, kinds) for take, one in found]
     seconds = sorted((one.last - one.first) / take.rate for take, one in found)
     own = FoundFamily("strides", tuple(rows), None, (), seconds[len(seconds) // 2], None, {}, ())
     return _of_one_topology(own, kinds, takes)
@@ -105,21 +105,23 @@ def _of_one_topology(
     Without one, the clips of the most common joints remain.
     """
     numbers = {file: at for at, kind in enumerate(kinds) for file in kind.performers}
-    rates = {take.file: take.rate for take in takes}
+    by_file = {take.file: take for take in takes}
     counts = Counter(numbers[row.file] for row in family.rows)
     common = [at for at, _ in counts.most_common()]
     if len(common) > 1 and not mixed_bodies.can_share([kinds[at] for at in common]):
         common = common[:1]
-    kept = tuple(row for row in family.rows if numbers[row.file] in common)
-    left_out = {
-        f"{row.file}@{row.first_frame / rates[row.file]:.1f}": "other joints than most clips"
-        for row in family.rows
-        if numbers[row.file] not in common
-    }
+    kept, left_out = [], {}
+    for row in family.rows:
+        whole = by_file[row.file].is_whole(row.first_frame, row.last_frame)
+        if numbers[row.file] in common and whole:
+            kept.append(row)
+        else:
+            place = f"{row.file}@{row.first_frame / by_file[row.file].rate:.1f}"
+            left_out[place] = "a joint leaps" if not whole else "other joints than most clips"
     reasons = family.reasons
     if len(kept) < FEWEST:
         reasons = (*reasons, f"{len(kept)} clips of one skeleton, expected {FEWEST} or more")
     if len({row.take for row in kept}) < 2:
         reasons = (*reasons, "clips of one take, expected two takes or more")
     own = tuple(kinds[at] for at in common)
-    return replace(family, rows=kept, kinds=own, left_out=left_out, reasons=reasons)
+    return replace(family, rows=tuple(kept), kinds=own, left_out=left_out, reasons=reasons)

@@ -22,6 +22,7 @@ from posefield_train.families import (
 from posefield_train.families.body_kinds import BodyKind
 from posefield_train.families.family_recipe import RecipeFacts
 from posefield_train.families.found_families import FoundFamily
+from posefield_train.source.motion_readers import MotionFiles
 
 SUMMARY, PAGE = "discover.json", "index.html"
 OWN_FILES = re.compile(r"family_\d{2,}\.(toml|csv)|discover\.json|index\.html|decisions\.json")
@@ -52,11 +53,13 @@ class FoundFamilies:
     refused: tuple[FoundFamily, ...]
 
 
-def offer(found: Sequence[FoundFamily], data: Path, licence: str) -> FoundFamilies:
+def offer(
+    found: Sequence[FoundFamily], data: Path, licence: str, known: MotionFiles | None = None
+) -> FoundFamilies:
     """Return the families with recipes, in the order found, numbered from 1.
 
-    data: folder of the takes. A family whose clips cannot be read together, or that no control
-    predicts, is refused with the reason.
+    data: folder of the takes. known: files that were read before. A family whose clips cannot be
+    read together, or that no control predicts, is refused with the reason.
     """
     offered: list[OfferedFamily] = []
     refused = []
@@ -68,7 +71,7 @@ def offer(found: Sequence[FoundFamily], data: Path, licence: str) -> FoundFamili
         draft = replace(facts, licence="not stated yet")
         text = family_recipe.recipe_text(draft, family_recipe.PLACEHOLDER)
         try:
-            proposal = family_controls.propose(text, facts.name, family.rows, data)
+            proposal = family_controls.propose(text, facts.name, family.rows, data, known)
         except (MotionError, ValueError) as fault:
             refused.append(replace(family, reasons=(str(fault),)))
             continue
@@ -123,6 +126,7 @@ def summary(
             for take in read.takes
         },
         "refused": read.refused,
+        "notes": read.notes,
         "families": [_offered_facts(one) for one in found.offered],
         "not_offered": [_family_facts(one) | {"reasons": one.reasons} for one in found.refused],
     }

@@ -20,12 +20,7 @@ from posefield_train.source import bone_lengths
 from posefield_train.source.bone_lengths import ForeignBones
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-
-# The speed around a frame is the median over this time to either side, s. A jump, or a jump and its
-# return, does not change the median; the start of a motion does.
-MEDIAN_SPAN = 0.035
-# A step is a jump if it exceeds the median by the factor TIMES and by FARTHER, m.
-JUMP_FACTOR, FARTHER = 8.0, 0.03
+from posefield_train.source.takes import frame_faults
 
 
 @dataclass(frozen=True)
@@ -46,25 +41,15 @@ class JointJump:
 def largest_jump(clip: Clip) -> JointJump | None:
     """Return the largest jump of a clip; None if there is none."""
     steps = np.linalg.norm(np.diff(clip.positions(), axis=0), axis=-1)
-    pace = np.maximum(
-        _median_steps(steps, max(2, round(MEDIAN_SPAN * clip.rate))), FARTHER / JUMP_FACTOR / 4
-    )
-    beyond = steps - pace
-    leaping = (beyond > FARTHER) & (steps > JUMP_FACTOR * pace)
-    if not leaping.any():
+    leaping = frame_faults.leaping_steps(steps, clip.rate)
+    if not len(leaping.frames):
         return None
-    frame, joint = np.unravel_index(int(np.argmax(np.where(leaping, beyond, 0.0))), steps.shape)
-    found, usual = float(steps[frame, joint]), float(pace[frame, joint])
-    return JointJump(
-        int(frame), int(joint), found, found / usual, bool(leaping[frame].mean() > 0.5)
-    )
-
-
-def _median_steps(steps: Floats, reach: int) -> Floats:
-    """Return the median (F - 1, J) of steps over `reach` frames to either side."""
-    padded = np.pad(steps, ((reach, reach), (0, 0)), mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=0)
-    return np.asarray(np.median(windows, axis=-1))
+    ways = steps[leaping.frames, leaping.joints]
+    farthest = int(np.argmax(ways - leaping.paces))
+    frame, joint = int(leaping.frames[farthest]), int(leaping.joints[farthest])
+    found, usual = float(ways[farthest]), float(leaping.paces[farthest])
+    whole = bool(np.sum(leaping.frames == frame) > 0.5 * steps.shape[1])
+    return JointJump(frame, joint, found, found / usual, whole)
 
 
 # Multiple of the median distance above which a clip is tested for mirroring, turns and swaps.

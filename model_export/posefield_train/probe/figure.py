@@ -1,6 +1,6 @@
 """Measurements of the figure in a motion file, in the file's own unit and axes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from posefield_train.source.motion_files.motion_file import MotionFile
 
 MAX_FRAMES = 200
 """Frames of a file that are measured, spread evenly."""
+FEW = 5
+"""Frames that are kept of a file among many, evenly spread."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,17 @@ class Figure:
             length += float(self.bones[joint])
             joint = parents[joint]
         return length if joint == top else None
+
+    def without_frames(self) -> "Figure":
+        """Return the figure with the first frame alone of its file, whose others take memory."""
+        own = self.file
+        first = replace(own, rotations=own.rotations[:1], translations=own.translations[:1])
+        return replace(self, file=first)
+
+    def with_few_frames(self) -> "Figure":
+        """Return the figure with FEW of the frames that were measured."""
+        few = np.unique(np.linspace(0, len(self.positions) - 1, FEW).round().astype(int))
+        return replace(self, positions=self.positions[few], turns=self.turns[few])
 
     @property
     def size(self) -> float:

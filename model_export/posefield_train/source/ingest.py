@@ -69,15 +69,18 @@ class Example:
         return measured_controls.bone_offsets(self.clip)
 
 
-def ingest(recipe: Recipe, folder: Path) -> tuple[list[Example], list[str]]:
+def ingest(
+    recipe: Recipe, folder: Path, known: MotionFiles | None = None
+) -> tuple[list[Example], list[str]]:
     """Return the examples of a recipe, and notes on assumptions and corrections.
 
-    Raises RecipeError for an invalid row, MotionFileError for a file that cannot be read or that
-    states another unit, up axis or rate.
+    known: files that were read before, which are not read again. Raises RecipeError for an invalid
+    row, MotionFileError for a file that cannot be read or that states another unit, up axis or
+    rate.
     """
     rows = clip_table.read(recipe, folder)
     alone = recipe.curves is not None and recipe.curves.alone
-    files = {} if alone else read_files(rows, recipe.source)
+    files = {} if alone else read_files(rows, recipe.source, known)
     curves = curve_files.reader(recipe.curves, rows) if recipe.curves else None
     notes = [*shipped_recipes.table_notes(rows[0].table), *clip_notes.reader_notes(files)]
     if recipe.source.root_offset is None:
@@ -129,13 +132,15 @@ def _takes(
     )
 
 
-def read_files(rows: Sequence[ClipRow], source: Source) -> dict[str, MotionFile]:
+def read_files(
+    rows: Sequence[ClipRow], source: Source, known: MotionFiles | None = None
+) -> dict[str, MotionFile]:
     """Return the motions of rows by their names, each content read once.
 
     Raises MotionFileError for a file that cannot be read and RecipeError for more than MAX_POSES in
     all.
     """
-    known, files = MotionFiles(), dict[str, MotionFile]()
+    known, files = known or MotionFiles(), dict[str, MotionFile]()
     poses = 0
     for row in rows:
         if row.motion not in files:

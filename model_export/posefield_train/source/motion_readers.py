@@ -172,6 +172,7 @@ class MotionFiles:
     most_poses: int | None = None
     _kept: "OrderedDict[tuple[str, ...], MotionFile]" = field(default_factory=OrderedDict)
     _digests: dict[str, str] = field(default_factory=dict)
+    _poses: int = 0
 
     def read(self, place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
         """Return the motion of a file, as `read`."""
@@ -179,6 +180,7 @@ class MotionFiles:
         found = self._kept.pop(key, None)
         if found is None:
             found = read(place, options)
+            self._poses += found.poses
         self._kept[key] = found
         self._drop_oldest()
         return found
@@ -197,8 +199,9 @@ class MotionFiles:
     def _drop_oldest(self) -> None:
         if self.most_poses is None:
             return
-        while len(self._kept) > 1 and sum(f.poses for f in self._kept.values()) > self.most_poses:
-            self._kept.popitem(last=False)
+        while len(self._kept) > 1 and self._poses > self.most_poses:
+            _, oldest = self._kept.popitem(last=False)
+            self._poses -= oldest.poses
 
 
 def _digest(place: FileLocation) -> str:

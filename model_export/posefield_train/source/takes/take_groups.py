@@ -19,12 +19,15 @@ def find_takes(
     """
     pairs = shared_frames.find_pairs(motions, joint_sides.mirrored_joints(joints))
     apart = [pair for pair in pairs if files[pair.first] != files[pair.second]]
-    takes = _union(files, apart)
+    takes = connected(files, apart)
     return takes, [*_pair_notes(named, apart), *_file_notes(files)]
 
 
-def _union(files: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
-    """Return for each clip the first file, by name, of all files that pairs connect."""
+def connected(files: Sequence[str], pairs: Sequence[ClipPair]) -> list[str]:
+    """Return for each clip the first file, by name, of all files that pairs connect.
+
+    files: of each clip. pairs: of indices of clips.
+    """
     above = {file: file for file in files}
 
     def top(file: str) -> str:
