@@ -1,6 +1,5 @@
 """Command `posefield discover`: clips found in long takes."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +12,7 @@ from posefield.common.units import UpAxis
 from posefield.console.arguments import Json
 from posefield.console.output import as_json
 from posefield.console.question_options import with_option_groups
-from posefield_train.cli.output_files import MAX_NOTES
+from posefield_train.cli import output_files
 
 if TYPE_CHECKING:
     from posefield_train.discover.found_clips import FoundClip
@@ -230,17 +229,11 @@ def _read(
     with ProgressBar("files", len(motion_readers.find_files(folder))) as bar:
         known = take_reading.Stated(stated.up, _roles(stated), stated.rate)
         read = take_reading.read_takes(folder, known, bar.update, files)
-    _tell_files("left out", list(read.refused.items()))
-    _tell_files("note", [(file, said) for file, own in read.notes.items() for said in own])
+    output_files.tell_files("left out", list(read.refused.items()))
+    output_files.tell_files(
+        "note", [(file, said) for file, own in read.notes.items() for said in own]
+    )
     return read
-
-
-def _tell_files(what: str, said: Sequence[tuple[str, str]]) -> None:
-    """Print a line for each of a bounded number of files to standard error."""
-    for file, reason in said[:MAX_NOTES]:
-        typer.echo(f"{what}: {file}: {reason}", err=True)
-    if len(said) > MAX_NOTES:
-        typer.echo(f"{what}: {len(said) - MAX_NOTES} further files: see --json", err=True)
 
 
 def _roles(stated: StatementOptions) -> dict[str, str]:

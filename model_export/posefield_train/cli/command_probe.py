@@ -9,6 +9,7 @@ from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField
 from posefield.console.arguments import Json
 from posefield.console.output import as_json
+from posefield_train.cli import output_files
 
 if TYPE_CHECKING:
     from posefield_train.probe.probe_report import ProbeReport
@@ -28,7 +29,8 @@ def probe(
 ) -> None:
     """Propose unit, up axis, rate, feet and heading of motion files.
 
-    Each proposal has its evidence and its confidence. The files are read as of one family.
+    Each proposal has its evidence and its confidence. The files are read as of one family. Those
+    that cannot be read are named with the reason, and the others are reported.
     """
     from posefield_train.probe import probe_report
 
@@ -61,7 +63,7 @@ def init(
     known = None if table is None else recipe_draft.read_table(folder / table)
     if known is None:
         _refuse_existing(folder / recipe_draft.TABLE)
-        files = motion_readers.find_files(folder)
+        files = [*motion_readers.find_files(folder), *motion_readers.find_refused(folder)]
     else:
         files = recipe_draft.files_of(known, folder)
     if not files:
@@ -81,7 +83,9 @@ def _probe(files: list[Path]) -> "ProbeReport":
     from posefield_train.probe import probe_report
 
     with ProgressBar("files", len(files)) as bar:
-        return probe_report.probe(files, bar.update)
+        report = probe_report.probe(files, bar.update)
+    output_files.tell_files("left out", list(report.refused.items()))
+    return report
 
 
 def _refuse_existing(path: Path) -> None:

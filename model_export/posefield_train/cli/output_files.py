@@ -1,7 +1,10 @@
 """Output files of commands: their names, and the summary that is printed."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import typer
 
 from posefield.common.errors import InvalidField
 from posefield.console.output import as_json
@@ -60,3 +63,11 @@ def summary(exported: "ExportedModel", output: Path) -> str:
             f"onnxruntime differs from the reference by at most {100 * found['parity_m']:.5f} cm",
         ]
     )
+
+
+def tell_files(what: str, said: Sequence[tuple[str, str]]) -> None:
+    """Print a line for each of a bounded number of files to standard error."""
+    for file, reason in said[:MAX_NOTES]:
+        typer.echo(f"{what}: {file}: {reason}", err=True)
+    if len(said) > MAX_NOTES:
+        typer.echo(f"{what}: {len(said) - MAX_NOTES} further files: see --json", err=True)

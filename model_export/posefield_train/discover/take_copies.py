@@ -10,7 +10,7 @@ import numpy as np
 
 from posefield.common.array_shapes import Positions
 from posefield.common.units import Floats
-from posefield_train.probe.proposals import ADULT_LEG
+from posefield_train.probe.figure import ADULT_LEG
 from posefield_train.source.takes import shared_frames, take_groups
 
 COMPARED = (
@@ -52,11 +52,13 @@ def find_copies(
     pairs = shared_frames.find_pairs(motions, swapped)
     recordings = take_groups.connected(files, pairs)
     notes: dict[str, str] = {}
-    for pair in pairs:
+    # Relations to the recording itself come first.
+    named = {files.index(file) for file in recordings}
+    for pair in sorted(pairs, key=lambda own: not {own.first, own.second} & named):
         said = f"{files[pair.second]} {pair.relation} {files[pair.first]}"
         for at in (pair.first, pair.second):
             if files[at] != recordings[at]:
-                notes.setdefault(files[at], f"{said}: both are one take, which is left out whole")
+                notes.setdefault(files[at], f"{said}: both are one take")
     copies = dict(zip(files, recordings, strict=True))
     return {file: TakeCopy(copies[file], note) for file, note in notes.items()}
 

@@ -15,7 +15,8 @@ from posefield.motion import skeleton
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.discover import take_copies
 from posefield_train.probe import figure, proposals
-from posefield_train.probe.proposals import ADULT_LEG, Proposal
+from posefield_train.probe.figure import ADULT_LEG, MOST_WHOLE, OTHER_UNIT
+from posefield_train.probe.proposals import Proposal
 from posefield_train.source import motion_readers
 from posefield_train.source.motion_files import clip_conversion
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
@@ -37,11 +38,7 @@ NEEDED = ("hips", *(side + role for side in ("left", "right") for role in LEG))
 """Roles without which a take cannot be searched."""
 MOST_FRAMES = 5_000_000
 """Frames of all takes together, which take 2 GB: eleven hours at 120 frames a second."""
-MOST_FIGURES = 50
-"""Bodies of one kind that tell the up axis, and that are kept with all measured frames."""
-OTHER_UNIT = 2.1
-"""Least ratio of the legs of two bodies with the same joints that are in different units: legs of a
-child and an adult differ by less, any two units by more."""
+FEWEST_FRAMES = 2
 
 
 @dataclass(frozen=True)
@@ -132,7 +129,9 @@ def read_takes(
     """
     if not folder.is_dir():
         raise FileError(folder, "not a folder, expected one with motion files")
-    bodies, refused, frames = [], dict[str, str](), 0
+    found = motion_readers.find_refused(folder)
+    refused = {path.relative_to(folder).as_posix(): said for path, said in found.items()}
+    bodies, frames = list[Body](), 0
     known = stated or Stated()
     read = motion_readers.read if files is None else files.read
     measured: Counter[tuple[str, ...]] = Counter()
@@ -142,8 +141,10 @@ def read_takes(
             body = _body(name, read(path, ReadOptions(rate=known.rate)), known)
             frames += len(body.take)
             measured[body.joints] += 1
-            bodies.append(body if measured[body.joints] <= MOST_FIGURES else body.light())
-        except (FileError, UnusableTake) as fault:
+            bodies.append(body if measured[body.joints] <= MOST_WHOLE else body.light())
+        except FileError as fault:
+            refused[name] = motion_readers.reason(fault, path)
+        except UnusableTake as fault:
             refused[name] = str(fault)
         if frames > MOST_FRAMES:
             raise FileError(
@@ -185,6 +186,8 @@ class Body:
 
 
 def _body(name: str, file: MotionFile, stated: Stated) -> Body:
+    if len(file) < FEWEST_FRAMES:
+        raise UnusableTake(f"found {len(file)} frame, expected a motion")
     if file.rate is None:
         raise UnusableTake(f"{file.format} states no frame rate: say it with --rate")
     measured = _with_roles(figure.measure(file), stated.roles)
@@ -249,7 +252,7 @@ def _recordings(takes: Sequence[Take]) -> tuple[list[Take], dict[str, list[str]]
     found, notes = [], {}
     for take in takes:
         joints = list(take.places)
-        said = frame_faults.describe(take.faults, joints, take.rate)
+        said = frame_faults.describe(take.faults, joints, take.rate, left_out=True)
         if take.file in copies:
             said += [copies[take.file].note]
         if said:
@@ -270,7 +273,7 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
     for body in bodies:
         if body.joints not in axes:
             alike = [other.figure for other in bodies if other.joints == body.joints]
-            proposal = proposals.propose_up(alike[:MOST_FIGURES])
+            proposal = proposals.propose_up(alike[:MOST_WHOLE])
             clear = proposal.confidence != "low"
             axes[body.joints] = up or (proposal.value if clear else None)
             reasons[body.joints] = "; ".join(proposal.evidence)

@@ -9,11 +9,18 @@ from posefield.motion import skeleton
 from posefield.roles import body_shape, joint_recognition
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.source.motion_files.motion_file import MotionFile
+from posefield_train.source.takes import frame_faults
 
+ADULT_LEG = 0.86
+"""Length of the bones from hip to foot of an adult, m."""
+OTHER_UNIT = 2.1
+"""Least ratio of the legs of two bodies with the same joints that are in different units: legs of a
+child and an adult differ by less, any two units by more."""
 MAX_FRAMES = 200
 """Frames of a file that are measured, spread evenly."""
-FEW = 5
-"""Frames that are kept of a file among many, evenly spread."""
+MOST_WHOLE, FEW = 50, 5
+"""Files with the same joints of which all measured frames are kept, and frames of each further one:
+ten thousand files would take gigabytes."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +29,7 @@ class Figure:
 
     guesses: joints by role, with confidence. positions: of the joints (F, J, 3), in some of the
     frames. bones: length (J,) of the bone that leads to each joint. turns: rotations (F, 4) of the
-    root. moves: whether position channels of each joint (J,) change.
+    root. moves: whether position channels of each joint (J,) change. frames: number of the file's.
     """
 
     file: MotionFile
@@ -31,6 +38,7 @@ class Figure:
     bones: Floats
     turns: Floats
     moves: tuple[bool, ...]
+    frames: int
 
     @property
     def names(self) -> list[str]:
@@ -106,4 +114,19 @@ def measure(file: MotionFile) -> Figure:
         np.linalg.norm(np.median(translations, axis=0), axis=-1),
         rotations[frames, 0],
         tuple(moves.tolist()),
+        len(file),
     )
+
+
+def faults(measured: Figure) -> list[str]:
+    """Return the faults of the frames of a figure's file, which has its frames and a rate."""
+    file, joints = measured.file, list(measured.sure_roles.values())
+    leg = measured.leg_length()
+    if file.rate is None or not leg:
+        return []
+    columns = [measured.names.index(joint) for joint in joints]
+    bones = file.skeleton
+    moved = skeleton.positions(bones.parents, file.rotations, file.translations)[:, columns]
+    rest = bones.at_rest(bones.offsets)[columns]
+    found = frame_faults.find_faults(moved * ADULT_LEG / leg, file.rate, rest * ADULT_LEG / leg)
+    return frame_faults.describe(found, joints, file.rate)

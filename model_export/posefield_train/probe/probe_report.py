@@ -2,10 +2,13 @@
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from posefield.common.errors import FileError
 from posefield.roles import joint_recognition
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.probe import figure, proposals
@@ -14,7 +17,7 @@ from posefield_train.probe.proposals import Proposal
 from posefield_train.source import motion_readers
 
 LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))
-SHOWN_JOINTS = 40
+SHOWN_JOINTS, SHOWN_FAULTS = 40, 20
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,7 @@ class ProbeReport:
     """Findings about motion files.
 
     joints: those of most files. guesses: joints by role with confidence. proposed: by name.
+    refused: reason by file that was not read.
     """
 
     files: tuple[FileFacts, ...]
@@ -44,6 +48,7 @@ class ProbeReport:
     guesses: dict[str, RoleGuess]
     proposed: dict[str, Proposal]
     warnings: tuple[str, ...]
+    refused: dict[str, str] = field(default_factory=dict)
 
     @property
     def roles(self) -> dict[str, str]:
@@ -80,20 +85,40 @@ class ProbeReport:
             },
             "proposed": {name: found.facts() for name, found in self.proposed.items()},
             "warnings": list(self.warnings),
+            "refused": self.refused,
         }
 
 
 def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None) -> ProbeReport:
     """Return the report on motion files.
 
-    report: called with the number of files that are read. Raises MotionFileError for a file that
-    cannot be read.
+    report: called with the number of files that are read. A file that cannot be read is refused
+    with its reason; FileError if none is left.
     """
-    figures = []
+    figures: dict[Path, Figure] = {}
+    faults: dict[Path, FileError] = {}
+    measured: Counter[tuple[str, ...]] = Counter()
+    faulty: list[str] = []
     for count, path in enumerate(paths, 1):
-        figures.append(figure.measure(motion_readers.read(path)))
+        try:
+            own = figure.measure(motion_readers.read(path))
+        except FileError as fault:
+            faults[path] = fault
+            report(count)
+            continue
+        faulty += [f"{path}: {said}" for said in figure.faults(own)]
+        own = own.without_frames()
+        measured[tuple(own.names)] += 1
+        whole = measured[tuple(own.names)] <= figure.MOST_WHOLE
+        figures[path] = own if whole else own.with_few_frames()
         report(count)
-    return report_of(paths, figures)
+    if not figures:
+        raise next(iter(faults.values()))
+    found = report_of(list(figures), list(figures.values()))
+    if len(faulty) > SHOWN_FAULTS:
+        faulty[SHOWN_FAULTS:] = [f"{len(faulty) - SHOWN_FAULTS} further faults of frames"]
+    reasons = {str(path): motion_readers.reason(own, path) for path, own in faults.items()}
+    return replace(found, warnings=(*found.warnings, *faulty), refused=reasons)
 
 
 def report_of(paths: Sequence[Path], figures: Sequence[Figure]) -> ProbeReport:
@@ -102,7 +127,7 @@ def report_of(paths: Sequence[Path], figures: Sequence[Figure]) -> ProbeReport:
     usual = [each for each in figures if tuple(each.names) == common]
     up = proposals.propose_up(usual)
     files = tuple(
-        FileFacts(str(path), each.file.format, len(each.file), each.file.rate)
+        FileFacts(str(path), each.file.format, each.frames, each.file.rate)
         for path, each in zip(paths, figures, strict=True)
     )
     proposed = {
@@ -140,6 +165,7 @@ def _warnings(figures: Sequence[Figure], usual: Sequence[Figure]) -> list[str]:
             f"{odd.file.source} ({', '.join(differ) or 'another order'}): one model needs one "
             "skeleton"
         )
+    found += _mixed_settings(usual)
     still = [each for each in usual if not each.moves[0] and any(each.moves)]
     if still:
         mover = still[0].names[still[0].moves.index(True)]
@@ -152,6 +178,30 @@ def _warnings(figures: Sequence[Figure], usual: Sequence[Figure]) -> list[str]:
         found.append(
             f"{len(stretching)} of {len(usual)} files have bones whose length changes; training "
             "keeps their mean"
+        )
+    return found
+
+
+def _mixed_settings(usual: Sequence[Figure]) -> list[str]:
+    """Return the warnings on files in another unit, or with another up axis, than most."""
+    found = []
+    legs = {each.file.source: leg for each in usual if (leg := each.leg_length())}
+    middle = float(np.median(list(legs.values()))) if legs else 0.0
+    least = figure.OTHER_UNIT
+    odd = [own for own, leg in legs.items() if max(leg, middle) > least * min(leg, middle)]
+    if odd:
+        found.append(
+            f"{len(odd)} of {len(usual)} files are in another unit, such as {odd[0]}, whose legs "
+            f"are {legs[odd[0]]:.4g} units long, and {middle:.4g} in the median: a recipe has one"
+        )
+    axes = {each.file.source: proposals.propose_up([each]) for each in usual}
+    sure = {own: axis.value for own, axis in axes.items() if axis.confidence in ("certain", "high")}
+    counts = Counter(sure.values()).most_common()
+    if len(counts) > 1:
+        other = next(own for own, axis in sure.items() if axis != counts[0][0])
+        found.append(
+            f"files have different up axes, such as {sure[other]} in {other} and {counts[0][0]} in "
+            f"{counts[0][1]} files: a recipe has one"
         )
     return found
 

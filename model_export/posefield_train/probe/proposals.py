@@ -8,13 +8,13 @@ import numpy as np
 
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat
-from posefield_train.probe.figure import Figure
+from posefield_train.probe.figure import ADULT_LEG, Figure
 from posefield_train.source.bone_lengths import UNITS
 from posefield_train.source.motion_files import clip_conversion
 
 Confidence = Literal["certain", "high", "medium", "low", "none"]
 
-ADULT_LEG, LEG_FACTORS = 0.86, (1.2, 1.35)
+LEG_FACTORS = (1.2, 1.35)
 """Usual length of an adult's leg from hip to ankle, m, and the largest factors between it and the
 proposed length for a high and a medium confidence."""
 ADULT_SIZE = 1.7

@@ -4,11 +4,11 @@ import hashlib
 import shutil
 import tempfile
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from posefield.common.errors import AcclaimError, MotionFileError
+from posefield.common.errors import AcclaimError, FileError, MotionFileError
 from posefield_train.source import acclaim, bvh, data_folder
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.motion_files.motion_file import AS_STATED, MotionFile, ReadOptions
@@ -152,13 +152,32 @@ def read(place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
     return own.read(place, options)
 
 
+def reason(fault: FileError, place: Path) -> str:
+    """Return why a file was refused, without its name where the fault is in the file itself."""
+    if fault.path != str(place):
+        return str(fault)
+    return fault.message if fault.line is None else f"line {fault.line}: {fault.message}"
+
+
 def _suffix(name: str) -> str:
     return PurePosixPath(name).suffix.lower()
 
 
 def find_files(folder: Path) -> list[Path]:
     """Return the motion files in a folder and its subfolders, in order of their paths."""
-    return sorted(path for path in folder.rglob("*") if _suffix(path.name) in SUFFIXES)
+    return _files_with(folder, SUFFIXES)
+
+
+def find_refused(folder: Path) -> dict[Path, str]:
+    """Return the files below a folder in formats that are refused, each with the way out."""
+    # A skeleton of Acclaim is read with the motion beside it.
+    known = {suffix: said for suffix, said in REFUSED.items() if suffix != ".asf"}
+    return {path: known[_suffix(path.name)] for path in _files_with(folder, known)}
+
+
+def _files_with(folder: Path, suffixes: Container[str]) -> list[Path]:
+    found = (path for path in folder.rglob("*") if _suffix(path.name) in suffixes)
+    return sorted(path for path in found if not path.is_dir())
 
 
 @dataclass

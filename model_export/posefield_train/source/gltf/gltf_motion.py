@@ -97,8 +97,8 @@ def _chosen(document: GltfDocument, wanted: str | None) -> tuple[str, Any]:
     listed = ", ".join(map(repr, names[:20]))
     if wanted is None and len(animations) > 1:
         raise document.error(
-            f"found {len(animations)} animations ({listed}), expected one, or the name of one in "
-            "the column clips.animation"
+            f"found {len(animations)} animations ({listed}), expected one: export each to a "
+            "file of its own, or name one in the column clips.animation"
         )
     if wanted is not None and names.count(wanted) != 1:
         raise document.error(f"found the animations {listed}, expected one {wanted!r}")

@@ -137,12 +137,18 @@ def _repeated(steps: Floats, rate: float) -> tuple[int, ...]:
     return tuple(found)
 
 
-def describe(faults: FrameFaults, joints: Sequence[str], rate: float) -> list[str]:
-    """Return a sentence for each kind of fault. joints: their names or roles."""
+def describe(
+    faults: FrameFaults, joints: Sequence[str], rate: float, left_out: bool = False
+) -> list[str]:
+    """Return a sentence for each kind of fault.
+
+    joints: their names or roles. left_out: whether frames at rest and clips across leaps were.
+    """
     found = []
     if faults.rests_first:
         found.append(
-            f"frame 0 is the rest pose, {faults.from_rest:.2f} m from frame 1, and was left out"
+            f"frame 0 is the rest pose, {faults.from_rest:.2f} m from frame 1"
+            f"{', and was left out' if left_out else ''}"
         )
     if faults.repeated:
         first = faults.repeated[0] / rate
@@ -155,7 +161,8 @@ def describe(faults: FrameFaults, joints: Sequence[str], rate: float) -> list[st
         what = "the whole body" if leap.whole else joints[leap.joint]
         found.append(
             f"{_counted(len(faults.leaps), 'leap')}, {what} by {leap.distance:.2f} m between "
-            f"frames {leap.frame} and {leap.frame + 1}: clips across leaps were left out"
+            f"frames {leap.frame} and {leap.frame + 1}"
+            f"{': clips across leaps were left out' if left_out else ''}"
         )
     return found
 

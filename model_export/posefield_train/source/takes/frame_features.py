@@ -29,27 +29,40 @@ def frame_features(motion: Positions) -> Annotated[Floats, "frames features"]:
     return np.concatenate([relative[..., 1], away], axis=1) / np.sqrt(joints)
 
 
+CHECKED = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Shares of common frames at which features are compared before all joints are: a pose that is held
+is like thousands of others."""
+
+
 @dataclass(frozen=True)
 class FrameIndex:
     """Frames of all clips, sorted by their joints' mean height above the root.
 
-    features: (F, 2 J) of all frames. owners, frames: clip, and frame within it, of each. order:
-    (F,) by mean height. heights: the sorted mean heights, m.
+    features: (F, 2 J) of all frames. counts: frames of each clip. owners, frames: clip, and frame
+    within it, of each. order: (F,) by mean height. heights: the sorted mean heights, m.
     """
 
     features: Floats
+    counts: Indices
     owners: Indices
     frames: Indices
     order: Indices
     heights: Floats
 
-    def like(self, wanted: Annotated[Floats, "features"]) -> Iterator[tuple[int, int]]:
-        """Yield clip and frame of all frames whose features are the same as the wanted ones."""
-        height = _mean_heights(wanted[None])[0]
+    def like(self, wanted: Annotated[Floats, "frames features"]) -> Iterator[tuple[int, int]]:
+        """Yield clip and frame of all frames from which on the features may be the wanted ones.
+
+        They are compared at CHECKED of the frames that the clip and the wanted ones have.
+        """
+        height = _mean_heights(wanted[:1])[0]
         first, last = np.searchsorted(self.heights, [height - SAME, height + SAME])
-        near = self.order[first:last]
-        apart = np.linalg.norm(self.features[near] - wanted, axis=1)
-        for found in np.sort(near[apart < SAME]):
+        near = np.sort(self.order[first:last])
+        common = np.minimum(self.counts[self.owners[near]] - self.frames[near], len(wanted)) - 1
+        for share in CHECKED:
+            ahead = (share * common).astype(int)
+            apart = np.linalg.norm(self.features[near + ahead] - wanted[ahead], axis=1)
+            near, common = near[apart < SAME], common[apart < SAME]
+        for found in near:
             yield int(self.owners[found]), int(self.frames[found])
 
 
@@ -61,6 +74,7 @@ def index_frames(features: Sequence[Floats]) -> FrameIndex:
     order = np.argsort(heights, kind="stable")
     return FrameIndex(
         whole,
+        np.array(lengths),
         np.repeat(np.arange(len(lengths)), lengths),
         np.concatenate([np.arange(length) for length in lengths]),
         order,

@@ -59,7 +59,7 @@ def _overlaps(motions: Motions, swapped: list[int]) -> Iterator[ClipPair]:
             ways["mirrors"] = features[second][:, other], _mirrored(motion, swapped)
         for relation, (own, moved) in ways.items():
             known = {second}
-            for first, start in index.like(own[0]):
+            for first, start in index.like(own):
                 # Two clips that begin together are found from both.
                 if first in known or (start == 0 and first > second):
                     continue

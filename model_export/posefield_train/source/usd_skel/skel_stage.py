@@ -104,8 +104,8 @@ def _animation(opened: SkelStage, animations: list[Any], wanted: str | None) -> 
     if wanted is None:
         if len(animations) > 1:
             raise opened.error(
-                f"found {len(animations)} animations ({paths}), expected one, or the path of "
-                "one in the column clips.animation"
+                f"found {len(animations)} animations ({paths}), expected one: export each to a "
+                "file of its own, or name the path of one in the column clips.animation"
             )
         return animations[0]
     found = [prim for prim in animations if wanted in (str(prim.GetPath()), prim.GetName())]

@@ -1,0 +1,255 @@
+"""Tests of folders with faults: each file is read, noted or refused, the others are searched."""
+
+import csv
+import json
+import tracemalloc
+
+import bad_takes
+import discover_takes
+import numpy as np
+import pytest
+import rigid_takes
+
+from posefield_train.discover import take_copies, take_reading
+from posefield_train.probe import probe_report
+from posefield_train.source import motion_readers
+from posefield_train.source.takes import frame_faults
+
+FILES = bad_takes.contents()
+SEARCHED = [name for name, (_, said) in FILES.items() if not said or said.startswith("note: ")]
+FEW = ("--candidates", "60", "--licence", "CC0-1.0")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Four good takes among files with faults, a broken link, and a folder with a file's name."""
+    place = rigid_takes.write_takes(tmp_path_factory.mktemp("bad") / "takes")
+    for name, (content, _) in FILES.items():
+        (place / name).write_bytes(content)
+    (place / "gone.bvh").symlink_to(place / "nowhere")
+    (place / "sub.bvh").mkdir()
+    return place
+
+
+@pytest.fixture(scope="module")
+def read(folder):
+    return take_reading.read_takes(folder)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_each_file_is_searched_noted_or_refused_with_its_reason(read, name):
+    said = FILES[name][1]
+    assert (name in read.refused) == (name not in SEARCHED)
+    assert (name in {take.file for take in read.takes}) == (name in SEARCHED)
+    if name in SEARCHED:
+        assert any(said.removeprefix("note: ") in own for own in read.notes.get(name, [""]))
+        assert (name in read.notes) == bool(said)
+    else:
+        assert said in read.refused[name] and not read.refused[name].startswith("/")
+
+
+def test_good_files_are_searched_beside_broken_ones(read):
+    names = {take.file for take in read.takes}
+    assert names == {*SEARCHED, *(f"{('ann', 'bob')[at % 2]}_{at}.bvh" for at in range(4))}
+    assert read.refused["gone.bvh"].startswith("cannot be read") and "sub.bvh" not in read.refused
+
+
+@pytest.mark.parametrize("words", [("--strides",), ("--like", "ann_0.bvh:1-3"), ()])
+def test_every_search_ends_well_and_tells_the_faults(posefield, folder, tmp_path, words):
+    output = tmp_path / ("found.csv" if words else "recipes")
+    given = words or FEW
+    code, out, err = posefield("discover", folder, *given, "-o", output, "--json")
+    facts = json.loads(out)
+    assert code == 0 and output.exists()
+    assert set(facts["refused"]) == {*FILES, "gone.bvh"} - set(SEARCHED)
+    assert set(facts["notes"]) == {own for own in SEARCHED if FILES[own][1]}
+    assert "left out: box.glb: found an animation of node 'box' without a skeleton" in err
+    assert "note: leaping.bvh: 2 leaps, rightHand by 0.60 m between frames 199 and 200" in err
+
+
+def test_a_folder_without_one_good_file_is_refused_and_nothing_written(posefield, tmp_path):
+    takes = tmp_path / "takes"
+    takes.mkdir()
+    for name in set(FILES) - set(SEARCHED) - {"metres.bvh", "z_up.bvh", "other_format.glb"}:
+        (takes / name).write_bytes(FILES[name][0])
+    for words in ((), ("--strides",), ("--like", "a.bvh:1-2")):
+        output = tmp_path / ("out.csv" if words else "out")
+        code, _, err = posefield("discover", takes, *words, "-o", output)
+        assert code == 3 and "no take that can be searched; such as" in err
+        assert not output.exists()
+
+
+def test_probe_reports_readable_files_and_names_the_others(posefield, folder):
+    files = sorted(path for path in folder.iterdir() if path.name != "sub.bvh")
+    code, out, err = posefield("probe", *files, "--json")
+    facts = json.loads(out)
+    # Probe reads a body without legs, and a single pose, too.
+    odd = {"no_legs.bvh", "one_frame.bvh", "metres.bvh", "z_up.bvh", "other_format.glb"}
+    known = {*SEARCHED, *odd}
+    assert code == 0 and "left out: " in err
+    refused = {path.rpartition("/")[2]: said for path, said in facts["refused"].items()}
+    assert set(refused) == {*FILES, "gone.bvh"} - known
+    assert all(FILES[name][1] in said for name, said in refused.items() if name in FILES)
+    warned = " ".join(facts["warnings"])
+    assert "are in another unit, such as" in warned and "files have different up axes" in warned
+    for name in ("rest_first.bvh: frame 0 is the rest pose", "dropped.bvh: 4 frames repeated"):
+        assert name in warned
+
+
+def test_init_leaves_out_what_cannot_be_read(posefield, tmp_path):
+    takes = rigid_takes.write_takes(tmp_path / "takes")
+    for name in ("cut.bvh", "scene.fbx"):
+        (takes / name).write_bytes(FILES[name][0])
+    code, _, err = posefield("init", takes)
+    assert code == 0 and "scene.fbx: FBX is read through Blender" in err and "cut.bvh: line" in err
+    table = (takes / "clips.csv").read_text()
+    assert "ann_0.bvh" in table and "cut" not in table and "scene" not in table
+
+
+@pytest.mark.parametrize("suffix", motion_readers.REFUSED)
+def test_every_command_refuses_a_format_with_the_way_out(posefield, tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(b"x")
+    said = motion_readers.REFUSED[suffix]
+    code, _, err = posefield("probe", path)
+    assert code == 3 and said in " ".join(err.split())
+    if suffix != ".asf":
+        code, _, err = posefield("discover", tmp_path, "--strides", "-o", tmp_path / "s.csv")
+        assert code == 3 and said in " ".join(err.split())
+    recipe = tmp_path / "r.toml"
+    recipe.write_text(RECIPE)
+    (tmp_path / "t.csv").write_text(f"file,x\na{suffix},1\n")
+    code, _, err = posefield("train", recipe, "--data", tmp_path, "-o", tmp_path / "m.onnx")
+    assert code == 3 and said in " ".join(err.split())
+    assert not (tmp_path / "m.onnx").exists()
+
+
+RECIPE = """
+schema = 1
+name = "walk"
+description = "d"
+licence = "l"
+[source]
+metres_per_unit = 1.0
+up = "y"
+[clips]
+table = "t.csv"
+file = "file"
+[[controls]]
+name = "x"
+unit = "m"
+column = "x"
+description = "x"
+[motion]
+frames = 60
+cyclic = false
+root = "travelling"
+[size]
+rms_budget_cm = 1.0
+"""
+
+
+def test_a_rest_pose_before_the_motion_is_in_no_clip(read):
+    (take,) = (own for own in read.takes if own.file == "rest_first.bvh")
+    assert take.first == 1
+    assert np.array_equal(take.places["leftHand"][0], take.places["leftHand"][1])
+    good = next(own for own in read.takes if own.file == "ann_0.bvh")
+    # All takes rest at first; where the motion goes on from there, nothing is left out.
+    assert good.first == 0
+
+
+def test_copies_are_one_take_of_one_performer_in_the_found_tables(posefield, folder, tmp_path):
+    words = ("discover", folder, "-o", tmp_path / "recipes", *FEW)
+    assert posefield(*words)[0] == 0
+    rows = [
+        row
+        for path in sorted((tmp_path / "recipes").glob("*.csv"))
+        for row in csv.DictReader(path.read_text().splitlines())
+    ]
+    copies = {"copied.bvh", "copied_again.bvh", "mirrored.bvh"}
+    assert copies & {row["file"] for row in rows}
+    for row in rows:
+        own = "copied" if row["file"] in copies else row["file"].removesuffix(".bvh")
+        assert row["take"] == own
+    assert len({row["performer"] for row in rows if row["file"] in copies}) == 1
+    table = tmp_path / "like.csv"
+    posefield("discover", folder, "--like", "copied.bvh:1-3.5", "-o", table)
+    found = {row["file"]: row["take"] for row in csv.DictReader(table.read_text().splitlines())}
+    assert {found[name] for name in copies & set(found)} == {"copied"}
+    assert len(copies & set(found)) > 1
+
+
+def test_no_clip_is_found_across_a_leap(posefield, folder, tmp_path):
+    table = tmp_path / "like.csv"
+    words = ("--like", "ann_0.bvh:1-3.5", "--most", "400")
+    posefield("discover", folder, *words, "-o", table)
+    rows = list(csv.DictReader(table.read_text().splitlines()))
+    own = [row for row in rows if row["file"] == "leaping.bvh"]
+    assert own
+    for row in own:
+        first, last = int(row["first_frame"]), int(row["last_frame"])
+        assert not first <= 199 < last and not first <= 204 < last
+
+
+def test_takes_of_two_performances_are_no_copies():
+    times = np.arange(240) / discover_takes.RATE
+    one = discover_takes.body(times, speed=1.0, swing=0.6)
+    other = discover_takes.body(times, speed=1.02, swing=0.61)
+    assert not take_copies.find_copies(["a", "b"], [one, other])
+    found = take_copies.find_copies(["a", "b"], [one, one])
+    assert found["b"].recording == "a" and "shares frames with" in found["b"].note
+
+
+def test_faults_are_told_from_motions_without():
+    clip = bad_takes.good(31)
+    rest = clip.skeleton.at_rest(clip.skeleton.offsets)
+    assert frame_faults.find_faults(clip.positions(), clip.rate, rest) == frame_faults.NO_FAULTS
+    # A pose that is held begins and ends slowly, or is long.
+    held = clip.positions()[np.clip(np.arange(200), 0, 100)]
+    assert not frame_faults.find_faults(held, clip.rate, rest).repeated
+
+
+def test_the_order_in_which_files_are_listed_does_not_matter(posefield, tmp_path):
+    outputs = []
+    for order in (1, -1):
+        takes = tmp_path / f"order{order}" / "takes"
+        takes.mkdir(parents=True)
+        good = rigid_takes.write_takes(tmp_path / "good")
+        for path in sorted(good.iterdir())[::order]:
+            (takes / path.name).write_bytes(path.read_bytes())
+        (takes / "cut.bvh").write_bytes(FILES["cut.bvh"][0])
+        output = tmp_path / f"order{order}" / "recipes"
+        assert posefield("discover", takes, "-o", output, *FEW)[0] == 0
+        outputs.append({p.name: p.read_text() for p in output.iterdir()})
+    one, other = ({n: own.replace("order-1", "order1") for n, own in o.items()} for o in outputs)
+    assert one == other
+
+
+def tiny(folder, count):
+    """Write many takes of a second, each of another motion."""
+    folder.mkdir()
+    base = rigid_takes.clip("FS", 3)
+    for index in range(count):
+        rng = np.random.default_rng(index)
+        start = int(rng.integers(0, 600))
+        turns = base.rotations[start : start + 40].copy()
+        places = base.translations[start : start + 40] + rng.normal(0.0, 0.05, 3)
+        places[:, 0, 2] += rng.uniform(0.2, 1.0) * np.arange(40) / base.rate
+        own = bad_takes.moved(base, turns, places * [1.0, rng.uniform(0.99, 1.01), 1.0])
+        (folder / f"{index:05d}.bvh").write_bytes(bad_takes.bvh(own))
+    return folder
+
+
+def test_memory_of_many_files_is_that_of_their_joints_alone(tmp_path):
+    """What a file keeps is its joints with a role, and few measured frames."""
+    folder = tiny(tmp_path / "many", 300)
+    tracemalloc.start()
+    read = take_reading.read_takes(folder)
+    size, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(read.takes) > 290
+    assert size < 300 * 100_000
+    few = [len(read.figures[f"{index:05d}.bvh"].positions) for index in (0, 299)]
+    assert few == [40, 5]
+    report = probe_report.report_of(list(folder.iterdir()), list(read.figures.values()))
+    assert report.proposed["up"].value == "y"
