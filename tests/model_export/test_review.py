@@ -76,6 +76,12 @@ def test_merged_families_are_one_with_proposals_of_its_own(posefield, made):
     assert first["clips"] == len(before[1]) + len(before[2])
     assert (second["status"], second["into"]) == ("merged", 1)
     assert [one.name for one in own.controls] == first["controls"]
+    # The evidence is that of all clips, and that of the other family is kept.
+    whole = (made / "family_01.toml").read_text()
+    said = f"# {first['clips']} clips of 2 performers, {first['seconds']:.1f} s long in the median."
+    assert whole.count(" clips of ") == 1 and said in whole
+    within = f"which differ by {second['within']:.1%} of all motion"
+    assert f"# Family 2 was merged into it: {len(before[2])} clips, {within}" in whole
     # What a person wrote into the recipe stays.
     assert own.accepted and own.size.rms_budget_cm == 2
 

@@ -88,6 +88,21 @@ def with_proposal(text: str, lines: Sequence[str]) -> str:
     return block.sub(lambda _: "\n".join(lines), text, count=1)
 
 
+def clips_text(clips: int, performers: int, seconds: float) -> str:
+    """Return the evidence on a family's clips. seconds: their median duration."""
+    return f"{clips} clips of {performers} performers, {seconds:.1f} s long in the median."
+
+
+def with_merged(text: str, clips: str, merged: str) -> str:
+    """Return a recipe with the evidence on the clips of a family that was merged into it.
+
+    clips: evidence on all clips, in place of that on the family's own. merged: on those merged.
+    """
+    counted = r"^# \d+ clips of \d+ performers, [\d.]+ s long in the median\.$"
+    found = re.sub(counted, lambda _: f"# {clips}", text, count=1, flags=re.M)
+    return re.sub(r"^schema = ", lambda own: f"# {merged}\n{own[0]}", found, count=1, flags=re.M)
+
+
 def with_accepted(text: str, accepted: bool) -> str:
     """Return a recipe that is accepted or not, and the rest of it as it is."""
     line = re.compile(r"^accepted = (true|false)$", re.MULTILINE)

@@ -85,10 +85,7 @@ def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
     is_mixed = len(own) > 1
     performers = {row.performer for row in family.rows}
     what = "Strides" if family.kind == "strides" else "Similar motions"
-    evidence = [
-        f"{len(family.rows)} clips of {len(performers)} performers, {family.seconds:.1f} s long in "
-        "the median."
-    ]
+    evidence = [family_recipe.clips_text(len(family.rows), len(performers), family.seconds)]
     if family.quality is not None:
         evidence.append(
             f"The clips differ by {family.quality.within:.1%} of all motion; "

@@ -1,7 +1,8 @@
 """Review of a folder of recipes: decisions are applied to its recipes, tables and summary."""
 
 import json
-from collections.abc import Sequence
+import statistics
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -120,15 +121,38 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
     moved = [row for row in own.rows.pop(second) if row.frames not in known]
     own.rows[first] += moved
     own.texts.pop(second)
-    text = own.texts[first]
+    into["performers"] = sorted({row.performer for row in own.rows[first]})
+    into["seconds"] = _median_seconds(own, first)
+    into["left_out"] |= gone["left_out"]
+    text = family_recipe.with_merged(
+        own.texts[first],
+        family_recipe.clips_text(len(own.rows[first]), len(into["performers"]), into["seconds"]),
+        _merged_text(gone),
+    )
     found = _propose(own, first, text)
     own.texts[first] = family_recipe.with_proposal(
         text, family_recipe.proposal_lines(found, into["roles"])
     )
     into |= recipe_folder.proposal_facts(found)
     into["clips"] = len(own.rows[first])
-    into["performers"] = sorted({row.performer for row in own.rows[first]})
     gone |= {"status": "merged", "into": first}
+
+
+def _median_seconds(own: ReviewedFolder, number: int) -> float:
+    rates = {file: float(take["rate"]) for file, take in own.facts["takes"].items()}
+    spans = [(row.last_frame - row.first_frame) / rates[row.file] for row in own.rows[number]]
+    return round(statistics.median(spans), 3)
+
+
+def _merged_text(gone: Mapping[str, Any]) -> str:
+    """Return the evidence on a family that is merged into another."""
+    said = f"Family {gone['number']} was merged into it: {gone['clips']} clips"
+    if gone["within"] is None:
+        return f"{said}."
+    return (
+        f"{said}, which differ by {gone['within']:.1%} of all motion; {gone['shared']:.0%} of "
+        "their motion is common."
+    )
 
 
 def _propose(own: ReviewedFolder, number: int, text: str) -> ControlProposal:
