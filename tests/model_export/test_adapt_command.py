@@ -2,6 +2,7 @@
 
 import json
 
+import exported_clips
 import newcomers
 import numpy as np
 import pytest
@@ -193,3 +194,26 @@ def test_a_wrong_unit_is_refused_where_all_controls_are_measured(
         words = (measuring, *clips, "-o", out, *SAID[:3], unit, *SAID[4:])
         assert refused(posefield, "times as long as is usual here", *words) == 4
     assert not out.exists()
+
+
+@pytest.mark.parametrize("ending", ["glb", "usda"])
+def test_clips_of_other_formats_adapt_alike(posefield, adapted, base, table, tmp_path, ending):
+    rows = ["file,speed"]
+    for index, value in enumerate(SHOWN):
+        content = exported_clips.encoded(newcomers.clip("cy", value), ending)
+        (table.parent / f"{index}.{ending}").write_bytes(content)
+        rows.append(f"{index}.{ending},{value:g}")
+    other = table.with_name(f"{ending}.csv")
+    other.write_text("\n".join(rows) + "\n")
+    path = tmp_path / f"{ending}.onnx"
+    assert posefield("adapt", base, "--table", other, "-o", path, *SAID)[0] == 0
+    asked = ClipQuestion(controls={"speed": 4.0}, performer="cy")
+    one, two = (
+        clips.synthesize_clip(Synthesizer("small", session.load(own)), asked).clip.positions()
+        for own in (adapted[0], path)
+    )
+    assert np.abs(one - two).max() < 1e-4
+    # Negative control: another performer moves otherwise.
+    asked = ClipQuestion(controls={"speed": 4.0}, performer="a")
+    other = clips.synthesize_clip(Synthesizer("small", session.load(path)), asked)
+    assert np.abs(other.clip.positions()[-1] - one[-1]).max() > 1e-3

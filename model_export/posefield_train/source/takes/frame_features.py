@@ -49,7 +49,7 @@ class FrameIndex:
     order: Indices
     heights: Floats
 
-    def like(self, wanted: Annotated[Floats, "frames features"]) -> Iterator[tuple[int, int]]:
+    def like(self, wanted: Annotated[Floats, "_ features"]) -> Iterator[tuple[int, int]]:
         """Yield clip and frame of all frames from which on the features may be the wanted ones.
 
         They are compared at CHECKED of the frames that the clip and the wanted ones have.
