@@ -86,7 +86,8 @@ def feet_of(
     """
     own = [FootPath(paths[:, foot], rate) for foot in range(2)]
     if told is None:
-        found = contact_estimates.from_motion(own)
+        # A single pose has no speeds.
+        found = contact_estimates.from_motion(own) if len(paths) > 1 else [[], []]
     else:
         found = [_stances(told, name, rate, len(paths)) for name in names]
     heights = [
@@ -150,14 +151,14 @@ def _correction(apart: RootPath, found: Sequence[Interval], rate: float) -> Root
         change[inside] = apart[inside].mean(axis=0) - apart[inside]
     for before, after in pairwise(found):
         last, first = before.end - 1, after.begin
-        steps = np.arange(1, first - last)[:, None] / (first - last)
+        shares = np.arange(1, first - last)[:, None] / (first - last)
         ends = (change[last], change[first])
         ways = (-(first - last) * slopes[last], -(first - last) * slopes[first])
-        change[last + 1 : first] = _cubic(ends, ways, steps)
+        change[last + 1 : first] = _cubic(ends, ways, shares)
     begin, end = found[0].begin, found[-1].end
     change[:begin] = _settled(change[begin], slopes[begin], np.arange(begin, 0, -1), rate)
-    after = np.arange(1, len(apart) - end + 1)
-    change[end:] = _settled(change[end - 1], -slopes[end - 1], after, rate)
+    steps = np.arange(1, len(apart) - end + 1)
+    change[end:] = _settled(change[end - 1], -slopes[end - 1], steps, rate)
     return change
 
 

@@ -41,6 +41,8 @@ def meet_goals(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> PosedRi
     A hand is moved by its distance from the goal, less before and after it. Out of reach it comes
     near.
     """
+    if not goals:
+        return rig
     rotations = rig.rotations.copy()
     times = np.arange(len(rotations)) / rate
     for role, roles in ARMS.items():

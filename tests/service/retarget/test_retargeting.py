@@ -9,6 +9,7 @@ import rig_files
 from posefield.common.errors import InvalidField
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
+from posefield.question.results import StanceResult
 from posefield.retarget import planted_legs
 from posefield.retarget.retarget_report import HandGoal, RetargetSettings
 from posefield.retarget.retargeting import retarget
@@ -114,6 +115,26 @@ def test_feet_stand_on_other_proportions(figure, onto, kind):
     knee = place(made.clip, "LeftLeg")
     assert np.abs(np.diff(knee, 2, axis=0)).max() < 0.03
     assert np.abs(np.diff(made.clip.root_path, 2, axis=0)).max() < 0.01
+
+
+@pytest.mark.parametrize("frames", [1, 2, 5])
+def test_short_clips_are_retargeted(walk, figure, onto, frames):
+    short = replace(
+        walk, rotations=walk.rotations[:frames], translations=walk.translations[:frames]
+    )
+    made = onto(figure.longer(1.2, *LEGS), clip=short)
+    assert len(made.clip) == frames and np.isfinite(made.clip.rotations).all()
+    assert made.report.penetration <= 0.01
+
+
+def test_told_stances_are_kept(walk, figure, onto):
+    """A foot that is told to stand in frames in which it does not moves as the motion's does."""
+    tall = figure.longer(1.25, *SHINS)
+    told = StanceResult("LeftToeBase", 0.7, 1.0, (0.0, 0.0, 0.0))
+    found = onto(tall, RetargetSettings(stances=[told])).report
+    assert found.skate_source > 0.1 and found.skate == pytest.approx(found.skate_source, rel=0.01)
+    # Without stances there is no skate to measure.
+    assert onto(tall, RetargetSettings(stances=[])).report.skate == 0.0
 
 
 def test_soles_are_lifted_beyond_seven_millimetres():

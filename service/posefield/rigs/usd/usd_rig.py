@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from pxr import UsdGeom, UsdSkel
 
+from posefield.common.units import UpAxis
 from posefield.rigs.joints.rest_joints import OuterTransform, RestJoints
 from posefield.rigs.usd import usd_stage
 from posefield.rigs.usd.skel_joints import SkelJoints
@@ -47,7 +48,7 @@ def read(path: Path, source: str) -> UsdRig:
     sizes = np.stack([joints.decomposed(matrix)[2] for matrix in local])
     outer = OuterTransform(*(part[0] for part in joints.world(np.zeros(1))))
     stage = opened.stage
-    up = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
+    up: UpAxis = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
     unit = float(UsdGeom.GetStageMetersPerUnit(stage))
     rest = RestJoints(source, names, parents, turns, places, sizes, outer, unit, up)
     paths = tuple(str(own) for own in joints.query.GetJointOrder())
