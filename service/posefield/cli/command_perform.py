@@ -126,8 +126,7 @@ def perform(
         typer.echo(as_json(report.document()) if json else report_text(report))
         return
     path = Path(one.output)
-    found = resolve_script(asked, find)
-    answer, content = _performed(found, path, one)
+    answer, content = _performed(resolve_script(asked, find), path, one)
     atomic_files.write(content, path)
     facts = {"file": str(path), **answer.trust.document()}
     typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
