@@ -121,6 +121,7 @@ def performances(ending):
 
 CALLS = {
     ("listModels", None): lambda client, r: client.models(),
+    ("listCharacters", None): lambda client, r: client.characters(),
     ("getLiveness", None): lambda client, r: client.live(),
     ("getReadiness", None): lambda client, r: client.ready(),
     ("getModel", None): lambda client, r: model(client, r).card,
