@@ -239,7 +239,7 @@ describe("a file that is dropped", () => {
 it("names of joints are understood as by the command, in all conventions of its tests", () => {
   const program = `
 import json, skeleton_tables
-from posefield_train.roles import joint_recognition
+from posefield.roles import joint_recognition
 tables = ("development", "held_out", "held_out_later", "held_out_last")
 print(json.dumps([
     [s.names, s.parents, {r: g.joint for r, g in joint_recognition.recognise(s.names, s.parents).items()}]

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.families.body_kinds import STATED, BodyKind
 from posefield_train.probe import recipe_draft
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Proposal
-from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.source.topology import common_topology, role_joints
 from posefield_train.source.topology.role_joints import RoleJoints, TopologyError
 
