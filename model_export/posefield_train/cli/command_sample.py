@@ -24,6 +24,29 @@ MOST_CLIPS = 20_000
 
 
 @dataclass(frozen=True)
+class NoiseFreeMotion:
+    """Noise-free motion in place of a family: whether, at which controls and which frame rate."""
+
+    truth: Annotated[
+        bool,
+        typer.Option(
+            "--truth",
+            help="write the noise-free motion of reaching at the controls of --control",
+        ),
+    ] = False
+    control: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--control",
+            "-c",
+            help="with --truth: value of a control; all are needed; may be repeated",
+            metavar="NAME=VALUE",
+        ),
+    ] = None
+    fps: Annotated[float, typer.Option(help="frame rate with --truth, frames a second")] = 120.0
+
+
+@dataclass(frozen=True)
 class FamilySize:
     """Size of the family of reaching: number of clips, and seed of their noise."""
 
@@ -53,24 +76,8 @@ def sample(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="output folder; with --truth, output file")
     ],
+    true: NoiseFreeMotion,
     size: FamilySize,
-    truth: Annotated[
-        bool,
-        typer.Option(
-            "--truth",
-            help="write the noise-free motion of reaching at the controls of --control",
-        ),
-    ] = False,
-    control: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--control",
-            "-c",
-            help="with --truth: value of a control; all are needed; may be repeated",
-            metavar="NAME=VALUE",
-        ),
-    ] = None,
-    fps: Annotated[float, typer.Option(help="frame rate with --truth, frames a second")] = 120.0,
     json: Json = False,
 ) -> None:
     """Write a procedural family of motions, or its noise-free motion.
@@ -86,8 +93,8 @@ def sample(
         raise InvalidField(
             "family", f"{family!r}{did_you_mean(family, WRITERS)}, expected one of {known}"
         )
-    _check_options(family, truth, size.given)
-    if not truth:
+    _check_options(family, true.truth, size.given)
+    if not true.truth:
         reaching = family == "reaching"
         path = (
             _write_reaching(output, size.clips, size.seed) if reaching else WRITERS[family](output)
@@ -97,8 +104,8 @@ def sample(
         )
         return
     encode = encoder_for(output).encode
-    controls = parse_controls(control or [])
-    clip = truths.truth_clip(controls, fps)
+    controls = parse_controls(true.control or [])
+    clip = truths.truth_clip(controls, true.fps)
     answer = ClipAnswer(clip, Trust("reaching@truth", controls, clip.duration, 0.0, ()))
     atomic_files.write(encode(answer), output)
     typer.echo(written_message(output, answer, json))
