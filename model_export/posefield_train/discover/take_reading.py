@@ -222,7 +222,7 @@ def _of_one_unit(bodies: Sequence[Body], refused: dict[str, str]) -> list[Body]:
     kinds: dict[tuple[str, ...], list[Body]] = {}
     for body in bodies:
         kinds.setdefault(body.joints, []).append(body)
-    kept = set()
+    kept = set[str]()
     for alike in kinds.values():
         groups = _groups_of_legs(alike)
         usual = max(groups, key=len)
