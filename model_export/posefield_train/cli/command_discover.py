@@ -152,8 +152,8 @@ def _write_recipes(
     found = recipe_folder.offer(listed, folder, wanted.licence, files)
     facts = recipe_folder.summary(found, folder, read, kinds, wanted.candidates)
     page = contact_sheet.render(found, read.takes, output.as_posix(), read.refused)
-    files = recipe_folder.contents(found, facts) | {recipe_folder.PAGE: page}
-    recipe_folder.write(files, output, replaced)
+    written = recipe_folder.contents(found, facts) | {recipe_folder.PAGE: page}
+    recipe_folder.write(written, output, replaced)
     if json:
         typer.echo(as_json(facts))
     else:
