@@ -92,11 +92,12 @@ def ingest(
     wholes.clear()
     clips, lasts = [clip for clip, _ in cuts], [last for _, last in cuts]
     cuts.clear()
-    clips, said = _on_one_topology(recipe, rows, clips)
+    shared, said = _on_one_topology(recipe, rows, clips)
     notes += said
     clips = [
-        clip_joints.drop_joints(clip, recipe, row) for clip, row in zip(clips, rows, strict=True)
+        clip_joints.drop_joints(clip, recipe, row) for clip, row in zip(shared, rows, strict=True)
     ]
+    del shared
     clip_joints.expect_same_skeleton(rows, clips)
     rigged = _normalize_rigs(recipe, rows, clips)
     clips, facing = list(rigged.clips), rigged.facing
