@@ -12,6 +12,7 @@ const HEAD =
 
 /** Documents whose keys are looked at before they are taken for what they should be. */
 const LOOKED_AT = [
+  "CharacterList",
   "ManifestEntry",
   "ModelCard",
   "ModelList",

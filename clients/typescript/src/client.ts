@@ -21,6 +21,7 @@ import { type Script, scriptQuestion } from "./scripts.ts";
 import { streamed } from "./streams.ts";
 import type {
   Archive,
+  CharacterList,
   ClipFormat,
   ClipQuestion,
   CrowdFormat,
@@ -81,6 +82,11 @@ export class Client {
 
   async models(signal?: AbortSignal): Promise<readonly ModelSummary[]> {
     return this.#read(get("/v1/models"), (found) => read("ModelList", found).models, signal);
+  }
+
+  /** Characters of users, to which motions are delivered, and files that cannot be used. */
+  async characters(signal?: AbortSignal): Promise<CharacterList> {
+    return this.#read(get("/v1/characters"), (found) => read("CharacterList", found), signal);
   }
 
   async card(model: string, signal?: AbortSignal): Promise<ModelCard> {

@@ -25,6 +25,7 @@ export type {
   ActSegment,
   Archive,
   ArchiveFormat,
+  CharacterList,
   ClipFormat,
   ClipQuestion,
   CrowdFormat,

@@ -4921,6 +4921,10 @@ export const CONTRACT = "4.3.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
+  "CharacterList": [
+    "characters",
+    "faults"
+  ],
   "ManifestEntry": [
     "name",
     "file",
@@ -5042,6 +5046,10 @@ export const REQUIRED = {
 
 /** Which of them are lists. */
 export const LISTS = {
+  "CharacterList": [
+    "characters",
+    "faults"
+  ],
   "ManifestEntry": [
     "warnings"
   ],

@@ -8,6 +8,7 @@ export type ManifestEntry = Schemas["ManifestEntry"];
 /** Something that a motion was held to, and by how much it misses it. */
 export type Met = Schemas["Met"];
 export type ModelCard = Schemas["ModelCard"];
+export type CharacterList = Schemas["CharacterList"];
 export type ModelSummary = Schemas["ModelSummary"];
 /** Timeline, joins and warnings of a performance. */
 export type PerformanceReport = Schemas["PerformanceReport"];

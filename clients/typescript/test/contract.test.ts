@@ -85,6 +85,7 @@ const PAGE = "a page, for browsers";
 
 const ASKED: Record<string, Ask | string | ByFormat> = {
   listModels: async (client) => ({ models: await client.models() }),
+  listCharacters: (client) => client.characters(),
   getModel: (client, model) => client.card(model),
   getCharacter: (client, model) => client.character(model),
   getPose: NEGOTIATED,
@@ -177,7 +178,9 @@ for (const [operation, format, ask] of CASES) {
 
 /** Whether the client's answer is the service's document. */
 function isSame(operation: string): boolean {
-  return /Why|Sigma|queryPerformance$|listModels|getModel|getReadiness/.test(operation);
+  return /Why|Sigma|queryPerformance$|listModels|listCharacters|getModel|getReadiness/.test(
+    operation,
+  );
 }
 
 function modelOf(path: string): string {
