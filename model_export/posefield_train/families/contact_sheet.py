@@ -12,8 +12,15 @@ from posefield_train.families.clip_sticks import StickStrip
 from posefield_train.families.family_table import FamilyRow
 from posefield_train.families.recipe_folder import FoundFamilies, OfferedFamily
 
+NO_BREAK = "\N{NO-BREAK SPACE}"
 BEST, WORST = 5, 3
-"""Clips that are shown: those most like the example, and those least like it."""
+"""Clips that are shown: those most like the example, and those least like it; of strides, which are
+like none, the first and the last."""
+HEADINGS = {
+    "motions": ("Most like the example", "Least like the example"),
+    "strides": ("First strides", "Last strides"),
+}
+"""Headings of these clips by the kind of the family."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +35,14 @@ class ShownClip:
 
 @dataclass(frozen=True)
 class ShownFamily:
-    """A row of the page. facts: names and values in text."""
+    """A row of the page. headings: of best and worst clips. facts: names and values in text."""
 
     number: int
     title: str
     example: StickStrip
     best: tuple[ShownClip, ...]
     worst: tuple[ShownClip, ...]
+    headings: tuple[str, str]
     facts: tuple[tuple[str, str], ...]
 
 
@@ -74,10 +82,11 @@ def _shown(one: OfferedFamily, takes: Mapping[str, Take]) -> ShownFamily:
     example = one.family.example or rows[0]
     return ShownFamily(
         one.number,
-        one.facts.description,
+        f"{len(rows)} {one.family.kind}",
         clip_sticks.draw(takes[example.file], example.first_frame, example.last_frame),
         tuple(_clip(one.number, row, takes) for row in best),
         tuple(_clip(one.number, row, takes) for row in worst),
+        HEADINGS[one.family.kind],
         _facts(one),
     )
 
@@ -87,7 +96,7 @@ def _clip(number: int, row: FamilyRow, takes: Mapping[str, Take]) -> ShownClip:
     start, end = row.first_frame / take.rate, row.last_frame / take.rate
     return ShownClip(
         f"{number}:{row.file}@{0.5 * (start + end):.2f}",
-        f"{row.file}, {start:.1f} to {end:.1f} s",
+        f"{row.file}, {start:.1f} to {end:.1f}{NO_BREAK}s",
         row.cost,
         clip_sticks.draw(take, row.first_frame, row.last_frame),
     )
@@ -98,7 +107,6 @@ def _facts(one: OfferedFamily) -> tuple[tuple[str, str], ...]:
     names = ", ".join(family_recipe.control_name(own) for own in proposal.controls)
     said = f"explain {1.0 - proposal.remaining[-1]:.0%} of the variance of takes left out"
     facts = [
-        ("Clips", str(len(family.rows))),
         ("Performers", ", ".join(sorted({row.performer for row in family.rows}))),
         ("Duration", f"{family.seconds:.1f} s in the median"),
         ("What varies", f"{names}, which {said}"),
