@@ -99,6 +99,14 @@ def stage_positions(path, frame):
     return tuple(unit * _y_up(found, up) for found in (np.array(joints)[:, 3, :3], points))
 
 
+def stage_joints(path):
+    """Return the names of the joints of a stage's skeleton."""
+    stage = Usd.Stage.Open(str(path))
+    prim = next(prim for prim in stage.Traverse() if prim.IsA(UsdSkel.Skeleton))
+    tokens = UsdSkel.Skeleton(prim).GetJointsAttr().Get()
+    return [token.rpartition("/")[2] for token in tokens]
+
+
 def _skinned_points(cache, root, query, world, frame):
     found = [np.zeros((0, 3))]
     transforms = query.ComputeSkinningTransforms(frame)

@@ -4,12 +4,12 @@ import html
 import json
 import re
 import shutil
-import subprocess
 
 import discover_takes
 import numpy as np
 import pytest
 import rigid_takes
+from decided_page import decide
 
 from posefield_train.families import clip_sticks, decisions
 
@@ -62,36 +62,23 @@ def test_clips_of_the_page_are_those_that_review_drops(posefield, page, tmp_path
 
 
 CLICKS = """
-<script>
 const one = document.querySelector("input[value=accept]");
 one.focus(); one.click();
 document.querySelector("#family-1 input[name=drop]").click();
 const select = document.querySelector("#family-2 select");
 select.value = "1"; select.dispatchEvent(new Event("change", { bubbles: true }));
-document.title = JSON.stringify(decisions());
-</script>
 """
 
 
 @pytest.mark.system
 def test_choices_become_decisions_and_their_command(page, tmp_path):
-    browser = shutil.which("chromium")
-    if browser is None:
-        pytest.skip("no chromium")
-    clicked = tmp_path / "clicked.html"
-    clicked.write_text(page.read_text().replace("</body>", f"{CLICKS}</body>"))
-    options = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}/b")
-    done = subprocess.run(
-        [browser, *options, "--dump-dom", clicked.as_uri()], capture_output=True, timeout=120
-    )
-    found = done.stdout.decode()
-    title = html.unescape(re.search(r"<title>(.*?)</title>", found)[1])
-    (tmp_path / "decisions.json").write_text(title)
+    decided = decide(page, CLICKS, tmp_path)
+    (tmp_path / "decisions.json").write_text(decided.saved)
     read = decisions.read(tmp_path / "decisions.json")
     assert (read.accept, read.reject, read.merge) == ((1,), (), ((1, 2),)) and len(read.drop) == 1
-    said = html.unescape(re.search(r"<output[^>]*>(.*?)</output>", found)[1])
-    wanted = f"posefield review {page.parent} --accept 1 --merge 1,2 --drop {read.drop[0].family}:"
-    assert said.startswith(wanted)
+    words = ["posefield", "review", str(page.parent), "--accept", "1", "--merge", "1,2", "--drop"]
+    assert decided.command[:-1] == words
+    assert decided.command[-1].startswith(f"{read.drop[0].family}:")
 
 
 def test_figures_keep_the_proportions_of_the_body():
