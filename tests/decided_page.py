@@ -11,13 +11,16 @@ import pytest
 
 SAVE = """
 <script>
-URL.createObjectURL = (blob) => { blob.text().then((text) => { document.title = text; }); return "#"; };
+URL.createObjectURL = (blob) => {
+  blob.text().then((text) => { document.title = text; });
+  return "#";
+};
 HTMLAnchorElement.prototype.click = () => {};
 CLICKS
 document.getElementById("save").click();
 </script>
 """
-"""The button saves to the title instead of a file, which a browser without a window does not write."""
+"""The button saves to the title: a browser without a window writes no file."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,8 @@ def decide(page, clicks, folder):
     if browser is None:
         pytest.skip("no chromium")
     clicked = folder / "clicked.html"
-    clicked.write_text(
-        page.read_text().replace("</body>", SAVE.replace("CLICKS", clicks) + "</body>")
-    )
+    script = SAVE.replace("CLICKS", clicks)
+    clicked.write_text(page.read_text().replace("</body>", f"{script}</body>"))
     options = ("--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=5000")
     words = [browser, *options, f"--user-data-dir={folder}/browser", "--dump-dom", clicked.as_uri()]
     done = subprocess.run(words, capture_output=True, timeout=120, check=True)

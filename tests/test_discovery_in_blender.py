@@ -20,7 +20,7 @@ pytestmark = pytest.mark.system
 ROOT = Path(__file__).parents[1]
 BLENDER = ROOT / ".venv-blender/bin/python"
 TAKES = {"hdm05_long": "*_0.bvh", "cmu_walk": "p[0134]*_walking_*_t*.bvh"}
-"""Takes of each data set that are searched: the first of each performer, and a part of the walks."""
+"""Takes of each data set that are searched: of each performer the first, and some walks."""
 FURTHEST = 1e-4
 """Largest distance of a joint in Blender from its place by UsdSkel, m."""
 

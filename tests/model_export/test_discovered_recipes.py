@@ -21,26 +21,6 @@ LICENCE = ("--licence", "CC BY 4.0, by us")
 FEW = ("--candidates", "60")
 
 
-@pytest.fixture(scope="module")
-def takes(tmp_path_factory):
-    return rigid_takes.write_takes(tmp_path_factory.mktemp("takes"))
-
-
-@pytest.fixture(scope="module")
-def made_once(tmp_path_factory):
-    return tmp_path_factory.mktemp("made") / "recipes"
-
-
-@pytest.fixture
-def made(posefield, takes, made_once, tmp_path):
-    """A folder of recipes with a stated licence."""
-    if not made_once.exists():
-        code, out, err = posefield("discover", takes, "-o", made_once, *LICENCE, *FEW)
-        assert code == 0, err
-        assert "families of 4 takes" in out
-    return shutil.copytree(made_once, tmp_path / "recipes")
-
-
 def test_families_become_recipes_that_train_reads(made, takes):
     facts = json.loads((made / "discover.json").read_text())
     assert len(facts["families"]) >= 2 and set(facts["takes"]) == {p.name for p in takes.iterdir()}

@@ -9,26 +9,6 @@ import rigid_takes
 from posefield_train.families import family_table
 from posefield_train.source import recipe
 
-WORDS = ("--licence", "CC BY 4.0, by us", "--candidates", "60")
-
-
-@pytest.fixture(scope="module")
-def takes(tmp_path_factory):
-    return rigid_takes.write_takes(tmp_path_factory.mktemp("takes"))
-
-
-@pytest.fixture(scope="module")
-def made_once(tmp_path_factory):
-    return tmp_path_factory.mktemp("made") / "recipes"
-
-
-@pytest.fixture
-def made(posefield, takes, made_once, tmp_path):
-    """A folder of two or more found families."""
-    if not made_once.exists():
-        assert posefield("discover", takes, "-o", made_once, *WORDS)[0] == 0
-    return shutil.copytree(made_once, tmp_path / "recipes")
-
 
 def content(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
