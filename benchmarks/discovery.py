@@ -5,13 +5,13 @@ action, with half of their time in common at least.
 """
 
 import argparse
-import csv
 import sys
 import time
 from collections import Counter, defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 
+import hand_cuts
 import numpy as np
 from rows import Row, record, table
 
@@ -26,14 +26,8 @@ from posefield_train.discover.joined_features import Span
 ROOT = Path(__file__).resolve().parents[1]
 ACCEPTED, REJECTED = 3, 2
 """Matches that a person accepts and rejects in the first list."""
-SAME_STRIDE, SAME_MOTION = 0.8, 0.5
-"""Least common time of a found clip and a cut, as a share of the time of either."""
-
-
-def records(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a CSV table."""
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
+SAME_STRIDE = 0.8
+"""Least common time of a found stride and a cut, as a share of the time of both together."""
 
 
 def strides(folder: Path) -> list[Row]:
@@ -42,7 +36,7 @@ def strides(folder: Path) -> list[Row]:
         take.file: [one for one in stride_detection.find_strides(take) if one.travels]
         for take in take_reading.read_takes(folder).takes
     }
-    cuts = records(folder / "strides.csv")
+    cuts = hand_cuts.records(folder / "strides.csv")
     apart = []
     for row in cuts:
         first, last = int(row["start_frame"]), int(row["end_frame"])
@@ -74,26 +68,23 @@ def examples(folder: Path) -> list[Row]:
     takes = take_reading.read_takes(folder / "bvh").takes
     corpus = motion_features.build_corpus(takes)
     reading = time.process_time() - begin
-    files = [take.file for take in takes]
-    truth = []
-    for row in records(folder / "truth.csv"):
-        take = files.index(row["file"])
-        first, last = (int(row[name]) / takes[take].rate for name in ("first_frame", "last_frame"))
-        truth.append((row["action"], Span(take, first, last)))
+    truth = [(cut.action, cut.span) for cut in hand_cuts.read(folder, takes)]
     begin = time.process_time()
     precisions = defaultdict(list)
     rounds: dict[str, list[float]] = {"first": [], "least sure": []}
     for action, example in truth:
         others = [span for own, span in truth if own == action and span != example]
         found = _spans(example_search.find_like(corpus, [example], len(others)))
-        right = [one for one in found if _is_right(one, others)]
+        right = [one for one in found if hand_cuts.is_right(one, others)]
         precisions[action].append(len(right) / len(others))
         wrong = [one for one in found if one not in right][:REJECTED]
         for name, accepted in (("first", right[:ACCEPTED]), ("least sure", right[-ACCEPTED:])):
             most = len(others) - len(accepted)
             again = example_search.find_like(corpus, [example, *accepted], most, wrong)
             several = [*accepted, *_spans(again)]
-            rounds[name].append(sum(_is_right(one, others) for one in several) / len(others))
+            rounds[name].append(
+                sum(hand_cuts.is_right(one, others) for one in several) / len(others)
+            )
     spent = time.process_time() - begin
     every = [each for own in precisions.values() for each in own]
     worst = min(precisions, key=lambda action: np.mean(precisions[action]))
@@ -121,17 +112,6 @@ def _missed(precisions: Sequence[float]) -> float:
 
 def _spans(matches: Sequence[example_search.Match]) -> list[Span]:
     return [match.span for match in matches]
-
-
-def _is_right(found: Span, cuts: Sequence[Span]) -> bool:
-    return any(_shared(found, cut) >= SAME_MOTION for cut in cuts)
-
-
-def _shared(one: Span, other: Span) -> float:
-    if one.take != other.take:
-        return 0.0
-    common = min(one.end, other.end) - max(one.start, other.start)
-    return common / (max(one.end, other.end) - min(one.start, other.start))
 
 
 def main(arguments: Sequence[str]) -> None:

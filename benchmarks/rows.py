@@ -49,12 +49,16 @@ def write(rows: list[Row], path: Path) -> None:
 
 def record(tables: Mapping[str, list[Row]], command: str, folder: Path) -> None:
     """Write the rows of tables of the documentation, a file NAME.json each, with their origin."""
-    machine = f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}"
-    day = f"{datetime.now(UTC):%Y-%m-%d}"
     for name, rows in tables.items():
-        found = {"command": command, "date": day, "machine": machine, "rows": _plain(rows)}
+        found = {**origin(command), "rows": _plain(rows)}
         text = json.dumps(found, indent=1, ensure_ascii=False)
         (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+
+
+def origin(command: str) -> dict[str, str]:
+    """Return the command, the date and the machine of figures that are measured now."""
+    machine = f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}"
+    return {"command": command, "date": f"{datetime.now(UTC):%Y-%m-%d}", "machine": machine}
 
 
 def _plain(rows: list[Row]) -> list[dict[str, object]]:
