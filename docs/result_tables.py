@@ -5,6 +5,7 @@ from itertools import chain
 
 import equal_tables
 import evaluation_tables as tables
+import found_tables
 import measured_tables
 import performed_tables
 import take_tables
@@ -63,6 +64,9 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "joins": lambda: (performed_tables.COLUMNS, performed_tables.joins()),
     "discovered": lambda: (performed_tables.COLUMNS, performed_tables.discovered()),
     "scaled": lambda: (performed_tables.COLUMNS, performed_tables.scaled()),
+    "found_families": lambda: (found_tables.FAMILY_COLUMNS, found_tables.families()),
+    "found_models": lambda: (found_tables.MODEL_COLUMNS, found_tables.models()),
+    "roles": lambda: (found_tables.ROLE_COLUMNS, found_tables.roles()),
     **{
         name: lambda name=name: (measured_tables.SPEED_COLUMNS, measured_tables.speed(name))
         for name in SPEED
@@ -74,10 +78,24 @@ REMARKS: dict[str, Callable[[], str]] = {
     "equal_known": lambda: equal_tables.counts("known"),
     "equal_open": lambda: equal_tables.counts("open"),
     "learning": measured_tables.learning_remark,
+    "found_families": found_tables.families_remark,
+    "roles": found_tables.roles_remark,
 }
 """A sentence made of the rows of a table, for some of them."""
 
-ORIGINS: dict[str, str] = {"recipes": "models", "levels": "models", "learning": "learning"} | {
-    name: name for name in (*SPEED, "performed", "joins", "discovered", "scaled")
+OWN_FILES = (
+    *SPEED,
+    "performed",
+    "joins",
+    "discovered",
+    "found_families",
+    "roles",
+    "learning",
+    "scaled",
+)
+ORIGINS: dict[str, str] = {name: name for name in OWN_FILES} | {
+    "recipes": "models",
+    "levels": "models",
+    "found_models": "found_families",
 }
 """File of docs/results that names the command and the date of a table's figures."""

@@ -1,0 +1,145 @@
+"""Families that `posefield discover` offers, against the cuts of long takes by hand.
+
+The action of a family is that of most of its clips. A clip is right if it has half of its time in
+common with a cut of the family's action. Strides are no action of these takes and are left out.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import hand_cuts
+import numpy as np
+from hand_cuts import HandCut
+
+from posefield_train.discover import take_reading
+from posefield_train.discover.joined_features import Span
+from posefield_train.discover.take_reading import Take
+from posefield_train.families import family_table
+from posefield_train.families.family_table import FamilyRow
+
+COMMAND = Path(sys.executable).with_name("posefield")
+LICENCE = "CC BY-SA 3.0, HDM05 (Universit\u00e4t Bonn)"
+Found = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class JudgedFamily:
+    """An offered family. recipe: its file. action: of most of its clips. pairs: each right clip
+    with its cut."""
+
+    recipe: Path
+    rows: tuple[FamilyRow, ...]
+    action: str
+    pairs: tuple[tuple[Span, HandCut], ...]
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """Families of takes with their cuts. performers: by file, as they were told. seconds: processor
+    time of the command."""
+
+    takes: tuple[Take, ...]
+    cuts: tuple[HandCut, ...]
+    families: tuple[JudgedFamily, ...]
+    performers: dict[str, str]
+    seconds: float
+
+
+def discover(folder: Path, made: Path) -> Discovery:
+    """Return the families of hdm05_long. made: folder for the recipes."""
+    before = _seconds()
+    words = [COMMAND, "discover", folder / "bvh", "-o", made, "--licence", LICENCE]
+    subprocess.run(words, check=True, capture_output=True)
+    seconds = _seconds() - before
+    takes = take_reading.read_takes(folder / "bvh").takes
+    cuts = hand_cuts.read(folder, takes)
+    facts = json.loads((made / "discover.json").read_text(encoding="utf-8"))
+    names = [one["number"] for one in facts["families"] if one["kind"] == "motions"]
+    paths = [made / f"family_{number:02d}.toml" for number in names]
+    families = [judge(path, takes, cuts) for path in paths]
+    performers = {file: own["performer"] for file, own in facts["takes"].items()}
+    return Discovery(tuple(takes), tuple(cuts), tuple(families), performers, seconds)
+
+
+def _seconds() -> float:
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def judge(recipe: Path, takes: Sequence[Take], cuts: Sequence[HandCut]) -> JudgedFamily:
+    """Return an offered family with its action and its right clips."""
+    files = {take.file: (at, take.rate) for at, take in enumerate(takes)}
+    rows = family_table.read(recipe.with_suffix(".csv"))
+    spans = []
+    for row in rows:
+        at, rate = files[row.file]
+        spans.append(Span(at, row.first_frame / rate, row.last_frame / rate))
+    own = [hand_cuts.same_cuts(span, cuts) for span in spans]
+    counted = Counter(cut.action for found in own for cut in found)
+    action = counted.most_common(1)[0][0] if counted else ""
+    pairs = [
+        (span, cut)
+        for span, found in zip(spans, own, strict=True)
+        for cut in found
+        if cut.action == action
+    ]
+    return JudgedFamily(recipe, tuple(rows), action, tuple(pairs))
+
+
+def document(found: Discovery) -> Found:
+    """Return counts by action and in all, distances of the ends, and the processor time."""
+    actions = sorted({cut.action for cut in found.cuts})
+    return {
+        "minutes": sum((len(take) - 1) / take.rate for take in found.takes) / 60.0,
+        "seconds": found.seconds,
+        "performers": len(set(found.performers.values())),
+        "actions": [{"action": action, **_counts_of(found, action)} for action in actions],
+        "all": counts(found.families, found.cuts),
+        "ends": ends(found.families),
+    }
+
+
+def _counts_of(found: Discovery, action: str) -> dict[str, int]:
+    return counts(
+        [one for one in found.families if one.action == action],
+        [cut for cut in found.cuts if cut.action == action],
+    )
+
+
+def counts(families: Sequence[JudgedFamily], cuts: Sequence[HandCut]) -> dict[str, int]:
+    """Return the numbers of families, of their clips, of the right ones, of cuts, of found cuts."""
+    return {
+        "families": len(families),
+        "clips": sum(len(one.rows) for one in families),
+        "right": sum(len({span for span, _ in one.pairs}) for one in families),
+        "cuts": len(cuts),
+        "found": len({cut for one in families for _, cut in one.pairs}),
+    }
+
+
+def ends(families: Sequence[JudgedFamily]) -> dict[str, float]:
+    """Return how far first and last frames of clips lie from those of their cuts, s.
+
+    convention: without the median of each family, since a person begins and ends the clips of an
+    action where they choose to.
+    """
+    signed = [
+        np.array([(one.start - cut.span.start, one.end - cut.span.end) for one, cut in own.pairs])
+        for own in families
+        if own.pairs
+    ]
+    every = np.abs(np.concatenate(signed))
+    rest = np.abs(np.concatenate([each - np.median(each, axis=0) for each in signed]))
+    return {
+        "median": float(np.median(every)),
+        "p90": float(np.percentile(every, 90)),
+        "convention_median": float(np.median(rest)),
+        "convention_p90": float(np.percentile(rest, 90)),
+    }

@@ -1,0 +1,117 @@
+"""Families that are found in hdm05_long, and their models against models of clips cut by hand.
+
+Both models have the recipe of the found family. Each is trained without one performer and asked
+for all clips of that performer as they were cut by hand.
+"""
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import discovered_families
+import numpy as np
+from discovered_families import Discovery, JudgedFamily
+from rows import origin
+
+from posefield_train.evaluate import compared_motion, methods, motion_errors
+from posefield_train.evaluate.methods import Queries
+from posefield_train.families import family_recipe, family_table
+from posefield_train.families.family_table import FamilyRow
+from posefield_train.source import ingest, recipe
+from posefield_train.source.ingest import Example
+from posefield_train.source.recipe import Recipe
+from posefield_train.train import train
+
+RESULTS = Path(__file__).resolve().parents[1] / "docs/results/found_families.json"
+ACTIONS = ("grabHighR", "depositFloorR", "kickLFront1Reps")
+
+
+def compare(found: Discovery, data: Path) -> list[dict[str, Any]]:
+    """Return the errors of models of each action, cm. data: folder of the takes."""
+    return [_compare(found, action, data) for action in ACTIONS]
+
+
+def _compare(found: Discovery, action: str, data: Path) -> dict[str, Any]:
+    own = [one for one in found.families if one.action == action]
+    family = max(own, key=lambda one: len(one.pairs))
+    by_hand = [
+        FamilyRow(cut.file, *cut.frames, found.performers[cut.file], Path(cut.file).stem)
+        for cut in found.cuts
+        if cut.action == action
+    ]
+    told, automatic = _read(family, family.rows, data)
+    _, manual = _read(family, by_hand, data)
+    errors: dict[str, list[tuple[float, float]]] = {"found": [], "by_hand": []}
+    for performer in sorted({one.row.performer for one in manual}):
+        held = [one for one in manual if one.row.performer == performer]
+        for name, examples in (("found", automatic), ("by_hand", manual)):
+            rest = [one for one in examples if one.row.performer != performer]
+            errors[name] += _errors(told, rest, held)
+    return {
+        "action": action,
+        "clips": {"found": len(automatic), "by_hand": len(manual)},
+        "relative_cm": {name: 100.0 * _mean(own, 0) for name, own in errors.items()},
+        "absolute_rms_cm": {name: 100.0 * _rms(own, 1) for name, own in errors.items()},
+    }
+
+
+def _mean(errors: Sequence[tuple[float, float]], column: int) -> float:
+    return float(np.mean(np.array(errors)[:, column]))
+
+
+def _rms(errors: Sequence[tuple[float, float]], column: int) -> float:
+    return float(np.sqrt(np.mean(np.square(np.array(errors)[:, column]))))
+
+
+def _read(
+    family: JudgedFamily, rows: Sequence[FamilyRow], data: Path
+) -> tuple[Recipe, list[Example]]:
+    """Return the recipe of a family and the examples of a table's rows."""
+    text = family_recipe.with_accepted(family.recipe.read_text(encoding="utf-8"), True)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / family.recipe.name
+        path.write_text(text, encoding="utf-8")
+        path.with_suffix(".csv").write_bytes(family_table.table(rows))
+        own = recipe.read(path)
+        examples, _ = ingest.ingest(own, data)
+    return own, list(examples)
+
+
+def _errors(
+    told: Recipe, rest: Sequence[Example], held: Sequence[Example]
+) -> list[tuple[float, float]]:
+    """Return the relative mean and the absolute root mean square of each held-out clip, m."""
+    trained = train(told, rest, lambda _: None)
+    asked = Queries(np.stack([one.controls for one in held]), [{}] * len(held))
+    made = methods.predict_posefield(told, trained, asked)
+    found = []
+    for one, answer in zip(held, made, strict=True):
+        captured = compared_motion.motion_of_clip(one.captured or one.clip, None)
+        errors = motion_errors.compare_motions(answer, captured, ())
+        found.append((errors.relative.mean, errors.absolute.rms))
+    return found
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the figures; write them where the documentation reads them if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path, help="folder hdm05_long, unpacked")
+    parser.add_argument("--record", action="store_true")
+    given = parser.parse_args(arguments)
+    with tempfile.TemporaryDirectory() as made:
+        found = discovered_families.discover(given.folder, Path(made))
+        models = compare(found, given.folder / "bvh")
+        families = discovered_families.document(found)
+    own = origin("python benchmarks/found_models.py HDM05_LONG --record")
+    text = json.dumps({**own, "families": families, "models": models}, indent=1)
+    print(text)
+    if given.record:
+        RESULTS.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
