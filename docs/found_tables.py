@@ -1,6 +1,7 @@
 """Tables of families that are found in long takes, of their models, and of roles of joints.
 
-`found_families.json` is written by benchmarks/found_models.py, `roles.json` by benchmarks/roles.py.
+`found_families.json` is written by benchmarks/found_models.py, `proposed_controls.json` by
+benchmarks/proposed_controls.py, `roles.json` by benchmarks/roles.py.
 """
 
 from typing import Any
@@ -26,6 +27,15 @@ ENDS = (0.10, 0.30)
 """Median and 90th percentile, s, of the distance of ends, without the convention of each family."""
 SECONDS_PER_MINUTE = 60.0 / 12.0
 """Processor time for a minute of takes."""
+CONTROL_COLUMNS = [
+    "recipe",
+    "controls by hand",
+    "not proposed",
+    "variance that remains with the proposed ones",
+    "with those by hand",
+]
+INCLUDED = (4, 6)
+"""Recipes whose controls must be among those proposed, and for which that is wished."""
 ROLE_COLUMNS = ["conventions", "roles", "right", "asked", "wrong", "right in the first run", "must"]
 RIGHT_ROLES = 0.95
 SETS = {
@@ -87,6 +97,29 @@ def models() -> Rows:
             f"{MOST_WORSE:+g} %, {_verdict(more <= MOST_WORSE)}",
             f"{travel['found']:.2f}, {travel['by_hand']:.2f}",
         ]
+
+
+def controls() -> Rows:
+    """Yield the controls of shipped recipes, and those that are not among the proposed ones."""
+    for own in measured_tables.read("proposed_controls")["recipes"]:
+        yield [
+            f"`{own['recipe']}`",
+            ", ".join(own["by_hand"]),
+            ", ".join(own["lacking"]) or "none",
+            *(f"{100.0 * own[key]:.0f} %" for key in ("remaining", "remaining_by_hand")),
+        ]
+
+
+def controls_remark() -> str:
+    """Return a sentence on the number of recipes whose controls are all proposed."""
+    found = measured_tables.read("proposed_controls")["recipes"]
+    count = sum(not own["lacking"] for own in found)
+    alike = sum(own["remaining"] <= own["remaining_by_hand"] for own in found)
+    must, wish = (f"{limit}, {_verdict(count >= limit)}" for limit in INCLUDED)
+    return (
+        f"All controls by hand are proposed for {count} of {len(found)} recipes (must {must}; wish "
+        f"{wish}); the proposed ones explain as much for {alike}."
+    )
 
 
 def roles() -> Rows:

@@ -66,6 +66,7 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "scaled": lambda: (performed_tables.COLUMNS, performed_tables.scaled()),
     "found_families": lambda: (found_tables.FAMILY_COLUMNS, found_tables.families()),
     "found_models": lambda: (found_tables.MODEL_COLUMNS, found_tables.models()),
+    "proposed_controls": lambda: (found_tables.CONTROL_COLUMNS, found_tables.controls()),
     "roles": lambda: (found_tables.ROLE_COLUMNS, found_tables.roles()),
     **{
         name: lambda name=name: (measured_tables.SPEED_COLUMNS, measured_tables.speed(name))
@@ -79,20 +80,13 @@ REMARKS: dict[str, Callable[[], str]] = {
     "equal_open": lambda: equal_tables.counts("open"),
     "learning": measured_tables.learning_remark,
     "found_families": found_tables.families_remark,
+    "proposed_controls": found_tables.controls_remark,
     "roles": found_tables.roles_remark,
 }
 """A sentence made of the rows of a table, for some of them."""
 
-OWN_FILES = (
-    *SPEED,
-    "performed",
-    "joins",
-    "discovered",
-    "found_families",
-    "roles",
-    "learning",
-    "scaled",
-)
+DISCOVERY = ("discovered", "found_families", "proposed_controls", "roles")
+OWN_FILES = (*SPEED, *DISCOVERY, "performed", "joins", "learning", "scaled")
 ORIGINS: dict[str, str] = {name: name for name in OWN_FILES} | {
     "recipes": "models",
     "levels": "models",

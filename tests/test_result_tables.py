@@ -282,3 +282,18 @@ def test_families_and_their_models_have_verdicts(tmp_path, monkeypatch):
     assert "takes 70 s of processor time for 12.0 minutes of takes (must 60 s, **missed**)" in said
     (row,) = found_tables.models()
     assert row[2:6] == ["8.80", "8.00", "+10.0 %", "+5 %, **missed**"]
+
+
+def test_controls_that_are_not_proposed_are_named_and_counted(tmp_path, monkeypatch):
+    kept = {"recipe": "kick", "by_hand": ["a", "b"], "lacking": []}
+    lost = {"recipe": "hop", "by_hand": ["c"], "lacking": ["c"]}
+    rest = {"remaining": 0.4, "remaining_by_hand": 0.5}
+    content = {"recipes": [kept | rest, lost | rest]}
+    (tmp_path / "proposed_controls.json").write_text(json.dumps(content))
+    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
+    rows = [["`kick`", "a, b", "none", "40 %", "50 %"], ["`hop`", "c", "c", "40 %", "50 %"]]
+    assert list(found_tables.controls()) == rows
+    assert found_tables.controls_remark() == (
+        "All controls by hand are proposed for 1 of 2 recipes (must 4, **missed**; wish 6, "
+        "**missed**); the proposed ones explain as much for 2."
+    )

@@ -1,0 +1,85 @@
+"""Controls that discovery proposes for the clips of shipped recipes, against those by hand."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from rows import origin
+
+from posefield_train.discover import control_proposals, take_prediction
+from posefield_train.discover.control_proposals import FamilyClips
+from posefield_train.discover.take_prediction import TakePrediction
+from posefield_train.source import ingest, measured_controls, recipe, shipped_recipes
+
+RESULTS = Path(__file__).resolve().parents[1] / "docs/results/proposed_controls.json"
+RECIPES = (
+    "hdm05_grab_high",
+    "hdm05_deposit_floor",
+    "hdm05_kick",
+    "hdm05_hop",
+    "cmu_walk",
+    "bandai_raise_hand",
+)
+PEAK = {"peak_frame": "highest"}
+"""Moment of the table of clips that is found as one of the motion."""
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """Proposal for the clips of a recipe. lacking: controls by hand that are not proposed.
+
+    remaining: share of the variance of left-out takes that is left with the proposed controls, and
+    with those by hand.
+    """
+
+    recipe: str
+    by_hand: tuple[str, ...]
+    lacking: tuple[str, ...]
+    remaining: float
+    remaining_by_hand: float
+
+
+def propose(name: str, data: Path) -> Proposed:
+    """Return the proposal for a shipped recipe. data: folder of the data sets."""
+    own = recipe.read(shipped_recipes.FOLDER / f"{name}.toml")
+    examples, _ = ingest.ingest(own, data)
+    joints = examples[0].clip.skeleton.names
+    motions = [measured_controls.measured_quantities(one.clip) for one in examples]
+    performers, takes = [one.row.performer for one in examples], [one.take for one in examples]
+    indices = {str(role): joints.index(joint) for role, joint in own.roles.items()}
+    clips = FamilyClips(tuple(motions), indices, tuple(performers), tuple(takes), own.motion.cyclic)
+    found = control_proposals.propose_controls(clips)
+    known = {(one.quantity, one.role, one.at) for one in found.controls}
+    roles = {joint: str(role) for role, joint in own.roles.items()}
+    wanted = {
+        control.name: (auto.quantity, roles.get(auto.joint or ""), PEAK.get(auto.at or "", auto.at))
+        for control in own.measured
+        if (auto := control.auto)
+    }
+    values = np.array([one.controls for one in examples])
+    given = list(((values - values.mean(axis=0)) / values.std(axis=0)).T)
+    prediction = TakePrediction(take_prediction.motion_coefficients(motions), performers, takes)
+    lacking = tuple(control for control, measure in wanted.items() if measure not in known)
+    return Proposed(name, tuple(wanted), lacking, found.remaining[-1], prediction.remaining(given))
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Print the figures; write them where the documentation reads them if asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("data", type=Path, help="folder of the data sets")
+    parser.add_argument("--record", action="store_true")
+    given = parser.parse_args(arguments)
+    found = [asdict(propose(name, given.data)) for name in RECIPES]
+    command = origin("python benchmarks/proposed_controls.py DATA --record")
+    text = json.dumps({**command, "recipes": found}, indent=1)
+    print(text)
+    if given.record:
+        RESULTS.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
