@@ -7,7 +7,7 @@ from msgspec import Meta, Struct
 from posefield.question.body_kind import Body
 from posefield.question.motion_question import Character, Name
 from posefield.question.performance_question import PerformanceQuestion
-from posefield.question.walk_question import Instancing
+from posefield.question.walk_question import FieldOfView, ImageHeight, Instancing, LevelPixels
 
 PerformanceLayout = Literal["whole", "segments"]
 """Animations in a file: one of the whole performance, or besides it one of each segment."""
@@ -42,18 +42,9 @@ class CrowdStageQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             extra={"metavar": "X,Y,Z"},
         ),
     ] = None
-    fov: Annotated[
-        float | None,
-        Meta(description="vertical field of view, rad; default: 60 degrees; requires a camera"),
-    ] = None
-    height: Annotated[
-        float | None,
-        Meta(description="height of the image, pixels; default: 1080; requires a camera"),
-    ] = None
-    pixels: Annotated[
-        float | None,
-        Meta(description="limit of a level's error, pixels; default: 1; requires a camera"),
-    ] = None
+    fov: FieldOfView = None
+    height: ImageHeight = None
+    pixels: LevelPixels = None
     instancing: Annotated[
         Instancing, Meta(description="of a crowd: sharing of data between characters in USD")
     ] = "references"

@@ -14,6 +14,19 @@ WalkerTake = Literal["index"] | int
 """Seed of all characters, or "index" for a seed of its own for each."""
 DEFAULT_FOV, DEFAULT_HEIGHT = math.pi / 3.0, 1080.0
 
+FieldOfView = Annotated[
+    float | None,
+    Meta(description="vertical field of view, rad; default: 60 degrees; requires a camera"),
+]
+ImageHeight = Annotated[
+    float | None,
+    Meta(description="height of the image, pixels; default: 1080; requires a camera"),
+]
+LevelPixels = Annotated[
+    float | None,
+    Meta(description="limit of a level's error, pixels; default: 1; requires a camera"),
+]
+
 
 class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Query for a walking crowd: its size, motions, level of detail and instancing in USD.
@@ -50,18 +63,9 @@ class WalkQuestion(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             extra={"metavar": "X,Y,Z"},
         ),
     ] = None
-    fov: Annotated[
-        float | None,
-        Meta(description="vertical field of view, rad; default: 60 degrees; requires a camera"),
-    ] = None
-    height: Annotated[
-        float | None,
-        Meta(description="height of the image, pixels; default: 1080; requires a camera"),
-    ] = None
-    pixels: Annotated[
-        float | None,
-        Meta(description="limit of a level's error, pixels; default: 1; requires a camera"),
-    ] = None
+    fov: FieldOfView = None
+    height: ImageHeight = None
+    pixels: LevelPixels = None
     feet: Annotated[
         FeetMode | None,
         Meta(
