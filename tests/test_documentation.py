@@ -58,9 +58,9 @@ def test_the_readme_is_short():
     assert len(re.findall(r"^!\[", text, re.MULTILINE)) == 1
 
 
-def test_architecture_is_eleven_short_pages():
+def test_architecture_is_twelve_short_pages():
     pages = sorted((DOCS / "architecture").glob("*.md"))
-    assert [path.name[:2] for path in pages] == [f"{number:02d}" for number in range(11)]
+    assert [path.name[:2] for path in pages] == [f"{number:02d}" for number in range(12)]
     assert [
         path.name for path in pages if len(path.read_text().splitlines()) > MOST_PAGE_LINES
     ] == []

@@ -14,9 +14,9 @@ from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source.topology import common_topology, rest_alignment, role_joints
+from posefield_train.source.topology import common_topology, canonical_rest, role_joints
 from posefield_train.source.topology.common_topology import JointPoint, Topology
-from posefield_train.source.topology.rest_alignment import JointMotion
+from posefield_train.source.topology.canonical_rest import JointMotion
 from posefield_train.source.topology.role_joints import RoleJoints, StatedRoles, TopologyError
 
 MOST_POSES = 60
@@ -135,7 +135,7 @@ def _body_turns(topology: Topology, motions: Sequence[JointMotion]) -> Floats:
         count = len(motion.positions)
         frames = np.unique(np.linspace(0, count - 1, min(count, MOST_POSES)).round().astype(int))
         picked.append(JointMotion(motion.positions[frames], motion.turns[frames]))
-    return rest_alignment.mean_turns(topology, picked)
+    return canonical_rest.mean_turns(topology, picked)
 
 
 @dataclass(frozen=True)
@@ -155,11 +155,11 @@ def _aimed_bones(
     The hips and the last joint of the spine carry several bones, and keep their orientation.
     """
     bones = [
-        (name, above, rest_alignment.Y)
+        (name, above, canonical_rest.Y)
         for name, above in zip(topology.trunk, topology.trunk[1:], strict=False)
         if name != f"spine{topology.spine}"
     ]
-    limbs = [(name, *rest_alignment.limb_bone(name)) for name in topology.names]
+    limbs = [(name, *canonical_rest.limb_bone(name)) for name in topology.names]
     bones += [bone for bone in limbs if bone[1] in topology.names]
     return [
         _AimedBone(topology.index(name), topology.index(end), direction)
@@ -187,7 +187,7 @@ def _unified(
     for bone in aimed:
         ahead = places[:, bone.end] - places[:, bone.joint]
         own = quat.rotate(frames[:, bone.joint], bone.direction)
-        swings = rest_alignment.smallest_turns(own, ahead)
+        swings = canonical_rest.smallest_turns(own, ahead)
         frames[:, bone.joint] = quat.mul(swings, frames[:, bone.joint])
     rotations, translations = frames.copy(), places.copy()
     for joint, parent in list(enumerate(topology.parents))[1:]:
