@@ -14,9 +14,9 @@ from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source.topology import common_topology, canonical_rest, role_joints
-from posefield_train.source.topology.common_topology import JointPoint, Topology
+from posefield_train.source.topology import canonical_rest, common_topology, role_joints
 from posefield_train.source.topology.canonical_rest import JointMotion
+from posefield_train.source.topology.common_topology import JointPoint, Topology
 from posefield_train.source.topology.role_joints import RoleJoints, StatedRoles, TopologyError
 
 MOST_POSES = 60
