@@ -240,7 +240,7 @@ def test_a_named_question_is_a_question_with_a_name(spec):
     named, alone = (schemas[name] for name in ("NamedClipQuestion", "ClipQuestion"))
     assert named["required"] == alone["required"]
     # An archive has one format, and one convention.
-    measures = {k: alone["properties"][k] for k in ("unit", "up", "body")}
+    measures = {k: alone["properties"][k] for k in ("unit", "up", "body", "character")}
     question = {k: v for k, v in named["properties"].items() if k != "name"}
     assert question | measures == alone["properties"]
     assert schemas["ClipsQuestion"]["properties"].items() >= measures.items()

@@ -215,9 +215,10 @@ def narrowed(spec, card):
     for name, only in (("unit", "m"), ("up", "y")):
         for question in ("ClipQuestion", "ClipsQuestion"):
             parts["schemas"][question]["properties"][name] = {"enum": [only, None]}
-    # Nor can it say which formats have a body.
+    # Nor can it say which formats have a body, and the service has no characters of users.
     for question in ("ClipQuestion", "ClipsQuestion"):
-        del parts["schemas"][question]["properties"]["body"]
+        for name in ("body", "character"):
+            del parts["schemas"][question]["properties"][name]
     # Feet of this model are as predicted, so that they stand on no floor but the level one.
     parts["schemas"]["FloorValue"] = {"enum": [0.0]}
     parts["parameters"]["floor"]["schema"] = {"enum": ["0"]}
@@ -237,6 +238,9 @@ def narrowed(spec, card):
     # One schema serves all formats, glTF too.
     given = narrow["paths"]["/v1/models/{model}/clip.{format}"]["get"]["parameters"]
     given.remove({"$ref": "#/components/parameters/body"})
+    for path in ("clip", "clip.{format}"):
+        whole = narrow["paths"][f"/v1/models/{{model}}/{path}"]["get"]["parameters"]
+        whole.remove({"$ref": "#/components/parameters/character"})
     for name, only in (("unit", "m"), ("up", "y")):
         given.remove({"$ref": f"#/components/parameters/{name}"})
         given.append({"name": name, "in": "query", "schema": {"enum": [only]}})

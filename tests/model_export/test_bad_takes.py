@@ -251,5 +251,7 @@ def test_memory_of_many_files_is_that_of_their_joints_alone(tmp_path):
     assert size < 300 * 100_000
     few = [len(read.figures[f"{index:05d}.bvh"].positions) for index in (0, 299)]
     assert few == [40, 5]
-    report = probe_report.report_of(list(folder.iterdir()), list(read.figures.values()))
+    report = probe_report.report_of(
+        [folder / name for name in read.figures], [*read.figures.values()]
+    )
     assert report.proposed["up"].value == "y"

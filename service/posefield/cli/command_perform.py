@@ -1,5 +1,6 @@
 """The `posefield perform` command: one long motion from a script."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,7 +23,7 @@ from posefield.synthesis.frame_times import MAX_POSES
 
 if TYPE_CHECKING:
     from posefield.characters.user_character import UserCharacter
-    from posefield.performance.script import Script
+    from posefield.synthesis.synthesizer import Synthesizer
 
 MAX_FRAMES = 10 * MAX_POSES
 
@@ -126,18 +127,23 @@ def perform(
         typer.echo(as_json(report.document()) if json else report_text(report))
         return
     path = Path(one.output)
-    answer, content = _performed(resolve_script(asked, find), path, one)
+    answer, content = _performed(asked, find, path, one)
     atomic_files.write(content, path)
     facts = {"file": str(path), **answer.trust.document()}
     typer.echo(as_json(facts) if json else f"{path}\n{report_text(answer.trust)}")
 
 
-def _performed(script: "Script", path: Path, one: OneArguments) -> tuple[PerformanceAnswer, bytes]:
-    """Return the performance of a script, and its file."""
+def _performed(
+    asked: PerformanceQuestion, find: "Callable[[str], Synthesizer]", path: Path, one: OneArguments
+) -> tuple[PerformanceAnswer, bytes]:
+    """Return the performance of a script, and its file, whose format is known before models are."""
     from posefield.performance import composition
+    from posefield.performance.script import resolve_script
 
-    form, question = encoder_for(path), script.question
+    form = encoder_for(path)
     encode = performance_files.encoder(form, one.layout)
+    script = resolve_script(asked, find)
+    question = script.question
     order = one.delivery(form, question, path)
     if order is None:
         convention = form.convention(question.unit, question.up, question.body)

@@ -12,9 +12,10 @@ a trace, waves of a sum; chosen ones of them. Walks: waypoints, paths, exits and
 seeds, samples and directions of variables.
 Kriging: points (B; a and b where there are two kinds), samples (n), their coordinates (d + p),
 controls (d), functions of a drift (k), rows of the system (n + k), linear functions (p + 1 + d),
-values (m). Tensors: dof of a pose (D), those varying (D'), freedoms (r1), times (r2) and modes (r3)
-of a reduced tensor, more_times and more_modes of one with the event's blend, rank of another
-decomposition, reduced motions (r2 r1), variables of a correction. Faces: curves (C).
+values (m), inducing clips. Tensors: dof of a pose (D), those varying (D'), freedoms (r1), times
+(r2) and modes (r3) of a reduced tensor, more_times and more_modes of one with the event's blend,
+rank of another decomposition, reduced motions (r2 r1), variables of a correction. Faces: curves
+(C).
 Any: batch, some, rows, columns, numbers, pairs, size.
 """
 

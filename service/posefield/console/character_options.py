@@ -30,7 +30,8 @@ class CharacterOptions:
     roles: Annotated[
         Path | None,
         typer.Option(
-            help="TOML file with a table [roles] of --character: joints that the names do not tell",
+            help="TOML file with a table of roles, for joints of --character whose names do not "
+            "tell them",
             metavar="FILE",
         ),
     ] = None
