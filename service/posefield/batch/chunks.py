@@ -8,9 +8,9 @@ the manifest.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from posefield.batch import checkpoint, layouts, manifest
+from posefield.batch import character_clips, checkpoint, layouts, manifest
 from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.job import ExportJob, WorkerInput, open_model_of
+from posefield.batch.job import WorkerInput, open_model_of
 from posefield.batch.layouts import ClipFile, Layout, ManifestEntry, path
 from posefield.batch.rows.row_query import MAX_KEPT_FAULTS, ClipQuery, RowFault
 from posefield.batch.target import open_target
@@ -52,7 +52,7 @@ def make_chunk(
     """
     target = open_target(work.target)
     layout = layouts.find_layout(work.job.layout)
-    chunk = _ChunkInProgress(work.job, layout, open_model_of(work), task, [])
+    chunk = _ChunkInProgress(work, layout, open_model_of(work), task, [])
     entries, archives = layout.write(target, task.number, chunk.batches(stopped))
     if chunk.faults and not work.skip:
         raise invalid_rows_error(len(chunk.faults), chunk.faults)
@@ -85,7 +85,7 @@ class _SynthesizedClip:
 class _ChunkInProgress:
     """A chunk in progress. faults: those found so far."""
 
-    job: ExportJob
+    work: WorkerInput
     layout: Layout
     synthesizer: Synthesizer
     task: ChunkTask
@@ -122,12 +122,19 @@ class _ChunkInProgress:
                 self._record_fault(row.place, row.message)
                 continue
             try:
-                answer = clips.synthesize_clip(self.synthesizer, row.question)
+                answer = self._answer(row)
             except QueryError as fault:
                 self._record_fault(row.place, str(fault))
             else:
                 noted = CLIP_ENCODERS[row.format].noted(answer)
                 yield _SynthesizedClip(path(number, row.name, row.format), row, noted)
+
+    def _answer(self, query: ClipQuery) -> ClipAnswer:
+        answer = clips.synthesize_clip(self.synthesizer, query.question)
+        delivery = character_clips.delivery_of(self.work, query.format)
+        if delivery is None:
+            return answer
+        return delivery.clip(answer, query.question, self.synthesizer.session.card.roles)
 
     def _record_fault(self, place: str, message: str) -> None:
         # The table's folder is not part of the job and must not affect its files.
@@ -138,10 +145,14 @@ class _ChunkInProgress:
         contents: dict[int, bytes] = {}
         for extension in dict.fromkeys(one.query.format for one in made):
             own = [index for index, one in enumerate(made) if one.query.format == extension]
-            convention = CLIP_ENCODERS[extension].convention(
-                self.job.unit, self.job.up, self.job.body
-            )
-            answers = [made[index].answer for index in own]
-            files = self.layout.encode(extension)(answers, convention)
+            files = self._encoded(extension, [made[index].answer for index in own])
             contents |= zip(own, files, strict=True)
         return [contents[index] for index in range(len(made))]
+
+    def _encoded(self, extension: str, answers: Sequence[ClipAnswer]) -> list[bytes]:
+        delivery = character_clips.delivery_of(self.work, extension)
+        if delivery is not None:
+            return [delivery.encode(answer) for answer in answers]
+        job = self.work.job
+        convention = CLIP_ENCODERS[extension].convention(job.unit, job.up, job.body)
+        return self.layout.encode(extension)(answers, convention)

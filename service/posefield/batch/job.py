@@ -4,7 +4,7 @@ import hashlib
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, lru_cache
 from importlib.metadata import version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import orjson
 
@@ -15,6 +15,9 @@ from posefield.inference import session
 from posefield.motion.joint_roles import NamingConvention
 from posefield.question.body_kind import BodyKind
 from posefield.synthesis.synthesizer import Synthesizer
+
+if TYPE_CHECKING:
+    from posefield.characters.user_character import UserCharacter
 
 VERSIONED_PACKAGES = ("numpy", "onnxruntime", "usd-core")
 """Packages whose versions may affect the bytes."""
@@ -27,7 +30,7 @@ class ExportJob:
     model: name@contenthash. content: SHA-256 of the model file. queries: digest of their source.
     layout: name of the layout. chunk: rows per chunk. unit, up: None for the convention of each
     format. names: default naming convention of the joints. body: None for the default of each
-    format.
+    format. character: name, digest and reference of the character of a user; empty for the model's.
     """
 
     model: str
@@ -39,6 +42,7 @@ class ExportJob:
     up: UpAxis | None = None
     names: NamingConvention = "own"
     body: BodyKind | None = None
+    character: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.chunk < 1:
@@ -50,7 +54,8 @@ class ExportJob:
             "posefield": __version__,
             **{maker: version(maker) for maker in VERSIONED_PACKAGES},
         }
-        return {**asdict(self), "versions": versions}
+        plain = {**asdict(self), "character": list(self.character)}
+        return {**plain, "versions": versions}
 
     @cached_property
     def digest(self) -> str:
@@ -64,13 +69,15 @@ class WorkerInput:
     """Data that a worker needs besides the rows; it can be pickled.
 
     model: content of the model file, read once; the job has its checksum. target: folder or URL.
-    skip: leave invalid rows out instead of ending the export.
+    skip: leave invalid rows out instead of ending the export. character: that moves instead of the
+    model's own; the job has its digest.
     """
 
     job: ExportJob
     model: bytes = field(compare=False, repr=False)
     target: str
     skip: bool = False
+    character: "UserCharacter | None" = field(default=None, compare=False, repr=False)
 
 
 @lru_cache(maxsize=1)

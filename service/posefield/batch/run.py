@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any, Protocol
 
-from posefield.batch import checkpoint, chunks, layouts, process_pool
+from posefield.batch import character_clips, checkpoint, chunks, layouts, process_pool
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.chunks import ChunkTask
 from posefield.batch.job import ExportJob, WorkerInput
@@ -105,7 +105,7 @@ def run(
             return RunOutcome(rows, rows, facts, already_complete=True)
         monitor.note(f"{work.target}/{path}: missing or damaged; the export is made again")
         checkpoint.reopen(target, work.job)
-    source = _checked_source(work.job, source)
+    source = _checked_source(work, source)
     total = _row_count(source, work.skip)
     return _resume(_ShardRun(work, source, target, shard, total, verify), monitor, runner)
 
@@ -186,8 +186,12 @@ def _row_count(source: RowSource, skip: bool) -> int:
     return found.total
 
 
-def _checked_source(job: ExportJob, source: RowSource) -> RowSource:
+def _checked_source(work: WorkerInput, source: RowSource) -> RowSource:
     """Return the source with faults in place of the queries that the job cannot write."""
+    job = work.job
+    if work.character is not None:
+        character_clips.check_layout(job.layout)
+        return _CheckedSource(source, job, lambda job, query: character_clips.misfit(work, query))
     misfit = layouts.find_layout(job.layout).misfit
     if misfit is None and (job.unit or job.up or job.body):
         misfit = _convention_misfit

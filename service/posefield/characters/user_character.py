@@ -38,6 +38,11 @@ class UserCharacter:
         return self.target.rig
 
     @property
+    def facts(self) -> tuple[str, ...]:
+        """Return name, digest and reference: all that determines files, besides the motion."""
+        return self.name, self.digest, self.target.reference
+
+    @property
     def height(self) -> float:
         """Return the height of the joints at rest, m."""
         joints = self.rig.skeleton

@@ -8,11 +8,11 @@ from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import Annotated, Self
+from typing import TYPE_CHECKING, Annotated, Self
 
 import typer
 
-from posefield.batch import layouts, process_pool, run, target
+from posefield.batch import character_clips, layouts, process_pool, run, target
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.layouts import LAYOUTS
@@ -24,11 +24,15 @@ from posefield.batch.rows.row_validation import Defaults
 from posefield.batch.run import RunOutcome, Shard
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, ModelPath
+from posefield.console.character_options import CharacterOptions
 from posefield.console.output import as_json
 from posefield.console.question_options import with_option_groups, with_question_options
 from posefield.model_file import checked_file
 from posefield.question.motion_question import FileQuestion
 from posefield.registry import model_loading
+
+if TYPE_CHECKING:
+    from posefield.characters.user_character import UserCharacter
 
 
 @dataclass(frozen=True)
@@ -57,8 +61,8 @@ class RowArguments:
 
 
 @dataclass(frozen=True)
-class RunArguments:
-    """Execution of an export, and the layout of its files."""
+class RunArguments(CharacterOptions):
+    """Execution of an export, the layout of its files, and whom they move."""
 
     layout: Annotated[str, typer.Option(help=f"layout of the output: {', '.join(LAYOUTS)}")] = (
         "folder"
@@ -107,12 +111,16 @@ def export(
 
     A column of the table takes precedence over the option of the same name. The same command
     resumes an interrupted export and gives the same files. It rewrites missing or damaged files.
+    With --character, the character of another file moves, as in `posefield clip`.
     """
     content = checked_file.read(model)
     opened = model_loading.open_model(model.stem, model, content)
     asked = SourceOptions(rows.table, tuple(rows.grid or ()), rows.sample, rows.method, rows.seed)
     source = row_sources.open_source(asked, Defaults(rows.form, question), opened)
     found = layouts.find_layout(execution.layout)
+    character = _character(output, execution)
+    if character is not None:
+        character_clips.check_model(opened.session.card)
     job = ExportJob(
         opened.identity,
         hashlib.sha256(content).hexdigest(),
@@ -123,11 +131,12 @@ def export(
         question.up,
         question.names,
         question.body,
+        () if character is None else character.facts,
     )
     part = Shard.parse(execution.shard)
     place = _absolute(output) if execution.scheduler else output
     with _runner(execution) as runner, ExportMonitor() as monitor:
-        work = WorkerInput(job, content, place, execution.skip_errors)
+        work = WorkerInput(job, content, place, execution.skip_errors, character)
         outcome = run.run(work, source, monitor, runner, part, execution.verify)
     _finish(output, outcome, monitor, execution.verify, json)
 
@@ -144,6 +153,18 @@ def _runner(execution: RunArguments) -> AbstractContextManager[Runner]:
     from posefield.batch import dask_export
 
     return dask_export.runner(scheduler)
+
+
+def _character(output: str, execution: RunArguments) -> "UserCharacter | None":
+    """Return the character to which the clips in a folder refer; None without one."""
+    if target.URL.match(output):
+        execution.refuse("with a URL as output, expected a folder: files refer to its file")
+    if execution.scheduler is not None:
+        execution.refuse("with --scheduler, expected --workers: the file is read on this machine")
+    character = execution.open(Path(output) / character_clips.FOLDER)
+    if character is not None:
+        character_clips.check_layout(execution.layout)
+    return character
 
 
 def _absolute(output: str) -> str:

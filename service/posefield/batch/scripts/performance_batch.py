@@ -180,7 +180,7 @@ def _digest(batch: PerformanceBatch, script: Script, registry: ModelRegistry) ->
         *(version(name) for name in VERSIONED_PACKAGES),
         *script.identities,
         "" if chosen is None else registry.find(chosen.model).identity,
-        *([] if whom is None else [whom.name, whom.digest, whom.target.reference]),
+        *([] if whom is None else whom.facts),
     ]
     content = msgspec.json.encode(script.question)
     return hashlib.sha256(orjson.dumps(facts) + content).hexdigest()
