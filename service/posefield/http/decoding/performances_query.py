@@ -16,7 +16,7 @@ from posefield.encode.formats import CLIP_ENCODERS, ClipEncoder, max_poses
 from posefield.http.api import problems
 from posefield.http.api.settings import Settings
 from posefield.performance import composition
-from posefield.performance.script import Script, resolve_script
+from posefield.performance.script import resolve_script
 from posefield.question import json_decoding
 from posefield.question.json_decoding import json_pointer
 from posefield.question.performance_batch_question import NamedScript, PerformancesQuestion
@@ -48,7 +48,9 @@ def decode_order(
     character = None if body.character is None else characters.find(body.character)
     if character is not None:
         _check_character(body, encoder, character)
-    planned = tuple(_planned(library, encoder, zip(names, body.scripts, strict=True), settings))
+    scripts = zip(names, body.scripts, strict=True)
+    own_joints = 0 if character is None else len(character.rig.skeleton)
+    planned = tuple(_planned(library, encoder, scripts, settings, own_joints))
     if character is None:
         return PerformanceOrder(planned, encode)
     return PerformanceOrder(planned, encode, _delivery(planned, encoder, character))
@@ -111,15 +113,20 @@ def _planned(
     encoder: ClipEncoder,
     scripts: Iterator[tuple[str, NamedScript]],
     settings: Settings,
+    own_joints: int,
 ) -> Iterator[ArchivedScript]:
-    """Yield the planned scripts; InvalidField as soon as they are too long together."""
+    """Yield the planned scripts; InvalidField as soon as they are too long together.
+
+    own_joints: of the character of a user; 0 without one.
+    """
     seconds = 0.0
     for index, (name, question) in enumerate(scripts):
         cancellation.check()
         try:
             convention = encoder.convention(question.unit, question.up, question.body)
             script = resolve_script(question, library.find)
-            most = _max_frames(script, encoder, settings)
+            joints = max(len(script.character.skeleton), own_joints)
+            most = max_poses(settings.output_limit, joints, encoder.bytes_per_joint)
             report = composition.plan(script, most)
         except QueryError as error:
             raise problems.nested_error(error, json_pointer("scripts", str(index))) from None
@@ -130,8 +137,3 @@ def _planned(
             raise InvalidField("scripts", f"{found}, {expected}")
         file = f"{name}.{encoder.extension}"
         yield ArchivedScript(name, file, script, convention, most, bool(report.warnings))
-
-
-def _max_frames(script: Script, encoder: ClipEncoder, settings: Settings) -> int:
-    joints = len(script.character.skeleton)
-    return max_poses(settings.output_limit, joints, encoder.bytes_per_joint)
