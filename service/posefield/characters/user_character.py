@@ -11,6 +11,7 @@ import numpy as np
 
 from posefield.common.errors import FileError
 from posefield.encode.user_rig.rig_files import RigTarget
+from posefield.rigs.joints import format_faults
 from posefield.rigs.rig import Rig
 from posefield.rigs.rig_reader import read_rig
 
@@ -23,9 +24,9 @@ ENDINGS = (".usd", ".usda", ".usdc", ".usdz", ".glb")
 class UserCharacter:
     """Character of a user's file.
 
-    digest: SHA-256 of the file, of the files that it refers to as far as its rig depends on them,
-    and of the roles that were stated. target: rig, and the path by
-    which written files refer to it.
+    digest: SHA-256 of the file, of the files that it refers to as far as its rig and the extent of
+    its meshes depend on them, and of the roles that were stated. target: rig, and the path by which
+    written files refer to it.
     """
 
     name: str
@@ -64,7 +65,11 @@ def open_character(
     rest = rig.rest
     for numbers in (rest.rotations, rest.translations, rest.scales):
         digest.update(np.ascontiguousarray(numbers).tobytes())
-    target = RigTarget.of(rig, path, reference)
+    with format_faults.naming_faults(str(path), RuntimeError, ValueError, TypeError, LookupError):
+        target = RigTarget.of(rig, path, reference)
+    if target.stage is not None:
+        # Meshes of files that this one refers to decide the extent.
+        digest.update(np.ascontiguousarray(target.stage.radii).tobytes())
     return UserCharacter(path.stem, digest.hexdigest(), target)
 
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom
+from pxr import Sdf, Usd, UsdGeom, UsdSkel, Vt
 from user_rigs import glb_positions, glb_rig, read_glb, stage_positions, usd_rig
 
 from posefield.characters.user_character import open_character
-from posefield.common.errors import InvalidField
+from posefield.common.errors import FileError, InvalidField
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion.clip import Clip
@@ -204,3 +204,30 @@ def test_characters_differ_by_their_files(tmp_path, shipped_walk):
     one, other = (open_character(path, "./x.glb") for path in (first, second))
     assert one.digest != other.digest == open_character(second, "./x.glb").digest
     assert replace(one, name="b").digest == one.digest
+
+
+def _without_binds(stage):
+    stage.GetPrimAtPath("/Character/Skel").RemoveProperty("bindTransforms")
+
+
+def _of_no_joint(stage):
+    body = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Character/Body"))
+    indices = np.array(body.GetJointIndicesAttr().Get())
+    body.GetJointIndicesAttr().Set(Vt.IntArray([5000] * len(indices)))
+
+
+def _of_other_length(stage):
+    body = UsdSkel.BindingAPI(stage.GetPrimAtPath("/Character/Body"))
+    body.GetJointWeightsAttr().Set(Vt.FloatArray([1.0, 0.0]))
+
+
+@pytest.mark.parametrize("broken", [_without_binds, _of_no_joint, _of_other_length])
+def test_skins_that_break_their_format_are_refused(tmp_path, shipped_walk, broken):
+    path = tmp_path / "hero.usdc"
+    usd_rig(path, shipped_walk.session.card)
+    open_character(path, "./hero.usdc")
+    stage = Usd.Stage.Open(str(path))
+    broken(stage)
+    stage.GetRootLayer().Save()
+    with pytest.raises(FileError, match=r"hero\.usdc"):
+        open_character(path, "./hero.usdc")

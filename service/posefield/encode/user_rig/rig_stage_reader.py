@@ -64,7 +64,11 @@ def _radii(skeleton: Any, skel_root: Any, joints: tuple[str, ...]) -> Floats:
     cache.Populate(skel_root, Usd.PrimDefaultPredicate)
     query = cache.GetSkelQuery(skeleton)
     order = [str(token) for token in query.GetJointOrder()]
-    binds = np.array(query.GetJointWorldBindTransforms(), float)[:, 3, :3]
+    matrices = np.array(query.GetJointWorldBindTransforms(), float)
+    if len(matrices) != len(order):
+        path = skeleton.GetPath()
+        raise ValueError(f"{path} has {len(matrices)} bindTransforms, expected {len(order)}")
+    binds = matrices[:, 3, :3]
     found = dict.fromkeys(order, 0.0)
     for binding in cache.ComputeSkelBindings(skel_root, Usd.PrimDefaultPredicate):
         if binding.GetSkeleton().GetPath() == skeleton.GetPath():
