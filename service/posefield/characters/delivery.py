@@ -145,15 +145,14 @@ def _stances(feet: FeetResult | None, question: ClipQuestion) -> Sequence[Stance
 def _held_hands(
     held: Sequence[HeldJoint], named: Mapping[str, str]
 ) -> tuple[list[HandGoal], list[str]]:
-    """Return the targets of hands as goals at their begin and end, and sentences on others.
+    """Return the targets of hands as goals while they are held, and sentences on others.
 
     named: role of each joint that is a hand.
     """
     goals = [
-        HandGoal(named[own.joint], time, np.array(own.position))
+        HandGoal(named[own.joint], own.begins, np.array(own.position), own.ends)
         for own in held
         if own.joint in named
-        for time in dict.fromkeys((own.begins, own.ends))
     ]
     others = dict.fromkeys(own.joint for own in held if own.joint not in named)
     return goals, [NO_GOAL.format(joint) for joint in others]

@@ -1,11 +1,13 @@
 """Hands of a rig that meet the exact targets of the motion's hands."""
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Frames, RootPath, Vector
+from posefield.common.array_shapes import Frames, RootPath
 from posefield.common.errors import InvalidField
+from posefield.common.units import Floats
 from posefield.motion import blend
 from posefield.retarget import planted_legs
 from posefield.retarget.planted_legs import PosedRig
@@ -29,9 +31,10 @@ def check_goals(goals: Sequence[HandGoal], rig: PosedRig, rate: float) -> None:
             raise InvalidField(
                 "character", f"with a goal of {goal.role!r}{said}; expected a hand of it"
             )
-        if not -1e-6 <= goal.time <= last + 1e-6:
+        if not -1e-6 <= goal.time <= goal.end <= last + 1e-6:
             raise InvalidField(
-                "character", f"with a goal at {goal.time:g} s, expected 0 to {last:g} s"
+                "character",
+                f"with a goal at {goal.time:g} s until {goal.end:g} s, expected 0 to {last:g} s",
             )
 
 
@@ -51,27 +54,28 @@ def meet_goals(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> PosedRi
             continue
         hand, moved = rig.of_role(role), np.zeros(rig.roots.shape)
         for goal in own:
-            apart = np.asarray(goal.position) - _at(hand + moved, goal.time * rate)
-            moved += _shares(times, goal, own)[:, None] * apart
+            there = np.clip(times, goal.time, goal.end)
+            apart = np.asarray(goal.position) - _at(hand + moved, there * rate)
+            moved += _shares(times - there, goal, own)[:, None] * apart
         limb, poses = rig.limb(roles)
         planted_legs.turn_limb(rotations, limb, poses, np.zeros(rig.roots.shape), hand + moved)
     return planted_legs.posed(rig.body, rotations, rig.roots)
 
 
-def _at(path: RootPath, frame: float) -> Vector:
-    """Return a point (3,) of a path (F, 3) at a fractional frame."""
+def _at(path: RootPath, places: Annotated[Floats, "places"]) -> Annotated[Floats, "places 3"]:
+    """Return the points (N, 3) of a path (F, 3) at fractional frames (N,)."""
     if len(path) < 2:
-        return path[0]
-    found: Vector = blend.interpolate_rows(path, np.clip(np.array(frame), 0, len(path) - 1))
-    return found
+        return path[[0] * len(places)]
+    return blend.interpolate_rows(path, np.clip(places, 0, len(path) - 1))
 
 
-def _shares(times: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
-    """Return the shares (F,) of a goal: 1 at its time, 0 from the next and the last goals on."""
-    gaps = [goal.time - other.time for other in goals]
-    before = min([FADE, *(gap for gap in gaps if gap > 0.0)])
-    after = min([FADE, *(-gap for gap in gaps if gap < 0.0)])
-    away = times - goal.time
+def _shares(away: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
+    """Return the shares (F,) of a goal: 1 at its times, 0 from the next and the last goals on.
+
+    away (F,): time since the goal, negative before it, s.
+    """
+    before = min([FADE, *(gap for own in goals if (gap := goal.time - own.end) > 0.0)])
+    after = min([FADE, *(gap for own in goals if (gap := own.time - goal.end) > 0.0)])
     found: Frames = blend.smoothstep(
         np.clip(1.0 - np.where(away < 0.0, -away / before, away / after), 0.0, 1.0)
     )
@@ -79,8 +83,16 @@ def _shares(times: Frames, goal: HandGoal, goals: Sequence[HandGoal]) -> Frames:
 
 
 def misses(rig: PosedRig, goals: Sequence[HandGoal], rate: float) -> tuple[float, ...]:
-    """Return the distance of each hand from its goal, m."""
+    """Return the largest distance of each hand from its goal, m."""
     return tuple(
-        float(np.linalg.norm(goal.position - _at(rig.of_role(goal.role), goal.time * rate)))
+        float(np.linalg.norm(goal.position - path, axis=-1).max())
         for goal in goals
+        for path in [_at(rig.of_role(goal.role), _frames(goal, rate))]
     )
+
+
+def _frames(goal: HandGoal, rate: float) -> Annotated[Floats, "places"]:
+    """Return the fractional frames of a goal: its first and last, and all between them."""
+    first, last = goal.time * rate, goal.end * rate
+    between = np.arange(np.floor(first) + 1.0, np.ceil(last))
+    return np.concatenate([[first], between, [last]])

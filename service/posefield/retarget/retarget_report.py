@@ -16,12 +16,18 @@ Travel = Literal["scaled", "kept"]
 class HandGoal:
     """A point in the world that a hand meets: `position` (3,), m, at `time`, s, from the start.
 
-    role: leftHand or rightHand.
+    role: leftHand or rightHand. until: time until which it stays there, s; None for the moment.
     """
 
     role: str
     time: float
     position: Vector
+    until: float | None = None
+
+    @property
+    def end(self) -> float:
+        """Return the last time at which the hand is there, s."""
+        return self.time if self.until is None else self.until
 
 
 @dataclass(frozen=True)

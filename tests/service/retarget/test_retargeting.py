@@ -246,11 +246,25 @@ def test_hands_meet_their_goals(walk, figure, onto):
     assert "leftHand at 0.5 s" in missed.warnings[0] and "out of reach" in missed.warnings[0]
 
 
+def test_hands_stay_at_goals_that_last(walk, figure, onto):
+    tall = figure.longer(1.15, *LEGS)
+    free = place(onto(tall).clip, "LeftHand")
+    goal = free[30] + np.array([0.05, 0.05, 0.0])
+    lasting = HandGoal("leftHand", 0.45, goal, 0.55)
+    made = onto(tall, RetargetSettings(hands=(lasting,)))
+    away = np.linalg.norm(place(made.clip, "LeftHand") - goal, axis=-1)[27:34]
+    assert away.max() < 1e-3 and made.report.hands_missed[0] < 1e-3
+    # Negative control: a hand that meets the goal at its ends alone moves between them.
+    ends = tuple(HandGoal("leftHand", time, goal) for time in (0.45, 0.55))
+    other = place(onto(tall, RetargetSettings(hands=ends)).clip, "LeftHand")
+    assert np.linalg.norm(other - goal, axis=-1)[27:34].max() > 3e-3
+
+
 @pytest.mark.parametrize(
     ("goal", "said"),
     [
         (HandGoal("head", 0.5, np.zeros(3)), "a goal of 'head'"),
-        (HandGoal("leftHand", 9.0, np.zeros(3)), "a goal at 9 s, expected 0 to"),
+        (HandGoal("leftHand", 9.0, np.zeros(3)), "a goal at 9 s until 9 s, expected 0 to"),
     ],
 )
 def test_goals_of_no_hand_or_no_time_are_refused(figure, onto, goal, said):
