@@ -175,6 +175,9 @@ def test_two_draws_for_tuning_share_no_clip(family):
     assert not {*draws[0].tolist()} & {*draws[1].tolist()}
     large_family = np.vstack([family, family + 0.01, family - 0.01])
     assert len(inducing_clips.choose_tuned(large_family, 3, (2,), 0)) == 500
+    for points in (family[:500], family[:601], family, large_family):
+        count = inducing_clips.tuned_count(len(points))
+        assert len(inducing_clips.choose_tuned(points, 3, (2,), 0)) == count
 
 
 def test_a_draw_keeps_inner_products_and_the_coordinates_of_the_effector(family, rng):

@@ -251,7 +251,7 @@ def _large_family(trained: TrainedModel) -> dict[str, Any]:
     apart = trained.pose.disagreement
     tuned = {} if apart is None else {"disagreement": rounded(apart)}
     clips = len(trained.examples)
-    counts = {"clips": clips, "tuned": min(clips, inducing_clips.LARGEST_TUNED)}
+    counts = {"clips": clips, "tuned": inducing_clips.tuned_count(clips)}
     return {"projected": {**counts, "inducing": len(trained.listed), **tuned}}
 
 

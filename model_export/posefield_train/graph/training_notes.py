@@ -58,7 +58,7 @@ def disagreement_notes(trained: TrainedModel) -> list[str]:
     apart = trained.pose.disagreement
     if apart is None or apart <= LARGEST_DISAGREEMENT:
         return []
-    tuned = inducing_clips.LARGEST_TUNED
+    tuned = inducing_clips.tuned_count(len(trained.examples))
     return [
         f"parameters tuned on two draws of {tuned} of {len(trained.examples)} clips differ: with "
         f"one a clip left out lies {100 * apart:.1f} % farther away than with the other, which is "

@@ -51,7 +51,8 @@ def choose_tuned(
     """Return the sorted indices of the clips of one draw, of LARGEST_TUNED at most.
 
     Half of them lie apart; the others are random, because near pairs tell the nugget. draw: 0 or 1;
-    the two share no clip where not all are drawn. Other arguments as in `choose_inducing`.
+    the two share no clip where not all are drawn, so that a draw is of half the clips at most.
+    Other arguments as in `choose_inducing`.
     """
     if len(points) <= LARGEST_TUNED:
         return np.arange(len(points))
@@ -61,6 +62,11 @@ def choose_tuned(
     apart = half[_pivoted(points[half], hyper, LARGEST_TUNED // 2, ())]
     others = half[~np.isin(half, apart)]
     return np.sort(np.concatenate([apart, others[: LARGEST_TUNED - len(apart)]]))
+
+
+def tuned_count(clips: int) -> int:
+    """Return the number of clips of a family's first draw, on which parameters are tuned."""
+    return clips if clips <= LARGEST_TUNED else min(LARGEST_TUNED, (clips + 1) // 2)
 
 
 def fixed_parameters(controls: int, labels: tuple[int, ...]) -> Hyper:
