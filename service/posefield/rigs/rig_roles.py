@@ -10,7 +10,7 @@ from posefield.common.array_shapes import Vector
 from posefield.common.errors import MotionFileError
 from posefield.common.name_suggestion import did_you_mean
 from posefield.motion.joint_roles import ROLES
-from posefield.motion.skeleton import Skeleton
+from posefield.motion.skeleton import Skeleton, joint_chain
 from posefield.roles import body_shape, joint_recognition
 from posefield.roles.joint_recognition import LOWEST_CONFIDENCE, SIDES, RoleGuess
 
@@ -89,6 +89,11 @@ def _stated(
             raise MotionFileError(
                 source, f"found no joint {joint!r} for {role}{did_you_mean(joint, places)}"
             )
+        other = next((own for own, told in found.items() if told.joint == places[joint]), None)
+        if other is not None:
+            raise MotionFileError(
+                source, f"found joint {joint!r} for {other} and {role}, expected one for each"
+            )
         found[role] = RoleGuess(places[joint], 1.0)
     return found
 
@@ -124,19 +129,12 @@ def _check_order(source: str, skeleton: Skeleton, roles: Mapping[str, RoleGuess]
         own = ["hips", *chain]
         known = [role for role in own if role in places]
         for upper, lower in pairwise(known):
-            if not _is_below(skeleton.parents, places[lower], places[upper]):
+            if places[upper] not in joint_chain(skeleton.parents, places[lower])[:-1]:
                 raise MotionFileError(
                     source,
                     f"found {lower} at {roles[lower].joint!r}, which is not below {upper} at "
                     f"{roles[upper].joint!r}; expected a chain: {HOW}",
                 )
-
-
-def _is_below(parents: Sequence[int], joint: int, above: int) -> bool:
-    joint = parents[joint]
-    while joint > above:
-        joint = parents[joint]
-    return joint == above
 
 
 def _facing(skeleton: Skeleton, roles: Mapping[str, RoleGuess]) -> float:

@@ -79,6 +79,10 @@ def test_stated_roles_are_taken(figure, tmp_path):
         ({"leftUperLeg": "LeftUpLeg"}, "the role 'leftUperLeg'.*did you mean 'leftUpperLeg'"),
         ({"leftUpperLeg": "LeftUpLegs"}, "no joint 'LeftUpLegs' for leftUpperLeg"),
         ({"leftLowerLeg": "LeftArm"}, "leftLowerLeg at 'LeftArm', which is not below"),
+        (
+            {"leftUpperLeg": "LeftUpLeg", "rightUpperLeg": "LeftUpLeg"},
+            "joint 'LeftUpLeg' for leftUpperLeg and rightUpperLeg, expected one for each",
+        ),
     ],
 )
 def test_wrong_statements_are_refused(figure, tmp_path, stated, said):
