@@ -1729,7 +1729,7 @@ export interface components {
             lowered: number;
             /** @description 99th percentile of the depth of soles below the floor, in metres. */
             penetration: number;
-            /** @description Distance of each hand from its target, in metres. */
+            /** @description Largest distance of each hand from its target while that is held, in metres. */
             hands_missed: number[];
         };
         /** @description Characters of users, and files that cannot be used. */
@@ -2035,7 +2035,7 @@ export interface components {
             rate: number;
             /** @description Number of frames of the motion tensor. */
             frames: number;
-            /** @description Number of captured clips in the motion tensor. */
+            /** @description Number of clips in the motion tensor: the captured ones, or the inducing ones of a family of 300 clips or more, all of whose clips `provenance.clips` counts. */
             samples: number;
             /** @description Levels of detail, the finest first. */
             levels: components["schemas"]["Level"][];
@@ -2045,9 +2045,9 @@ export interface components {
             labels: components["schemas"]["LabelSet"][];
             /** @description Names of the performers that a request may name; empty if the model does not distinguish performers. */
             performers: string[];
-            /** @description Control values of each captured clip. */
+            /** @description Control values of each clip of `samples`. */
             examples: number[][];
-            /** @description Performer of each captured clip, as an index into `performers`; empty if the model does not distinguish performers. */
+            /** @description Performer of each clip of `samples`, as an index into `performers`; empty if the model does not distinguish performers. */
             moved_by: number[];
             /** @description Indices of the joints that stand on the ground; empty if the recipe names none. */
             feet: number[];
@@ -2059,7 +2059,7 @@ export interface components {
             roles: {
                 [key: string]: string;
             };
-            /** @description File and frames of each captured clip. */
+            /** @description File and frames of each clip of `samples`. */
             sources: string[];
             /** @description Error of each joint as a share of sigma. */
             joint_sigma?: number[];
