@@ -9,6 +9,9 @@ from posefield.common.units import Floats
 from posefield.encode.user_rig import metre_joints
 from posefield.rigs.joints.rest_joints import RestJoints
 
+BLOCK = 256
+"""Frames whose matrices are computed together: those of a long motion take gigabytes."""
+
 
 @dataclass(frozen=True, eq=False)
 class RigStage:
@@ -39,6 +42,14 @@ class RigStage:
         rotations (F, J, 4), translations (F, J, 3): of the file's joints. A skinned point is a mean
         of points, each as far from a joint as at rest, so it lies within spheres about the joints.
         """
+        corners = [
+            self._box(rest, rotations[first : first + BLOCK], translations[first : first + BLOCK])
+            for first in range(0, len(rotations), BLOCK)
+        ]
+        low, high = np.stack(corners, axis=1)
+        return np.stack([low.min(axis=0), high.max(axis=0)])
+
+    def _box(self, rest: RestJoints, rotations: Rotations, translations: Positions) -> Floats:
         placed = np.zeros((len(rotations), len(rest.names), 4, 4))
         local = metre_joints.matrices(rotations, translations)
         local[..., :3, :3] *= rest.scales[:, :, None]
