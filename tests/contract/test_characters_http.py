@@ -50,7 +50,7 @@ def saved(folder, name, response):
     return folder / name
 
 
-def test_the_list_has_the_characters_and_why_files_are_left_out(ask, spec):
+def test_the_list_has_the_characters_and_why_files_are_left_out(ask, folder, spec):
     found = ask("GET", "/v1/characters").json()
     schema = {"$ref": "#/components/schemas/CharacterList", "components": spec["components"]}
     jsonschema.Draft202012Validator(schema).validate(found)
@@ -65,6 +65,8 @@ def test_the_list_has_the_characters_and_why_files_are_left_out(ask, spec):
     }
     (fault,) = found["faults"]
     assert fault["file"] == "broken.usdc" and "USD" in fault["reason"]
+    # Clients do not learn where the folder is.
+    assert str(folder) not in json.dumps(found)
 
 
 def test_broken_files_are_logged(shipped_walk, folder, caplog):

@@ -1,6 +1,7 @@
 """Characters of a folder, read once: those that can be used, and why others cannot."""
 
 import hashlib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -87,7 +88,9 @@ def read_folder(folder: Path, prefix: str) -> CharacterFolder:
         try:
             found[file.stem] = _read(file, prefix, found)
         except FileError as error:
-            faults.append(CharacterFault(file.name, error.message))
+            # Clients read the reasons: they do not tell where the folder is.
+            reason = error.message.replace(f"{folder.resolve()}{os.sep}", "")
+            faults.append(CharacterFault(file.name, reason))
     return CharacterFolder(found, tuple(faults))
 
 

@@ -75,4 +75,4 @@ def _notes(opened: SkelStage, unit: float) -> tuple[str, ...]:
     """Return a note on a unit that is the format's default."""
     if UsdGeom.StageHasAuthoredMetersPerUnit(opened.stage):
         return ()
-    return (f"{opened.source}: states no metersPerUnit, {unit:g} is USD's default",)
+    return (f"the file states no metersPerUnit, {unit:g} is USD's default",)
