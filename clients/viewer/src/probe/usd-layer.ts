@@ -37,12 +37,13 @@ export class Layer {
   prims(type: string): string[] {
     const found: string[] = [];
     const ahead = ["/"];
+    const most = Object.keys(this.#specs).length;
     while (ahead.length) {
       const path = ahead.pop()!;
       const fields = this.#fields(path);
       if (fields["typeName"] === type) found.push(path);
       const children = (fields["primChildren"] ?? []) as readonly string[];
-      if (found.length + ahead.length > Object.keys(this.#specs).length)
+      if (found.length + ahead.length > most)
         throw new Refusal("does not open as USD: found prims within themselves");
       ahead.push(...children.map((name) => `${path === "/" ? "" : path}/${name}`).reverse());
     }
