@@ -12,6 +12,7 @@ import numpy as np
 from posefield.common.errors import FileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
+from posefield.rigs.rig_roles import NEEDED
 from posefield.roles.joint_recognition import RoleGuess
 from posefield_train.discover import take_copies
 from posefield_train.probe import figure, proposals
@@ -34,8 +35,6 @@ SEARCHED = frozenset(
     }
 )
 """Roles whose places are kept."""
-NEEDED = ("hips", *(side + role for side in ("left", "right") for role in LEG))
-"""Roles without which a take cannot be searched."""
 MOST_FRAMES = 5_000_000
 """Frames of all takes together, which take 2 GB: eleven hours at 120 frames a second."""
 FEWEST_FRAMES = 2
@@ -305,7 +304,7 @@ def _with_roles(measured: figure.Figure, roles: Mapping[str, str]) -> figure.Fig
 
 
 def _lacking(measured: figure.Figure) -> list[str]:
-    """Return each needed role without a joint that is sure, with the reason."""
+    """Return each role of hips and legs without a joint that is sure, with the reason."""
     found = []
     for role in NEEDED:
         guess = measured.guesses.get(role)
