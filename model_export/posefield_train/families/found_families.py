@@ -123,5 +123,7 @@ def _of_one_topology(
         reasons = (*reasons, f"{len(kept)} clips of one skeleton, expected {FEWEST} or more")
     if len({row.take for row in kept}) < 2:
         reasons = (*reasons, "clips of one take, expected two takes or more")
-    own = tuple(kinds[at] for at in common)
+    # Clips in which a joint leaps may have been all of a kind.
+    left = {numbers[row.file] for row in kept} or {common[0]}
+    own = tuple(kinds[at] for at in common if at in left)
     return replace(family, rows=tuple(kept), kinds=own, left_out=left_out, reasons=reasons)
