@@ -31,6 +31,8 @@ SOURCES = (
     "service/posefield/model_file",
     "service/posefield/motion",
     "service/posefield/question",
+    "service/posefield/rigs",
+    "service/posefield/roles",
     "tests/fixture_cache.py",
     "tests/fixture_models.py",
 )
