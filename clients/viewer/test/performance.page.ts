@@ -274,7 +274,7 @@ test("files are those that the service gives, and scripts are saved and opened",
     await page.getByRole("button", { name: "Save script" }).click();
     const saved = readFileSync((await (await coming).path())!, "utf8");
     assert.deepEqual(JSON.parse(saved), { segments: [TURN] });
-    await page.locator("input[type=file]").setInputFiles({
+    await page.locator('input[type=file][accept^=".json"]').setInputFiles({
       name: "other.json",
       mimeType: "application/json",
       buffer: Buffer.from(saved.replace('"seconds": 2', '"seconds": 3')),

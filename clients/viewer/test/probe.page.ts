@@ -139,7 +139,9 @@ describe("a file that is dropped", () => {
     await settled(page);
     page.on("request", (request) => {
       const { pathname, protocol } = new URL(request.url());
-      if (protocol === "http:") asked.add(`${request.method()} ${pathname} ${request.postData()}`);
+      // The page may still ask which clips are nearest to its own motion.
+      if (protocol === "http:" && !pathname.endsWith("/why"))
+        asked.add(`${request.method()} ${pathname} ${request.postData()}`);
     });
   });
   after(() => page.close());

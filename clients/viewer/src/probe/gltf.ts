@@ -90,7 +90,7 @@ function lacking(takes: readonly Read[]): string[] {
     .map(({ name }) => `'${name}'`)
     .join(", ");
   return [
-    `found ${takes.length} animations (${listed}), expected one, or the name of one in the column clips.animation`,
+    `found ${takes.length} animations (${listed}), expected one: export each to a file of its own, or name one in the column clips.animation`,
     ...faults,
   ];
 }
