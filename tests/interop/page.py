@@ -56,7 +56,7 @@ def _clicked(node: Path, address: str, models: Path) -> list[str]:
 
 
 def _passed(node: Path, file: Path, told: dict[str, str]) -> bool:
-    """Whether the tests of a file pass, at the first or the second try."""
+    """Return whether the tests of a file pass at the first or the second try."""
     # One after the other: they measure. A browser that draws with the processor, beside other work,
     # may miss a wait of some seconds; what fails twice is a fault, and what fails once is said.
     options = ("--test-concurrency=1", "--test-timeout=300000", "--test-reporter=spec")

@@ -241,7 +241,7 @@ def tiny(folder, count):
 
 
 def test_memory_of_many_files_is_that_of_their_joints_alone(tmp_path):
-    """What a file keeps is its joints with a role, and few measured frames."""
+    """Of each file, only the joints with a role and a few measured frames stay in memory."""
     folder = tiny(tmp_path / "many", 300)
     tracemalloc.start()
     read = take_reading.read_takes(folder)

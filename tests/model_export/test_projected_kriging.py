@@ -79,7 +79,7 @@ def test_the_drift_is_reproduced_exactly(hyper, samples, points):
 
 
 def test_its_sample_values_give_its_weights(hyper, samples, values, points):
-    """What adaptation reads from a file, and weights of clips: a dense model of inducing clips."""
+    """A dense model of the inducing clips, which adaptation reads, has equal weights."""
     field = sample_kriging.solve(hyper, large(samples, np.arange(20)), values)
     again = universal_kriging.solve(hyper, field.samples, field.values)
     assert np.abs(again.dual - field.dual).max() < SAME

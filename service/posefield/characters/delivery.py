@@ -23,7 +23,7 @@ from posefield.retarget import role_map
 from posefield.retarget.retarget_report import HandGoal, RetargetSettings
 from posefield.retarget.retargeting import Retargeted, retarget
 
-SIDES, ARM = ("left", "right"), ("UpperArm", "LowerArm", "Hand")
+ARM = ("UpperArm", "LowerArm", "Hand")
 CLOSED = 1e-3
 """Largest distance of a joint between both ends of a loop that is not told, m."""
 NO_GOAL = (
@@ -109,7 +109,7 @@ class Delivery:
     def _hands(self, roles: Mapping[str, str]) -> dict[str, str]:
         """Return the role of each joint of the model that is a hand which the character has."""
         own = self.character.rig.joints
-        arms = {side + "Hand": {side + part for part in ARM} for side in SIDES}
+        arms = {side + "Hand": {side + part for part in ARM} for side in role_map.SIDES}
         return {
             roles[hand]: hand for hand, arm in arms.items() if hand in roles and arm <= own.keys()
         }

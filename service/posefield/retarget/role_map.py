@@ -12,8 +12,8 @@ from posefield.common.array_shapes import Bones
 from posefield.common.errors import InvalidField
 from posefield.common.units import Floats
 from posefield.motion.skeleton import Skeleton, joint_chain
+from posefield.rigs import rig_roles
 from posefield.rigs.rig import Rig
-from posefield.rigs.rig_roles import NEEDED
 from posefield.roles import joint_recognition
 
 SIDES = joint_recognition.SIDES
@@ -67,8 +67,7 @@ class Body:
     def facing(self) -> float:
         """Return the direction in which the body faces at rest, rad, to the left of +Z."""
         left, right = (self.rest[self.joints[side + "UpperLeg"]] for side in SIDES)
-        across = left - right
-        return float(np.arctan2(-across[2], across[0]))
+        return rig_roles.facing_of(left - right)
 
     @cached_property
     def spine(self) -> "Chain":
@@ -127,7 +126,7 @@ def body_of_motion(skeleton: Skeleton, bones: Bones, roles: Mapping[str, str]) -
     """
     named = roles or joint_recognition.roles_of(skeleton.names, skeleton.parents)
     joints = {role: skeleton.names.index(own) for role, own in named.items()}
-    missing = [role for role in NEEDED if role not in joints]
+    missing = [role for role in rig_roles.NEEDED if role not in joints]
     if missing:
         raise InvalidField(
             FIELD,

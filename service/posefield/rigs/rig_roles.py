@@ -138,12 +138,16 @@ def _check_order(source: str, skeleton: Skeleton, roles: Mapping[str, RoleGuess]
 
 
 def _facing(skeleton: Skeleton, roles: Mapping[str, RoleGuess]) -> float:
-    """Return the direction in which the body faces at rest, rad.
-
-    The line from the right upper leg to the left one is its left.
-    """
+    """Return the direction in which the body faces at rest, rad, to the left of +Z."""
     left, right = (_position(skeleton, roles[side + "UpperLeg"]) for side in SIDES)
-    across = left - right
+    return facing_of(left - right)
+
+
+def facing_of(across: Vector) -> float:
+    """Return the direction in which a body faces, rad, to the left of +Z.
+
+    across: vector (3,) from its right upper leg to the left one.
+    """
     return float(np.arctan2(-across[2], across[0]))
 
 

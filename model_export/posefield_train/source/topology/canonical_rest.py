@@ -169,7 +169,7 @@ def _turn_between(first: Directions, second: Directions) -> Floats:
     """
     own, common = (_basis(first[at], second[at]) for at in (0, 1))
     if own is None or common is None:
-        return _smallest_turn(first[0], first[1])
+        return smallest_turns(first[0][None], first[1][None])[0]
     return np.asarray(quat.from_matrix(common @ own.T))
 
 
@@ -183,13 +183,8 @@ def _basis(along: Floats, beside: Floats) -> Floats | None:
     return np.stack([x, y, quat.cross(x, y)], axis=-1)
 
 
-def _smallest_turn(a: Floats, b: Floats) -> Floats:
-    """Return the smallest turn (4,) between directions; of opposite or no directions none."""
-    return smallest_turns(a[None], b[None])[0]
-
-
 def smallest_turns(a: Floats, b: Floats) -> Floats:
-    """Return the smallest turns (F, 4) from directions (F, 3) to others; none without a length."""
+    """Return the smallest turns (F, 4) between directions (F, 3); none between opposites."""
     start, end = _units(a), _units(b)
     halves = np.concatenate(
         [1.0 + np.sum(start * end, axis=-1, keepdims=True), quat.cross(start, end)], axis=-1

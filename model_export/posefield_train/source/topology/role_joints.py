@@ -9,7 +9,7 @@ from posefield.motion.joint_roles import ROLES
 from posefield.motion.skeleton import Skeleton
 from posefield.roles import joint_recognition
 
-SIDES = ("left", "right")
+SIDES = joint_recognition.SIDES
 ARM = ("Shoulder", "UpperArm", "LowerArm", "Hand")
 LEG = ("UpperLeg", "LowerLeg", "Foot", "Toes")
 LIMB_ROLES = tuple(side + role for limb in (LEG, ARM) for side in SIDES for role in limb)

@@ -7,8 +7,9 @@ from pxr import UsdGeom, UsdSkel
 
 from posefield.common.units import UpAxis
 from posefield.rigs.joints import format_faults, posed_joints
+from posefield.rigs.joints.rest_joints import MAX_JOINTS
 from posefield.rigs.usd import usd_stage
-from posefield.rigs.usd.usd_stage import MAX_JOINTS, SkelStage
+from posefield.rigs.usd.usd_stage import SkelStage
 from posefield_train.source.motion_files import key_times
 from posefield_train.source.motion_files.key_times import UnevenKeys
 from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions

@@ -11,9 +11,7 @@ from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.rigs.gltf import gltf_accessors
 from posefield.rigs.gltf.gltf_document import GltfDocument
-
-MAX_JOINTS = 1000
-"""Limit of joints, several times those of any character."""
+from posefield.rigs.joints.rest_joints import MAX_JOINTS
 
 EIGHTH = float(np.cos(np.pi / 8))
 """Product of two quaternions that are turned against each other by an eighth of a turn."""

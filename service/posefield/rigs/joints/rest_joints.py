@@ -21,6 +21,9 @@ from posefield.rigs.joints.posed_joints import PosedJoints
 Z_UP = quat.from_axis_angle(np.array([1.0, 0.0, 0.0]), np.array(-0.5 * np.pi))
 """Rotation of the axes of a file with Z up: (x, y, z) becomes (x, z, -y)."""
 
+MAX_JOINTS = 1000
+"""Limit of joints, several times those of any character."""
+
 
 @dataclass(frozen=True)
 class OuterTransform:

@@ -7,10 +7,10 @@ import numpy as np
 from pxr import UsdGeom, UsdSkel
 
 from posefield.common.units import UpAxis
-from posefield.rigs.joints.rest_joints import OuterTransform, RestJoints
+from posefield.rigs.joints.rest_joints import MAX_JOINTS, OuterTransform, RestJoints
 from posefield.rigs.usd import usd_stage
 from posefield.rigs.usd.skel_joints import SkelJoints
-from posefield.rigs.usd.usd_stage import MAX_JOINTS, SkelStage
+from posefield.rigs.usd.usd_stage import SkelStage
 
 SHOWN = 20
 """Skeletons that a message lists."""

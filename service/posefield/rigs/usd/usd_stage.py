@@ -8,9 +8,6 @@ from pxr import Tf, Usd, UsdSkel
 
 from posefield.common.errors import MotionFileError
 
-MAX_JOINTS = 1000
-"""Limit of joints, several times those of any character."""
-
 
 @dataclass(frozen=True)
 class SkelStage:
