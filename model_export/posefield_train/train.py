@@ -38,6 +38,8 @@ from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.outliers import family_check, outlier_detection
 from posefield_train.parallel import single_thread
+from posefield_train.parallel.jobs import Jobs, ordered_results
+from posefield_train.source.canonical import clip_blocks
 from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
@@ -53,7 +55,6 @@ from posefield_train.tensor.event_blend import EventBlend
 from posefield_train.tensor.event_jacobian import COEFFICIENTS
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
-from posefield_train.tensor.pose_vectors import PoseChart
 from posefield_train.tensor.truncation_error import TruncationReference
 
 StepCallback = Callable[[str], None]
@@ -64,50 +65,69 @@ StepCallback = Callable[[str], None]
 class _VectorizedClips:
     """Aligned clips as pose vectors.
 
-    numbers: (N, T, D). offsets: bone offsets (N, J, 3), m. laid: their sample points. travels: (N,
-    3) of cycles, otherwise empty. controls: (N, d), in their own units.
+    tensor: of their pose vectors. offsets: bone offsets (N, J, 3), m. laid: their sample points.
+    travels: (N, 3) of cycles, otherwise empty. controls: (N, d), in their own units.
     """
 
     samples: SamplePoints
     labels: LabelNames
     aligned: AlignedClips
     offsets: Floats
-    numbers: Floats
-    chart: PoseChart
+    tensor: MotionTensor
     travels: dict[str, Floats]
     findings: list[Finding]
     controls: Floats
 
 
-def train(recipe: Recipe, examples: Sequence[Example], report: StepCallback) -> TrainedModel:
+def train(
+    recipe: Recipe,
+    examples: Sequence[Example],
+    report: StepCallback,
+    jobs: Jobs = kriging_tuning.SERIAL,
+) -> TrainedModel:
     """Return a model of a recipe's examples.
 
-    report: called with a description of each step. Raises TrainingError if the samples do not
+    report: called with a description of each step. jobs: executor of the parts that need not wait
+    for each other, which give the same bytes on all. Raises TrainingError if the samples do not
     determine a kriging model.
     """
     with single_thread.single_threaded():
-        return _train(recipe, examples, report)
+        return _train(recipe, examples, report, jobs)
 
 
-def _train(recipe: Recipe, examples: Sequence[Example], report: StepCallback) -> TrainedModel:
+def _train(
+    recipe: Recipe, examples: Sequence[Example], report: StepCallback, jobs: Jobs
+) -> TrainedModel:
     names = tuple(control.name for control in recipe.controls)
     given = np.stack([example.controls for example in examples])
     family_check.check_family(recipe, examples)
     universal_kriging.check_samples(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
     examples = _sorted(examples)
+    clip_blocks.return_freed_memory()
     report(f"aligning {len(examples)} clips")
     weights = truncation_error.joint_weights(recipe, examples)
     examples = phase_alignment.align_phases(recipe, examples, weights)
-    moved = _vectorize(recipe, examples, weights)
-    report("building the motion tensor")
-    parents = examples[0].clip.skeleton.parents
-    own_tensor = motion_tensor.build_tensor(
-        moved.numbers, moved.chart, parents, moved.offsets, weights, _curves(examples)
-    )
-    full = hosvd.decompose(own_tensor.values)
+    moved = _vectorize(recipe, examples, weights, jobs)
+    report("decomposing the motion tensor")
+    full = _decompose(moved)
+    clip_blocks.return_freed_memory()
     report("fitting the fields")
-    trained = _fit_and_truncate(recipe, examples, moved, own_tensor, full)
+    trained = _fit_and_truncate(recipe, examples, moved, full, jobs)
     return replace(trained, outliers=outlier_detection.find_outliers(recipe, trained))
+
+
+# Root mean square distance of joints, m, that each of the three projections of a large tensor may
+# leave out: together less than the least limit of a truncation.
+NEXT_TO_NOTHING = 5e-5
+
+
+def _decompose(moved: _VectorizedClips) -> TuckerTensor:
+    """Return the HOSVD of a family's tensor; that of a large one in passes over its clips."""
+    own = moved.tensor
+    if moved.samples.inducing is None:
+        return hosvd.decompose(own.values)
+    _, frames, clips = own.values.shape
+    return hosvd.decompose_in_passes(own.values, NEXT_TO_NOTHING**2 * own.weight * frames * clips)
 
 
 def _sorted(examples: Sequence[Example]) -> tuple[Example, ...]:
@@ -125,13 +145,15 @@ def _curves(examples: Sequence[Example]) -> tuple[Curve, ...]:
     return own.curves if own else ()
 
 
-def _vectorize(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> _VectorizedClips:
-    """Align clips and convert them to pose vectors."""
+def _vectorize(
+    recipe: Recipe, examples: Sequence[Example], weights: Floats, jobs: Jobs
+) -> _VectorizedClips:
+    """Align clips and build the tensor of their pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
     laid, labels = sample_points.make_samples(recipe, examples)
-    predict = _predictor(recipe, laid)
+    predict = _predictor(recipe, laid, jobs)
     aligned = time_alignment.align(
-        examples, recipe.motion.frames, basis, settings.rounds, weights, predict
+        examples, recipe.motion.frames, basis, settings.rounds, weights, predict, jobs
     )
     travels = {}
     if recipe.motion.cyclic:
@@ -139,23 +161,28 @@ def _vectorize(recipe: Recipe, examples: Sequence[Example], weights: Floats) -> 
     offsets = np.stack([example.offsets for example in examples])
     parents = examples[0].clip.skeleton.parents
     numbers, chart, noticed = motion_tensor.pose_vectors(aligned, parents, offsets)
+    if laid.inducing is not None:
+        aligned = aligned.without_poses()
+    own_tensor = motion_tensor.build_tensor(
+        numbers, chart, parents, offsets, weights, _curves(examples)
+    )
     jumps = [replace(jump, clip=i) for i, example in enumerate(examples) for jump in example.jumps]
     findings = jumps + noticed
     controls = np.stack([example.controls for example in examples])
-    return _VectorizedClips(
-        laid, labels, aligned, offsets, numbers, chart, travels, findings, controls
-    )
+    return _VectorizedClips(laid, labels, aligned, offsets, own_tensor, travels, findings, controls)
 
 
-def _predictor(recipe: Recipe, laid: SamplePoints) -> time_alignment.Predictor:
+def _predictor(recipe: Recipe, laid: SamplePoints, jobs: Jobs) -> time_alignment.Predictor:
     """Return a function that predicts each clip from the others by a tuned kriging model."""
 
     settings = recipe.kriging
 
     def predict(values: Floats) -> Floats:
         problem = TuningProblem(laid, values, settings.nugget)
-        tuned = kriging_tuning.tune(problem, settings.covariances[0], settings.fixed_degree)
-        return values - tuned.residuals
+        covariance, degree = settings.covariances[0], settings.fixed_degree
+        tuned = kriging_tuning.tune(problem, covariance, degree, jobs=jobs)
+        predicted: Floats = np.subtract(values, tuned.residuals, out=tuned.residuals)
+        return predicted
 
     def mean(values: Floats) -> Floats:
         return np.broadcast_to(values.mean(axis=0), values.shape)
@@ -187,13 +214,14 @@ def _fit_models(
     moved: _VectorizedClips,
     judge: TruncationReference,
     full: TuckerTensor,
+    jobs: Jobs,
 ) -> _FittedModels:
     laid, own_tensor = moved.samples, judge.own_tensor
     proportions, bones = coefficient_models.fit_proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
     effector = event_jacobian.effector_weights(judge, full)
-    pose = coefficient_models.choose_covariance(recipe.kriging, laid, full.motions, effector)
+    pose = coefficient_models.choose_covariance(recipe.kriging, laid, full.motions, effector, jobs)
     fitted = {
         k: coefficient_models.fit(recipe.kriging, pose.hyper, laid, v) for k, v in beside.items()
     }
@@ -208,7 +236,7 @@ def _fit_models(
     motions = full.motions - pose.residuals
     expected = {name: values[name] - found.residuals for name, found in fitted.items()}
 
-    def block_errors(rows: slice) -> Floats:
+    def motions_of(rows: slice) -> tuple[Floats, Floats, int]:
         predicted = warped_errors.predicted_positions(
             CanonicalTiming(WarpBasis(recipe.alignment.knots), recipe.motion.frames),
             own_tensor,
@@ -218,10 +246,10 @@ def _fit_models(
             judge.parents,
         )
         captured = warped_errors.captured_positions(examples[rows])
-        return warped_errors.mean_squared_errors(captured, predicted, len(own_tensor.curves))
+        return captured, predicted, len(own_tensor.curves)
 
-    blocks = truncation_error.clip_blocks(len(examples))
-    warped = np.concatenate([block_errors(rows) for rows in blocks])
+    compared = map(motions_of, clip_blocks.clip_blocks(len(examples)))
+    warped = np.concatenate(ordered_results(jobs, warped_errors.mean_squared_errors, compared))
     event = _fit_event(recipe, laid, judge, full, pose, effector)
     return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law, event)
 
@@ -319,12 +347,13 @@ def _fit_and_truncate(
     recipe: Recipe,
     examples: Sequence[Example],
     moved: _VectorizedClips,
-    own_tensor: MotionTensor,
     full: TuckerTensor,
+    jobs: Jobs,
 ) -> TrainedModel:
     """Fit the coefficient models, choose the ranks within the budgets, and assemble the model."""
+    own_tensor = moved.tensor
     judge = truncation_error.truncation_reference(recipe, examples, own_tensor)
-    fits = _fit_models(recipe, examples, moved, judge, full)
+    fits = _fit_models(recipe, examples, moved, judge, full, jobs)
     controls = np.stack([example.controls for example in examples])
     price = truncation_cost.RANK_COSTS[recipe.size.cost](own_tensor, controls.shape[1])
     limits = _truncation_limits(judge, full, fits)
@@ -397,7 +426,7 @@ def joint_error_shares(
         places = truncation_error.positions(own, predicted, judge.parents, judge.offsets[rows])
         return np.mean(np.sum(np.square(places - judge.whole[rows]), axis=-1), axis=1)
 
-    blocks = truncation_error.clip_blocks(len(judge.whole))
+    blocks = clip_blocks.clip_blocks(len(judge.whole))
     squares = np.concatenate([block_squares(rows) for rows in blocks])
     if travels is not None:
         squares[:, : len(judge.parents)] += travel.mean_squared_distance(travels)[:, None]

@@ -193,3 +193,46 @@ def test_rank_that_is_not_there_is_refused(ranks, rng):
     with pytest.raises(TrainingError) as refusal:
         full.truncated(ranks)
     assert str(refusal.value) == f"ranks {ranks}, expected 1 to (3, 2, 4)"
+
+
+# --- in passes over many clips --------------------------------------------------------------------
+
+
+@pytest.fixture
+def motions(rng):
+    """Tensor of 700 clips in three blocks: a smooth part, and noise a thousandth as large."""
+    whole = np.einsum(
+        "ak,bk,ck->abc",
+        rng.normal(size=(9, 4)),
+        rng.normal(size=(12, 4)),
+        rng.normal(size=(700, 4)),
+    )
+    return whole + 1e-3 * rng.normal(size=whole.shape)
+
+
+def test_passes_over_blocks_give_the_decomposition_of_all_at_once(motions):
+    whole, passes = hosvd.decompose(motions), hosvd.decompose_in_passes(motions, 0.0)
+    for one, other in zip(whole.bases[:2], passes.bases[:2], strict=True):
+        # The noise's directions are nearly equal in size, and so less certain.
+        assert np.max(np.abs(one - other)) < 1e-6
+    assert np.max(np.abs(passes.restored() - motions)) < 1e-10
+    rank = passes.core.shape[2]
+    assert np.max(np.abs(whole.bases[2][:, :rank] - passes.bases[2])) < 1e-6
+    assert np.max(np.abs(passes.bases[2].T @ passes.bases[2] - np.eye(rank))) < TOLERANCE
+
+
+def test_projections_leave_out_no_more_than_told(motions):
+    allowed = 2.0 * 1e-6 * motions.size
+    passes = hosvd.decompose_in_passes(motions, allowed)
+    assert passes.core.shape == (4, 4, 4)
+    missed = float(np.sum(np.square(passes.restored() - motions)))
+    assert 0.0 < missed <= 3.0 * allowed
+    # Negative control: one direction less leaves out more.
+    fewer = passes.truncated((4, 4, 3))
+    assert float(np.sum(np.square(fewer.restored() - motions))) > 3.0 * allowed
+
+
+def test_slices_of_a_projected_tensor_are_those_of_its_motions(motions):
+    passes = hosvd.decompose_in_passes(motions, 2.0 * 1e-6 * motions.size)
+    some = passes.slices(passes.motions[3:9])
+    assert np.max(np.abs(some - passes.restored()[:, :, 3:9])) < 1e-10

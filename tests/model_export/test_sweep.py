@@ -71,6 +71,14 @@ def test_a_cluster_trains_the_same_models(folder, alone, tmp_path):
     assert done.stdout.count("onnxruntime differs from the reference") == len(FRAMES)
 
 
+def test_a_cluster_computes_the_parts_of_one_training(folder, alone, tmp_path):
+    own, path = recipes(folder)[0], tmp_path / "one.onnx"
+    with started(tmp_path, 2) as cluster:
+        done = train(own, "-o", path, "--scheduler", cluster.address)
+    assert done.returncode == 0, done.stderr
+    assert path.read_bytes() == alone[f"{own.stem}.onnx"]
+
+
 def test_a_recipe_that_makes_no_model_stops_no_other(folder, alone, tmp_path):
     few = folder / "few.toml"
     few.write_text(TOML + "[clips.where]\nv = { maximum = 0 }\n")
@@ -85,7 +93,8 @@ def test_a_recipe_that_makes_no_model_stops_no_other(folder, alone, tmp_path):
     ("words", "said"),
     [
         (("-o", "made.onnx"), "output: 'made.onnx', expected a folder for several models"),
-        (("-o", "made", "--report", "a.html"), "report: of several recipes or on a cluster"),
+        (("-o", "made", "--report", "a.html"), "report: of several recipes, expected none"),
+        (("-o", "made", "--resume", "kept"), "resume: of several recipes, expected none"),
         (("-o", "made", "--jobs", "0"), "jobs: 0, expected 1 or more"),
     ],
 )

@@ -4,19 +4,22 @@ Clips are compared by joint positions relative to the root. In the first round t
 every clip is the medoid; in later rounds it is the prediction from the other aligned clips.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
 from posefield.common.array_shapes import (
     ClipBones,
+    ClipFrames,
     ClipPaths,
     ClipPositions,
     ClipRotations,
+    JointRotations,
     JointWeights,
     PerClip,
+    RootPath,
     Traces,
 )
 from posefield.common.units import UP, Floats
@@ -24,9 +27,12 @@ from posefield.motion import blend, curves, quat, skeleton
 from posefield.motion.clip import Clip
 from posefield_train.align import dtw
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
+from posefield_train.parallel.jobs import Jobs, SerialJobs, ordered_results
+from posefield_train.source.canonical import clip_blocks
 from posefield_train.source.canonical.placement import heading
 from posefield_train.source.ingest import Example
 
+SERIAL = SerialJobs()
 # Numbers of frames for the medoid and for warps; more frames do not improve the result.
 COARSE, FINE = 25, 100
 # A landmark is one of 501 samples; the weight makes the fitted warp pass through it.
@@ -39,9 +45,10 @@ LARGEST_COMPARED, MEDOID_SAMPLE = 300, 200
 class AlignedClips:
     """Clips in canonical time.
 
-    rotations: (N, T, J, 4). root_path: (N, T, 3), m. logs: log increments (N, knots) of each clip's
-    warp from its own time to canonical time. durations: (N,), s. reference: index of the medoid.
-    curves: values (N, T, C); None for a family without curves.
+    rotations: (N, T, J, 4). root_path: (N, T, 3), m. Both are of no frames once they were released.
+    logs: log increments (N, knots) of each clip's warp from its own time to canonical time.
+    durations: (N,), s. reference: index of the medoid. curves: values (N, T, C); None for a family
+    without curves.
     """
 
     rotations: ClipRotations
@@ -50,6 +57,11 @@ class AlignedClips:
     durations: PerClip
     reference: int
     curves: Annotated[Floats, "clips frames curves"] | None = None
+
+    def without_poses(self) -> "AlignedClips":
+        """Return the timing alone: the poses of thousands of clips take hundreds of megabytes."""
+        rotations, root_path = self.rotations[:, :0].copy(), self.root_path[:, :0].copy()
+        return replace(self, rotations=rotations, root_path=root_path, curves=None)
 
 
 Predictor = Callable[[Floats], Floats]
@@ -63,27 +75,54 @@ def align(
     rounds: int,
     joint_weights: JointWeights,
     predict: Predictor,
+    jobs: Jobs = SERIAL,
 ) -> AlignedClips:
     """Warp examples to one canonical time and resample them to `frames` frames.
 
     joint_weights: weights (J,) of the joints' positions in the comparison. predict: maps values (N,
-    m) of all clips to the prediction (N, m) of each clip from the others. The mean of the inverse
-    warps is the identity, so canonical time is the average timing of the family.
+    m) of all clips to the prediction (N, m) of each clip from the others. jobs: executor of
+    the warps of many clips. The mean of the inverse warps is the identity, so canonical time is the
+    average timing of the family.
     """
-    traces = [trace(example.clip, np.sqrt(joint_weights)) for example in examples]
+    traces = _ClipTraces(examples, np.sqrt(joint_weights))
     marks = _landmark_times(examples)
     knees = _breakpoints(marks, marks.mean(axis=0))
     medoid = _medoid(_align_piecewise(traces, knees, COARSE))
     fine = _align_piecewise(traces, knees, FINE)
-    logs = _centre(_warps_to(fine, fine[medoid], knees, basis), knees, basis)
+    logs = _centre(_warps_to(fine, fine[medoid], knees, basis, jobs), knees, basis)
     for _ in range(rounds):
         pairs = zip(traces, logs, strict=True)
-        warped = np.stack(
-            [interpolate(trace, basis.invert(log, _uniform_times(FINE))) for trace, log in pairs]
+        warped = _stack(
+            (interpolate(trace, basis.invert(log, _uniform_times(FINE))) for trace, log in pairs),
+            len(examples),
         )
         predicted = predict(warped.reshape(len(warped), -1)).reshape(warped.shape)
-        logs = _centre(_warps_to(fine, predicted, knees, basis), knees, basis)
+        del warped
+        logs = _centre(_warps_to(fine, predicted, knees, basis, jobs), knees, basis)
+        del predicted
     return _resample_all(examples, frames, basis, logs, medoid)
+
+
+@dataclass(frozen=True)
+class _ClipTraces:
+    """Traces of examples, made each time they are read: those of thousands take gigabytes."""
+
+    examples: Sequence[Example]
+    weights: JointWeights
+
+    def __iter__(self) -> Iterator[Annotated[Floats, "_ features"]]:
+        return (trace(example.clip, self.weights) for example in self.examples)
+
+
+def _stack(rows: Iterable[Floats], count: int) -> Annotated[Floats, "{count} ..."]:
+    """Return `np.stack` of `count` arrays of equal shapes, of which only one is held at a time."""
+    found: Floats | None = None
+    for index, row in enumerate(rows):
+        if found is None:
+            found = np.empty((count, *row.shape))
+        found[index] = row
+    assert found is not None and index == count - 1
+    return found
 
 
 @dataclass(frozen=True)
@@ -105,9 +144,9 @@ def align_to(examples: Sequence[Example], references: Traces, canon: CanonicalTi
 
     references: traces (N, FINE, features) at uniform steps of canonical time.
     """
-    traces = [trace(example.clip, np.sqrt(canon.joint_weights)) for example in examples]
+    traces = _ClipTraces(examples, np.sqrt(canon.joint_weights))
     knees = _breakpoints(_landmark_times(examples), np.sort(canon.landmarks))
-    logs = _warps_to(_align_piecewise(traces, knees, FINE), references, knees, canon.basis)
+    logs = _warps_to(_align_piecewise(traces, knees, FINE), references, knees, canon.basis, SERIAL)
     return _resample_all(examples, canon.frames, canon.basis, logs, medoid=0)
 
 
@@ -126,11 +165,18 @@ def _resample_all(
 ) -> AlignedClips:
     times = [basis.invert(log, _uniform_times(frames)) for log in logs]
     pairs = list(zip(examples, times, strict=True))
-    resampled = [resample(example.clip, u) for example, u in pairs]
     values = [interpolate(e.clip.curve_values, np.clip(u, 0.0, 1.0)) for e, u in pairs]
+    paths: list[RootPath] = []
+
+    def rotations() -> Iterator[JointRotations]:
+        for example, u in pairs:
+            found, path = resample(example.clip, u)
+            paths.append(path)
+            yield found
+
     return AlignedClips(
-        np.stack([rotations for rotations, _ in resampled]),
-        np.stack([path for _, path in resampled]),
+        _stack(rotations(), len(examples)),
+        np.stack(paths),
         logs,
         np.array([example.clip.duration for example in examples]),
         medoid,
@@ -194,11 +240,12 @@ def _breakpoints(
 
 
 def _align_piecewise(
-    traces: list[Annotated[Floats, "_ features"]], knees: _Breakpoints, frames: int
+    traces: Iterable[Annotated[Floats, "_ features"]], knees: _Breakpoints, frames: int
 ) -> Annotated[Floats, "clips {frames} features"]:
     """Resample traces to (N, frames, features), with landmarks aligned by piecewise linear maps."""
     times = [np.interp(_uniform_times(frames), knees.canonical, own) for own in knees.own]
-    return np.stack([interpolate(trace, u) for trace, u in zip(traces, times, strict=True)])
+    pairs = zip(traces, times, strict=True)
+    return _stack((interpolate(trace, u) for trace, u in pairs), len(times))
 
 
 def _medoid(traces: Traces) -> int:
@@ -216,6 +263,7 @@ def _warps_to(
     reference: Annotated[Floats, "... frames features"],
     knees: _Breakpoints,
     basis: WarpBasis,
+    jobs: Jobs,
 ) -> Annotated[Floats, "clips knots"]:
     """Return log increments (N, knots) of the warps to a reference.
 
@@ -225,12 +273,23 @@ def _warps_to(
     # Time warping may shift a landmark: the phases are rescaled so that it returns to its time.
     phases = [
         np.interp(phase, np.interp(knees.canonical, _uniform_times(FINE), phase), knees.canonical)
-        for phase in dtw.warp(traces, reference)
+        for phase in _phases(traces, reference, jobs)
     ]
     warps = np.stack(
         [np.interp(s, _uniform_times(FINE), p) for s, p in zip(straight, phases, strict=True)]
     )
     return np.stack([basis.fit(warp, w) for warp, w in zip(warps, knees.weights, strict=True)])
+
+
+def _phases(
+    traces: Traces, reference: Annotated[Floats, "... frames features"], jobs: Jobs
+) -> ClipFrames:
+    """Return `dtw.warp` of traces, block by block of clips."""
+    own = np.broadcast_to(reference, traces.shape)
+    blocks = clip_blocks.clip_blocks(len(traces))
+    return np.concatenate(
+        ordered_results(jobs, dtw.warp, ((traces[rows], own[rows]) for rows in blocks))
+    )
 
 
 def _centre(

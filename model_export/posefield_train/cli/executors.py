@@ -22,20 +22,33 @@ Scheduler = Annotated[
 
 @dataclass(frozen=True)
 class ExecutorOptions:
-    """Executor of the training of several models.
+    """Executor of the training of a model, or of several.
 
-    jobs: number of processes; None for one per core. scheduler: address of a cluster's scheduler;
-    None for this machine.
+    jobs: number of processes; None for one per core of several recipes, and for this process alone
+    of one. scheduler: address of a cluster's scheduler; None for this machine.
     """
 
-    jobs: Annotated[int | None, typer.Option(help="for several recipes: number of processes")] = (
-        None
-    )
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            help="number of processes; default: one per core for several recipes, this one alone "
+            "for one recipe"
+        ),
+    ] = None
     scheduler: Scheduler = None
 
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise InvalidField("jobs", f"{self.jobs}, expected 1 or more")
+
+
+def parts(options: ExecutorOptions) -> "AbstractContextManager[Jobs]":
+    """Open an executor of the parts of one training: this process unless others are asked for."""
+    if options == ExecutorOptions():
+        from posefield_train.parallel.jobs import SerialJobs
+
+        return nullcontext(SerialJobs())
+    return jobs(options.scheduler, options.jobs)
 
 
 def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextManager[Jobs]":

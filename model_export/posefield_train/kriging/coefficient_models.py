@@ -18,11 +18,11 @@ from posefield_train.kriging.tuning_loss import (
     POSE_STRENGTH,
     TINY,
     UNNAMED_STRENGTH,
-    LeaveOneOutLoss,
     PredictiveDensityLoss,
     TuningProblem,
 )
 from posefield_train.kriging.universal_kriging import Hyper
+from posefield_train.parallel.jobs import Jobs
 from posefield_train.source.recipe_sections.training_sections import Kriging
 from posefield_train.tensor.decoder import Proportions
 
@@ -53,29 +53,33 @@ def choose_covariance(
     samples: SamplePoints,
     values: SampleValues,
     effector: Annotated[Floats, "samples _ _"] | None = None,
+    jobs: Jobs = kriging_tuning.SERIAL,
 ) -> TunedKriging:
     """Return the model of values (N, m) with the first covariance, or a clearly better one.
 
     A covariance is clearly better if its leave-one-out error is below CLEAR_IMPROVEMENT times the
-    first's. effector: as in `TuningProblem`.
+    first's. effector: as in `TuningProblem`. jobs: as in `kriging_tuning.tune`.
     """
     strength = UNNAMED_STRENGTH if samples.unnamed else POSE_STRENGTH
     problem = TuningProblem(
         samples, values, settings.nugget, effector, strength, unnamed=samples.unnamed
     )
     first, *others = (
-        kriging_tuning.tune(problem, name, settings.fixed_degree) for name in settings.covariances
+        kriging_tuning.tune(problem, name, settings.fixed_degree, jobs=jobs)
+        for name in settings.covariances
     )
     best = min(others, key=lambda field: field.unexplained, default=first)
     chosen = best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
     if len(samples.points) <= inducing_clips.LARGEST_TUNED:
         return chosen
-    return _better_draw(problem, settings.fixed_degree, chosen)
+    return _better_draw(problem, settings.fixed_degree, chosen, jobs)
 
 
-def _better_draw(problem: TuningProblem, degree: int | None, first: TunedKriging) -> TunedKriging:
+def _better_draw(
+    problem: TuningProblem, degree: int | None, first: TunedKriging, jobs: Jobs
+) -> TunedKriging:
     """Return the better of a model and of one tuned on other clips, with their disagreement."""
-    second = kriging_tuning.tune(problem, first.hyper.covariance, degree, draw=1)
+    second = kriging_tuning.tune(problem, first.hyper.covariance, degree, draw=1, jobs=jobs)
     better = min(first, second, key=lambda own: own.unexplained)
     errors = np.sqrt([first.unexplained, second.unexplained])
     return replace(better, disagreement=float(errors.max() / max(errors.min(), TINY) - 1.0))
@@ -92,7 +96,7 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
     if np.ptp(values, axis=0).max() <= ROUNDING * np.abs(values).max():
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
     problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
-    loss = PredictiveDensityLoss if values.shape[1] == 1 else LeaveOneOutLoss
+    loss = PredictiveDensityLoss if values.shape[1] == 1 else kriging_tuning.loss_of(samples)
     found = kriging_tuning.tune_beside(problem, pose, loss)
     from_mean, mean = samples.from_mean(values), values.mean(axis=0)
     predicted = from_mean - found.residuals

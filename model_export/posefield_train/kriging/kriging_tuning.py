@@ -16,14 +16,17 @@ from posefield_train.kriging.tuning_loss import (
     PRIORS,
     LeaveOneOutLoss,
     Parameter,
+    RestrictedLikelihoodLoss,
     TuningProblem,
 )
 from posefield_train.kriging.universal_kriging import Hyper
+from posefield_train.parallel.jobs import Jobs, SerialJobs, ordered_results
 
 # The loss has several minima, between a smooth field and one of independent samples.
 STARTS = ((0.5, 0.1), (0.25, 0.03), (1.0, 0.3))
 """Scale and nugget at which searches start."""
 ITERATIONS = 80
+SERIAL = SerialJobs()
 # Columns of the values of large families that are summed up at once.
 COLUMNS_TOGETHER = 1_000
 
@@ -52,12 +55,19 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) ->
     left_out = sample_kriging.leave_out(hyper, samples)
     variances = universal_kriging.left_out_variances(hyper, samples.points, left_out)
     residuals, total = left_out @ values, _total(samples, values)
+    if len(values) <= inducing_clips.LARGEST_DENSE:
+        squares = np.sum(np.square(residuals), axis=1)
+        whole = float(np.sum(np.square(residuals)))
+    else:
+        # A square of each residual would take as much memory as the motions.
+        squares = np.einsum("nm,nm->n", residuals, residuals)
+        whole = float(np.sum(squares))
     return TunedKriging(
         hyper,
         residuals,
-        float(np.sum(np.square(residuals))) / total if total > 0 else 1.0,
+        whole / total if total > 0 else 1.0,
         variances,
-        float(np.mean(np.sum(np.square(residuals), axis=1) / variances)),
+        float(np.mean(squares / variances)),
     )
 
 
@@ -73,20 +83,34 @@ def _total(samples: SamplePoints, values: SampleValues) -> float:
 
 
 def tune(
-    problem: TuningProblem, covariance: str, degree: int | None, draw: int = 0
+    problem: TuningProblem,
+    covariance: str,
+    degree: int | None,
+    draw: int = 0,
+    jobs: Jobs = SERIAL,
 ) -> TunedKriging:
-    """Return the model whose parameters minimize the leave-one-out loss.
+    """Return the model whose parameters minimize the loss.
 
     degree: of the drift; None for a constant and a trend within the covariance. draw: of the clips
-    of a large family, 0 or 1.
+    of a large family, 0 or 1. jobs: executor of the searches from several starts.
     """
     labels = tuple(LabelKernel(count, 1.0, 0.0) for count in problem.samples.labels)
     scales = np.ones(problem.samples.controls)
     hyper = Hyper(covariance, (degree or 0,), scales, 0.0, 0.0, labels)
     names = _free(problem, trend=degree is None)
     starts = [(np.log(scale), np.log(nugget)) for scale, nugget in STARTS]
-    loss = LeaveOneOutLoss(problem.drawn(draw), hyper, names, own_scales=True)
-    return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts], problem)
+    loss = loss_of(problem.samples)(problem.drawn(draw), hyper, names, own_scales=True)
+    return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts], problem, jobs)
+
+
+def loss_of(samples: SamplePoints) -> type[LeaveOneOutLoss]:
+    """Return the loss that parameters of samples are tuned by.
+
+    Many clips, each a take of its own, are tuned by their restricted likelihood.
+    """
+    independent = len(np.unique(samples.groups)) == len(samples.groups)
+    large = samples.inducing is not None
+    return RestrictedLikelihoodLoss if large and independent else LeaveOneOutLoss
 
 
 def tune_beside(
@@ -110,7 +134,8 @@ def _tune_at_scales(
 ) -> TunedKriging:
     names = tuple(own for own in _free(problem, trend) if own[0] != "correlation")
     own = loss(problem.drawn(0), hyper.without_offsets(), names, own_scales=False)
-    return _best(own, [own.start(0.0, np.log(nugget)) for _, nugget in STARTS], problem)
+    starts = [own.start(0.0, np.log(nugget)) for _, nugget in STARTS]
+    return _best(own, starts, problem, SERIAL)
 
 
 def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
@@ -121,24 +146,28 @@ def _free(problem: TuningProblem, trend: bool) -> tuple[Parameter, ...]:
     return tuple((name, index) for name in PRIORS for index in range(counts[name]))
 
 
-def _best(loss: LeaveOneOutLoss, starts: Sequence[Floats], whole: TuningProblem) -> TunedKriging:
+def _best(
+    loss: LeaveOneOutLoss, starts: Sequence[Floats], whole: TuningProblem, jobs: Jobs
+) -> TunedKriging:
     """Return the model at the least loss that searches from the starts find.
 
     whole: the problem that the loss is of, or of some of whose clips it is.
     """
     if not len(starts[0]):
         return evaluate_fixed(loss.read(starts[0]), whole.samples, whole.values)
-    bounds = [(prior.low, prior.high) for prior in loss.priors]
-    found = [
-        minimize(
-            loss.value_and_slope,
-            start,
-            jac=True,
-            method="L-BFGS-B",
-            bounds=bounds,
-            options={"maxiter": ITERATIONS},
-        )
-        for start in starts
-    ]
-    best = min(found, key=lambda result: float(result.fun))
-    return evaluate_fixed(loss.read(best.x), whole.samples, whole.values)
+    found = ordered_results(jobs, _search, ((start,) for start in starts), (loss,))
+    _, best = min(found, key=lambda result: result[0])
+    return evaluate_fixed(loss.read(best), whole.samples, whole.values)
+
+
+def _search(loss: LeaveOneOutLoss, start: Floats) -> tuple[float, Floats]:
+    """Return the least loss that a search from a start finds, and where."""
+    found = minimize(
+        loss.value_and_slope,
+        start,
+        jac=True,
+        method="L-BFGS-B",
+        bounds=[(prior.low, prior.high) for prior in loss.priors],
+        options={"maxiter": ITERATIONS},
+    )
+    return float(found.fun), found.x

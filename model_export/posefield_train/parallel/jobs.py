@@ -7,6 +7,8 @@ from typing import Any, Protocol
 
 import joblib
 
+from posefield_train.parallel import single_thread
+
 Arguments = tuple[Any, ...]
 """Arguments of one job, after the shared ones."""
 
@@ -26,6 +28,40 @@ class Jobs(Protocol):
         large ones. The first exception of a job ends the iteration.
         """
         ...
+
+
+@dataclass(frozen=True)
+class SerialJobs:
+    """Jobs run one after the other in this process."""
+
+    def run(
+        self,
+        function: Callable[..., Any],
+        arguments: Iterable[Arguments],
+        shared: Arguments = (),
+    ) -> Iterator[Any]:
+        """Run jobs as `Jobs.run` does, in their order."""
+        for own in arguments:
+            yield function(*shared, *own)
+
+
+def ordered_results(
+    jobs: Jobs,
+    function: Callable[..., Any],
+    arguments: Iterable[Arguments],
+    shared: Arguments = (),
+) -> list[Any]:
+    """Return the results of jobs in the order of their arguments, each made on one BLAS thread."""
+    numbered = ((number, own) for number, own in enumerate(arguments))
+    found = jobs.run(_run_numbered, numbered, (function, shared))
+    return [result for _, result in sorted(found, key=lambda pair: pair[0])]
+
+
+def _run_numbered(
+    function: Callable[..., Any], shared: Arguments, number: int, own: Arguments
+) -> tuple[int, Any]:
+    with single_thread.single_threaded():
+        return number, function(*shared, *own)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from posefield_train.source import (
     measured_controls,
     shipped_recipes,
 )
-from posefield_train.source.canonical import placement
+from posefield_train.source.canonical import clip_blocks, placement
 from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.clip_landmarks import Spans
 from posefield_train.source.clip_table import ClipRow
@@ -94,16 +94,16 @@ def ingest(
     cuts.clear()
     shared, said = _on_one_topology(recipe, rows, clips)
     notes += said
-    clips = [
-        clip_joints.drop_joints(clip, recipe, row) for clip, row in zip(shared, rows, strict=True)
-    ]
-    del shared
+    left = list(reversed(shared))
+    del shared, clips
+    clips = [clip_joints.drop_joints(left.pop(), recipe, row) for row in rows]
     clip_joints.expect_same_skeleton(rows, clips)
     rigged = _normalize_rigs(recipe, rows, clips)
     clips, facing = list(rigged.clips), rigged.facing
     notes_of_rigs = rigged.notes
     del rigged
     clips.reverse()
+    clip_blocks.return_freed_memory()
     found = [
         _example(recipe, row, clips.pop(), last, facing)
         for row, last in zip(rows, lasts, strict=True)
@@ -113,6 +113,7 @@ def ingest(
         recipe.landmark_names, rows, [own.landmarks for own in examples]
     )
     notes += [*notes_of_rigs, *clip_notes.stretch_notes(rows, [own.stretch for own in found])]
+    clip_blocks.return_freed_memory()
     takes, said = _takes(rows, found)
     examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]
     return examples, [*said, *notes]

@@ -5,6 +5,7 @@ J. Matrix Anal. 2000): a tensor A is its core S times one orthonormal matrix per
 Kuriyama 2006, section 2, apply it to the motion tensor.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Annotated
@@ -13,6 +14,7 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
+from posefield_train.source.canonical import clip_blocks
 
 # Directions with less than this share of the first singular value are rounding errors.
 RELATIVE_ZERO = 1e-9
@@ -90,6 +92,45 @@ def decompose(tensor: Floats) -> TuckerTensor:
     return _project(tensor, tuple(_basis(unfold(tensor, mode)) for mode in range(tensor.ndim)))
 
 
+def decompose_in_passes(
+    tensor: Annotated[Floats, "varying frames clips"], squared_error: float
+) -> TuckerTensor:
+    """Return the HOSVD of many clips, whose bases leave out next to nothing.
+
+    Gram matrices of the first two modes add up over blocks of clips, and the last mode is
+    decomposed after the first two are projected, as by Vannieuwenhoven et al. 2012 (ST-HOSVD), so
+    that no matrix of all clips by all clips is made. squared_error: that each of the three
+    projections may add, summed over the tensor.
+    """
+    blocks = clip_blocks.clip_blocks(tensor.shape[2])
+    bases = []
+    for mode in (0, 1):
+        gram = sum(_gram(unfold(tensor[:, :, own], mode)) for own in blocks)
+        bases.append(_leading(np.asarray(gram), squared_error))
+    parts = [_projected(tensor[:, :, own], bases) for own in blocks]
+    some = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
+    left, lengths, _ = np.linalg.svd(unfold(some, 2), full_matrices=False)
+    kept = len(lengths) - _negligible(np.square(lengths[::-1]), squared_error)
+    last = fix_signs(left[:, :kept])
+    return TuckerTensor(some @ last, (*bases, last))
+
+
+def _leading(gram: Annotated[Floats, "size size"], squared_error: float) -> Floats:
+    """Return the leading eigenvectors (size, rank) of a Gram matrix that leave out an error."""
+    sizes, vectors = np.linalg.eigh(gram)
+    return fix_signs(vectors[:, _negligible(np.maximum(sizes, 0.0), squared_error) :][:, ::-1])
+
+
+def _negligible(sizes: Annotated[Floats, "size"], squared_error: float) -> int:
+    """Return how many of increasing squared sizes add up to at most an error; never all."""
+    left_out = np.cumsum(sizes)
+    return min(int(np.searchsorted(left_out, squared_error, side="right")), len(sizes) - 1)
+
+
+def _projected(tensor: Floats, bases: Sequence[Floats]) -> Floats:
+    return reduce(lambda x, mb: mode_dot(x, mb[1].T, mb[0]), enumerate(bases), tensor)
+
+
 def decompose_truncated(tensor: Floats, ranks: tuple[int, ...]) -> TuckerTensor:
     """Return `decompose` truncated to ranks, in half the time.
 
@@ -101,13 +142,16 @@ def decompose_truncated(tensor: Floats, ranks: tuple[int, ...]) -> TuckerTensor:
 
 
 def _project(tensor: Floats, bases: tuple[Floats, ...]) -> TuckerTensor:
-    core = reduce(lambda x, mb: mode_dot(x, mb[1].T, mb[0]), enumerate(bases), tensor)
-    return TuckerTensor(core, bases)
+    return TuckerTensor(_projected(tensor, bases), bases)
 
 
 def _basis(unfolded: Annotated[Floats, "size rest"]) -> Annotated[Floats, "size rank"]:
-    _, vectors = np.linalg.eigh(unfolded @ unfolded.T)
+    _, vectors = np.linalg.eigh(_gram(unfolded))
     return fix_signs(vectors[:, ::-1])
+
+
+def _gram(unfolded: Annotated[Floats, "size rest"]) -> Annotated[Floats, "size size"]:
+    return unfolded @ unfolded.T
 
 
 def fix_signs(columns: Annotated[Floats, "size rank"]) -> Annotated[Floats, "size rank"]:

@@ -13,7 +13,7 @@ from posefield.common.errors import TrainingError
 from posefield.common.units import Booleans, Floats
 from posefield.motion.curves import Curve, distances
 from posefield_train.align.time_alignment import AlignedClips
-from posefield_train.source.canonical import half_turns
+from posefield_train.source.canonical import clip_blocks, half_turns
 from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.tensor import pose_metric
 from posefield_train.tensor import pose_vectors as chart
@@ -124,9 +124,13 @@ def _whiten(
 ) -> Annotated[Floats, "varying frames clips"]:
     """Return the tensor (D', T, N) of pose vectors (N, T, D), transposed in small blocks."""
     samples, frames, _ = numbers.shape
-    flat = whiten @ numbers.reshape(samples * frames, -1).T
-    flat -= (whiten @ mean)[:, None]
-    return np.ascontiguousarray(flat.reshape(-1, samples, frames).swapaxes(1, 2))
+    values = np.empty((len(whiten), frames, samples))
+    for rows in clip_blocks.clip_blocks(samples):
+        own = numbers[rows]
+        flat = whiten @ own.reshape(len(own) * frames, -1).T
+        flat -= (whiten @ mean)[:, None]
+        values[:, :, rows] = flat.reshape(-1, len(own), frames).swapaxes(1, 2)
+    return values
 
 
 def sampled_gram(

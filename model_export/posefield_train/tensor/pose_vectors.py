@@ -4,7 +4,7 @@ Rotation vectors are ambiguous beyond half a turn from the mean, which a raised 
 are unwrapped so that no clip is discontinuous, and every such joint is reported.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -20,6 +20,7 @@ from posefield.common.array_shapes import (
 from posefield.common.units import Booleans, Floats
 from posefield.motion import quat, quat_planes
 from posefield.motion.skeleton import POSES_PER_BLOCK
+from posefield_train.source.canonical import clip_blocks
 from posefield_train.source.canonical.half_turns import Finding
 
 # Angle from the mean, rad, above which a joint is reported: rotation vectors become ambiguous at π.
@@ -46,8 +47,12 @@ class PoseChart:
         self, rotations: ClipRotations, root_path: ClipPaths
     ) -> Annotated[Floats, "clips frames 3+joints*3"]:
         """Return pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4), root paths (N, T, 3)."""
-        vectors = _unwrap(quat.log(quat.mul(quat.conj(self.means), rotations)))
-        return np.concatenate([root_path, vectors.reshape(*root_path.shape[:2], -1)], axis=-1)
+        found = np.empty((*root_path.shape[:2], self.joint_numbers.stop))
+        found[..., :3] = root_path
+        for rows in clip_blocks.clip_blocks(len(rotations)):
+            vectors = _unwrap(self._vectors(rotations[rows]))
+            found[rows, :, self.joint_numbers] = vectors.reshape(*vectors.shape[:2], -1)
+        return found
 
     def poses(
         self, numbers: Annotated[Floats, "*poses dof"]
@@ -77,7 +82,14 @@ class PoseChart:
 
     def far_joints(self, rotations: ClipRotations) -> list[Finding]:
         """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
-        return _far_joints(quat.log(quat.mul(quat.conj(self.means), rotations)))
+        return [
+            replace(own, clip=rows.start + own.clip)
+            for rows in clip_blocks.clip_blocks(len(rotations))
+            for own in _far_joints(self._vectors(rotations[rows]))
+        ]
+
+    def _vectors(self, rotations: ClipRotations) -> ClipPositions:
+        return quat.log(quat.mul(quat.conj(self.means), rotations))
 
 
 def fit_chart(rotations: ClipRotations) -> tuple[PoseChart, list[Finding]]:

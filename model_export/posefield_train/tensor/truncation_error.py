@@ -16,6 +16,7 @@ from posefield.common.units import Floats
 from posefield.model_file.model_card import Event
 from posefield.motion import skeleton
 from posefield.motion.curves import distances
+from posefield_train.source.canonical import clip_blocks
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import hosvd
@@ -36,16 +37,6 @@ class TruncationErrors:
     p99: float
     max: float
     effector: float | None
-
-
-CLIPS_TOGETHER = 300
-"""Clips whose whole motions are restored at once; more would take gigabytes."""
-
-
-def clip_blocks(clips: int) -> list[slice]:
-    """Return the blocks of at most CLIPS_TOGETHER clips that motions are restored in."""
-    starts = range(0, clips, CLIPS_TOGETHER)
-    return [slice(start, min(start + CLIPS_TOGETHER, clips)) for start in starts]
 
 
 @dataclass(frozen=True)
@@ -85,7 +76,10 @@ class TruncationReference:
         return max(getattr(found, name) / budget for name, budget in budgets.items())
 
     def _distances(self, reduced: TuckerTensor) -> "_Distances":
-        parts = [self._block_distances(reduced, rows) for rows in clip_blocks(len(self.whole))]
+        parts = [
+            self._block_distances(reduced, rows)
+            for rows in clip_blocks.clip_blocks(len(self.whole))
+        ]
         distances = parts[0] if len(parts) == 1 else np.concatenate(parts)
         return _Distances(distances, self.weights, self.event_frame)
 
@@ -150,10 +144,26 @@ def truncation_reference(
     parents = examples[0].clip.skeleton.parents
     weights = np.append(joint_weights(recipe, examples), np.ones(len(own_tensor.curves)))
     offsets = np.stack([example.offsets for example in examples])
-    whole = positions(own_tensor, own_tensor.values, parents, offsets)
+    whole = _all_positions(own_tensor, parents, offsets)
     return TruncationReference(
         own_tensor, parents, offsets, weights, event_frame(recipe, examples), whole
     )
+
+
+def _all_positions(
+    own_tensor: MotionTensor, parents: tuple[int, ...], offsets: ClipBones
+) -> Annotated[Floats, "clips frames points 3"]:
+    """Return the joint positions (N, T, J, 3), m, of a tensor, block by block of clips."""
+    values = own_tensor.values
+    blocks = clip_blocks.clip_blocks(values.shape[2])
+    found = (positions(own_tensor, values[:, :, own], parents, offsets[own]) for own in blocks)
+    if len(blocks) == 1:
+        return next(found)
+    shape = (values.shape[2], values.shape[1], len(parents) + len(own_tensor.curves), 3)
+    whole = np.empty(shape)
+    for own, block in zip(blocks, found, strict=True):
+        whole[own] = block
+    return whole
 
 
 def positions(

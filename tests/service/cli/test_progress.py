@@ -1,5 +1,7 @@
 """Tests of progress without a terminal: plain lines on standard error only."""
 
+import re
+import time
 from inspect import signature
 
 import pytest
@@ -76,6 +78,30 @@ def test_progress_of_steps_names_work_and_step(capsys):
         progress("done")
     assert [line[10:] for line in capsys.readouterr().err.splitlines()] == ["reading", "done"]
     assert [name for name, _ in progress.finished] == ["reading"]
+
+
+def test_progress_of_steps_estimates_the_rest_by_the_finished_ones(capsys):
+    with ProgressPrinter("training", 3) as progress:
+        progress("reading")
+        time.sleep(0.05)
+        progress.expect([1e-4, 0.2, 0.3])
+        progress("fitting")
+        progress("done")
+    said = [line[10:] for line in capsys.readouterr().err.splitlines()]
+    assert said[0] == "reading"
+    # At least 500 times 0.05 s of ours are as many times the 0.1 ms expected.
+    left = re.fullmatch(r"fitting \(about (\d+) (s|min) left\)", said[1])
+    assert left is not None
+    assert int(left[1]) * (60 if left[2] == "min" else 1) >= 120
+    assert said[2] == "done"
+
+
+def test_a_rest_of_a_few_seconds_is_not_told(capsys):
+    with ProgressPrinter("training", 2) as progress:
+        progress("reading")
+        progress.expect([10.0, 1.0])
+        progress("writing")
+    assert "left" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("kind", [ProgressBar, LateProgress, ProgressPrinter])

@@ -17,6 +17,7 @@ from posefield.common.array_shapes import Vector
 from posefield.common.units import Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
+from posefield_train.source.canonical import clip_blocks
 
 # Rotations of a joint are hardly visible if all its descendants lie within a hand's length, m.
 HAND_SIZE = 0.15
@@ -131,14 +132,22 @@ def remove_flips_about(
     means: Floats, rotations: Floats, small: Floats
 ) -> tuple[Floats, list[Finding]]:
     """Return the result of `remove_flips` relative to given means (J, 4)."""
-    away = quat.mul(quat.conj(means), rotations)
-    least = np.linalg.norm(quat.log(away), axis=-1).min(axis=1)
-    clean, findings = rotations.copy(), []
-    for clip, joint in np.argwhere((least > FLIP_ANGLE) & small):
-        offset = quat.mean(away[clip, :, joint][:, None])[0]
+    blocks = clip_blocks.clip_blocks(len(rotations))
+    least = np.concatenate([_least_angles(means, rotations[rows]) for rows in blocks])
+    flips = np.argwhere((least > FLIP_ANGLE) & small.astype(bool))
+    clean, findings = rotations.copy() if len(flips) else rotations, []
+    for clip, joint in flips:
+        away = quat.mul(quat.conj(means[joint]), rotations[clip, :, joint])
+        offset = quat.mean(away[:, None])[0]
         # mean⁻¹ q = offset · the motion itself; the offset alone is the flip.
-        itself = quat.mul(quat.conj(offset), away[clip, :, joint])
+        itself = quat.mul(quat.conj(offset), away)
         clean[clip, :, joint] = quat.mul(means[joint], itself)
         angle = float(np.linalg.norm(quat.log(offset)))
         findings.append(Finding("flip", int(joint), int(clip), angle))
     return clean, findings
+
+
+def _least_angles(means: Floats, rotations: Floats) -> Floats:
+    """Return the least angle (N, J) of aligned rotations (N, T, J, 4) from their means, rad."""
+    away = quat.mul(quat.conj(means), rotations)
+    return np.asarray(np.linalg.norm(quat.log(away), axis=-1).min(axis=1))

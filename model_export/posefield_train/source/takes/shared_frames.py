@@ -50,6 +50,8 @@ def find_pairs(motions: Motions, swapped: tuple[int, ...]) -> list[ClipPair]:
 def _overlaps(motions: Motions, swapped: list[int]) -> Iterator[ClipPair]:
     features = [frame_features.frame_features(motion) for motion in motions]
     index = frame_features.index_frames(features)
+    # Views: of thousands of clips a second copy is hundreds of megabytes.
+    features = np.split(index.features, np.cumsum(index.counts)[:-1])
     joints = len(swapped)
     other = np.array([*swapped, *(joints + joint for joint in swapped)])
     for second, motion in enumerate(motions):
