@@ -1,4 +1,4 @@
-"""Tests of the tuning of single values by the density of left-out takes, and of many clips."""
+"""Tests of the tuning of single values by the density of left-out takes."""
 
 from dataclasses import replace
 
@@ -17,7 +17,6 @@ from posefield_train.kriging.tuning_loss import (
     PRIORS,
     LeaveOneOutLoss,
     PredictiveDensityLoss,
-    RestrictedLikelihoodLoss,
     TuningProblem,
 )
 from posefield_train.kriging.universal_kriging import Hyper
@@ -119,52 +118,3 @@ def test_only_a_single_value_is_tuned_by_its_density(laid, rng):
         found = coefficient_models.fit(Kriging(), HYPER, laid, own).field.hyper
         assert found.nugget == expected.nugget != other.nugget
         assert PRIORS["nugget"].low <= np.log(found.nugget) <= PRIORS["nugget"].high
-
-
-# --- restricted likelihood of many clips ----------------------------------------------------------
-
-
-def contrasts(functions):
-    """Orthonormal combinations of samples whose drift is zero."""
-    return np.linalg.qr(functions, mode="complete")[0][:, functions.shape[1] :]
-
-
-def test_restricted_likelihood_is_the_density_of_contrasts(laid, rng):
-    """Patterson & Thompson 1971: whatever the contrasts, but for a constant."""
-    values = rng.normal(size=(COUNT, 1))
-
-    def direct(hyper):
-        some = contrasts(np.ones((COUNT, 1)))
-        spread = some.T @ universal_kriging.noisy(hyper, laid.points) @ some
-        own = some.T @ values
-        squares = float((own.T @ np.linalg.solve(spread, own)).item())
-        return 0.5 * ((COUNT - 1) * np.log(squares) + np.linalg.slogdet(spread)[1])
-
-    def found(hyper, kind=RestrictedLikelihoodLoss):
-        return loss_of(laid, values, kind).of_samples(hyper)[0]
-
-    other = replace(HYPER, nugget=1.3, trend=2.0)
-    apart = direct(other) - direct(HYPER)
-    assert abs(found(other) - found(HYPER) - apart) < 1e-9
-    density = found(other, PredictiveDensityLoss) - found(HYPER, PredictiveDensityLoss)
-    assert abs(density - apart) > 0.1
-
-
-def test_gradient_of_the_restricted_likelihood_is_that_of_differences(laid, rng):
-    loss = loss_of(laid, rng.normal(size=(COUNT, 3)), RestrictedLikelihoodLoss)
-    at = in_search_units(HYPER)
-    _, slope = loss.value_and_slope(at)
-    for place in range(len(at)):
-        step = np.zeros(len(at))
-        step[place] = 1e-5
-        ahead, behind = (loss.value_and_slope(at + sign * step)[0] for sign in (1.0, -1.0))
-        assert slope[place] == pytest.approx((ahead - behind) / 2e-5, rel=1e-5, abs=1e-7)
-
-
-def test_many_clips_of_takes_of_their_own_are_tuned_by_the_restricted_likelihood(laid):
-    alone = replace(laid, groups=np.arange(COUNT))
-    many = replace(alone, inducing=np.arange(9))
-    assert kriging_tuning.loss_of(many) is RestrictedLikelihoodLoss
-    assert kriging_tuning.loss_of(alone) is LeaveOneOutLoss
-    # Several clips of a take are no independent trials.
-    assert kriging_tuning.loss_of(replace(many, groups=laid.groups)) is LeaveOneOutLoss

@@ -18,6 +18,7 @@ from posefield_train.kriging.tuning_loss import (
     POSE_STRENGTH,
     TINY,
     UNNAMED_STRENGTH,
+    LeaveOneOutLoss,
     PredictiveDensityLoss,
     TuningProblem,
 )
@@ -96,7 +97,7 @@ def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleVal
     if np.ptp(values, axis=0).max() <= ROUNDING * np.abs(values).max():
         return FittedModel(ConstantModel(values[0]), 0.0, np.zeros_like(values))
     problem = TuningProblem(samples, values, settings.nugget, strength=OTHER_STRENGTH)
-    loss = PredictiveDensityLoss if values.shape[1] == 1 else kriging_tuning.loss_of(samples)
+    loss = PredictiveDensityLoss if values.shape[1] == 1 else LeaveOneOutLoss
     found = kriging_tuning.tune_beside(problem, pose, loss)
     from_mean, mean = samples.from_mean(values), values.mean(axis=0)
     predicted = from_mean - found.residuals

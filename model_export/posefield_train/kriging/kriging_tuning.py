@@ -16,7 +16,6 @@ from posefield_train.kriging.tuning_loss import (
     PRIORS,
     LeaveOneOutLoss,
     Parameter,
-    RestrictedLikelihoodLoss,
     TuningProblem,
 )
 from posefield_train.kriging.universal_kriging import Hyper
@@ -89,7 +88,7 @@ def tune(
     draw: int = 0,
     jobs: Jobs = SERIAL,
 ) -> TunedKriging:
-    """Return the model whose parameters minimize the loss.
+    """Return the model whose parameters minimize the leave-one-out loss.
 
     degree: of the drift; None for a constant and a trend within the covariance. draw: of the clips
     of a large family, 0 or 1. jobs: executor of the searches from several starts.
@@ -99,18 +98,8 @@ def tune(
     hyper = Hyper(covariance, (degree or 0,), scales, 0.0, 0.0, labels)
     names = _free(problem, trend=degree is None)
     starts = [(np.log(scale), np.log(nugget)) for scale, nugget in STARTS]
-    loss = loss_of(problem.samples)(problem.drawn(draw), hyper, names, own_scales=True)
+    loss = LeaveOneOutLoss(problem.drawn(draw), hyper, names, own_scales=True)
     return _best(loss, [loss.start(scale, nugget) for scale, nugget in starts], problem, jobs)
-
-
-def loss_of(samples: SamplePoints) -> type[LeaveOneOutLoss]:
-    """Return the loss that parameters of samples are tuned by.
-
-    Many clips, each a take of its own, are tuned by their restricted likelihood.
-    """
-    independent = len(np.unique(samples.groups)) == len(samples.groups)
-    large = samples.inducing is not None
-    return RestrictedLikelihoodLoss if large and independent else LeaveOneOutLoss
 
 
 def tune_beside(

@@ -304,37 +304,6 @@ def _product(shares: Sequence[Floats]) -> Floats | float:
 
 
 @dataclass(frozen=True)
-class RestrictedLikelihoodLoss(LeaveOneOutLoss):
-    """Negative logarithm of the likelihood of the values less their drift, with the sill that fits.
-
-    It uses every distance between clips, where leave-one-out uses those to the nearest alone, and
-    so finds scales and nugget more surely where clips are many. It takes clips for independent
-    trials, and so does not suit several clips of one take (Patterson & Thompson 1971; Stein 1999,
-    section 6.4). The event's joint has no weight.
-    """
-
-    def of_samples(self, hyper: Hyper) -> tuple[float, SampleMatrix]:
-        """Return the loss without the prior, and its derivative (n, n) by the covariances.
-
-        With the inverse B of the system's sample block, covariances C and drift F it is that of
-        (n - k) log tr(values' B values) + log |C| + log |F' C⁻¹ F|, for the mean value.
-        """
-        points, degree = self.problem.samples.points, max(hyper.drifts)
-        noisy = universal_kriging.noisy(hyper, points)
-        inverse: Floats = np.asarray(np.linalg.inv(noisy), dtype=np.float64)
-        functions = universal_kriging.drift(points, len(hyper.scales), degree)
-        block = leave_one_out.sample_block(inverse, functions)
-        product = block @ self.values
-        squares = max(float(np.sum(self.values * product)), TINY)
-        free = len(block) - functions.shape[1]
-        determinants = (
-            np.linalg.slogdet(noisy)[1] + np.linalg.slogdet(functions.T @ inverse @ functions)[1]
-        )
-        loss = 0.5 * (free * float(np.log(squares)) + float(determinants))
-        return loss, 0.5 * (block - free / squares * (product @ product.T))
-
-
-@dataclass(frozen=True)
 class PredictiveDensityLoss(LeaveOneOutLoss):
     """Negative logarithm of the density that left-out takes have by the prediction from all others.
 

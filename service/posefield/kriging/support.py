@@ -35,6 +35,8 @@ SCALE, NUGGET = 1.0, 0.05
 RATE = 0.5 / SCALE**2
 # Largest error of a variance in single precision; nearer to the limit it is computed in double.
 FLOAT32_ERROR = 1e-3
+SMALL_SHARE = 0.02
+"""Share of the nugget below which a direction of the covariances is bounded, not computed."""
 # Rows whose intermediate arrays fit the cache of a core.
 BATCH = 512
 
@@ -68,10 +70,11 @@ class Support:
         inside = ((low <= points) & (points <= high)).all(axis=1)
         found = np.zeros(len(points), dtype=bool)
         own = points[inside]
-        room = self.limit - self._float32_variance(own)
-        close = np.abs(room) < FLOAT32_ERROR
-        room[close] = self.limit - self.variance(own[close])
-        found[inside] = room >= 0.0
+        lowest, highest = self._float32_bounds(own)
+        verdict = highest <= self.limit - FLOAT32_ERROR
+        unsure = np.flatnonzero(~verdict & (lowest < self.limit + FLOAT32_ERROR))
+        verdict[unsure] = self.variance(own[unsure]) <= self.limit
+        found[inside] = verdict
         return found
 
     def is_supported(self, point: Sequence[float]) -> bool:
@@ -141,36 +144,65 @@ class Support:
         return slopes * factors, -slopes @ offsets - own
 
     @cached_property
-    def _float32_factors(
-        self,
-    ) -> tuple[
-        Annotated[Singles, "controls samples"],
-        Annotated[Singles, "samples"],
-        Annotated[Singles, "samples samples"],
-    ]:
-        """Return in float32 `_exponents` for half-ranges, (d, n) and (n,), and the inverse."""
-        own = RATE * np.sum(np.square(self.samples), axis=1)
-        parts = (2.0 * RATE * self.samples.T, -own, self._inverse)
-        slopes, offsets, inverse = (np.ascontiguousarray(part, dtype=np.float32) for part in parts)
-        return slopes, offsets, inverse
+    def _float32_factors(self) -> "_VarianceFactors":
+        """Return the parts of the variance in the leading directions of the covariances.
 
-    def _float32_variance(self, points: PointControls) -> PerPoint:
-        """Return `variance` (B,) in single precision, for points near the range."""
-        slopes, offsets, inverse = self._float32_factors
+        With eigenvectors u and eigenvalues e of the covariances between samples, and covariances k
+        of a point, the variance is 1 - sum (u k)² / (e + NUGGET), over all directions. Those of
+        small e hardly count: sum (u k)² / e is at most 1.
+        """
+        sizes, vectors = np.linalg.eigh(covariances(self.samples, self.samples))
+        sizes, vectors = np.maximum(sizes[::-1], 0.0), vectors[:, ::-1]
+        count = max(int(np.sum(sizes > SMALL_SHARE * NUGGET)), 1)
+        kept = sizes[:count]
+        own = RATE * np.sum(np.square(self.samples), axis=1)
+        parts = (
+            2.0 * RATE * self.samples.T,
+            -own,
+            vectors[:, :count] / np.sqrt(kept + NUGGET),
+            np.stack([np.ones(count), (kept + NUGGET) / kept], axis=1),
+        )
+        next_size = float(sizes[count]) if count < len(sizes) else 0.0
+        singles = (np.ascontiguousarray(part, dtype=np.float32) for part in parts)
+        return _VarianceFactors(*singles, next_size / (next_size + NUGGET))
+
+    def _float32_bounds(self, points: PointControls) -> tuple[PerPoint, PerPoint]:
+        """Return bounds (B,) of `variance` in single precision, for points near the range."""
+        own = self._float32_factors
         scaled = self.scaled(points).astype(np.float32)
-        found = np.empty(len(points))
+        explained, captured = np.empty((2, len(points)))
         for rows in (slice(at, at + BATCH) for at in range(0, len(points), BATCH)):
             cancellation.check()
-            own = scaled[rows]
-            near = own @ slopes
-            near += offsets - np.float32(RATE) * np.sum(np.square(own), axis=1)[:, None]
+            some = scaled[rows]
+            near = some @ own.slopes
+            near += own.offsets - np.float32(RATE) * np.sum(np.square(some), axis=1)[:, None]
             np.exp(near, out=near)
-            found[rows] = 1.0 - np.einsum("bi,bi->b", near @ inverse, near)
-        return found
+            parts = near @ own.directions
+            np.square(parts, out=parts)
+            explained[rows], captured[rows] = (parts @ own.sums).T
+        rest = own.rest * np.maximum(1.0 - captured, 0.0)
+        return 1.0 - explained - rest, 1.0 - explained
 
     def scaled(self, points: PointControls) -> PointControls:
         """Return points (B, d) in half-ranges."""
         return half_ranges(points, self.low, self.high)
+
+
+@dataclass(frozen=True)
+class _VarianceFactors:
+    """Factors of the variance in float32, in the leading directions of the covariances.
+
+    slopes (d, n), offsets (n,): of the log covariances between samples and a point in half-ranges.
+    directions (n, r): from covariances to parts of the variance that is explained, before they are
+    squared. sums (r, 2): from squares to what they explain, and to what they hold of the largest
+    possible. rest: share of what is left of that, at most, that the other directions explain.
+    """
+
+    slopes: Annotated[Singles, "controls samples"]
+    offsets: Annotated[Singles, "samples"]
+    directions: Annotated[Singles, "samples rank"]
+    sums: Annotated[Singles, "rank 2"]
+    rest: float
 
 
 def fit_support(controls: SampleControls) -> Support:
