@@ -36,6 +36,8 @@ CLIPS = (92, 300, 1_000, 2_000)
 ASKED, SEED = 200, 7
 """Points at which models are compared with the truth, and the seed of new clips there."""
 GOALS = {92: ("cpu_s", 15.0), 1_000: ("cpu_s", 600.0), 2_000: ("cpu_s", 1_200.0)}
+USED = 2_000
+"""Clips of the model that is exported from, explained and adapted, too."""
 PICTURE = ROOT / "docs/scale.png"
 
 
@@ -50,6 +52,9 @@ def measure(clips: int) -> dict[str, Any]:
     exported = onnx_export.export_model(own, trained, notes)
     spent, wall = _cpu() - before, time.perf_counter() - start
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    model = place / "reaching.onnx"
+    model.write_bytes(exported.content)
+    used = use(model, place) if clips == USED else {}
     with single_thread.single_threaded():
         truth, ratio = compare(own, trained)
     return {
@@ -63,7 +68,36 @@ def measure(clips: int) -> dict[str, Any]:
         "truth_cm": round(100 * truth, 3),
         "sigma_ratio": round(ratio, 3),
         "disagreement": exported.card.diagnostics.get("projected", {}).get("disagreement"),
+        "used": used,
     }
+
+
+def use(model: Path, place: Path) -> dict[str, float]:
+    """Return the processor time, s, of what people do with a model, each command's in all.
+
+    RuntimeError for a command that fails.
+    """
+    table = place / "new.csv"
+    names, *rows = (place / "clips.csv").read_text(encoding="utf-8").splitlines()
+    table.write_text("\n".join([names, *rows[:: len(rows) // 4][:4]]) + "\n", encoding="utf-8")
+    told = ("--performer", "kim", "--unit", "1", "--up", "y", "--root-offset", "replace")
+    adapting = ("--table", table, *told, "--licence", "CC0-1.0", "-o", place / "adapted.onnx")
+    commands: dict[str, tuple[object, ...]] = {
+        "100 clips exported": ("export", model, "--sample", "100", "-o", place / "made"),
+        "a motion explained": ("why", model, "-c", "turn=20"),
+        "adapted to a performer by four clips": ("adapt", model, *adapting),
+    }
+    return {name: _children_seconds(words) for name, words in commands.items()}
+
+
+def _children_seconds(words: Sequence[object]) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [Path(sys.executable).with_name("posefield"), *words]
+    done = subprocess.run([*map(str, command)], check=False, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{words[0]} ended with {done.returncode}: {done.stderr}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, 1)
 
 
 def compare(own: recipe.Recipe, trained: TrainedModel) -> tuple[float, float]:
@@ -150,6 +184,10 @@ def _rows(own: dict[str, Any], first: dict[str, Any]) -> list[Row]:
             "at least 0.6" if largest else "",
             None,
             1.4 if largest else None,
+        ),
+        *(
+            Row(f"{name}: {done}", seconds, "s", "processor time of the command", None, None)
+            for done, seconds in own["used"].items()
         ),
     ]
 

@@ -3,9 +3,12 @@
 import json
 import re
 import shutil
+import urllib.parse
+import urllib.request
 
 import numpy as np
 import pytest
+import serving
 
 from posefield.inference import session
 from posefield_train.adapt import model_reconstruction
@@ -54,6 +57,19 @@ def test_a_large_family_is_trained_served_explained_and_adapted(posefield, folde
     points = bank.points(np.array([[0.9, 20.0, 1.2]]), np.zeros((1, 3)))
     expected = bank.pose.weights(points) @ bank.pose.values
     assert np.abs(bank.pose.predict(points) - expected).max() < 1e-6
+    # Served and exported: the same bytes.
+    asked = {"stature": 1.7, "hip_height": 0.9, "turn": 20, "target_height": 1.2}
+    made = tmp_path / "made"
+    table = tmp_path / "asked.csv"
+    table.write_text("hip_height,turn,target_height\n0.9,20,1.2\n")
+    assert posefield("export", path, table, "-o", made, "--workers", "1")[0] == 0
+    (exported,) = made.rglob("*.usdc")
+    del asked["stature"]
+    with serving.process(path) as child:
+        query = urllib.parse.urlencode(asked)
+        url = f"{serving.address(child)}/v1/models/large/clip.usdc?{query}"
+        with urllib.request.urlopen(url) as answer:
+            assert answer.read() == exported.read_bytes()
     # A new performer from clips of another family.
     clips = tmp_path / "new"
     clips.mkdir()

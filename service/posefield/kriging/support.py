@@ -70,7 +70,7 @@ class Support:
         inside = ((low <= points) & (points <= high)).all(axis=1)
         found = np.zeros(len(points), dtype=bool)
         own = points[inside]
-        lowest, highest = self._float32_bounds(own)
+        lowest, highest = self.variance_bounds(own)
         verdict = highest <= self.limit - FLOAT32_ERROR
         unsure = np.flatnonzero(~verdict & (lowest < self.limit + FLOAT32_ERROR))
         verdict[unsure] = self.variance(own[unsure]) <= self.limit
@@ -163,11 +163,14 @@ class Support:
             np.stack([np.ones(count), (kept + NUGGET) / kept], axis=1),
         )
         next_size = float(sizes[count]) if count < len(sizes) else 0.0
-        singles = (np.ascontiguousarray(part, dtype=np.float32) for part in parts)
-        return _VarianceFactors(*singles, next_size / (next_size + NUGGET))
+        slopes, offsets, directions, sums = (
+            np.ascontiguousarray(part, dtype=np.float32) for part in parts
+        )
+        rest = next_size / (next_size + NUGGET)
+        return _VarianceFactors(slopes, offsets, directions, sums, rest)
 
-    def _float32_bounds(self, points: PointControls) -> tuple[PerPoint, PerPoint]:
-        """Return bounds (B,) of `variance` in single precision, for points near the range."""
+    def variance_bounds(self, points: PointControls) -> tuple[PerPoint, PerPoint]:
+        """Return bounds (B,) of `variance`, right to FLOAT32_ERROR, for points near the range."""
         own = self._float32_factors
         scaled = self.scaled(points).astype(np.float32)
         explained, captured = np.empty((2, len(points)))
