@@ -19,14 +19,34 @@ import {
 } from "three";
 
 import type { Character } from "./character.ts";
+import type { Crowd } from "./crowd-walk.ts";
 
 /** Numbers of a joint's matrix: three rows of four. */
 export const SIZE = 12;
 /** Most characters that have all triangles. */
 export const NEAREST = 64;
 /** Texels of a row of a texture. */
-const WIDE = 1024;
-const MOST_LEVELS = 8;
+export const WIDE = 1024;
+export const MOST_LEVELS = 8;
+
+/** What draws a crowd. */
+export interface CrowdDrawing {
+  readonly group: Group;
+  /** Colours of the levels from now on. */
+  paint(colours: readonly string[]): void;
+  begin(): void;
+  /** One character more: number `i` of a crowd, near or far. */
+  add(near: boolean, crowd: Crowd, i: number): void;
+  end(): void;
+  dispose(): void;
+}
+
+/** A colour in the light that falls on a skin, by where it faces. */
+export const LIT = `
+vec3 lit(vec3 facing, vec3 colour) {
+  float share = 0.5 + 0.5 * dot(normalize(facing), vec3(0.42, 0.78, 0.46));
+  return min(vec3(1.0), colour * (0.32 + 0.9 * share));
+}`;
 
 const VERTEX = `
 attribute vec4 skinIndex;
@@ -36,6 +56,7 @@ uniform int texels;
 uniform vec3 tints[${MOST_LEVELS}];
 varying vec3 tint;
 vec4 texel(int at) { return texelFetch(crowd, ivec2(at % ${WIDE}, at / ${WIDE}), 0); }
+${LIT}
 void main() {
   int own = gl_VertexID / POINTS * texels;
   vec4 rest = vec4(position, 1.0);
@@ -54,11 +75,10 @@ void main() {
     whole += weight;
   }
   int level = int(texel(own + texels - 1).x);
-  float lit = 0.5 + 0.5 * dot(normalize(facing), vec3(0.42, 0.78, 0.46));
-  tint = min(vec3(1.0), tints[level] * (0.32 + 0.9 * lit));
+  tint = lit(facing, tints[level]);
   gl_Position = projectionMatrix * viewMatrix * vec4(place / whole, 1.0);
 }`;
-const FRAGMENT = `
+export const FRAGMENT = `
 varying vec3 tint;
 void main() {
   gl_FragColor = vec4(tint, 1.0);
@@ -133,7 +153,7 @@ class Part {
   }
 }
 
-export class CrowdMesh {
+export class CrowdMesh implements CrowdDrawing {
   readonly group = new Group();
   readonly #near: Part;
   readonly #far: Part;
@@ -146,7 +166,6 @@ export class CrowdMesh {
     this.group.add(this.#near.mesh, this.#far.mesh);
   }
 
-  /** Colours of the levels from now on. */
   paint(colours: readonly string[]): void {
     colours.forEach((colour, level) => void this.#tints[level]?.set(colour));
   }
@@ -155,10 +174,9 @@ export class CrowdMesh {
     for (const part of [this.#near, this.#far]) part.begin();
   }
 
-  /** Where to write SIZE numbers for each joint of one character more, in a level's colour. */
-  add(near: boolean, level: number): Float32Array {
+  add(near: boolean, crowd: Crowd, i: number): void {
     const part = near && this.#near.count < NEAREST ? this.#near : this.#far;
-    return part.add(level);
+    crowd.lay(part.add(crowd.level[i]!), i);
   }
 
   end(): void {

@@ -6,7 +6,7 @@ import { type Page, served } from "./page.ts";
 import type { State } from "./state.ts";
 import { figure } from "./written.ts";
 
-const [FEWEST, MOST] = [50, 1000];
+const [FEWEST, MOST] = [50, 10_000];
 /** Powers of two between which the limit in pixels lies. */
 const [SHARP, COARSE] = [-2, 4];
 
@@ -74,7 +74,7 @@ export class Panel {
 
 function people(page: Page): HTMLElement {
   const range = { min: FEWEST, max: MOST, step: 50 };
-  const said = (value: number) => `${value} characters`;
+  const said = (value: number) => `${value.toLocaleString("en")} characters`;
   return slider(page, "crowd", range, said, Number, (count) => count);
 }
 

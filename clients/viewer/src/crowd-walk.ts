@@ -11,6 +11,10 @@ const ROOM = 9;
 /** Radius, m, about which a character is looked for in the view: a body with arms out. */
 export const REACH = 1.3;
 
+interface Writable {
+  [at: number]: number;
+}
+
 export class Crowd {
   readonly count: number;
   /** Half of the field's side, m. */
@@ -86,11 +90,27 @@ export class Crowd {
     }
   }
 
+  /** Where the motions end, they go back. */
+  #folded(i: number): number {
+    return this.#phase[i]! > 1 ? 2 - this.#phase[i]! : this.#phase[i]!;
+  }
+
+  /** Character `i` as four numbers (x, z, heading, phase) and two (motion at its level, level). */
+  stand(standing: Writable, motion: Writable, at: number, i: number): void {
+    const level = this.level[i]!;
+    standing[4 * at] = this.x[i]!;
+    standing[4 * at + 1] = this.z[i]!;
+    standing[4 * at + 2] = this.heading[i]!;
+    standing[4 * at + 3] = this.#folded(i);
+    motion[2 * at] = level * this.#library.count + this.#motion[i]!;
+    motion[2 * at + 1] = level;
+  }
+
   /** The matrices of character `i`'s joints in the world, SIZE numbers each, written into `out`. */
   lay(out: Float32Array, i: number): void {
     const { poses, count } = this.#library;
     const [cos, sin] = [Math.cos(this.heading[i]!), Math.sin(this.heading[i]!)];
-    const phase = this.#phase[i]! > 1 ? 2 - this.#phase[i]! : this.#phase[i]!;
+    const phase = this.#folded(i);
     const frame = Math.min(FRAMES - 1, Math.floor(phase * FRAMES));
     const share = phase * FRAMES - frame;
     const size = out.length;

@@ -14,8 +14,9 @@ import {
 
 import "./crowd.css";
 import { levelColour } from "./colours.ts";
+import { BakedCrowd } from "./crowd-baked.ts";
 import { type Library, library } from "./crowd-library.ts";
-import { CrowdMesh } from "./crowd-mesh.ts";
+import { type CrowdDrawing, CrowdMesh } from "./crowd-mesh.ts";
 import { Panel } from "./crowd-panel.ts";
 import { Crowd, half, REACH } from "./crowd-walk.ts";
 import { type Ladder, ladder, lens, pixels } from "./detail.ts";
@@ -25,7 +26,9 @@ import type { Session } from "./session.ts";
 import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
 
-export const MOST = 1000;
+export const MOST = 10_000;
+/** Most characters that are drawn as one mesh of them all, where a processor draws. */
+const ONE_MESH = 1000;
 /** Metres between lines of the ground, and seconds between two readings of numbers. */
 const [GROUND, READING] = [5, 0.25];
 /** Pixels to a metre from which on a character has all triangles. */
@@ -45,7 +48,7 @@ class CrowdView {
   #library: Library | null = null;
   #loading = false;
   #crowd: Crowd | null = null;
-  #mesh: CrowdMesh | null = null;
+  #mesh: CrowdDrawing | null = null;
   #ground: LineSegments<BufferGeometry, LineBasicMaterial> | null = null;
   #before: { position: Vector3; target: Vector3 } | null = null;
   #since = 0;
@@ -121,11 +124,11 @@ class CrowdView {
     this.#before = null;
   }
 
-  /** From a corner, so that near and far are both in view. */
+  /** From a corner of a thousand, so that near and far are both in view; more stand around it. */
   #look(): void {
     const { scene, store } = this.#page;
     const { camera, orbit } = scene;
-    const far = half(Math.min(MOST, store.state.crowd));
+    const far = half(Math.min(ONE_MESH, store.state.crowd));
     camera.position.set(far * 0.35, 4.5, far * 1.02);
     orbit.target.set(-far * 0.05, 0.5, far * 0.1);
     orbit.update();
@@ -161,10 +164,14 @@ class CrowdView {
 
   #people(): void {
     const own = this.#library!;
-    const { card, character } = this.#page;
+    const { card, character, scene } = this.#page;
     this.#crowd = new Crowd(own, Math.min(MOST, this.#page.store.state.crowd));
     this.#bare();
-    this.#mesh = new CrowdMesh(character, card.skeleton.names.length, this.#crowd.count);
+    const [joints, { count }] = [card.skeleton.names.length, this.#crowd];
+    this.#mesh =
+      scene.software && count <= ONE_MESH
+        ? new CrowdMesh(character, joints, count)
+        : new BakedCrowd(character, own, joints, count);
     this.#group.add(this.#mesh.group);
     this.#ground = ground(this.#crowd.half);
     this.#group.add(this.#ground);
@@ -212,7 +219,7 @@ class CrowdView {
       this.#sphere.center.set(crowd.x[i]!, 0.9, crowd.z[i]!);
       if (!this.#frustum.intersectsSphere(this.#sphere)) continue;
       const [x, z] = [crowd.x[i]! - camera.position.x, crowd.z[i]! - camera.position.z];
-      crowd.lay(mesh.add(x * x + z * z < near * near, crowd.level[i]!), i);
+      mesh.add(x * x + z * z < near * near, crowd, i);
       seen++;
     }
     mesh.end();

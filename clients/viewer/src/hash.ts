@@ -185,7 +185,7 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   view: one("one", "levels", "crowd", "performance"),
   across: control(),
   along: control(),
-  crowd: between(() => [50, 1000], Number.isInteger),
+  crowd: between(() => [50, 10_000], Number.isInteger),
   varied: yes(),
   pixels: between(() => [0.25, 16]),
   script: {

@@ -27,6 +27,8 @@ export class Scene {
   readonly camera = new PerspectiveCamera(38, 1, 0.05, 500);
   readonly renderer: WebGLRenderer;
   readonly orbit: OrbitControls;
+  /** Whether a processor draws, not a graphics card. */
+  readonly software = isSoftware();
   readonly #quality: Quality;
   readonly #steps = new Set<Step>();
   readonly #ground = new Ground();
@@ -36,10 +38,9 @@ export class Scene {
   #last = 0;
 
   constructor(host: HTMLElement) {
-    const software = isSoftware();
-    this.renderer = new WebGLRenderer({ antialias: !software });
-    this.#quality = new Quality(this.renderer, software, () => this.redraw());
-    if (software) this.#sun.shadow.mapSize.set(512, 512);
+    this.renderer = new WebGLRenderer({ antialias: !this.software });
+    this.#quality = new Quality(this.renderer, this.software, () => this.redraw());
+    if (this.software) this.#sun.shadow.mapSize.set(512, 512);
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     const canvas = this.renderer.domElement;
