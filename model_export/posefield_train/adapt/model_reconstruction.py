@@ -175,7 +175,9 @@ def _hyper(file: _ModelFile, name: str) -> Hyper:
 def _power_law(file: _ModelFile) -> PowerLaw | None:
     if "duration_exponents" not in file:
         return None
-    return PowerLaw(file["duration_exponents"][:, 0], file["duration_floor"])
+    # In the graph they are widened to whole registers.
+    count = len(file.card.controls)
+    return PowerLaw(file["duration_exponents"][:count, 0], file["duration_floor"][:count])
 
 
 def _order(file: _ModelFile, points: Floats) -> Indices:

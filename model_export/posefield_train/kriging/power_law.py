@@ -14,7 +14,7 @@ from posefield.common.units import Floats
 from posefield.kriging import kriging_model, leave_one_out
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph.graph_builder import REGISTER, GraphBuilder
 
 # Controls over a smaller ratio are nearly linear in their logarithms.
 SMALLEST_RATIO = 1.3
@@ -37,10 +37,19 @@ class PowerLaw:
         return np.asarray(powers @ self.exponents[used])[:, None]
 
     def onnx(self, net: GraphBuilder, controls: str) -> str:
-        """Build `logarithms` in a graph."""
+        """Build `logarithms` in a graph.
+
+        Each row is widened to whole registers by a product with ones and zeros, which is exact: the
+        last numbers of a partly filled register round differently in a logarithm.
+        """
+        count = len(self.exponents)
+        width = -(-count // REGISTER) * REGISTER
+        wide = net("MatMul", controls, net.weights("duration_places", np.eye(count, width)))
         # Controls without exponent may be negative: one replaces them, whose logarithm is zero.
-        above = net("Max", controls, net.weights("duration_floor", self.floor))
-        pairs = np.stack([self.exponents, self.exponents], axis=1)
+        floor = np.append(self.floor, np.ones(width - count))
+        above = net("Max", wide, net.weights("duration_floor", floor))
+        exponents = np.append(self.exponents, np.zeros(width - count))
+        pairs = np.stack([exponents, exponents], axis=1)
         return net.row_sums(net("Log", above), net.weights("duration_exponents", pairs))
 
 

@@ -1,5 +1,6 @@
 """Tests of batches: equal bytes as single evaluation, at every level of every model."""
 
+import numpy as np
 import onnx
 import pytest
 from hypothesis import given, settings
@@ -48,6 +49,18 @@ def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places,
     for each, row in zip(asked, poses.run_batch(model, asked), strict=True):
         (own,) = poses.run_batch(model, [each])
         assert [a.tobytes() for a in row] == [a.tobytes() for a in own]
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5, 7, 8, 15, 17])
+def test_the_last_question_of_a_batch_gets_the_same_bytes(model, count):
+    """The last numbers of arrays may not fill a register."""
+    places = [((share, 0.4, 0.9, 0.2), 0.2, 0) for share in np.linspace(0.03, 0.97, 11)]
+    for level in range(len(model.session.card.levels)):
+        for place in places:
+            asked = [question(model, each, level) for each in (*[places[0]] * (count - 1), place)]
+            (own,) = poses.run_batch(model, asked[-1:])
+            last = poses.run_batch(model, asked)[-1]
+            assert [a.tobytes() for a in last] == [a.tobytes() for a in own]
 
 
 def test_every_level_is_known_to_be_exact(model):
