@@ -13,7 +13,7 @@ from posefield.motion.curves import Curve
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment, travel
 from posefield_train.align.canonical_timing import CanonicalTiming
-from posefield_train.align.time_alignment import AlignedClips
+from posefield_train.align.time_alignment import AlignedClips, Refinement
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
 from posefield_train.contacts import contact_model
@@ -151,10 +151,8 @@ def _vectorize(
     """Align clips and build the tensor of their pose vectors."""
     basis, settings = WarpBasis(recipe.alignment.knots), recipe.alignment
     laid, labels = sample_points.make_samples(recipe, examples)
-    predict = _predictor(recipe, laid, jobs)
-    aligned = time_alignment.align(
-        examples, recipe.motion.frames, basis, settings.rounds, weights, predict, jobs
-    )
+    refinement = Refinement(settings.rounds, _predictor(recipe, laid, jobs))
+    aligned = time_alignment.align(examples, recipe.motion.frames, basis, weights, refinement, jobs)
     travels = {}
     if recipe.motion.cyclic:
         aligned, travels["travel"] = travel.remove_travel(aligned)

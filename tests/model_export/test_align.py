@@ -11,6 +11,7 @@ from posefield.kriging.kriging_model import half_ranges
 from posefield.motion import clip, quat
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import dtw, time_alignment
+from posefield_train.align.time_alignment import Refinement
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.kriging import kriging_tuning
 from posefield_train.kriging.sample_points import SamplePoints
@@ -83,7 +84,7 @@ def to_the_prediction(family):
 
 
 def aligned(family, rounds=2, basis=BASIS, weights=WEIGHTS, predict=to_the_mean):
-    return time_alignment.align(family, FRAMES, basis, rounds, weights, predict)
+    return time_alignment.align(family, FRAMES, basis, weights, Refinement(rounds, predict))
 
 
 def disagreement(found, true):
@@ -301,10 +302,7 @@ def test_the_medoid_of_a_large_family_is_that_of_a_sample():
     sizes = np.linspace(0.2, 1.4, 320)
     mixed = np.random.Generator(np.random.PCG64(5)).permutation(sizes)
     clips = [example(float(size), CANONICAL) for size in mixed]
-    found = [
-        time_alignment.align(clips, FRAMES, BASIS, 0, WEIGHTS, lambda values: values).reference
-        for _ in range(2)
-    ]
+    found = [aligned(clips, 0).reference for _ in range(2)]
     assert found[0] == found[1]
     assert abs(mixed[found[0]] - 0.8) < 0.1
     # Negative control: most clips lie farther from the middle.

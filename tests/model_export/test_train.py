@@ -309,4 +309,4 @@ def test_a_budget_is_kept_and_not_wasted(trained, small_recipe):
 def test_progress_is_told_step_by_step(small_recipe, few):
     told = []
     train.train(with_size(small_recipe, 0.1, [5, 5, 5]), few, told.append)
-    assert told == ["aligning 23 clips", "building the motion tensor", "fitting the fields"]
+    assert told == ["aligning 23 clips", "decomposing the motion tensor", "fitting the fields"]

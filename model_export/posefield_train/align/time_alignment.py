@@ -68,20 +68,26 @@ Predictor = Callable[[Floats], Floats]
 """Map from values (N, m) of all clips to the prediction (N, m) of each of them."""
 
 
+@dataclass(frozen=True)
+class Refinement:
+    """Rounds in which clips are warped to their predictions from the other aligned clips."""
+
+    rounds: int
+    predict: Predictor
+
+
 def align(
     examples: Sequence[Example],
     frames: int,
     basis: WarpBasis,
-    rounds: int,
     joint_weights: JointWeights,
-    predict: Predictor,
+    refinement: Refinement,
     jobs: Jobs = SERIAL,
 ) -> AlignedClips:
     """Warp examples to one canonical time and resample them to `frames` frames.
 
-    joint_weights: weights (J,) of the joints' positions in the comparison. predict: maps values (N,
-    m) of all clips to the prediction (N, m) of each clip from the others. jobs: executor of
-    the warps of many clips. The mean of the inverse warps is the identity, so canonical time is the
+    joint_weights: weights (J,) of the joints' positions in the comparison. jobs: executor of the
+    warps of many clips. The mean of the inverse warps is the identity, so canonical time is the
     average timing of the family.
     """
     traces = _ClipTraces(examples, np.sqrt(joint_weights))
@@ -90,13 +96,13 @@ def align(
     medoid = _medoid(_align_piecewise(traces, knees, COARSE))
     fine = _align_piecewise(traces, knees, FINE)
     logs = _centre(_warps_to(fine, fine[medoid], knees, basis, jobs), knees, basis)
-    for _ in range(rounds):
+    for _ in range(refinement.rounds):
         pairs = zip(traces, logs, strict=True)
         warped = _stack(
             (interpolate(trace, basis.invert(log, _uniform_times(FINE))) for trace, log in pairs),
             len(examples),
         )
-        predicted = predict(warped.reshape(len(warped), -1)).reshape(warped.shape)
+        predicted = refinement.predict(warped.reshape(len(warped), -1)).reshape(warped.shape)
         del warped
         logs = _centre(_warps_to(fine, predicted, knees, basis, jobs), knees, basis)
         del predicted

@@ -1,8 +1,5 @@
 """Command `posefield train`: one or several recipes to models."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +18,6 @@ from posefield_train.source import shipped_recipes
 if TYPE_CHECKING:
     from posefield_train.graph.onnx_export import ExportedModel
     from posefield_train.graph.trained_model import TrainedModel
-    from posefield_train.parallel.jobs import Jobs
     from posefield_train.source.recipe import Recipe
 
 
@@ -52,49 +48,28 @@ def train_command(
             help="output .html report of the training; a .json file is written next to it"
         ),
     ] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            help="folder of finished parts of a training that was stopped: those of equal data, "
-            "code and settings are read instead of computed, and new ones are kept; it holds "
-            "pickles, use your own only",
-            metavar="FOLDER",
-        ),
-    ] = None,
     json: Json = False,
 ) -> None:
     """Train the model of each recipe, one .onnx file each."""
     output_files.expect_html(report)
     recipe_files = [shipped_recipes.file_of(given, data) for given in recipes]
     if len(recipe_files) == 1:
-        _train(recipe_files[0], data, output, _TrainingRun(executor, report, resume), json)
+        _train(recipe_files[0], data, output, executor, report, json)
     elif report:
         raise InvalidField("report", "of several recipes, expected none")
-    elif resume:
+    elif executor.resume:
         raise InvalidField("resume", "of several recipes, expected none")
     else:
         _sweep(recipe_files, data, output, executor, json)
 
 
-@dataclass(frozen=True)
-class _TrainingRun:
-    """Executor of a training. report: output file; resume: folder of finished parts; or None."""
-
-    executor: ExecutorOptions
-    report: Path | None
-    resume: Path | None
-
-    @contextmanager
-    def jobs(self) -> "Iterator[Jobs]":
-        """Open the executor of the parts of the training."""
-        from posefield_train.parallel.finished_jobs import FinishedJobs
-
-        with executors.parts(self.executor) as own:
-            yield FinishedJobs(own, self.resume) if self.resume else own
-
-
 def _train(
-    recipe_file: Path, data: Path | None, output: Path, run: _TrainingRun, json: bool
+    recipe_file: Path,
+    data: Path | None,
+    output: Path,
+    executor: ExecutorOptions,
+    report: Path | None,
+    json: bool,
 ) -> None:
     # SciPy and onnx take a second to import, and other commands do not need them.
     from posefield_train import train
@@ -103,8 +78,8 @@ def _train(
 
     output_files.expect_onnx(output)
     own = recipe.read_accepted(recipe_file)
-    steps = REPORT_STEPS if run.report else STEPS
-    with run.jobs() as jobs, ProgressPrinter("training", steps) as progress:
+    steps = REPORT_STEPS if report else STEPS
+    with executors.parts(executor) as jobs, ProgressPrinter("training", steps) as progress:
         progress(f"reading {recipe_file}")
         examples, notes = ingest.ingest(own, data or recipe_file.parent)
         progress.expect(_step_seconds(len(examples)))
@@ -113,8 +88,8 @@ def _train(
         progress("writing the graph and comparing it with the reference")
         exported = onnx_export.export_model(own, trained, notes)
         atomic_files.write(exported.content, output)
-        if run.report:
-            _write_report(own, trained, exported, progress, run.report)
+        if report:
+            _write_report(own, trained, exported, progress, report)
         progress("done")
     typer.echo(output_files.format_output(exported, output, json))
 

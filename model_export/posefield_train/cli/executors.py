@@ -1,7 +1,9 @@
 """Executors of a command's jobs: processes of this machine, or a cluster."""
 
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -25,7 +27,8 @@ class ExecutorOptions:
     """Executor of the training of a model, or of several.
 
     jobs: number of processes; None for one per core of several recipes, and for this process alone
-    of one. scheduler: address of a cluster's scheduler; None for this machine.
+    of one. scheduler: address of a cluster's scheduler; None for this machine. resume: folder of
+    finished parts of one training; None to keep none.
     """
 
     jobs: Annotated[
@@ -36,19 +39,30 @@ class ExecutorOptions:
         ),
     ] = None
     scheduler: Scheduler = None
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            help="folder of finished parts of a training that was stopped: those of equal data, "
+            "code and settings are read instead of computed, and new ones are kept; it holds "
+            "pickles, use your own only",
+            metavar="FOLDER",
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
         if self.jobs is not None and self.jobs < 1:
             raise InvalidField("jobs", f"{self.jobs}, expected 1 or more")
 
 
-def parts(options: ExecutorOptions) -> "AbstractContextManager[Jobs]":
+@contextmanager
+def parts(options: ExecutorOptions) -> "Iterator[Jobs]":
     """Open an executor of the parts of one training: this process unless others are asked for."""
-    if options == ExecutorOptions():
-        from posefield_train.parallel.jobs import SerialJobs
+    from posefield_train.parallel.finished_jobs import FinishedJobs
+    from posefield_train.parallel.jobs import SerialJobs
 
-        return nullcontext(SerialJobs())
-    return jobs(options.scheduler, options.jobs)
+    alone = options.jobs is None and options.scheduler is None
+    with nullcontext(SerialJobs()) if alone else jobs(options.scheduler, options.jobs) as own:
+        yield FinishedJobs(own, options.resume) if options.resume else own
 
 
 def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextManager[Jobs]":
