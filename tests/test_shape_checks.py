@@ -39,7 +39,9 @@ WRONG = {
     "other joints": lambda: skeleton.forward_kinematics((-1, 0), np.ones((3, 4)), np.ones((2, 3))),
     "a sample of other controls": lambda: support.covariances(np.ones((2, 3)), np.ones((2, 4))),
     "shares of other rows": lambda: blend.lerp(np.ones((2, 3)), np.ones((2, 3)), np.ones(3)),
-    "a method's argument": lambda: PoseChart(np.ones((2, 4))).far_joints(np.ones((5, 2, 4))),
+    "a method's argument": lambda: PoseChart(np.ones((2, 4)), "stereographic").far_joints(
+        np.ones((5, 2, 4))
+    ),
 }
 POSITIONS = np.zeros((2, 2, 3))
 FIELDS = {

@@ -152,7 +152,7 @@ def test_folders_names_and_arrows_follow_the_rules(own):
         ),
         ("service/posefield/common/units.py", "from posefield.common import errors", ""),
         ("service/posefield/motion/clip.py", "import posefield.motion.blend", ""),
-        ("service/posefield/motion/alone.py", "", ""),
+        ("service/posefield/kriging/alone.py", "", ""),
     ],
 )
 def test_a_breach_is_found(plant, file, text, fault):

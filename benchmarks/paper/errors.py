@@ -66,7 +66,7 @@ class Errors:
     def of(self, reduced: TuckerTensor) -> Poses:
         """Return the pose function of a truncation."""
         own, field = self.made.trained.tensor, self.field(reduced)
-        decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart.means)
+        decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart)
         frames = np.arange(float(own.values.shape[1]))
         return lambda points: decoder.numpy(
             field.predict(points), np.tile(frames, (len(points), 1))

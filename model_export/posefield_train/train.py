@@ -338,7 +338,7 @@ def _event_blend(
 
 
 def _decoder(own: MotionTensor, reduced: TuckerTensor, blend: EventBlend | None) -> Decoder:
-    return Decoder(reduced, own.mean, own.unwhiten, own.chart.means, event=blend, curves=own.curves)
+    return Decoder(reduced, own.mean, own.unwhiten, own.chart, event=blend, curves=own.curves)
 
 
 def _fit_and_truncate(

@@ -29,7 +29,7 @@ def field(made):
 def test_compiled_poses_are_those_of_the_decoder(made, question):
     reduced, own = precomputation.ours(made, RANKS)
     tensor = made.trained.tensor
-    decoder = Decoder(reduced, tensor.mean, tensor.unwhiten, tensor.chart.means)
+    decoder = Decoder(reduced, tensor.mean, tensor.unwhiten, tensor.chart)
     found = poses.ours(made, reduced, own, question)()
 
     def expected(points, places):

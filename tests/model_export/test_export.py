@@ -191,7 +191,8 @@ def bent(exported, joint, radians):
     means = decoder.means.copy()
     turn = np.array([0.0, 0.0, radians])
     means[joint] = quat.mul(means[joint], quat.exp(turn))
-    return replace(exported.model, decoder=replace(decoder, means=means))
+    chart = replace(decoder.chart, means=means)
+    return replace(exported.model, decoder=replace(decoder, chart=chart))
 
 
 def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(exported, model_path, opened):
@@ -300,7 +301,7 @@ def test_onnxruntime_alone_reads_the_metadata(model_path):
     runtime = onnxruntime.InferenceSession(model_path, providers=["CPUExecutionProvider"])
     entries = runtime.get_modelmeta().custom_metadata_map
     card = {k: json.loads(v) for k, v in entries.items() if k.startswith("posefield.")}
-    assert card["posefield.format"] == 4
+    assert card["posefield.format"] == 5
     assert card["posefield.units"] == {
         "length": "m",
         "time": "s",

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from posefield.motion import quat, skeleton
+from posefield.motion.rotation_charts import CHARTS
 from posefield_train.tensor import pose_metric
 
 PARENTS = (-1, 0, 1, 2, 1, 4)
@@ -12,11 +13,21 @@ JOINTS, POSES = 6, 5
 TOLERANCE = 1e-8
 
 
+@pytest.fixture(params=CHARTS)
+def chart(request):
+    return CHARTS[request.param]
+
+
 @pytest.fixture
-def family(rng):
-    """Means (J, 4), vectors (P, J, 3) and translations (P, J, 3) of differing performers."""
+def family(rng, chart):
+    """The chart, means (J, 4), numbers (P, J, 3), and translations (P, J, 3) of performers."""
     means = quat.normalize(rng.normal(size=(JOINTS, 4)))
-    return means, 0.8 * rng.normal(size=(POSES, JOINTS, 3)), rng.normal(size=(POSES, JOINTS, 3))
+    return (
+        chart,
+        means,
+        0.8 * rng.normal(size=(POSES, JOINTS, 3)),
+        rng.normal(size=(POSES, JOINTS, 3)),
+    )
 
 
 @pytest.fixture
@@ -24,16 +35,16 @@ def weights(rng):
     return rng.uniform(0.5, 2.0, JOINTS)
 
 
-def skin(means, numbers, bones):
+def skin(chart, means, numbers, bones):
     """Six points (J * 6, 3) on the sphere of skin around every joint, in one pose."""
-    rotations = quat.mul(means, quat.exp(numbers[3:].reshape(-1, 3)))
+    rotations = quat.mul(means, chart.quaternions(numbers[3:].reshape(-1, 3)))
     translations = np.vstack([numbers[:3], bones[1:]])
     positions, orientations = skeleton.forward_kinematics(PARENTS, rotations, translations)
     axes = pose_metric.SHELL_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
     return (positions[:, None] + quat.rotate(orientations[:, None], axes)).reshape(-1, 3)
 
 
-def by_differences(means, vectors, translations, weights):
+def by_differences(chart, means, vectors, translations, weights):
     """Mean over poses of JᵀJ, with the derivative of every number by central differences."""
     total, step = 0.0, 1e-5
     for vector, bones in zip(vectors, translations, strict=True):
@@ -41,8 +52,8 @@ def by_differences(means, vectors, translations, weights):
         columns = []
         for index in range(len(numbers)):
             moved = step * np.eye(len(numbers))[index]
-            gap = skin(means, numbers + moved, bones) - skin(means, numbers - moved, bones)
-            columns.append(gap / (2.0 * step))
+            ahead, behind = (skin(chart, means, numbers + s * moved, bones) for s in (1, -1))
+            columns.append((ahead - behind) / (2.0 * step))
         jacobian = np.stack(columns)
         # Each sphere's mass is spread over its six points.
         masses = np.repeat(weights / 6.0, 6)
@@ -50,9 +61,10 @@ def by_differences(means, vectors, translations, weights):
     return total / len(vectors)
 
 
-def gram(means, vectors, translations, weights):
-    rotations = quat.mul(means, quat.exp(vectors))
-    return pose_metric.gram(PARENTS, rotations, vectors, translations, weights)
+def gram(chart, means, vectors, translations, weights):
+    rotations = quat.mul(means, chart.quaternions(vectors))
+    jacobians = chart.right_jacobian(vectors)
+    return pose_metric.gram(PARENTS, rotations, jacobians, translations, weights)
 
 
 def test_gram_matrix_is_that_of_finite_differences(family, weights):
@@ -60,27 +72,28 @@ def test_gram_matrix_is_that_of_finite_differences(family, weights):
     scale = np.max(np.abs(expected))
     assert np.max(np.abs(gram(*family, weights) - expected)) < TOLERANCE * scale
     assert np.max(np.abs(gram(*family, np.ones(JOINTS)) - expected)) > 1e-2 * scale
-    means, vectors, translations = family
+    chart, means, vectors, translations = family
+    flat = np.tile(np.eye(3), (POSES, JOINTS, 1, 1))
     no_curvature = pose_metric.gram(
-        PARENTS, quat.mul(means, quat.exp(vectors)), 0.0 * vectors, translations, weights
+        PARENTS, quat.mul(means, chart.quaternions(vectors)), flat, translations, weights
     )
     assert np.max(np.abs(no_curvature - expected)) > 1e-2 * scale
 
 
 def test_turn_about_a_bone_counts_by_the_skin():
     """A lone joint: only its own sphere moves, by two thirds of its squared radius."""
-    still = np.zeros((1, 1, 3)), np.zeros((1, 1, 3))
-    found = pose_metric.gram((-1,), quat.exp(still[0]), *still, np.array([2.0]))
+    still, jacobians = np.zeros((1, 1, 3)), np.eye(3)[None, None]
+    found = pose_metric.gram((-1,), quat.exp(still), jacobians, still, np.array([2.0]))
     expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * pose_metric.SHELL_RADIUS**2] * 3)
     assert np.max(np.abs(found - expected)) < 1e-15
 
 
 def test_tiny_and_vanishing_vectors_are_no_special_case(family, weights):
-    means, vectors, translations = family
+    chart, means, vectors, translations = family
     for size in (0.0, 1e-9, 9e-5, 1.1e-4):
         small = size * vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-        expected = by_differences(means, small, translations, weights)
-        found = gram(means, small, translations, weights)
+        expected = by_differences(chart, means, small, translations, weights)
+        found = gram(chart, means, small, translations, weights)
         assert np.max(np.abs(found - expected)) < TOLERANCE * np.max(np.abs(expected))
 
 

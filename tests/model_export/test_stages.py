@@ -8,6 +8,7 @@ from numpy.random import PCG64, Generator
 from running import outputs
 
 from posefield.motion import quat
+from posefield.motion.rotation_charts import CHARTS
 from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
@@ -19,6 +20,7 @@ from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.tensor import decoder_graph, hosvd
 from posefield_train.tensor.decoder import BLOCK_NUMBERS, Decoder, LevelSize, Proportions
 from posefield_train.tensor.hosvd import TuckerTensor
+from posefield_train.tensor.pose_vectors import PoseChart
 
 SAMPLES, CONTROLS, BATCH, STEPS = 25, 3, 40, 11
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
@@ -154,14 +156,14 @@ def timing(knots=6):
     return Case(found, [duration, place], list(wrong), 2e-4 if knots <= 6 else 1e-2)
 
 
-def decoder_stage():
+def decoder_stage(chart="stereographic"):
     own = rng()
     full = hosvd.decompose(own.normal(size=(12, 20, 15)))
     return Decoder(
         full.truncated((7, 5, 6)),
         own.normal(size=15),
         0.3 * own.normal(size=(15, 12)),
-        quat.normalize(own.normal(size=(4, 4))),
+        PoseChart(quat.normalize(own.normal(size=(4, 4))), chart),
     )
 
 
@@ -219,9 +221,9 @@ def level_of_decoder(level):
     return Case(found, list(stage.at_level(level).numpy(coefficients, place)), list(nearest), 2e-5)
 
 
-def poses_at_the_means():
-    """No rotation vector at all: the sine over the angle has its value at zero."""
-    stage = decoder_stage()
+def poses_at_the_means(chart):
+    """No rotation at all: the sine over the angle has its value at zero."""
+    stage = decoder_stage(chart)
     still = replace(stage, mean=np.zeros(15))
     nothing = np.zeros((3, 6))
 
@@ -295,8 +297,10 @@ CASES = {
     **{f"bank, level {n}": (level_of_bank, {"level": n}) for n in (1, 2, 3, 4)},
     **{f"decoder, level {n}": (level_of_decoder, {"level": n}) for n in (0, 1, 2, 3)},
     "decoder": (decoder, {"stage": decoder_stage()}),
+    "decoder of rotation vectors": (decoder, {"stage": decoder_stage("rotation_vector")}),
     "decoder with stiff axes": (decoder, {"stage": stiff_stage()}),
-    "decoder at the means": (poses_at_the_means, {}),
+    "decoder at the means": (poses_at_the_means, {"chart": "stereographic"}),
+    "rotation vectors at the means": (poses_at_the_means, {"chart": "rotation_vector"}),
     "proportions": (proportions, {}),
     "travel of a cycle": (travel, {}),
 }
@@ -355,7 +359,8 @@ def test_poses_at_whole_frames_are_those_of_the_tensor():
     frames = np.tile(np.arange(20.0), (15, 1))
     found = stage.numpy(coefficients, frames)
     numbers = stage.mean + stage.reduced.restored().transpose(2, 1, 0) @ stage.unwhiten.T
-    rotations = quat.mul(stage.means, quat.exp(numbers[..., 3:].reshape(15, 20, 4, 3)))
+    turns = CHARTS["stereographic"].quaternions(numbers[..., 3:].reshape(15, 20, 4, 3))
+    rotations = quat.mul(stage.means, turns)
     assert np.max(np.abs(quat.to_matrix(found[0]) - quat.to_matrix(rotations))) < 1e-12
     assert np.max(np.abs(found[1] - numbers[..., :3])) < 1e-12
     full = TuckerTensor(stage.reduced.core[::-1], stage.reduced.bases)
@@ -401,7 +406,7 @@ def test_at_full_ranks_and_without_nugget_the_clips_come_back_at_their_controls(
     hyper = replace(trained.pose.hyper, nugget=0.0)
     exact = universal_kriging.solve(hyper, points, trained.full.bases[2])
     own = trained.tensor
-    whole = Decoder(trained.full, own.mean, own.unwhiten, own.chart.means)
+    whole = Decoder(trained.full, own.mean, own.unwhiten, own.chart)
     numbers = own.mean + own.values.transpose(2, 1, 0) @ own.unwhiten.T
     rotations, root = own.chart.poses(numbers)
     frames = np.tile(np.arange(float(root.shape[1])), (len(points), 1))

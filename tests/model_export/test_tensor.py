@@ -127,7 +127,7 @@ def test_facing_of_the_whole_family_changes_no_distance(small, offsets):
     near = between_pairs(first.values.transpose(2, 1, 0))
     gap = between_pairs(second.values.transpose(2, 1, 0)) / near - 1.0
     assert np.max(np.abs(gap)) < 1e-6
-    identity = pose_vectors.PoseChart(np.tile(quat.IDENTITY, (5, 1)))
+    identity = pose_vectors.PoseChart(np.tile(quat.IDENTITY, (5, 1)), "rotation_vector")
     plain = identity.numbers(small.rotations, small.root_path)
     turned = identity.numbers(rotations, away.root_path)
     assert np.max(np.abs(between_pairs(turned) / between_pairs(plain) - 1.0)) > 1e-2

@@ -96,8 +96,7 @@ def _solve(
     field, table = (contacts.kriging, contacts.table) if contacts else (None, None)
     bank = KrigingBank(*ends, laid.labels, pose, others, sill, (), law, event, field)
     own = extended.tensor
-    chart = own.chart.means
-    decoder = Decoder(reduced, own.mean, own.unwhiten, chart, event=blend, curves=own.curves)
+    decoder = Decoder(reduced, own.mean, own.unwhiten, own.chart, event=blend, curves=own.curves)
     adapted = FloatModel(bank, model.timing, decoder, proportions, model.travel, table)
     return AdaptedModel(adapted, moved, extended, missed, contacts)
 

@@ -26,7 +26,6 @@ from posefield_train.source.canonical.half_turns import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
-from posefield_train.tensor.pose_vectors import PoseChart
 
 # A clip farther from the prediction than this many times sigma of an unseen performer is taken for
 # another action. On three real families held-out performers lie within 1.1, 0.9 and 1.8 times
@@ -136,10 +135,8 @@ def _to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> Can
     gone = {}
     if adaptable.model.travel:
         aligned, gone["travel"] = travels.remove_travel(aligned)
-    offsets, own_chart = (
-        np.stack([e.offsets for e in examples]),
-        PoseChart(adaptable.model.decoder.means),
-    )
+    offsets = np.stack([e.offsets for e in examples])
+    own_chart = adaptable.model.decoder.chart
     small = half_turns.small_joints(adaptable.skeleton.parents, offsets.mean(axis=0))
     rotations, flipped = half_turns.remove_flips_about(own_chart.means, aligned.rotations, small)
     jumps = [replace(jump, clip=i) for i, e in enumerate(examples) for jump in e.jumps]

@@ -38,6 +38,7 @@ from posefield_train.tensor import event_blend
 from posefield_train.tensor.decoder import Decoder, Proportions
 from posefield_train.tensor.event_blend import EventBlend
 from posefield_train.tensor.hosvd import TuckerTensor
+from posefield_train.tensor.pose_vectors import PoseChart
 
 # Largest rounding error of sample controls in float32, in half-ranges.
 SAMPLE_TOLERANCE = 1e-5
@@ -247,12 +248,12 @@ def _solve_recovered(
 def _decoder(file: _ModelFile, bank: KrigingBank) -> Decoder:
     """Return a decoder with the core's coordinates for the first mode."""
     finest = file.card.levels[0]
-    held = reduced_motion.read(file.numbers, replace(finest, event=0), file.card.curves)
+    held = reduced_motion.read(file.numbers, replace(finest, event=0), file.card)
     core = held.core.transpose(1, 0, 2)
     bases = np.eye(len(core)), held.time, bank.pose.values
     blend = _event_blend(file.card, core, held.time) if finest.event else None
-    tensor, rotations = TuckerTensor(core, bases), held.rotations
-    return Decoder(tensor, held.mean, held.directions.T, rotations, event=blend, curves=held.curves)
+    tensor, chart = TuckerTensor(core, bases), PoseChart(held.rotations, held.chart)
+    return Decoder(tensor, held.mean, held.directions.T, chart, event=blend, curves=held.curves)
 
 
 def _event_blend(card: ModelCard, core: Floats, basis: Floats) -> EventBlend | None:

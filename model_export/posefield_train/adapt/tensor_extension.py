@@ -15,7 +15,6 @@ from posefield_train.tensor import hosvd, motion_tensor
 from posefield_train.tensor.decoder import Decoder
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import CONSTANT_RANGE, MotionTensor
-from posefield_train.tensor.pose_vectors import PoseChart
 
 # Error allowed for a model that was not truncated, m: invisible.
 MINIMUM_NORM = 1e-4
@@ -94,7 +93,7 @@ def _pose_space(
     numbers: Floats,
     old: Floats,
 ) -> _PoseSpace:
-    decoder, own_chart = model.decoder, PoseChart(model.decoder.means)
+    decoder, own_chart = model.decoder, model.decoder.chart
     known = decoder.mean + old.transpose(2, 1, 0) @ decoder.directions
     offsets = model.proportions.numpy(model.bank.sample_values("offsets"))
     gram = motion_tensor.sampled_gram(known, own_chart, parents, offsets, joint_weights)
@@ -127,6 +126,5 @@ def _tensor(
     whiten, unwhiten = np.zeros((2, len(values), len(decoder.mean)))
     whiten[:, space.varies] = directions.T @ space.root
     unwhiten[:, space.varies] = directions.T @ space.inverse
-    own_chart = PoseChart(decoder.means)
-    own_curves = decoder.curves
+    own_chart, own_curves = decoder.chart, decoder.curves
     return MotionTensor(values, decoder.mean, whiten, unwhiten.T, own_chart, weight, own_curves)

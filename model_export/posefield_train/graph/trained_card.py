@@ -160,6 +160,7 @@ def _making(recipe: Recipe, trained: TrainedModel) -> TrainingParameters:
         recipe.motion.cyclic and recipe.alignment.begin == "in_phase",
         _takes([trained.examples[clip] for clip in trained.listed]),
         trained.examples[0].facing,
+        chart=trained.tensor.chart.chart,
     )
 
 

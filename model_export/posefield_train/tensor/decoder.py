@@ -45,20 +45,24 @@ class Decoder:
 
     reduced: core (r1, r2, r3) and bases of degrees of freedom, frames and samples, in the metric's
     coordinates. mean: pose vector (D,) on which the tensor is centred. unwhiten: map (D, D') from
-    the metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. means:
-    rotations (J, 4) about which the rotation vectors are taken. coarse: ranks and joints of each
-    coarser level. event: blend into a second prediction around the event, at the finest level; its
-    coefficients follow those of the core. curves: those of the last
-    numbers of a pose vector.
+    the metric's coordinates, of the D' degrees of freedom that vary, to pose vectors. chart: of the
+    poses. coarse: ranks and joints of each coarser level. event: blend into a second prediction
+    around the event, at the finest level; its coefficients follow those of the core. curves: those
+    of the last numbers of a pose vector.
     """
 
     reduced: TuckerTensor
     mean: Annotated[Floats, "dof"]
     unwhiten: Annotated[Floats, "dof varying"]
-    means: JointRotations
+    chart: PoseChart
     coarse: tuple[LevelSize, ...] = ()
     event: EventBlend | None = None
     curves: tuple[Curve, ...] = ()
+
+    @property
+    def means(self) -> JointRotations:
+        """Return the rotations (J, 4) about which rotations are taken."""
+        return self.chart.means
 
     @property
     def blended(
@@ -104,7 +108,7 @@ class Decoder:
         Kuriyama 2006, section 2).
         """
         numbers = self.mean + self.reduced_poses(coefficients, place) @ self.directions
-        return PoseChart(self.means).poses(numbers)
+        return self.chart.poses(numbers)
 
     def curve_values(
         self, coefficients: Annotated[Floats, "clips modes"], place: ClipFrames
@@ -113,7 +117,7 @@ class Decoder:
 
         coefficients: (B, r3).
         """
-        own = PoseChart(self.means).curve_numbers
+        own = self.chart.curve_numbers
         numbers = self.mean[own] + self.reduced_poses(coefficients, place) @ self.directions[:, own]
         return clamp(self.curves, numbers)
 
@@ -127,7 +131,7 @@ class Decoder:
         whole, times = self.blended
         core = np.tensordot(times[frame], whole, axes=(0, 1))
         numbers = self.mean + coefficients @ (core.T @ self.directions)
-        return PoseChart(self.means).poses(numbers)
+        return self.chart.poses(numbers)
 
     def select_joints(self, joints: Sequence[int]) -> "Decoder":
         """Return the finest level's decoder of some joints, including the root, without curves."""
@@ -137,7 +141,7 @@ class Decoder:
             self,
             mean=self.mean[rows],
             unwhiten=self.unwhiten[rows],
-            means=self.means[list(joints)],
+            chart=replace(self.chart, means=self.means[list(joints)]),
             coarse=(),
             curves=(),
         )
@@ -160,9 +164,9 @@ class Decoder:
         return poses
 
     @property
-    def mean_vectors(self) -> Annotated[Floats, "numbers"]:
-        """Return the mean rotation vectors (3 J,)."""
-        return self.mean[PoseChart(self.means).joint_numbers]
+    def mean_turns(self) -> Annotated[Floats, "numbers"]:
+        """Return the mean numbers (3 J,) of the rotations."""
+        return self.mean[self.chart.joint_numbers]
 
 
 @dataclass(frozen=True)

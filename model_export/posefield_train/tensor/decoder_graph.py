@@ -5,13 +5,11 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.units import Floats, Indices
-from posefield.motion import quat
 from posefield.motion.curves import limits
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.onnx_graph.level_tables import Integers
 from posefield_train.tensor import quaternion_graph
 from posefield_train.tensor.decoder import Decoder
-from posefield_train.tensor.pose_vectors import PoseChart
 
 
 def entries(decoder: Decoder) -> dict[str, list[Integers]]:
@@ -64,7 +62,7 @@ def _curves(
     decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
 ) -> str:
     """Build the values (B S, C) of the curves, clamped, from coefficients (B S, r1)."""
-    own = PoseChart(decoder.means).curve_numbers
+    own = decoder.chart.curve_numbers
     of_curves = net("Slice", directions, net.indices(own.start, 0), ends["curves"])
     mean = net.weights("curve_mean", decoder.mean[own])
     values = net("Gemm", flat, of_curves, mean, transB=1)
@@ -140,24 +138,30 @@ def _rotations(
     decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
 ) -> str:
     """Build quaternions (B, S, J, 4) from the first mode's coefficients (B S, r1)."""
-    turning = quaternion_graph.half_angle_products_onnx(net, decoder.means, directions)
-    offset = quaternion_graph.half_angle_products(decoder.means, decoder.mean_vectors)
+    turning = quaternion_graph.mean_products_onnx(net, decoder.chart, directions)
+    offset = quaternion_graph.mean_products(decoder.chart, decoder.mean_turns)
     if any(len(rung.joints) < len(decoder.means) for rung in decoder.level_sizes):
         return _partly_fixed_rotations(decoder, net, flat, turning, offset, ends)
     turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
     means = net.weights("mean_rotations", decoder.means[:, :, None])
     constant = net.weights("rotation_mean", offset[:, None])
-    return quaternion_graph.innermost_joints(
-        net,
-        quaternion_graph.quaternions(
-            net,
-            net("Gemm", turning, flat, constant, transB=1),
-            means,
-            ends["half_angles"],
-        ),
-        len(decoder.means),
-        ends["rotations"],
-    )
+    found = _chart_quaternions(decoder, net, (turning, flat, constant), means, ends)
+    return quaternion_graph.innermost_joints(net, found, len(decoder.means), ends["rotations"])
+
+
+def _chart_quaternions(
+    decoder: Decoder,
+    net: GraphBuilder,
+    rows: tuple[str, str, str],
+    means: str,
+    ends: dict[str, str],
+) -> str:
+    """Build quaternions (J, 4, P) of directions (4 J, r1), poses (P, r1), constant (4 J, 1)."""
+    directions, poses, constant = rows
+    chart = decoder.chart.chart
+    offset = quaternion_graph.row_offset(net, chart, constant, means)
+    products = net("Gemm", directions, poses, offset, transB=1)
+    return quaternion_graph.quaternions(net, chart, products, means, ends["half_angles"])
 
 
 def _partly_fixed_rotations(
@@ -183,11 +187,8 @@ def _partly_fixed_rotations(
     ordered = net.weights("mean_rotations", decoder.means[:, :, None])
     ordered = net("Gather", ordered, net.weights("joint_order", order))
     moving = net("Slice", ordered, zero, ends["joints"], zero)
-    rows_of_joints = net("Gemm", turning, flat, constant, transB=1)
-    found = quaternion_graph.quaternions(net, rows_of_joints, moving, ends["half_angles"])
-    still = quat.mul(decoder.means, quat.exp(decoder.mean_vectors.reshape(-1, 3)))[order][
-        :, :, None
-    ]
+    found = _chart_quaternions(decoder, net, (turning, flat, constant), moving, ends)
+    still = decoder.chart.rotation_planes(decoder.mean_turns[:, None])[order]
     still_ones = net(
         "Slice", net.weights("still", still), ends["joints"], net.indices(joints), zero
     )

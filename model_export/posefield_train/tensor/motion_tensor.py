@@ -12,6 +12,7 @@ from posefield.common.array_shapes import ClipBones, JointWeights, PoseVectors
 from posefield.common.errors import TrainingError
 from posefield.common.units import Booleans, Floats
 from posefield.motion.curves import Curve, distances
+from posefield.motion.rotation_charts import CHARTS
 from posefield_train.align.time_alignment import AlignedClips
 from posefield_train.source.canonical import clip_blocks, half_turns
 from posefield_train.source.canonical.half_turns import Finding
@@ -149,5 +150,6 @@ def sampled_gram(
     rotations, root = own_chart.poses(some)
     translations = offsets[chosen // frames].copy()
     translations[:, 0] = root
-    vectors = some[:, own_chart.joint_numbers].reshape(len(some), -1, 3)
-    return pose_metric.gram(parents, rotations, vectors, translations, joint_weights)
+    turns = some[:, own_chart.joint_numbers].reshape(len(some), -1, 3)
+    jacobians = CHARTS[own_chart.chart].right_jacobian(turns)
+    return pose_metric.gram(parents, rotations, jacobians, translations, joint_weights)

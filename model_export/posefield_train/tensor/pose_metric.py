@@ -29,18 +29,18 @@ FLOOR = 1e-6
 def gram(
     parents: tuple[int, ...],
     rotations: Annotated[Floats, "poses joints 4"],
-    vectors: Annotated[Floats, "poses joints 3"],
+    jacobians: Annotated[Floats, "poses joints 3 3"],
     translations: Annotated[Floats, "poses joints 3"],
     joint_weights: JointWeights,
 ) -> Annotated[Floats, "3+joints*3 3+joints*3"]:
     """Return the mean over poses of JᵀJ (D, D), D = 3 + 3 J, in m² per squared unit.
 
-    rotations: local (P, J, 4). vectors: the same as rotation vectors about the means (P, J, 3).
+    rotations: local (P, J, 4). jacobians: right Jacobians (P, J, 3, 3) of their numbers.
     translations: local (P, J, 3), m. joint_weights: mass (J,) of each joint.
     """
     positions, orientations = skeleton.forward_kinematics(parents, rotations, translations)
     below = skeleton.descendant_matrix(parents)
-    motions = _motions(positions, _axes(orientations, vectors))
+    motions = _motions(positions, _axes(orientations, jacobians))
     forces = _forces(motions, positions, joint_weights, below)
     poses = len(positions)
     products = np.tensordot(motions, forces, axes=([0, 2], [0, 2])) / poses
@@ -51,10 +51,11 @@ def gram(
 
 
 def _axes(
-    orientations: Annotated[Floats, "poses joints 4"], vectors: Annotated[Floats, "poses joints 3"]
+    orientations: Annotated[Floats, "poses joints 4"],
+    jacobians: Annotated[Floats, "poses joints 3 3"],
 ) -> Annotated[Floats, "poses joints 3 3"]:
-    """Return the world axis (P, J, 3 numbers, 3) of each number of a rotation vector."""
-    turned = quat.to_matrix(orientations) @ quat.right_jacobian(vectors)
+    """Return the world axis (P, J, 3 numbers, 3) of each number of a rotation."""
+    turned = quat.to_matrix(orientations) @ jacobians
     return np.swapaxes(turned, -1, -2)
 
 

@@ -1,7 +1,8 @@
-"""Pose vectors: root translation and rotation vectors about each joint's mean rotation.
+"""Pose vectors: root translation and the numbers of each joint's rotation about its mean.
 
-Rotation vectors are ambiguous beyond half a turn from the mean, which a raised arm can reach. They
-are unwrapped so that no clip is discontinuous, and every such joint is reported.
+The numbers are those of a chart of rotations (`rotation_charts`). Rotations are ambiguous beyond
+half a turn from the mean, which a raised arm can reach: they are unwrapped so that no clip is
+discontinuous, and every such joint is reported.
 """
 
 from dataclasses import dataclass, replace
@@ -17,25 +18,33 @@ from posefield.common.array_shapes import (
     RootPath,
     Vector,
 )
+from posefield.common.errors import TrainingError
 from posefield.common.units import Booleans, Floats
 from posefield.motion import quat, quat_planes
+from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield.motion.skeleton import POSES_PER_BLOCK
 from posefield_train.source.canonical import clip_blocks
 from posefield_train.source.canonical.half_turns import Finding
 
 # Angle from the mean, rad, above which a joint is reported: rotation vectors become ambiguous at π.
 REPORTED_ANGLE = 0.9 * np.pi
+FARTHEST = 1.5 * np.pi
+"""Angle from the mean, rad, above which rotation vectors are used.
+
+The stereographic numbers of larger angles grow fast, and those of a whole turn are infinite.
+"""
 
 
 @dataclass(frozen=True)
 class PoseChart:
-    """Chart of poses. means: rotations (J, 4) about which rotation vectors are taken."""
+    """Chart of poses. means: rotations (J, 4) about which rotations are taken, in a chart."""
 
     means: JointRotations
+    chart: ChartName
 
     @property
     def joint_numbers(self) -> slice:
-        """Return the place of the rotation vectors in a pose vector."""
+        """Return the place of the rotations in a pose vector."""
         return slice(3, 3 + 3 * len(self.means))
 
     @property
@@ -46,12 +55,17 @@ class PoseChart:
     def numbers(
         self, rotations: ClipRotations, root_path: ClipPaths
     ) -> Annotated[Floats, "clips frames 3+joints*3"]:
-        """Return pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4), root paths (N, T, 3)."""
+        """Return pose vectors (N, T, 3 + 3 J) of rotations (N, T, J, 4), root paths (N, T, 3).
+
+        Raises TrainingError for a rotation beyond the chart's limit.
+        """
         found = np.empty((*root_path.shape[:2], self.joint_numbers.stop))
         found[..., :3] = root_path
         for rows in clip_blocks.clip_blocks(len(rotations)):
-            vectors = _unwrap(self._vectors(rotations[rows]))
-            found[rows, :, self.joint_numbers] = vectors.reshape(*vectors.shape[:2], -1)
+            vectors = _unwrap(self.rotation_vectors(rotations[rows]))
+            self._check_angles(vectors)
+            own = CHARTS[self.chart].numbers(vectors)
+            found[rows, :, self.joint_numbers] = own.reshape(*own.shape[:2], -1)
         return found
 
     def poses(
@@ -73,11 +87,11 @@ class PoseChart:
     def rotation_planes(
         self, vectors: Annotated[Floats, "numbers *poses"]
     ) -> Annotated[Floats, "joints 4 *poses"]:
-        """Return rotations (J, 4, ...) of rotation vectors about the means (3 J, ...)."""
+        """Return rotations (J, 4, ...) of their numbers (3 J, ...)."""
         planes = vectors.reshape(len(self.means), 3, *vectors.shape[1:]).swapaxes(0, 1)
         rotations = np.empty((len(self.means), 4, *vectors.shape[1:]))
         means = self.means.T.reshape(4, -1, *(1 for _ in vectors.shape[1:]))
-        quat_planes.product(means, quat_planes.exp(planes), out=rotations.swapaxes(0, 1))
+        quat_planes.product(means, CHARTS[self.chart].planes(planes), out=rotations.swapaxes(0, 1))
         return rotations
 
     def far_joints(self, rotations: ClipRotations) -> list[Finding]:
@@ -85,17 +99,37 @@ class PoseChart:
         return [
             replace(own, clip=rows.start + own.clip)
             for rows in clip_blocks.clip_blocks(len(rotations))
-            for own in _far_joints(self._vectors(rotations[rows]))
+            for own in _far_joints(self.rotation_vectors(rotations[rows]))
         ]
 
-    def _vectors(self, rotations: ClipRotations) -> ClipPositions:
+    def _check_angles(self, vectors: ClipPositions) -> None:
+        limit = CHARTS[self.chart].limit
+        largest = np.linalg.norm(vectors, axis=-1).max(axis=(0, 1))
+        joint = int(largest.argmax())
+        if largest[joint] > limit:
+            found, most = np.degrees([largest[joint], limit])
+            raise TrainingError(
+                f"joint {joint} turns {found:.0f} degrees from its mean rotation, expected at most "
+                f"{most:.0f} in the {self.chart} chart of this model"
+            )
+
+    def rotation_vectors(self, rotations: ClipRotations) -> ClipPositions:
+        """Return the rotation vectors (N, T, J, 3), rad, of at most half a turn from the means."""
         return quat.log(quat.mul(quat.conj(self.means), rotations))
 
 
 def fit_chart(rotations: ClipRotations) -> tuple[PoseChart, list[Finding]]:
-    """Return the chart about the chordal means of rotations (N, T, J, 4), and far joints."""
-    own_chart = PoseChart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])))
-    return own_chart, own_chart.far_joints(rotations)
+    """Return the chart about the chordal means of rotations (N, T, J, 4), and far joints.
+
+    It is stereographic unless a rotation lies farther than FARTHEST from its mean.
+    """
+    plain = PoseChart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])), "rotation_vector")
+    farthest = max(
+        float(np.linalg.norm(_unwrap(plain.rotation_vectors(rotations[rows])), axis=-1).max())
+        for rows in clip_blocks.clip_blocks(len(rotations))
+    )
+    own = plain if farthest > FARTHEST else replace(plain, chart="stereographic")
+    return own, own.far_joints(rotations)
 
 
 def _jumps(vectors: ClipPositions) -> Annotated[Booleans, "clips joints"]:

@@ -1,55 +1,69 @@
-"""Quaternions of rotation vectors about mean rotations, in a graph."""
+"""Quaternions of rotations about mean rotations, in a graph; `rotation_charts` has the formulas."""
 
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import JointRotations
 from posefield.common.units import Floats
 from posefield.motion import quat
+from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.tensor.pose_vectors import PoseChart
 
 # Added to squared half angles, so that sin(a) / a is defined at zero.
 TINY = 1e-12
 
 
-def half_angle_products(
-    means: JointRotations, vectors: Annotated[Floats, "*batch joints*3"]
-) -> Annotated[Floats, "*batch joints*4"]:
-    """Return mean · v / 2 of rotation vectors (..., 3 J) about means (J, 4), as (..., 4 J).
+def mean_products(
+    own: PoseChart, numbers: Annotated[Floats, "*batch numbers"]
+) -> Annotated[Floats, "*batch products"]:
+    """Return mean · s v of the numbers v (..., 3 J) of rotations, as (..., 4 J).
 
-    mean · exp(v) = mean cos φ + (mean · v / 2) sin φ / φ with φ = |v| / 2. The bracket is linear in
-    v and keeps its length, so it is folded into the model's directions and the graph needs no
-    quaternion products.
+    mean · (c + k s v) = mean c + (mean · s v) k. The bracket is linear in v and as long as s v, so
+    it is folded into the model's directions and the graph needs no quaternion products.
     """
-    pure = np.zeros((*vectors.shape[:-1], len(means), 4))
-    pure[..., 1:] = 0.5 * vectors.reshape(*vectors.shape[:-1], -1, 3)
-    return quat.mul(means, pure).reshape(*vectors.shape[:-1], -1)
+    pure = np.zeros((*numbers.shape[:-1], len(own.means), 4))
+    pure[..., 1:] = CHARTS[own.chart].share * numbers.reshape(*numbers.shape[:-1], -1, 3)
+    return quat.mul(own.means, pure).reshape(*numbers.shape[:-1], -1)
 
 
-def half_angle_products_onnx(net: GraphBuilder, means: JointRotations, vectors: str) -> str:
-    """Build `half_angle_products` in a graph: columns (3 J, r) to columns (4 J, r)."""
+def mean_products_onnx(net: GraphBuilder, own: PoseChart, columns: str) -> str:
+    """Build `mean_products` in a graph: columns (3 J, r) to columns (4 J, r)."""
     # A quaternion's product with each axis is linear in it: (J, 4) becomes (J, 4, 3).
-    axes = quat.mul(np.eye(4)[:, None], 0.5 * np.eye(4)[1:]).swapaxes(1, 2).reshape(4, 12)
-    rotations = net("Squeeze", net.weights("mean_rotations", means[:, :, None]), net.indices(2))
-    products = net("MatMul", rotations, net.weights("half_axes", axes))
+    axes = CHARTS[own.chart].share * np.eye(4)[1:]
+    table = quat.mul(np.eye(4)[:, None], axes).swapaxes(1, 2).reshape(4, 12)
+    count = len(own.means)
+    rotations = net("Squeeze", net.weights("mean_rotations", own.means[:, :, None]), net.indices(2))
+    products = net("MatMul", rotations, net.weights("number_axes", table))
     matrices = net("Reshape", products, net.indices(-1, 4, 3))
-    columns = net("MatMul", matrices, net("Reshape", vectors, net.indices(len(means), 3, -1)))
-    return net("Reshape", columns, net.indices(4 * len(means), -1))
+    found = net("MatMul", matrices, net("Reshape", columns, net.indices(count, 3, -1)))
+    return net("Reshape", found, net.indices(4 * count, -1))
 
 
-def quaternions(net: GraphBuilder, rows: str, means: str, shape: str) -> str:
-    """Build quaternions (J, 4, P) from turned rotation vectors (4 J, P) about means (J, 4, 1).
+def row_offset(net: GraphBuilder, chart: ChartName, products: str, means: str) -> str:
+    """Build the offset (4 J, 1) of the rows that `quaternions` takes.
 
-    Poses lie innermost, so that every operation runs over long rows. shape: graph value of the
-    shape (J, 1, -1).
+    products: mean products (4 J, 1) of the mean numbers. means: (J, 4, 1).
     """
-    joints = net(
-        "Reshape", rows, net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
-    )
-    squares = net("ReduceSum", net("Mul", joints, joints), net.indices(1), keepdims=1)
-    cosine, share = _half_angle_terms(net, squares, shape)
-    return net("Add", net("Mul", means, cosine), net("Mul", joints, share))
+    if chart == "rotation_vector":
+        return products
+    return net("Add", products, net("Reshape", means, net.indices(-1, 1)))
+
+
+def quaternions(net: GraphBuilder, chart: ChartName, rows: str, means: str, shape: str) -> str:
+    """Build quaternions (J, 4, P) about means (J, 4, 1) from rows (4 J, P).
+
+    Poses lie innermost, so that every operation runs over long rows. The rows are mean products,
+    of the stereographic chart with the means added. shape: graph value of the shape (J, 1, -1).
+    """
+    joints = net("Concat", net("Shape", means, start=0, end=2), net.indices(-1), axis=0)
+    own = net("Reshape", rows, joints)
+    squares = net("ReduceSum", net("Mul", own, own), net.indices(1), keepdims=1)
+    if chart == "rotation_vector":
+        cosine, share = _half_angle_terms(net, squares, shape)
+        return net("Add", net("Mul", means, cosine), net("Mul", own, share))
+    # 2 y / |y|² - mean with y = mean + mean · s v, whose squared length is 1 + |s v|².
+    return net("Sub", net("Mul", own, net("Div", net.number(2.0), squares)), means)
 
 
 def _half_angle_terms(net: GraphBuilder, squares: str, shape: str) -> tuple[str, str]:

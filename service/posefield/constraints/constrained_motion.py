@@ -125,7 +125,7 @@ class LevelCorrector:
 def build_corrector(session: Session, level: int) -> LevelCorrector:
     """Return the data for corrections at a level."""
     weights = subgraph.initializers(session.content)
-    own = reduced_motion.read(weights, session.card.levels[level], session.card.curves)
+    own = reduced_motion.read(weights, session.card.levels[level], session.card)
     return LevelCorrector(
         session.card,
         own,

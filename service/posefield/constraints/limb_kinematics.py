@@ -12,6 +12,7 @@ from posefield.common.array_shapes import Bones, RootPath, Vector
 from posefield.common.units import UP, Floats
 from posefield.inference.reduced_motion import ReducedTensor
 from posefield.motion import quat
+from posefield.motion.rotation_charts import CHARTS, RotationChart
 
 
 @dataclass(frozen=True)
@@ -19,13 +20,15 @@ class JointChain:
     """Chain of C joints from the root to one joint.
 
     bones: (C, 3), m. rotations: mean rotation matrices (C, 3, 3). mean (3 + 3 C,), directions (r1,
-    3 + 3 C): rows of the reduced tensor for the root's position and the chain's rotation vectors.
+    3 + 3 C): rows of the reduced tensor for the root's position and the chain's rotations. chart:
+    of the numbers of rotations.
     """
 
     bones: Annotated[Floats, "chain 3"]
     rotations: Annotated[Floats, "chain 3 3"]
     mean: Annotated[Floats, "dof"]
     directions: Annotated[Floats, "freedoms dof"]
+    chart: RotationChart
 
     def compute_poses(
         self, moves: Annotated[Floats, "frames freedoms"], gone: RootPath
@@ -36,7 +39,7 @@ class JointChain:
         """
         found = self.mean + moves @ self.directions
         vectors = found[:, 3:].reshape(len(moves), -1, 3)
-        turns = self.rotations @ quat.to_matrix(quat.exp(vectors))
+        turns = self.rotations @ quat.to_matrix(self.chart.quaternions(vectors))
         if gone[:, 2].any():
             turns[:, 0] = quat.to_matrix(quat.from_axis_angle(UP, gone[:, 2])) @ turns[:, 0]
         roots = found[:, :3].copy()
@@ -51,7 +54,7 @@ class JointChain:
         The first is by the coefficients of the first mode (3, r1), m; the second by the turn of the
         travel (3,), m per radian.
         """
-        axes = pose.turned[row] @ quat.right_jacobian(pose.vectors[row])
+        axes = pose.turned[row] @ self.chart.right_jacobian(pose.vectors[row])
         arms = pose.positions[row, -1] - pose.positions[row]
         moved = quat.cross(np.swapaxes(axes, -1, -2), arms[:, None])
         by_turning = moved.reshape(-1, 3).T @ self.directions[:, 3:].T
@@ -62,7 +65,8 @@ class JointChain:
 class ChainPoses:
     """A chain in S poses.
 
-    vectors: rotation vectors (S, C, 3). turned: orientations (S, C, 3, 3). positions: (S, C, 3), m.
+    vectors: numbers (S, C, 3) of the rotations. turned: orientations (S, C, 3, 3). positions: (S,
+    C, 3), m.
     """
 
     vectors: Annotated[Floats, "frames chain 3"]
@@ -79,7 +83,8 @@ def chain_to(
         chain.insert(0, parents[chain[0]])
     numbers = [0, 1, 2, *(3 + 3 * link + axis for link in chain for axis in range(3))]
     mean, directions = reduced.mean[numbers], reduced.directions[:, numbers]
-    return JointChain(bones[chain], quat.to_matrix(reduced.rotations[chain]), mean, directions)
+    turns, chart = quat.to_matrix(reduced.rotations[chain]), CHARTS[reduced.chart]
+    return JointChain(bones[chain], turns, mean, directions, chart)
 
 
 def _forward(

@@ -11,8 +11,10 @@ import numpy.typing as npt
 from posefield.common.array_shapes import Bones, Frames, JointRotations, RootPath, Rotations
 from posefield.common.units import Floats
 from posefield.model_file.level_of_detail import Level
+from posefield.model_file.model_card import ModelCard
 from posefield.motion import blend, curves, quat
 from posefield.motion.curves import Curve
+from posefield.motion.rotation_charts import CHARTS, ChartName
 
 GraphConstants = Mapping[str, npt.NDArray[Any]]
 """Constants of a model's graph by name."""
@@ -23,9 +25,10 @@ class ReducedTensor:
     """Core and bases of one level of detail.
 
     core: (r2, r1, r3), modes of time, degrees of freedom and samples. time: (T, r2). directions:
-    (r1, D) and mean: (D,), pose vectors of the root's position and a rotation vector for each joint
-    about its mean rotation, and then of the curves. rotations: mean rotations (J, 4). curves: of
-    the family. detail (T, r1): added to the moves of every motion; None for none.
+    (r1, D) and mean: (D,), pose vectors of the root's position and three numbers for each joint's
+    rotation about its mean, and then of the curves. rotations: mean rotations (J, 4). chart: of
+    the numbers of rotations. curves: of the family. detail (T, r1): added to the moves of every
+    motion; None for none.
     """
 
     core: Annotated[Floats, "times freedoms modes"]
@@ -33,6 +36,7 @@ class ReducedTensor:
     directions: Annotated[Floats, "freedoms dof"]
     mean: Annotated[Floats, "dof"]
     rotations: JointRotations
+    chart: ChartName
     curves: tuple[Curve, ...] = ()
     detail: Annotated[Floats, "frames freedoms"] | None = None
 
@@ -87,8 +91,12 @@ class ReducedTensor:
     ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
         numbers = self.mean + self.moves(motion, places) @ self.directions
-        vectors = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(places), -1, 3)
-        return quat.mul(self.rotations, quat.exp(vectors)), numbers[:, :3]
+        return self.turns(numbers), numbers[:, :3]
+
+    def turns(self, numbers: Annotated[Floats, "poses dof"]) -> Rotations:
+        """Return rotations (S, J, 4) of pose vectors (S, D)."""
+        own = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(numbers), -1, 3)
+        return quat.mul(self.rotations, CHARTS[self.chart].quaternions(own))
 
     def poses_of_moves(
         self, moves: Annotated[Floats, "poses freedoms"]
@@ -104,24 +112,25 @@ class ReducedTensor:
         """
         others = np.r_[:3, 3 + 3 * len(self.rotations) : len(self.mean)]
         numbers = self.mean[others] + moves @ self.directions[:, others]
-        mean, turns = self._half_turns
-        halves = (mean + moves @ turns).reshape(len(moves), -1, 4)
-        angles = np.sqrt(np.einsum("njk,njk->nj", halves, halves))
-        # np.sinc is sin(pi x) / (pi x), and exact at zero.
-        halves *= np.sinc(angles / np.pi)[..., None]
-        halves += np.cos(angles)[..., None] * self.rotations
-        return halves, numbers[:, :3], curves.clamp(self.curves, numbers[:, 3:])
+        mean, turns = self._mean_products
+        found = (mean + moves @ turns).reshape(len(moves), -1, 4)
+        squares = np.einsum("njk,njk->nj", found, found)
+        real, factor = CHARTS[self.chart].terms(squares)
+        found *= factor[..., None]
+        found += real[..., None] * self.rotations
+        return found, numbers[:, :3], curves.clamp(self.curves, numbers[:, 3:])
 
     @cached_property
-    def _half_turns(
+    def _mean_products(
         self,
     ) -> tuple[Annotated[Floats, "joints_4"], Annotated[Floats, "freedoms joints_4"]]:
-        """Mean rotations times half the rotation vectors (J 4): their mean, and by direction.
+        """Mean rotations times the chart's share of the numbers (J 4): their mean, by direction.
 
-        They are linear in the moves, and as long as half the angles.
+        They are linear in the moves, and as long as the share of the numbers.
         """
         end, joints = 3 + 3 * len(self.rotations), len(self.rotations)
-        rows = 0.5 * np.vstack([self.mean, self.directions])[:, 3:end].reshape(-1, joints, 3)
+        numbers = np.vstack([self.mean, self.directions])[:, 3:end]
+        rows = CHARTS[self.chart].share * numbers.reshape(-1, joints, 3)
         found = quat.mul(self.rotations, np.pad(rows, ((0, 0), (0, 0), (1, 0))))
         flat = found.reshape(len(rows), -1)
         return flat[0], flat[1:]
@@ -135,20 +144,19 @@ class ReducedTensor:
         return curves.clamp(self.curves, numbers)
 
 
-def read(
-    weights: GraphConstants, level: Level, own_curves: tuple[Curve, ...] = ()
-) -> ReducedTensor:
+def read(weights: GraphConstants, level: Level, card: ModelCard) -> ReducedTensor:
     """Return the reduced tensor of a level; KeyError for a missing constant.
 
-    own_curves: those of the card.
+    card: tells the chart and the curves.
     """
+    own_curves, chart = card.curves, card.making.chart
     r1, r2, r3 = level.ranks
     rotations = weights["mean_rotations"][:, :, 0].astype(np.float64)
     moves = np.zeros((1 + len(rotations), 1))
     moves[[0, *(1 + joint for joint in level.joints)]] = 1.0
     moved = np.concatenate([np.repeat(moves, 3, axis=0), np.ones((len(own_curves), 1))])
     directions = _directions(weights)[:, :r1] * moved
-    mean = [weights["root_mean"], _mean_vectors(weights, rotations).ravel()]
+    mean = [weights["root_mean"], _mean_turns(weights, rotations, chart).ravel()]
     core = weights["core"][:r2, :r1, :r3].astype(np.float64)
     time = weights["time_basis"][:r2].T.astype(np.float64)
     if level.event:
@@ -160,6 +168,7 @@ def read(
         directions.T.copy(),
         np.concatenate([*mean, *([weights["curve_mean"]] if own_curves else [])]),
         rotations,
+        chart,
         own_curves,
     )
 
@@ -184,9 +193,9 @@ def _directions(weights: GraphConstants) -> Annotated[Floats, "dof freedoms"]:
     return found
 
 
-def _mean_vectors(weights: GraphConstants, rotations: JointRotations) -> Bones:
-    """Return the mean rotation vectors (J, 3); the graph stores mean rotation · vector / 2."""
+def _mean_turns(weights: GraphConstants, rotations: JointRotations, chart: ChartName) -> Bones:
+    """Return the mean numbers (J, 3); the graph stores their products with the mean rotations."""
     turned = weights["rotation_mean"].reshape(-1, 4).astype(np.float64)
     if "joint_order" in weights:
         turned = turned[np.argsort(weights["joint_order"])]
-    return 2.0 * quat.mul(quat.conj(rotations), turned)[:, 1:]
+    return quat.mul(quat.conj(rotations), turned)[:, 1:] / CHARTS[chart].share

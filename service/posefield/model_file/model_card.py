@@ -33,9 +33,10 @@ from posefield.motion import measures
 from posefield.motion.curves import Curve
 from posefield.motion.foot_contacts import FootContact
 from posefield.motion.measures import Measure
+from posefield.motion.rotation_charts import ChartName
 from posefield.motion.skeleton import Skeleton
 
-FORMAT = 4
+FORMAT = 5
 PREFIX = "posefield."
 OPTIONAL_ENTRIES = ("presets", "curves", "contacts", "captured_acceleration")
 """Entries that a file lacks where they are empty, or None."""
@@ -114,7 +115,8 @@ class TrainingParameters:
     facing: degrees from the root's +z in the files to the body's facing, to the left; None for
     motions without one. take_root (4, r3 + 4): of a cycle, last rows of a root of the covariance of
     the errors of the coefficients, of the duration's logarithm and of the travel, for a sigma of
-    one metre. detail: of a cycle, deviations that no control predicts (`motion_detail`).
+    one metre. detail: of a cycle, deviations that no control predicts (`motion_detail`). chart: of
+    the numbers of rotations (`rotation_charts`).
     """
 
     fields: Mapping[Name, tuple[NonNegative, ...]] = field(default_factory=dict)
@@ -125,6 +127,7 @@ class TrainingParameters:
     facing: Number | None = 0.0
     take_root: tuple[tuple[Number, ...], ...] = ()
     detail: bytes = b""
+    chart: ChartName = "rotation_vector"
 
 
 @dataclass(frozen=True)
@@ -225,8 +228,8 @@ def rounded(value: SupportsFloat) -> float:
 def dump(card: ModelCard) -> dict[str, str]:
     """Return the metadata entries of a card: keys in a fixed order, values JSON text."""
     making: dict[str, Any] = msgspec.to_builtins(card.making)
-    # All defaults are false or empty.
-    told = {key: value for key, value in making.items() if value}
+    defaults = msgspec.to_builtins(TrainingParameters())
+    told = {key: value for key, value in making.items() if value != defaults[key]}
     plain = {**_plain_fields(card), "format": FORMAT, "making": told}
     for name in OPTIONAL_ENTRIES:
         if not getattr(card, name):

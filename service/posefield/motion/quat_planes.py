@@ -40,15 +40,3 @@ def rotate(
     np.add(vx + w * tx, uy * tz - uz * ty, out=out[0, ...])
     np.add(vy + w * ty, uz * tx - ux * tz, out=out[1, ...])
     np.add(vz + w * tz, ux * ty - uy * tx, out=out[2, ...])
-
-
-def exp(v: Annotated[Floats, "3 *batch"]) -> Annotated[Floats, "4 *batch"]:
-    """Return the quaternions (4, ...) of rotation vectors (3, ...), rad."""
-    half = 0.5 * np.sqrt(np.sum(np.square(v), axis=0))
-    found = np.empty((4, *half.shape))
-    np.cos(half, out=found[0, ...])
-    # NumPy's sinc(x), which is sin(pi x) / (pi x), of x = half / pi.
-    angle = np.pi * (half / np.pi)
-    angle = np.where(angle, angle, np.finfo(angle.dtype).eps)
-    np.multiply(0.5 * (np.sin(angle) / angle), v, out=found[1:])
-    return found

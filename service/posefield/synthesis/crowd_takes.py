@@ -10,7 +10,7 @@ import numpy as np
 from posefield.common import cancellation
 from posefield.common.array_shapes import Frames, PointControls, PointLabels
 from posefield.common.units import Floats
-from posefield.motion import blend, curves, quat, root_travel
+from posefield.motion import blend, curves, root_travel
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 from posefield.validation.crowd_question import CharacterTakes
 
@@ -42,9 +42,7 @@ def pose_takes(
     moves = np.einsum("nt,ntd->nd", reduced.rows(frames), motions.reshape(-1, r2, r1))
     moves += _details(model, takes, frames, level)
     numbers = reduced.mean + moves @ reduced.directions
-    end = 3 + 3 * len(reduced.rotations)
-    vectors = numbers[:, 3:end].reshape(len(numbers), -1, 3)
-    rotations = quat.mul(reduced.rotations, quat.exp(vectors))
+    end, rotations = 3 + 3 * len(reduced.rotations), reduced.turns(numbers)
     share = frames / (reduced.frames - 1)
     turned, path = root_travel.add_travel(rotations, numbers[:, :3], share[:, None] * travel)
     return turned, path, curves.clamp(model.session.card.curves, numbers[:, end:])
