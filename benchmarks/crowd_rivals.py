@@ -16,6 +16,7 @@ import onnxruntime
 from crowd_frames import Answer, Questions
 from crowd_scene import AUTO, Scene
 from family import Family
+from naive_graphs import VECTORS
 from rows import Row
 from scipy.interpolate import RBFInterpolator
 from timing import in_turn
@@ -57,7 +58,7 @@ def rows(made: Family, model: Synthesizer) -> list[Row]:
     field = naive_kriging.fit_naive(
         made.trained.model.bank.pose.samples,
         naive_graphs.positions(made),
-        naive_graphs.numbers(made),
+        naive_graphs.numbers(made, VECTORS),
         "matern52",
         variogram.fit_by_grid,
     )
@@ -110,7 +111,7 @@ def _ours(scene: Scene, levels: Indices) -> Callable[[], None]:
 
 
 def _naive(made: Family, field: naive_kriging.NaiveKriging, asked: Asked) -> dict[str, Answer]:
-    content, questions = naive_graphs.Contents(made, field), asked.questions
+    content, questions = naive_graphs.Contents(made, field, VECTORS), asked.questions
     return {
         SOLVED: crowd_frames.solved(made, field, questions),
         DUAL: crowd_frames.dual(made, field, questions),
@@ -138,7 +139,7 @@ def _graph(content: bytes, scene: Scene) -> Answer:
 
 
 def _scipy(made: Family, questions: Questions) -> Answer:
-    values = naive_graphs.numbers(made)[..., 3:]
+    values = naive_graphs.numbers(made, VECTORS)[..., 3:]
     samples = made.trained.model.bank.pose.samples
     field = RBFInterpolator(samples, values.reshape(len(values), -1), degree=1)
     means = made.trained.model.decoder.means.astype(np.float32)
@@ -156,4 +157,5 @@ def _scipy(made: Family, questions: Questions) -> Answer:
 def _check(made: Family, field: naive_kriging.NaiveKriging, asked: Asked) -> None:
     scene = asked.scene
     rivals = _naive(made, field, asked)
-    naive_graphs.check(made, field, rivals, scene.controls, scene.times[:, None])
+    content = naive_graphs.Contents(made, field, VECTORS)
+    naive_graphs.check(content, rivals, scene.controls, scene.times[:, None])

@@ -5,14 +5,16 @@ pose vectors come out of controls.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from family import Family
 
 from posefield.common.units import Floats
+from posefield.model_file import subgraph
 from posefield.motion import quat
+from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.align import time_alignment
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -21,15 +23,21 @@ from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.tensor import quaternion_graph
 
+VECTORS: ChartName = "rotation_vector"
+"""Chart of the paper, which naive kriging has but where it is said."""
 ABOUT = {"producer_name": "posefield", "producer_version": "naive"}
 
 
-def numbers(made: Family) -> Floats:
-    """Return the values (N, T, 3 + 4 J) that naive kriging averages: root positions, and rotation
-    vectors turned beforehand as in the model, so that decoding costs both the same."""
-    means = made.trained.model.decoder.means
-    vectors = quaternion_graph.half_angle_products(means, made.vectors[..., 3:])
-    return np.concatenate([made.vectors[..., :3], vectors], axis=-1)
+def numbers(made: Family, chart: ChartName) -> Floats:
+    """Return the values (N, T, 3 + 4 J) that naive kriging averages: root positions, and the rows
+    of rotations that are decoded, as in the model, so that decoding costs both the same."""
+    own = replace(made.trained.tensor.chart, chart=chart)
+    aligned = made.trained.aligned
+    vectors = own.numbers(aligned.rotations, aligned.root_path)
+    rows = quaternion_graph.mean_products(own, vectors[..., 3:])
+    if chart == "stereographic":
+        rows += own.means.ravel()
+    return np.concatenate([vectors[..., :3], rows], axis=-1)
 
 
 def positions(made: Family) -> Floats:
@@ -39,10 +47,11 @@ def positions(made: Family) -> Floats:
 
 @dataclass(frozen=True)
 class Contents:
-    """Graphs of one naive field."""
+    """Graphs of one naive field, of numbers in a chart of rotations."""
 
     made: Family
     field: NaiveKriging
+    chart: ChartName
 
     def every_frame_once(self) -> bytes:
         """All frames' poses, then two of them for each time."""
@@ -76,26 +85,29 @@ class Contents:
         fields = kriging_graph.onnx(model.bank, net, "controls", ends.onnx(net))
         duration, place = model.timing.onnx(net, fields["duration"], fields["warp"], "time")
         points = self._points(net)
-        axes = net.indices(1, 2) if alone else net.indices(0, 2)
+        axes = net.indices(1) if alone else net.indices(0)
         numbers = poses(net, points, net("Squeeze", place, axes))
-        net.add_output("rotations", self._rotations(net, numbers))
-        net.add_output(
-            "root_position", net("Slice", numbers, net.indices(0), net.indices(3), net.indices(1))
-        )
-        net.add_output("bone_offsets", model.proportions.onnx(net, fields["offsets"]))
-        net.add_output("duration", duration)
+        root = net("Slice", numbers, net.indices(0), net.indices(3), net.indices(1))
+        net.add_output("rotation_rows", self._rotations(net, numbers))
+        net.add_output("root_rows", root)
+        net.add_output("offset_rows", model.proportions.onnx(net, fields["offsets"]))
+        net.add_output("durations", duration)
         joints, controls = len(self.made.parents), len(model.bank.low)
         questions, times, answers = ("batch", 1, "batch") if alone else (1, "steps", "steps")
-        return net.model(
+        whole = net.model(
             {"controls": [questions, controls], "time": [questions, times]},
             {
-                "rotations": [answers, joints, 4],
-                "root_position": [answers, 3],
-                "bone_offsets": [questions, joints, 3],
-                "duration": [questions],
+                "rotation_rows": [answers, 4 * joints],
+                "root_rows": [answers, 3],
+                "offset_rows": [questions, 3 * joints],
+                "durations": [questions, 1],
             },
             {},
             ABOUT,
+        )
+        # Nodes that no output needs would be computed, too: those of our own poses and sigma.
+        return subgraph.select_outputs(
+            whole, "rotation_rows", "root_rows", "offset_rows", "durations"
         )
 
     def _points(self, net: GraphBuilder) -> str:
@@ -182,20 +194,19 @@ class Contents:
         return net("Squeeze", net("MatMul", weights, net("Gather", samples, row)), net.indices(1))
 
     def _rotations(self, net: GraphBuilder, numbers: str) -> str:
-        """Quaternions (S, J, 4) of numbers (S, 3 + 4 J), as the model's decoder makes them."""
+        """Quaternions (S, 4 J) of numbers (S, 3 + 4 J), as the model's decoder makes them."""
         means = self.made.trained.model.decoder.means
         end = net.indices(3 + 4 * len(means))
         turned = net("Slice", numbers, net.indices(3), end, net.indices(1))
         rows = net("Transpose", turned, perm=[1, 0])
         innermost = net.weights("naive_means", means[:, :, None])
-        found = quaternion_graph.quaternions(net, rows, innermost, net.indices(len(means), 1, -1))
-        shape = net.indices(-1, len(means), 4)
-        return quaternion_graph.innermost_joints(net, found, len(means), shape)
+        shape = net.indices(len(means), 1, -1)
+        found = quaternion_graph.quaternions(net, self.chart, rows, innermost, shape)
+        return quaternion_graph.rows_of_poses(net, found, len(means))
 
 
 def check(
-    made: Family,
-    field: NaiveKriging,
+    content: Contents,
     rivals: Mapping[str, Callable[[], list[Floats]]],
     controls: Floats,
     times: Floats,
@@ -204,7 +215,7 @@ def check(
 
     controls (B, d) and times (B, S): the rivals' answers have B and S as one axis.
     """
-    model = made.trained.model
+    model, field, chart = content.made.trained.model, content.field, CHARTS[content.chart]
     # The procedural family's performers are not told apart.
     points = model.bank.points(controls, np.zeros((len(controls), 0)))
     fields = model.bank.numpy(points)
@@ -215,9 +226,9 @@ def check(
     which = np.arange(len(frames))[:, None]
     numbers = (1.0 - share) * frames[which, below] + share * frames[which, below + 1]
     means = model.decoder.means
-    halves = numbers[..., 3:].reshape(-1, len(means), 4)
-    pure = quat.mul(quat.conj(means), halves)[..., 1:]
-    expected = quat.mul(means, quat.exp(2.0 * pure))
+    rows = numbers[..., 3:].reshape(-1, len(means), 4)
+    pure = quat.mul(quat.conj(means), rows)[..., 1:]
+    expected = quat.mul(means, chart.quaternions(pure / chart.share))
     for name, rival in rivals.items():
-        gap = float(np.abs(rival()[0] - expected).max())
+        gap = float(np.abs(rival()[0].reshape(expected.shape) - expected).max())
         assert gap < 1e-3, f"{name} differs from naive kriging by {gap}"

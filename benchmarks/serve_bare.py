@@ -15,7 +15,8 @@ import numpy as np
 import orjson
 import uvicorn
 
-from posefield.inference import session
+from posefield.inference import onnx_runtime, session
+from posefield.model_file import subgraph
 from posefield.synthesis.poses import POSE_OUTPUTS
 
 
@@ -23,7 +24,9 @@ def main(model: Path, port: int) -> None:
     """Answer for a model until ended."""
     opened = session.load(model)
     names = [control.name for control in opened.card.controls]
-    ask, identity = opened.runtimes[0].run, f"{model.stem}@{opened.digest}"
+    fixed = subgraph.fix_level(model.read_bytes(), 0)
+    runtime = onnx_runtime.open_session(subgraph.select_outputs(fixed, *POSE_OUTPUTS), model.stem)
+    ask, identity = runtime.run, f"{model.stem}@{opened.digest}"
     outputs = [*POSE_OUTPUTS]
 
     async def app(scope: Any, receive: Any, send: Any) -> None:

@@ -1,37 +1,33 @@
-"""Models whose onnxruntime sessions record their calls."""
+"""Models whose graphs record their calls."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from posefield.inference.graph_parts import Graph
 from posefield.inference.session import Session
 
 Feed = dict[str, Any]
 
 
 @dataclass
-class Runtime:
-    """A session of onnxruntime, the feeds of its calls, and a check that may refuse one."""
+class RecordedGraph:
+    """A graph, the feeds of its calls, and a check that may refuse one."""
 
-    real: Any
+    real: Graph
     calls: list[Feed] = field(default_factory=list)
     check: Callable[[Feed], None] = lambda feed: None
 
-    def run(self, outputs: list[str], feed: Feed) -> list[Any]:
+    def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
         """Note the feed, check it, and answer as the real one."""
         self.calls.append(feed)
         self.check(feed)
-        return self.real.run(outputs, feed)
+        return self.real.run(values, feed, level)
 
 
 def session(
     opened: Session, check: Callable[[Feed], None] = lambda feed: None
 ) -> tuple[Session, list[Feed]]:
-    """Return the session with every graph recorded, and the list that the feeds are added to."""
-    calls: list[Feed] = []
-
-    def recorded(runtimes: Sequence[Any]) -> tuple[Runtime, ...]:
-        return tuple(Runtime(runtime, calls, check) for runtime in runtimes)
-
-    graphs = ("runtimes", "duration_sessions", "sigma_sessions", "state_sessions")
-    return replace(opened, **{name: recorded(getattr(opened, name)) for name in graphs}), calls
+    """Return the session with its graph recorded, and the list that the feeds are added to."""
+    graph = RecordedGraph(opened.graph, check=check)
+    return replace(opened, graph=graph), graph.calls

@@ -316,7 +316,7 @@ def _assemble(
         timing,
         _decoder(own_tensor, reduced, blend),
         fits.proportions,
-        Travel(recipe.motion.frames) if recipe.motion.cyclic else None,
+        Travel(recipe.motion.frames, len(own_tensor.chart.means)) if recipe.motion.cyclic else None,
     )
 
 

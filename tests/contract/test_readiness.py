@@ -6,6 +6,7 @@ import time
 
 import model_files
 import pytest
+import recorded
 from asking import asker
 from model_files import numbered
 
@@ -57,7 +58,12 @@ def test_a_model_that_answers_otherwise_than_it_did_is_not(told, loaded):
 
 def test_a_model_that_no_longer_answers_at_all_is_not(told, loaded):
     model = loaded.models["reach"]
-    broken = changed(model, runtimes=(model.session.duration_sessions[0],))
+
+    class Broken:
+        def run(self, values, feed, level):
+            raise RuntimeError("no answer")
+
+    broken = changed(model, graph=Broken())
     assert model.identity in refused(told(ModelRegistry({"reach": broken})))
 
 
@@ -75,14 +81,8 @@ def test_a_service_that_ends_is_not(told, loaded):
 
 def test_models_are_asked_once_a_second_and_anew_when_they_change(loaded, monkeypatch):
     model = loaded.models["reach"]
-    asked, runtime = [], model.session.runtimes[0]
-
-    class Counted:
-        def run(self, *question):
-            asked.append(question)
-            return runtime.run(*question)
-
-    counted = changed(model, runtimes=(Counted(),))
+    opened, asked = recorded.session(model.session)
+    counted = dataclasses.replace(model, session=opened)
     clock = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
     fixed = FixedRegistry(ModelRegistry({"reach": counted}))
@@ -90,10 +90,11 @@ def test_models_are_asked_once_a_second_and_anew_when_they_change(loaded, monkey
     for moment, times in ((100.0, 1), (100.9, 1), (101.1, 2)):
         clock[0] = moment
         ready.document(lambda name: True)
-        assert len(asked) == times
+        # Of poses, and of the duration.
+        assert len(asked) == 2 * times
     fixed.registry = ModelRegistry({"other": counted})
     ready.document(lambda name: True)
-    assert len(asked) == 3
+    assert len(asked) == 6
 
 
 def test_a_broken_new_file_is_told_and_the_old_one_is_ready(told, models, tmp_path, caplog):

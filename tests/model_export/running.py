@@ -1,4 +1,4 @@
-"""Evaluation of a graph fragment in onnxruntime."""
+"""Evaluation of graph fragments in onnxruntime."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,20 @@ import numpy as np
 import onnxruntime
 
 from posefield.common.units import Floats
+from posefield_train.kriging import kriging_graph
+from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
+from posefield_train.onnx_graph.level_tables import LevelTables
+
+
+def bank_values(
+    net: GraphBuilder, bank: KrigingBank, controls: str, ranks: list[int]
+) -> tuple[str, ...]:
+    """Build the values of a bank at levels of these ranks, and sigma (B,) last."""
+    ends = LevelTables(kriging_graph.entries(bank, ranks)).onnx(net)
+    fields = kriging_graph.onnx(bank, net, controls, ends)
+    fields["sigma"] = net("Gather", fields["sigma"], net.weights("first", np.array(0)), axis=1)
+    return tuple(fields.values())
 
 
 def outputs(

@@ -9,7 +9,7 @@ import pytest
 from label_kernels import performers, vary
 from model_files import written
 from numpy.random import PCG64, Generator
-from running import outputs
+from running import bank_values, outputs
 
 from posefield.common.errors import ExportRefused, ModelError
 from posefield.inference import session
@@ -18,11 +18,10 @@ from posefield.model_file import model_card
 from posefield.model_file.model_card import LabelSet
 from posefield_train.graph import onnx_export, parity_check
 from posefield_train.graph.float_model import ModelOutputs
-from posefield_train.kriging import kriging_graph, universal_kriging
+from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import ConstantModel, KrigingBank
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.level_tables import LevelTables
 
 SAMPLES, CONTROLS, BATCH = 25, 3, 40
 LOW, HIGH = np.array([1.5, -60.0, 0.2]), np.array([1.9, 60.0, 1.8])
@@ -69,8 +68,7 @@ def graph_of(bank, rank=6):
     """Function of controls, and of labels where they are given, that runs the fields and sigma."""
 
     def build(net, controls, *_):
-        ends = LevelTables(kriging_graph.entries(bank, [rank])).onnx(net)
-        return tuple(kriging_graph.onnx(bank, net, controls, ends).values())
+        return bank_values(net, bank, controls, [rank])
 
     return lambda controls, **labels: outputs(build, (2, 2, 2, 1), controls=controls, **labels)
 

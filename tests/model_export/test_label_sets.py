@@ -5,14 +5,13 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from running import outputs
+from running import bank_values, outputs
 from scipy.optimize import check_grad
 
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train import train
 from posefield_train.kriging import (
-    kriging_graph,
     kriging_tuning,
     sample_points,
     thinning,
@@ -23,7 +22,6 @@ from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import LeaveOneOutLoss, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.sample import sample_walk
 from posefield_train.source import ingest
 
@@ -204,8 +202,7 @@ def test_the_graph_weights_names_and_mixtures_as_the_reference_does(laid, rng):
     controls = 0.5 * (points[:, :2] * (high - low) + high + low)
 
     def build(net, controls, *_):
-        ends = LevelTables(kriging_graph.entries(bank, [6])).onnx(net)
-        return tuple(kriging_graph.onnx(bank, net, controls, ends).values())
+        return bank_values(net, bank, controls, [6])
 
     asked = controls.astype(np.float32).astype(float)
     found = outputs(build, (2, 2, 2, 1), controls=asked, labels=points[:, 2:])

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from running import outputs
+from running import bank_values, outputs
 from test_graph_labels import HIGH, LOW, asked, labelled_bank, mixed
 
-from posefield_train.kriging import kriging_graph, power_law, thinning
+from posefield_train.kriging import power_law, thinning
 from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.level_tables import LevelTables
 
 POSE = Hyper("matern52", (0,), np.array([0.5, 0.5, 0.5]), 0.1, 1.0)
 LAW = PowerLaw(np.array([0.8, 0.0, -0.6]), np.array([0.75, 1.0, 0.1]))
@@ -102,8 +101,7 @@ def test_the_graph_multiplies_the_duration_by_the_law_at_every_level(level):
     assert LOW[1] < 0.0 < HIGH[1]
 
     def build(net, controls, *_):
-        ends = LevelTables(kriging_graph.entries(own, list(RANKS))).onnx(net)
-        return tuple(kriging_graph.onnx(own, net, controls, ends).values())
+        return bank_values(net, own, controls, list(RANKS))
 
     found = outputs(build, (2, 2, 2, 1), level=level, controls=controls, labels=labels)
     points = own.points(controls, labels)

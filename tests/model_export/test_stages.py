@@ -5,19 +5,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from numpy.random import PCG64, Generator
-from running import outputs
+from running import bank_values, outputs
 
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS
 from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
 from posefield_train.align.warp import WarpBasis
-from posefield_train.kriging import kriging_graph, thinning, universal_kriging
+from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import VARIANCE, ConstantModel, KrigingBank
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.onnx_graph.level_tables import LevelTables
-from posefield_train.tensor import decoder_graph, hosvd
+from posefield_train.tensor import decoder_graph, hosvd, quaternion_graph
 from posefield_train.tensor.decoder import BLOCK_NUMBERS, Decoder, LevelSize, Proportions
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.pose_vectors import PoseChart
@@ -82,8 +82,7 @@ def graph_of(own, ranks):
     """Function that builds the fields of a bank, the pose last, and sigma behind it."""
 
     def build(net, controls):
-        ends = LevelTables(kriging_graph.entries(own, ranks)).onnx(net)
-        return tuple(kriging_graph.onnx(own, net, controls, ends).values())
+        return bank_values(net, own, controls, ranks)
 
     return build
 
@@ -143,11 +142,8 @@ def timing(knots=6):
     time[:, :2] = 0.0, 100.0
     length, logs, time = (a.astype(np.float32).astype(np.float64) for a in (length, logs, time))
 
-    def build(net, length, logs, time):
-        duration, place = stage.onnx(net, length, logs, time)
-        return duration, net("Squeeze", place, net.indices(2))
-
-    found = outputs(build, (1, 2), length=length, logs=logs, time=time)
+    found = outputs(stage.onnx, (2, 2), length=length, logs=logs, time=time)
+    found[0] = found[0][:, 0]
     duration, place = stage.numpy(length, logs, time)
     assert place.min() == 0.0
     assert place.max() > 58.999
@@ -175,6 +171,19 @@ def stiff_stage():
     return replace(stage, unwhiten=unwhiten)
 
 
+def decoded(stage, coefficients, place, level=None):
+    """Rotations (B, S, J, 4) and root positions (B, S, 3) of the graph."""
+    joints = len(stage.means)
+
+    def build(net, coefficients, place):
+        ends = LevelTables(decoder_graph.entries(stage)).onnx(net)
+        rows = decoder_graph.onnx(stage, net, coefficients, place, ends)
+        return quaternion_graph.rows_of_poses(net, rows.planes, joints), rows.root
+
+    rotations, root = outputs(build, (2, 2), level, coefficients=coefficients, place=place)
+    return [rotations.reshape(*place.shape, joints, 4), root.reshape(*place.shape, 3)]
+
+
 def decoder(stage):
     own = rng()
     coefficients = own.normal(size=(BATCH, 6))
@@ -182,13 +191,7 @@ def decoder(stage):
     place[:, :4] = 0.0, 19.0, 7.0, 18.5
     coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
 
-    def build(net, coefficients, place):
-        ends = LevelTables(decoder_graph.entries(stage)).onnx(net)
-        return decoder_graph.onnx(
-            stage, net, coefficients, net("Unsqueeze", place, net.indices(2)), ends
-        )
-
-    found = outputs(build, (4, 3), coefficients=coefficients, place=place)
+    found = decoded(stage, coefficients, place)
     nearest = stage.numpy(coefficients, np.rint(place))
     return Case(found, list(stage.numpy(coefficients, place)), list(nearest), 2e-5)
 
@@ -208,13 +211,7 @@ def level_of_decoder(level):
     place = own.uniform(0.0, 19.0, (BATCH, STEPS))
     coefficients, place = (a.astype(np.float32).astype(float) for a in (coefficients, place))
 
-    def build(net, coefficients, place):
-        ends = LevelTables(decoder_graph.entries(stage)).onnx(net)
-        return decoder_graph.onnx(
-            stage, net, coefficients, net("Unsqueeze", place, net.indices(2)), ends
-        )
-
-    found = outputs(build, (4, 3), level=level, coefficients=coefficients, place=place)
+    found = decoded(stage, coefficients, place, level)
     moving = replace(stage, coarse=(*RUNGS[:-1], LevelSize((1, 1, 1), (0, 1))))
     other = stage.at_level(level) if level < 3 else moving.at_level(level)
     nearest = other.numpy(coefficients, np.rint(place))
@@ -227,13 +224,7 @@ def poses_at_the_means(chart):
     still = replace(stage, mean=np.zeros(15))
     nothing = np.zeros((3, 6))
 
-    def build(net, coefficients, place):
-        ends = LevelTables(decoder_graph.entries(still)).onnx(net)
-        return decoder_graph.onnx(
-            still, net, coefficients, net("Unsqueeze", place, net.indices(2)), ends
-        )[0]
-
-    found = outputs(build, (4,), coefficients=nothing, place=np.zeros((3, 2)))
+    found = decoded(still, nothing, np.zeros((3, 2)))[:1]
     expected = np.broadcast_to(still.means, (3, 2, 4, 4))
     return Case(found, [expected], [-expected], 1e-6)
 
@@ -242,13 +233,14 @@ def proportions():
     own = rng()
     stage = Proportions(own.normal(size=(5, 3)), own.normal(size=(2, 5, 3)))
     coefficients = own.normal(size=(BATCH, 2)).astype(np.float32).astype(float)
-    found = outputs(stage.onnx, (3,), coefficients=coefficients)
+    (rows,) = outputs(stage.onnx, (2,), coefficients=coefficients)
+    found = [rows.reshape(BATCH, 5, 3)]
     wrong = stage.numpy(coefficients[:, ::-1])
     return Case(found, [stage.numpy(coefficients)], [wrong], 2e-6)
 
 
 def travel():
-    own, stage = rng(), Travel(20)
+    own, stage = rng(), Travel(20, 5)
     given = {
         "rotations": quat.normalize(own.normal(size=(BATCH, STEPS, 5, 4))),
         "root": own.normal(size=(BATCH, STEPS, 3)),
@@ -257,11 +249,16 @@ def travel():
     }
     given = {name: array.astype(np.float32).astype(float) for name, array in given.items()}
 
-    def build(net, rotations, root, travel, place):
-        steps = net("Unsqueeze", place, net.indices(2))
-        return stage.onnx(net, rotations, root, travel, steps)
-
-    found = outputs(build, (4, 3, 3), **given)
+    planes, root, gone = outputs(
+        stage.onnx,
+        (3, 2, 2),
+        planes=given["rotations"].reshape(-1, 5, 4).transpose(1, 2, 0),
+        root=given["root"].reshape(-1, 3),
+        travel=given["travel"],
+        place=given["place"],
+    )
+    rotations = planes.transpose(2, 0, 1).reshape(given["rotations"].shape)
+    found = [rotations, root.reshape(BATCH, STEPS, 3), gone.reshape(BATCH, STEPS, 3)]
     wrong = stage.numpy(**{**given, "travel": given["travel"] * [1.0, 1.0, -1.0]})
     return Case(found, list(stage.numpy(**given)), list(wrong), 2e-6)
 

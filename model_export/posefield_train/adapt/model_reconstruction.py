@@ -122,7 +122,7 @@ def _adaptable(file: _ModelFile) -> AdaptableModel:
 
 
 def _travel(card: ModelCard) -> Travel | None:
-    return Travel(card.frames) if card.cyclic else None
+    return Travel(card.frames, len(card.skeleton)) if card.cyclic else None
 
 
 def _timing(file: _ModelFile) -> CanonicalTiming:

@@ -7,6 +7,7 @@ import numpy as np
 
 from posefield.common.array_shapes import ClipFrames, PerClip
 from posefield.common.units import Floats
+from posefield.model_file.row_values import ROW_VALUES
 from posefield_train.align.warp import WarpBasis
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
@@ -33,8 +34,8 @@ class CanonicalTiming:
         return durations, (self.frames - 1) * self.basis.evaluate(logs, u)
 
     def onnx(self, net: GraphBuilder, log_duration: str, logs: str, time: str) -> tuple[str, str]:
-        """Build durations (B,), s, and canonical frames (B, S, 1)."""
-        duration = net("Exp", log_duration)
+        """Build durations (B, 1), s, and canonical frames (B, S)."""
+        duration = net.rename_value(ROW_VALUES["duration"], net("Exp", log_duration))
         u = net("Clip", net("Div", time, duration), net.number(0.0), net.number(1.0))
         still = net.weights("warp_still", np.log(self.basis.identity))
         increments = net("Softmax", net("Add", logs, still), axis=1)
@@ -44,11 +45,7 @@ class CanonicalTiming:
         # Powers lie outermost: a sum over them has the same order at every place of a row.
         terms = net("Mul", self._powers(net, u), coefficients)
         place = net("ReduceSum", terms, net.indices(0), keepdims=0)
-        kept = net("Clip", place, net.number(0.0), net.number(self.frames - 1.0))
-        return (
-            net("Squeeze", duration, net.indices(1)),
-            net("Unsqueeze", kept, net.indices(2)),
-        )
+        return duration, net("Clip", place, net.number(0.0), net.number(self.frames - 1.0))
 
     def _powers(self, net: GraphBuilder, u: str) -> str:
         """Build the functions (2 + pieces, B, S) of the warps' power form at shares (B, S).

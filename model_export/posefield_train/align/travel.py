@@ -12,9 +12,10 @@ import numpy as np
 
 from posefield.common.array_shapes import ClipFrames, ClipPaths, ClipRotations, ClipTravel, PerClip
 from posefield.common.units import UP, Floats
+from posefield.model_file.row_values import ROW_VALUES
 from posefield.motion import quat, root_travel
 from posefield_train.align.time_alignment import AlignedClips
-from posefield_train.onnx_graph.graph_builder import SLICE_END, GraphBuilder
+from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.source import measured_controls
 
 # A quaternion q turned about the vertical by an angle a is q cos a/2 + (q TURN) sin a/2.
@@ -58,9 +59,10 @@ def mean_squared_distance(residuals: ClipTravel) -> PerClip:
 
 @dataclass(frozen=True)
 class Travel:
-    """Travel of a cycle. frames: number of canonical frames."""
+    """Travel of a cycle. frames: number of canonical frames. joints: of the skeleton."""
 
     frames: int
+    joints: int
 
     def numpy(
         self, rotations: ClipRotations, root: ClipPaths, travel: ClipTravel, place: ClipFrames
@@ -73,21 +75,26 @@ class Travel:
         return *put_back(rotations, root, travel, share), share[..., None] * travel[:, None]
 
     def onnx(
-        self, net: GraphBuilder, rotations: str, root: str, travel: str, place: str
+        self, net: GraphBuilder, planes: str, root: str, travel: str, place: str
     ) -> tuple[str, str, str]:
-        """Build `numpy` in a graph; canonical frames are (B, S, 1)."""
+        """Build `numpy` in a graph with poses as rows P = B S.
+
+        planes: rotations (J, 4, P), poses innermost. root: (P, 3). travel: (B, 3). place: canonical
+        frames (B, S). The travel completed is (P, 3).
+        """
         share = net("Mul", place, net.number(1.0 / (self.frames - 1)))
-        gone = net("Mul", share, net("Unsqueeze", travel, net.indices(1)))
+        steps, whole = net("Unsqueeze", share, net.indices(2)), net.indices(1)
+        gone = net("Mul", steps, net("Unsqueeze", travel, whole))
+        rows = net.rename_value(ROW_VALUES["travel"], net("Reshape", gone, net.indices(-1, 3)))
         axes = np.vstack([np.eye(3)[[0, 2]], np.zeros(3)])
-        moved = net("Add", root, net("MatMul", gone, net.weights("travel_axes", axes)))
-        # Half the angle, with axes for the root's four numbers: (B, S, 1, 1).
-        angle = net("Slice", gone, net.indices(2), net.indices(3), net.indices(2))
-        half = net("Unsqueeze", net("Mul", angle, net.number(0.5)), net.indices(3))
-        row, shape = net.padded(half), net("Shape", half)
-        cosine, sine = (net.unpadded(net(turn, row), shape) for turn in ("Cos", "Sin"))
-        joints = net.indices(2)
-        own = net("Slice", rotations, net.indices(0), net.indices(1), joints)
-        others = net("Slice", rotations, net.indices(1), net.indices(SLICE_END), joints)
-        across = net("MatMul", own, net.weights("travel_quarter", HALF_TURN))
+        moved = net("Gemm", rows, net.weights("travel_axes", axes), root)
+        angle = net("Gather", rows, net.weights("travel_turn", np.array(2)), axis=1)
+        half = net.padded(net("Mul", angle, net.number(0.5)))
+        cosine, sine = (net.unpadded(net(turn, half)) for turn in ("Cos", "Sin"))
+        sizes = net.indices(1, self.joints - 1)
+        own, *others = (
+            net.multi_output("Split", 2, planes, sizes, axis=0) if self.joints > 1 else [planes]
+        )
+        across = net("MatMul", net.weights("travel_quarter", HALF_TURN.T), own)
         turned = net("Add", net("Mul", own, cosine), net("Mul", across, sine))
-        return net("Concat", turned, others, axis=2), moved, gone
+        return net("Concat", turned, *others, axis=0), moved, rows

@@ -45,15 +45,14 @@ class ContactTable:
         return np.einsum("rkt,nr->ntk", self.values, coefficients)
 
     def onnx(self, net: GraphBuilder, coefficients: str, place: str) -> str:
-        """Build `numpy` in a graph, from canonical frames (B, S, 1)."""
+        """Build `numpy` in a graph, from canonical frames (B, S)."""
         table, last = net.weights("contact_table", self.values), self.values.shape[2] - 1
         zero, one, time = net.indices(0), net.indices(1), net.indices(2)
         first = net("Slice", table, zero, net.indices(last), time)
         steps = net("Sub", net("Slice", table, one, net.indices(last + 1), time), first)
-        when = net("Squeeze", place, time)
-        before = net("Min", net("Floor", when), net.number(last - 1.0))
+        before = net("Min", net("Floor", place), net.number(last - 1.0))
         column = net("Cast", before, to=6)
-        rise = net("Mul", net("Gather", steps, column, axis=2), net("Sub", when, before))
+        rise = net("Mul", net("Gather", steps, column, axis=2), net("Sub", place, before))
         functions = net("Add", net("Gather", first, column, axis=2), rise)
         # (r, 1, B, 1) beside functions (r, K, B, S).
         weights = net("Unsqueeze", net("Transpose", coefficients, perm=[1, 0]), net.indices(1, 3))

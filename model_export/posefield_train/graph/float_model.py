@@ -7,6 +7,7 @@ import numpy as np
 
 from posefield.common.units import Floats
 from posefield.model_file import checksum
+from posefield.model_file.row_values import ROW_VALUES
 from posefield.motion import skeleton
 from posefield.motion.curves import Curve, as_points
 from posefield_train.align.canonical_timing import CanonicalTiming
@@ -16,7 +17,7 @@ from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_bank import POSE, VARIANCE, KrigingBank
 from posefield_train.onnx_graph.graph_builder import GraphBuilder, Shapes
 from posefield_train.onnx_graph.level_tables import LevelTables
-from posefield_train.tensor import decoder_graph
+from posefield_train.tensor import decoder_graph, quaternion_graph
 from posefield_train.tensor.decoder import Decoder, Proportions
 
 
@@ -143,31 +144,32 @@ class FloatModel:
         fields[POSE] = net.rename_value("coefficients", fields[POSE])
         duration, place = self.timing.onnx(net, fields["duration"], fields["warp"], "time")
         place = net.rename_value("frame", place)
-        rotations, root, *curves = decoder_graph.onnx(self.decoder, net, fields[POSE], place, ends)
+        decoded = decoder_graph.onnx(self.decoder, net, fields[POSE], place, ends)
+        planes, root = decoded.planes, decoded.root
         if self.travel:
             way = net.rename_value("way", fields["travel"])
-            rotations, root, gone = self.travel.onnx(net, rotations, root, way, place)
-        else:
-            # A difference of equal numbers costs less than a product with three zeros per pose.
-            root = net.rename_value("root_position", root)
-            gone = net("Sub", root, root)
-        net.add_output("rotations", rotations)
-        if root != "root_position":
-            net.add_output("root_position", root)
-        net.add_output("bone_offsets", self.proportions.onnx(net, fields["offsets"]))
-        net.add_output("duration", duration)
-        net.add_output("sigma", fields["sigma"])
-        net.add_output("travel", gone)
-        if curves:
-            steps = net("Shape", place, start=0, end=2)
-            shape = net("Concat", steps, net.indices(len(self.decoder.curves)), axis=0)
-            net.add_output("curves", net("Reshape", *curves, shape))
+            planes, root, gone = self.travel.onnx(net, planes, root, way, place)
+        joints = len(self.decoder.means)
+        rows = {
+            "rotations": quaternion_graph.rows_of_poses(net, planes, joints),
+            "root_position": root,
+            "bone_offsets": self.proportions.onnx(net, fields["offsets"]),
+            "duration": duration,
+            "sigma": fields["sigma"],
+        }
+        if decoded.curves:
+            rows["curves"] = decoded.curves
+        # The service reads the rows, whose shape it knows.
+        rows = {name: net.rename_value(ROW_VALUES[name], value) for name, value in rows.items()}
+        # A difference of equal numbers costs less than a product with three zeros per pose.
+        still = gone if self.travel else net("Sub", rows["root_position"], rows["root_position"])
+        rows["travel"] = net.rename_value(ROW_VALUES["travel"], still)
+        self._add_outputs(net, rows, place)
         if self.contacts and self.bank.contacts:
             # Built last, so that a graph pruned of them is the graph of a model without them.
             field = self.bank.contacts
             found = kriging_graph.contact_coefficients(self.bank, field, net, "controls")
             net.add_output("contacts", self.contacts.onnx(net, found, place))
-        joints = len(self.decoder.means)
         inputs: Shapes = {"controls": ["batch", len(self.bank.low)], "time": ["batch", "steps"]}
         if self.bank.labels:
             # Its default has one row, so its axis must not share the name "batch".
@@ -186,3 +188,20 @@ class FloatModel:
         if self.contacts:
             outputs["contacts"] = ["batch", "steps", self.contacts.values.shape[1]]
         return checksum.append_checksum(net.model(inputs, outputs, metadata, about))
+
+    def _add_outputs(self, net: GraphBuilder, rows: dict[str, str], place: str) -> None:
+        """Add the outputs in their shapes, from rows by output; place: canonical frames (B, S)."""
+        sizes = net("Shape", place)
+        first = net.weights("first", np.array(0))
+        ends = {"rotations": (len(self.decoder.means), 4), "root_position": (3,), "travel": (3,)}
+        if self.decoder.curves:
+            ends["curves"] = (len(self.decoder.curves),)
+        for name, value in rows.items():
+            if name in ends:
+                shape = net("Concat", sizes, net.indices(*ends[name]), axis=0)
+                net.add_output(name, net("Reshape", value, shape))
+            elif name == "bone_offsets":
+                shape = net.indices(-1, len(self.decoder.means), 3)
+                net.add_output(name, net("Reshape", value, shape))
+            else:
+                net.add_output(name, net("Gather", value, first, axis=1))

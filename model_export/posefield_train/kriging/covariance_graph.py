@@ -19,6 +19,8 @@ class Covariance:
 
     slope: derivative by the squared distance; zero at distance zero where it is infinite there.
     gain: number by which the nodes expect squared distances to be multiplied, which saves a node.
+    Rounding can give a squared distance of zero the other sign, and its square root would be NaN:
+    the nodes take it for zero.
     """
 
     numpy: Callable[[Floats], Floats]
@@ -28,30 +30,31 @@ class Covariance:
 
 
 def _exponential_onnx(net: GraphBuilder, scaled: str) -> str:
-    return net("Exp", net("Neg", net("Sqrt", scaled)))
+    return net("Exp", net("Neg", net("Sqrt", net("Relu", scaled))))
 
 
 def _gaussian_onnx(net: GraphBuilder, scaled: str) -> str:
-    return net("Exp", net("Neg", scaled))
+    return net("Exp", net("Min", scaled, net.number(0.0)))
 
 
 def _spherical_onnx(net: GraphBuilder, scaled: str) -> str:
-    h = net("Min", net("Sqrt", scaled), net.number(1.0))
+    h = net("Min", net("Sqrt", net("Relu", scaled)), net.number(1.0))
     cubed = net("Mul", net("Mul", h, h), h)
     falling = net("Sub", net("Mul", cubed, net.number(0.5)), net("Mul", h, net.number(1.5)))
     return net("Add", falling, net.number(1.0))
 
 
 def _matern32_onnx(net: GraphBuilder, scaled: str) -> str:
-    a = net("Sqrt", scaled)
-    return net("Mul", net("Add", a, net.number(1.0)), net("Exp", net("Neg", a)))
+    a = net("Sqrt", net("Relu", scaled))
+    return net("Div", net("Add", a, net.number(1.0)), net("Exp", a))
 
 
 def _matern52_onnx(net: GraphBuilder, scaled: str) -> str:
-    a = net("Sqrt", scaled)
+    squared = net("Relu", scaled)
+    a = net("Sqrt", squared)
     linear = net("Add", a, net.number(1.0))
-    growing = net("Add", net("Mul", scaled, net.number(1.0 / 3.0)), linear)
-    return net("Mul", growing, net("Exp", net("Neg", a)))
+    growing = net("Add", net("Mul", squared, net.number(1.0 / 3.0)), linear)
+    return net("Div", growing, net("Exp", a))
 
 
 def _exponential_slope(squared: Floats) -> Floats:
@@ -81,7 +84,7 @@ def _matern52_slope(squared: Floats) -> Floats:
 
 _GRAPHS = {
     "exponential": (_exponential_slope, _exponential_onnx, 9.0),
-    "gaussian": (_gaussian_slope, _gaussian_onnx, 3.0),
+    "gaussian": (_gaussian_slope, _gaussian_onnx, -3.0),
     "spherical": (_spherical_slope, _spherical_onnx, 1.0),
     "matern32": (_matern32_slope, _matern32_onnx, RATE32**2),
     "matern52": (_matern52_slope, _matern52_onnx, RATE52**2),

@@ -50,7 +50,7 @@ def entries(bank: KrigingBank, ranks: list[int]) -> dict[str, list[Integers]]:
 def onnx(
     bank: KrigingBank, net: GraphBuilder, controls: str, ends: dict[str, str]
 ) -> dict[str, str]:
-    """Build values (B, m) of each quantity by name, with `sigma` (B,) in place of the variance.
+    """Build values (B, m) of each quantity by name, with `sigma` (B, 2) in place of the variance.
 
     With label sets, the graph has the optional input `labels` (B or 1, p): a weight for each name
     of each set. Its default is zeros, which leave all sets open.
@@ -117,8 +117,7 @@ def _covariances(bank: KrigingBank, net: GraphBuilder, linear: str, columns: str
     both = net("Concat", net("Mul", linear, linear), linear, axis=1)
     zero, one = net.indices(0), net.indices(1)
     factors = net("Slice", _factors(bank, net, covariance.gain), zero, columns, one)
-    # Rounding can make a squared distance of zero negative, and its square root NaN.
-    near = covariance.onnx(net, net("Relu", net("MatMul", both, factors)))
+    near = covariance.onnx(net, net("MatMul", both, factors))
     for every in _label_shares(bank, net):
         shares = net("Slice", every, zero, columns, one)
         near = net("Mul", near, net("MatMul", linear, shares))
@@ -206,7 +205,7 @@ def _duals(bank: KrigingBank, net: GraphBuilder) -> str:
 def _sigma(
     bank: KrigingBank, net: GraphBuilder, basis: str, logarithm: str, ends: dict[str, str]
 ) -> str:
-    """Build sigma (B,), m, from the variance: its logarithm's exponential and a quadratic form.
+    """Build sigma, m, twice (B, 2), from the variance: its logarithm's exponential and a form.
 
     The finest level's logarithm is that of the sill, so that its form lacks the sill; coarser
     levels have no form.
@@ -221,7 +220,7 @@ def _sigma(
     terms = net("Mul", net("MatMul", own, form), own)
     # Not Relu, which onnxruntime-web 1.23 fuses with Gemm into an operator that it lacks.
     variance = net("Max", net("Gemm", terms, pairs, net("Exp", logarithm)), net.number(0.0))
-    return net("Gather", net("Sqrt", variance), net.weights("first", np.array(0)), axis=1)
+    return net("Sqrt", variance)
 
 
 def _log_sill(bank: KrigingBank) -> float:

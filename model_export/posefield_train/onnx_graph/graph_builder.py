@@ -78,19 +78,17 @@ class GraphBuilder:
         sums = self("MatMul", terms, pairs)
         return self("Slice", sums, self.indices(0), self.indices(1), self.indices(-1))
 
-    def padded(self, values: str) -> str:
-        """Flatten values and append padding.
+    def padded(self, row: str) -> str:
+        """Append padding to a row (n,).
 
         The last numbers that do not fill a register are processed one by one and round differently
         in sine and cosine. The padding takes their place.
         """
-        row = self("Reshape", values, self.indices(-1))
         return self("Pad", row, self.indices(0, REGISTER - 1))
 
-    def unpadded(self, row: str, shape: str) -> str:
-        """Remove the padding of a row and restore its shape."""
-        own = self("Slice", row, self.indices(0), self.indices(1 - REGISTER))
-        return self("Reshape", own, shape)
+    def unpadded(self, row: str) -> str:
+        """Remove the padding of a row."""
+        return self("Slice", row, self.indices(0), self.indices(1 - REGISTER))
 
     def _kind(self, name: str) -> int:
         constant = self._constants.get(name)

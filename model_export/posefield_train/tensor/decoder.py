@@ -184,11 +184,7 @@ class Proportions:
         return self.mean + np.einsum("br,rjk->bjk", coefficients, self.directions)
 
     def onnx(self, net: GraphBuilder, coefficients: str) -> str:
-        """Build `numpy` in a graph."""
-        flat = net(
-            "Gemm",
-            coefficients,
-            net.weights("offset_directions", self.directions.reshape(len(self.directions), -1)),
-            net.weights("offset_mean", self.mean.ravel()),
-        )
-        return net("Reshape", flat, net.indices(-1, len(self.mean), 3))
+        """Build `numpy` in a graph, as rows (B, 3 J)."""
+        flat = self.directions.reshape(len(self.directions), -1)
+        directions = net.weights("offset_directions", flat)
+        return net("Gemm", coefficients, directions, net.weights("offset_mean", self.mean.ravel()))

@@ -1,5 +1,6 @@
 """ONNX graph of the decoder; `decoder` is its NumPy counterpart."""
 
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
@@ -33,35 +34,43 @@ def entries(decoder: Decoder) -> dict[str, list[Integers]]:
     }
 
 
+@dataclass(frozen=True)
+class DecodedRows:
+    """Graph values of the poses P = B S, as rows: the root (P, 3) and curves (P, C), if any.
+
+    planes: rotations (J, 4, P), with poses innermost.
+    """
+
+    planes: str
+    root: str
+    curves: str | None
+
+
 def onnx(
     decoder: Decoder, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
-) -> tuple[str, ...]:
-    """Build `Decoder.numpy` and `curve_values` in a graph, from canonical frames (B, S, 1).
+) -> DecodedRows:
+    """Build `Decoder.numpy` and `curve_values` in a graph, from canonical frames (B, S).
 
-    ends: graph values of the level's slice ends, by the names of `entries`. The third name, of
-    the curves (B S, C), is missing without curves.
+    ends: graph values of the level's slice ends, by the names of `entries`.
     """
-    flat = _reduced(decoder, net, coefficients, place, ends)
+    flat = _moves(decoder, net, coefficients, place, ends)
     directions = _directions(decoder, net)
     three, end = net.indices(3), net.indices(3 + 3 * len(decoder.means))
     of_root = net("Slice", directions, net.indices(0, 0), ends["root"])
     mean = net.weights("root_mean", decoder.mean[:3])
     root = net("Gemm", flat, of_root, mean, transB=1)
-    steps = net("Shape", place, start=0, end=2)
-    root_shape = net("Concat", steps, net.indices(3), axis=0)
-    joint_shape = net("Concat", steps, net.indices(len(decoder.means), 4), axis=0)
     of_joints = net("Slice", directions, three, end, net.indices(0))
-    return (
-        _rotations(decoder, net, flat, of_joints, {**ends, "rotations": joint_shape}),
-        net("Reshape", root, root_shape),
-        *([_curves(decoder, net, flat, directions, ends)] if decoder.curves else []),
+    return DecodedRows(
+        _rotations(decoder, net, flat, of_joints, ends),
+        root,
+        _curves(decoder, net, flat, directions, ends) if decoder.curves else None,
     )
 
 
 def _curves(
     decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
 ) -> str:
-    """Build the values (B S, C) of the curves, clamped, from coefficients (B S, r1)."""
+    """Build the values (P, C) of the curves, clamped, from coefficients (P, r1)."""
     own = decoder.chart.curve_numbers
     of_curves = net("Slice", directions, net.indices(own.start, 0), ends["curves"])
     mean = net.weights("curve_mean", decoder.mean[own])
@@ -71,10 +80,10 @@ def _curves(
     return net("Min", net("Max", values, least), most)
 
 
-def _reduced(
+def _moves(
     decoder: Decoder, net: GraphBuilder, coefficients: str, place: str, ends: dict[str, str]
 ) -> str:
-    """Build the coefficients of the first mode (B S, r1).
+    """Build the coefficients of the first mode (P, r1).
 
     Each clip is a product of its own, time coefficients (S, r2) with its motion (r2, r1), so
     that sums have the same order in every batch.
@@ -119,8 +128,9 @@ def _time(decoder: Decoder, net: GraphBuilder, place: str, end: str) -> str:
     kept = net("Slice", every, zero, end, one)
     steps = net("Slice", net("Sub", after, every), zero, end, one)
     before = net("Floor", place)
-    row = net("Cast", net("Squeeze", before, net.indices(2)), to=6)
-    rise = net("Mul", net("Gather", steps, row), net("Sub", place, before))
+    row = net("Cast", before, to=6)
+    share = net("Unsqueeze", net("Sub", place, before), net.indices(2))
+    rise = net("Mul", net("Gather", steps, row), share)
     return net("Add", net("Gather", kept, row), rise)
 
 
@@ -137,7 +147,7 @@ def _directions(decoder: Decoder, net: GraphBuilder) -> str:
 def _rotations(
     decoder: Decoder, net: GraphBuilder, flat: str, directions: str, ends: dict[str, str]
 ) -> str:
-    """Build quaternions (B, S, J, 4) from the first mode's coefficients (B S, r1)."""
+    """Build quaternions (J, 4, P) from the first mode's coefficients (P, r1)."""
     turning = quaternion_graph.mean_products_onnx(net, decoder.chart, directions)
     offset = quaternion_graph.mean_products(decoder.chart, decoder.mean_turns)
     if any(len(rung.joints) < len(decoder.means) for rung in decoder.level_sizes):
@@ -145,8 +155,7 @@ def _rotations(
     turning = net("Slice", turning, net.indices(0, 0), ends["turning"])
     means = net.weights("mean_rotations", decoder.means[:, :, None])
     constant = net.weights("rotation_mean", offset[:, None])
-    found = _chart_quaternions(decoder, net, (turning, flat, constant), means, ends)
-    return quaternion_graph.innermost_joints(net, found, len(decoder.means), ends["rotations"])
+    return _chart_quaternions(decoder, net, (turning, flat, constant), means, ends)
 
 
 def _chart_quaternions(
@@ -195,8 +204,7 @@ def _partly_fixed_rotations(
     poses = net("Shape", found, start=2, end=3)
     shape = net("Concat", net.indices(1, 1), poses, axis=0)
     both = net("Concat", found, net("Expand", still_ones, shape), axis=0)
-    back = net("Gather", both, net.weights("joint_places", np.argsort(order)))
-    return quaternion_graph.innermost_joints(net, back, joints, ends["rotations"])
+    return net("Gather", both, net.weights("joint_places", np.argsort(order)))
 
 
 def _order(decoder: Decoder) -> Annotated[Indices, "joints"]:

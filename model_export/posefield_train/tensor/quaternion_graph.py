@@ -68,12 +68,13 @@ def quaternions(net: GraphBuilder, chart: ChartName, rows: str, means: str, shap
 
 def _half_angle_terms(net: GraphBuilder, squares: str, shape: str) -> tuple[str, str]:
     """Build cosines of half angles a and ratios sin(a) / a, from their squares (J, 1, P)."""
-    half = net("Sqrt", net("Add", net.padded(squares), net.number(TINY)))
-    share = net("Div", net("Sin", half), half)
-    return net.unpadded(net("Cos", half), shape), net.unpadded(share, shape)
+    row = net.padded(net("Reshape", squares, net.indices(-1)))
+    half = net("Sqrt", net("Add", row, net.number(TINY)))
+    ratio = net("Div", net("Sin", half), half)
+    cosine, share = (net.unpadded(found) for found in (net("Cos", half), ratio))
+    return net("Reshape", cosine, shape), net("Reshape", share, shape)
 
 
-def innermost_joints(net: GraphBuilder, rotations: str, joints: int, shape: str) -> str:
-    """Build quaternions of a shape (..., J, 4) from quaternions (J, 4, P) with poses innermost."""
-    finished = net("Reshape", rotations, net.indices(4 * joints, -1))
-    return net("Reshape", net("Transpose", finished, perm=[1, 0]), shape)
+def rows_of_poses(net: GraphBuilder, planes: str, joints: int) -> str:
+    """Build quaternions (P, 4 J) from quaternions (J, 4, P) with poses innermost."""
+    return net("Transpose", net("Reshape", planes, net.indices(4 * joints, -1)), perm=[1, 0])

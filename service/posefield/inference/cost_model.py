@@ -26,7 +26,7 @@ def seconds_per_pose(
     Each is the median of the rounds. The costs never increase from a level to the next coarser one,
     since a finer level that is cheaper can be used instead.
     """
-    levels = [(session, level) for level in range(len(session.runtimes))]
+    levels = [(session, level) for level in range(len(session.card.levels))]
     return monotone_costs(benchmark_levels(levels, ROUNDS, progress))
 
 

@@ -1,32 +1,10 @@
 """Sessions of onnxruntime, each on one thread."""
 
-from collections.abc import Callable, Sequence
 from typing import Any
 
 import onnxruntime
 
 from posefield.common.errors import ModelError
-
-
-class LazySessions(Sequence[Any]):
-    """Sessions, one for each level of detail, each opened on first use.
-
-    Two threads that open a level at the same time each open a session; one of them is kept.
-    """
-
-    def __init__(self, opened: Callable[[int], Any], count: int) -> None:
-        self._open = opened
-        self._sessions: list[Any] = [None] * count
-
-    def __len__(self) -> int:
-        return len(self._sessions)
-
-    # Typed for single levels: slices are not used.
-    def __getitem__(self, level: Any) -> Any:
-        held = self._sessions[level]
-        if held is None:
-            held = self._sessions[level] = self._open(level)
-        return held
 
 
 def open_session(content: bytes, source: str) -> Any:

@@ -1,6 +1,6 @@
 """A checked model file opened in onnxruntime."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from dataclasses import field as field_of
 from functools import cached_property
@@ -12,20 +12,19 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Indices, Singles
 from posefield.inference import graph_ports, onnx_runtime
+from posefield.inference.graph_parts import Graph, GraphParts
 from posefield.inference.graph_ports import CONTACTS, LABELS
-from posefield.inference.onnx_runtime import LazySessions
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights
-from posefield.model_file import answer_bounds, checked_file, subgraph
+from posefield.model_file import answer_bounds, checked_file
 from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import ModelCard
+from posefield.model_file.row_values import ROW_VALUES, shape_rows
 
 # Estimate of memory: a model of 114 kB with four levels in use takes 3.1 MB, for twelve sessions
 # with weights.
 BASE_MEMORY, COPIES = 2 << 20, 12
-PATH_OUTPUTS = {"duration", "root_position", "travel"}
-"""Outputs without rotations: they take a third of the time of whole poses."""
 
 
 @dataclass(frozen=True)
@@ -50,23 +49,14 @@ class PredictionState:
 class Session:
     """An open model.
 
-    card: its metadata. digest: identifies the file's bytes. runtimes: onnxruntime sessions, one for
-    each level of detail. clocks: sessions that compute only the duration. gauges: the session that
-    computes only sigma, at the finest level. states: sessions that compute a State. size: of the
-    file, bytes. contact_sessions: sessions that compute only the contacts, none without them.
-    path_sessions: sessions that compute only the outputs in `PATH_OUTPUTS`. content: the file.
-    golden: the answer at the default controls.
+    card: its metadata. digest: identifies the file's bytes. graph: in onnxruntime. size: of the
+    file, bytes. content: the file. golden: the answer at the default controls.
     """
 
     card: ModelCard
     digest: str
-    runtimes: Sequence[Any]
-    duration_sessions: Sequence[Any]
-    sigma_sessions: Sequence[Any]
+    graph: Graph
     size: int
-    state_sessions: Sequence[Any] = ()
-    contact_sessions: Sequence[Any] = ()
-    path_sessions: Sequence[Any] = ()
     content: bytes = field_of(default=b"", repr=False)
     golden: bytes = b""
 
@@ -150,12 +140,10 @@ class Session:
             rows, raw, bounded = self._outside_durations(controls, labels, level)
             times = times * _stretch(len(controls), rows, raw / bounded)
             limited = self.bounds.limit(controls)
-        feed = self._feed(limited, labels)
-        feed["time"] = times.astype(np.float32, copy=False)
-        names = [name for name in ("coefficients", "frame", "way") if name in self._state_outputs]
-        found = [a.astype(float) for a in self.state_sessions[level].run(names, feed)]
+        names = [name for name in ("coefficients", "frame", "way") if name in self._state_values]
+        found = [a.astype(float) for a in self._values(names, limited, times, labels, level)]
         ways = found[2] if self.card.cyclic else np.zeros((len(controls), 3))
-        return found[0], found[1][:, 0, 0], ways
+        return found[0], found[1][:, 0], ways
 
     @cached_property
     def bounds(self) -> AnswerBounds:
@@ -171,25 +159,38 @@ class Session:
         level: int,
     ) -> list[Any]:
         """Return the graph's outputs at any controls, without bounds."""
-        feed = self._feed(controls, labels)
-        feed["time"] = time.astype(np.float32, copy=False)
-        poses = [name for name in outputs if name != CONTACTS]
-        # A walking crowd asks three times as often for strides as for poses.
-        alone = self.path_sessions and set(poses) <= PATH_OUTPUTS
-        runtimes = self.path_sessions if alone else self.runtimes
-        answers: list[Any] = runtimes[level].run(poses, feed) if poses else []
-        if CONTACTS in outputs:
-            (contacts,) = self.contact_sessions[level].run([CONTACTS], feed)
-            answers.insert(outputs.index(CONTACTS), contacts)
-        return answers
+        values = [ROW_VALUES.get(name, name) for name in outputs]
+        found = self._values(values, controls, time, labels, level)
+        joints = len(self.card.skeleton)
+        return [
+            shape_rows(name, rows, len(controls), joints) if name in ROW_VALUES else rows
+            for name, rows in zip(outputs, found, strict=True)
+        ]
+
+    def _values(
+        self,
+        values: Sequence[str],
+        controls: Floats | Singles,
+        time: Floats | Singles | None,
+        labels: Floats | Singles | None,
+        level: int,
+    ) -> list[Any]:
+        """Return values of the graph at any controls, without bounds.
+
+        time: None for values that do not depend on it.
+        """
+        feed = {"controls": controls.astype(np.float32, copy=False)}
+        if time is not None:
+            feed["time"] = time.astype(np.float32, copy=False)
+        if labels is not None and self.card.labels:
+            feed[LABELS] = labels.astype(np.float32, copy=False)
+        return self.graph.run(values, feed, level)
 
     def _durations(
         self, controls: Floats | Singles, labels: Floats | Singles | None, level: int
     ) -> Singles:
-        answers: list[Singles] = self.duration_sessions[level].run(
-            ["duration"], self._feed(controls, labels)
-        )
-        return answers[0]
+        (found,) = self._values([ROW_VALUES["duration"]], controls, None, labels, level)
+        return np.asarray(found[:, 0])
 
     def _outside_durations(
         self,
@@ -218,18 +219,19 @@ class Session:
     def _state(
         self, controls: Floats | Singles, time: Floats, labels: Floats | None, level: int
     ) -> PredictionState:
-        feed = self._feed(controls, labels)
-        feed["time"] = time[None].astype(np.float32, copy=False)
-        found = self.state_sessions[level].run(list(self._state_outputs), feed)
+        found = self._values(self._state_values, controls, time[None], labels, level)
         coefficients, frames, bones, durations, sigmas, *ways = (a.astype(float) for a in found)
         way = ways[0][0] if ways else np.zeros(3)
-        sigma = float(sigmas[0])
-        numbers = float(durations[0]), sigma, sigma
-        return PredictionState(coefficients[0], frames[0, :, 0], way, bones[0], *numbers)
+        sigma = float(sigmas[0, 0])
+        numbers = float(durations[0, 0]), sigma, sigma
+        return PredictionState(coefficients[0], frames[0], way, bones[0].reshape(-1, 3), *numbers)
 
     @property
-    def _state_outputs(self) -> tuple[str, ...]:
-        return state_outputs(self.card)
+    def _state_values(self) -> tuple[str, ...]:
+        """Return the names of the graph's values that a state is made of."""
+        rows = (ROW_VALUES[name] for name in ("bone_offsets", "duration", "sigma"))
+        own = ("coefficients", "frame", *rows)
+        return (*own, "way") if self.card.cyclic else own
 
     def sigmas(
         self,
@@ -237,8 +239,8 @@ class Session:
         labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None = None,
     ) -> Annotated[Singles, "points"]:
         """Return the sigmas (B,), m, of `run` at level 0, in half of its time."""
-        answers: list[Singles] = self.sigma_sessions[0].run(["sigma"], self._feed(controls, labels))
-        return answers[0]
+        (found,) = self._values([ROW_VALUES["sigma"]], controls, None, labels, 0)
+        return np.asarray(found[:, 0])
 
     @cached_property
     def kriging_weights(self) -> KrigingWeights:
@@ -261,28 +263,12 @@ class Session:
             for answer in (*answers, self.durations(graph_ports.default_controls(self.card)))
         )
 
-    def _feed(
-        self,
-        controls: PointControls | Annotated[Singles, "points controls"],
-        labels: Annotated[Floats, "_ labels"] | Annotated[Singles, "_ labels"] | None,
-    ) -> dict[str, Singles]:
-        feed = {"controls": controls.astype(np.float32, copy=False)}
-        if labels is not None and self.card.labels:
-            feed[LABELS] = labels.astype(np.float32, copy=False)
-        return feed
-
 
 def _stretch(count: int, rows: Indices, ratios: Singles) -> Annotated[Singles, "points 1"]:
     """Return factors (B, 1) of times: ratios (K,) in these rows (K,), one in all others."""
     found = np.ones((count, 1), ratios.dtype)
     found[rows, 0] = ratios
     return found
-
-
-def state_outputs(card: ModelCard) -> tuple[str, ...]:
-    """Return the names of the graph's values that a State holds."""
-    own = ("coefficients", "frame", "bone_offsets", "duration", "sigma")
-    return (*own, "way") if card.cyclic else own
 
 
 def load(path: Path) -> Session:
@@ -307,33 +293,8 @@ def open_bytes(content: bytes, source: str) -> Session:
 
 
 def open_checked(content: bytes, card: ModelCard, source: str) -> Session:
-    """Return a session on a checked file, with the finest level and its clock open."""
-
-    # onnxruntime computes outputs that are not asked for, too.
-    poses = (
-        subgraph.select_outputs(content, *graph_ports.outputs(card)) if card.contacts else content
-    )
-
-    def whole(level: int) -> Any:
-        return onnx_runtime.open_session(subgraph.fix_level(poses, level), source)
-
-    def telling(*outputs: str) -> Callable[[int], Any]:
-        return lambda level: onnx_runtime.open_session(
-            subgraph.select_outputs(subgraph.fix_level(content, level), *outputs), source
-        )
-
-    count = len(card.levels)
+    """Return a session on a checked file, after a trial of its finest level."""
     session = Session(
-        card,
-        checked_file.digest(content),
-        runtimes=LazySessions(whole, count),
-        duration_sessions=LazySessions(telling("duration"), count),
-        sigma_sessions=LazySessions(telling("sigma"), 1),
-        size=len(content),
-        state_sessions=LazySessions(telling(*state_outputs(card)), count),
-        contact_sessions=LazySessions(telling(CONTACTS), count) if card.contacts else (),
-        path_sessions=LazySessions(telling(*sorted(PATH_OUTPUTS)), count),
-        content=content,
+        card, checked_file.digest(content), GraphParts(content, source), len(content), content
     )
-    # The trial runs the finest level and its clock, which opens them.
     return replace(session, golden=session.run_trial())

@@ -11,6 +11,7 @@ from itertools import pairwise
 
 from posefield.kriging.covariance import COVARIANCE_MODELS
 from posefield.model_file.model_card import ModelCard
+from posefield.model_file.row_values import ROW_VALUES
 from posefield.motion.joint_roles import ROLES
 from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
 
@@ -74,7 +75,8 @@ def check_graph(
             raise ValueError(
                 f"its graph's constant {name!r} has shape {found}, expected {wanted} by its card"
             )
-    further = (*["way"] * card.cyclic, *["contacts"] * bool(card.contacts))
+    further = [*["way"] * card.cyclic, *["contacts"] * bool(card.contacts)]
+    further += [rows for name, rows in ROW_VALUES.items() if card.curves or name != "curves"]
     for name in (*REQUIRED_VALUES, *further):
         if name not in values:
             raise ValueError(f"its graph computes no value {name!r}, expected one")

@@ -67,7 +67,7 @@ def test_the_graph_alone_would_run_away(walk):
     typical = {c.name: c.default for c in walk.session.card.controls}
     point = np.array([list({**typical, "speed": at(speed, 9.0)}.values())], np.float32)
     feed = {"controls": point, "time": np.zeros((1, 1), np.float32)}
-    raw = walk.session.runtimes[0].run(["duration"], feed)[0][0]
+    raw = walk.session.graph.run(["duration"], feed, 0)[0][0]
     least = walk.session.bounds.duration_limits[0]
     assert raw < 0.6 * least <= walk.session.durations(point)[0] * (1 + NEAR)
 
@@ -153,7 +153,7 @@ def test_within_the_ranges_the_answer_is_the_graph_s(model, rng):
     feed = {"controls": points.astype(np.float32), "time": time.astype(np.float32)}
     if card.performers:
         feed["labels"] = np.zeros((50, len(card.performers)), np.float32)
-    raw = model.session.runtimes[0].run(list(outputs), feed)
+    raw = model.session.graph.run(outputs, feed, 0)
     labels = feed.get("labels")
     for own, expected in zip(
         model.session.run(points, time, *outputs, labels=labels), raw, strict=True

@@ -16,16 +16,17 @@ def opened(model_path):
 
 
 class Slow:
-    """A level that lets the clock run on by so many seconds a call."""
+    """A graph whose levels let the clock run on by so many seconds a call."""
 
-    def __init__(self, clock, seconds):
-        self.clock, self.seconds, self.calls = clock, seconds, 0
+    def __init__(self, real, clock, seconds):
+        self.real, self.clock, self.seconds = real, clock, seconds
+        self.calls = [0] * len(seconds)
 
-    def run(self, outputs, feed):
-        assert {len(values) for values in feed.values()} == {cost_model.BATCH}
-        self.clock[0] += self.seconds
-        self.calls += 1
-        return [None for _ in outputs]
+    def run(self, values, feed, level):
+        assert {len(rows) for rows in feed.values()} == {cost_model.BATCH}
+        self.clock[0] += self.seconds[level]
+        self.calls[level] += 1
+        return self.real.run(values, feed, level)
 
 
 @pytest.fixture
@@ -35,7 +36,9 @@ def paced(opened, monkeypatch):
     monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
 
     def build(*milliseconds):
-        return replace(opened, runtimes=tuple(Slow(clock, m / 1e3) for m in milliseconds))
+        levels = opened.card.levels[: len(milliseconds)]
+        graph = Slow(opened.graph, clock, [m / 1e3 for m in milliseconds])
+        return replace(opened, card=replace(opened.card, levels=levels), graph=graph)
 
     return build
 
@@ -56,7 +59,7 @@ def test_a_cost_is_that_of_its_level_by_the_pose(paced):
 def test_every_level_is_asked_as_often(paced):
     own = paced(3, 2, 1)
     cost_model.seconds_per_pose(own)
-    assert {runtime.calls for runtime in own.runtimes} == {cost_model.ROUNDS + 1}
+    assert own.graph.calls == [cost_model.ROUNDS + 1] * 3
 
 
 def test_a_coarser_level_that_is_slower_costs_what_the_finer_one_does(paced):
@@ -66,13 +69,14 @@ def test_a_coarser_level_that_is_slower_costs_what_the_finer_one_does(paced):
 def test_a_round_that_something_else_slowed_down_does_not_count(paced):
     own = paced(512)
     disturbed = iter([0.0, 0.5, 0.0, 0.0, 0.5, 0.0, 0.0, 0.5])
-    answer = own.runtimes[0].run
+    slow = own.graph
 
-    def run(outputs, feed):
-        own.runtimes[0].clock[0] += next(disturbed)
-        return answer(outputs, feed)
+    class Disturbed:
+        def run(self, values, feed, level):
+            slow.clock[0] += next(disturbed)
+            return slow.run(values, feed, level)
 
-    own.runtimes[0].run = run
+    own = replace(own, graph=Disturbed())
     assert cost_model.seconds_per_pose(own) == pytest.approx([1e-3])
     assert next(disturbed, None) is None
 

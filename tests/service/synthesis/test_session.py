@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -12,7 +11,7 @@ from model_files import written
 from onnx import TensorProto, helper, numpy_helper
 
 from posefield.common.errors import ModelError
-from posefield.inference import session
+from posefield.inference import graph_ports, onnx_runtime, session
 from posefield.inference.graph_ports import OUTPUTS
 
 
@@ -59,7 +58,7 @@ def test_the_same_graph_written_again_still_opens(graph):
 
 
 def test_a_model_runs_on_one_thread_and_the_cpu(model_path):
-    runtime = session.load(model_path).runtimes[0]
+    runtime = onnx_runtime.open_session(model_path.read_bytes(), "reaching")
     options = runtime.get_session_options()
     assert (options.intra_op_num_threads, options.inter_op_num_threads) == (1, 1)
     assert runtime.get_providers() == ["CPUExecutionProvider"]
@@ -87,10 +86,29 @@ def test_durations_alone_are_those_of_the_whole_graph(labelled_path, rng):
         assert np.ptp(alone) > 0.01
 
 
-def test_durations_alone_are_a_part_of_the_graph(model_path):
-    clock = session.load(model_path).duration_sessions[0]
-    assert [port.name for port in clock.get_inputs()] == ["controls"]
-    assert [port.name for port in clock.get_outputs()] == ["duration"]
+def test_each_set_of_values_is_a_part_of_the_graph(labelled_path):
+    """That needs the inputs that its values depend on, and ignores the others."""
+    opened = session.load(labelled_path)
+    controls = graph_ports.default_controls(opened.card).astype(np.float32)
+    (alone,) = opened.graph.run(["duration_column"], {"controls": controls}, 0)
+    feed = {"controls": controls, "time": np.zeros((1, 1), np.float32)}
+    assert np.array_equal(opened.graph.run(["duration_column"], feed, 0)[0], alone)
+    # Inputs with a default are fed, too.
+    named = {"controls": controls, "labels": np.eye(1, 3, dtype=np.float32)}
+    assert opened.graph.run(["duration_column"], named, 0)[0] != alone
+    with pytest.raises(Exception, match="time"):
+        opened.graph.run(["rotation_rows"], {"controls": controls}, 0)
+
+
+def test_outputs_are_rows_in_their_shapes(walk_path):
+    opened = session.load(walk_path)
+    examples, times = np.array(opened.card.examples[:3]), np.full((3, 5), 0.2)
+    feed = {"controls": examples.astype(np.float32), "time": times.astype(np.float32)}
+    names = graph_ports.outputs(opened.card)
+    shaped = opened.run(examples, times, *names)
+    for name, own, other in zip(names, shaped, opened.graph.run(names, feed, 0), strict=True):
+        assert own.shape == other.shape, name
+        assert np.array_equal(own, other), name
 
 
 def test_a_damaged_file_is_refused(refused, model_path):
@@ -186,16 +204,14 @@ def test_an_error_names_what_bytes_were_said_to_be():
             opened(b"nothing", "upload.onnx")
 
 
-def test_paths_without_rotations_are_those_of_whole_poses(walk_path):
+def test_parts_have_the_bytes_of_the_whole(walk_path):
     own = session.load(walk_path)
     example = np.array(own.card.examples[:5])
     times = np.linspace(0.0, 0.8, 5)[:, None]
     names = ("duration", "root_position", "travel")
-    whole = replace(own, path_sessions=())
-    for found, expected in zip(
-        own.run(example, times, *names), whole.run(example, times, *names), strict=True
-    ):
-        assert np.array_equal(found, expected)
+    whole = dict(zip(OUTPUTS, own.run(example, times, *OUTPUTS), strict=True))
+    for name, found in zip(names, own.run(example, times, *names), strict=True):
+        assert np.array_equal(found, whole[name])
 
 
 def test_rows_outside_are_bounded_as_they_are_alone(walk_path):
