@@ -12,8 +12,10 @@ from rows import Row
 from timing import in_turn
 
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.synthesis.crowd_synthesis import BATCH
+from posefield.inference.providers import CPU
 from posefield.synthesis.synthesizer import Synthesizer
+
+BATCH = CPU.calls.most
 
 Profile = dict[str, Part]
 

@@ -10,8 +10,10 @@ from rows import Row
 from timing import in_turn
 
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.synthesis.crowd_synthesis import BATCH
+from posefield.inference.providers import CPU
 from posefield.synthesis.synthesizer import Synthesizer
+
+BATCH = CPU.calls.most
 
 MANY = 10_000
 SIZES = (1, 10, 100, 1_000, MANY, 100_000)

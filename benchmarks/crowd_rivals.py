@@ -23,9 +23,11 @@ from timing import in_turn
 
 from posefield.common.units import Indices, Singles
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.synthesis.crowd_synthesis import BATCH
+from posefield.inference.providers import CPU
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train.kriging import naive_kriging, variogram
+
+BATCH = CPU.calls.most
 
 MANY, FEW, CHECKED = 10_000, 1_000, 200
 TOGETHER = 128

@@ -10,11 +10,12 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Row:
-    """One figure: value in unit; ratio to the baseline; goal for the ratio, or for the value where
-    there is no ratio, met upwards for ratios and downwards for values."""
+    """One figure: value in unit, None if it is not measured yet; ratio to the baseline; goal for
+    the ratio, or for the value where there is no ratio, met upwards for ratios and downwards for
+    values."""
 
     name: str
-    value: float
+    value: float | None
     unit: str
     baseline: str
     ratio: float | None
@@ -22,8 +23,8 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Return whether the goal is met; None without a goal."""
-        if self.goal is None:
+        """Return whether the goal is met; None without a goal or a value."""
+        if self.goal is None or self.value is None:
             return None
         # Numbers may be NumPy's, whose comparisons JSON does not know.
         return bool(self.value <= self.goal if self.ratio is None else self.ratio >= self.goal)
@@ -36,7 +37,7 @@ def table(rows: list[Row]) -> str:
         ratio = "" if row.ratio is None else f"{row.ratio:.1f}"
         goal = "" if row.goal is None else f"{row.goal:g}"
         met = {True: "yes", False: "**no**", None: ""}[row.met]
-        value = f"{row.value:.3g} {row.unit}"
+        value = "" if row.value is None else f"{row.value:.3g} {row.unit}"
         lines.append(f"| {row.name} | {value} | {row.baseline} | {ratio} | {goal} | {met} |")
     return "\n".join(lines)
 
@@ -47,17 +48,21 @@ def write(rows: list[Row], path: Path) -> None:
     path.write_text(json.dumps(_plain(rows), indent=2) + "\n")
 
 
-def record(tables: Mapping[str, list[Row]], command: str, folder: Path) -> None:
-    """Write the rows of tables of the documentation, a file NAME.json each, with their origin."""
+def record(tables: Mapping[str, list[Row]], command: str, folder: Path, device: str = "") -> None:
+    """Write the rows of tables of the documentation, a file NAME.json each, with their origin.
+
+    device: that computed, if it is not the machine's processor.
+    """
     for name, rows in tables.items():
-        found = {**origin(command), "rows": _plain(rows)}
+        found = {**origin(command, device), "rows": _plain(rows)}
         text = json.dumps(found, indent=1, ensure_ascii=False)
         (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
 
 
-def origin(command: str) -> dict[str, str]:
+def origin(command: str, device: str = "") -> dict[str, str]:
     """Return the command, the date and the machine of figures that are measured now."""
-    machine = f"{platform.machine()}, {platform.system()}, Python {platform.python_version()}"
+    parts = platform.machine(), platform.system(), f"Python {platform.python_version()}", device
+    machine = ", ".join(filter(None, parts))
     return {"command": command, "date": f"{datetime.now(UTC):%Y-%m-%d}", "machine": machine}
 
 

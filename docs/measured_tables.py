@@ -35,6 +35,8 @@ LEVEL_COLUMNS = [
 PIXELS, FIELD = 1080, math.pi / 3.0
 """Height of the image, pixels, and vertical field of view, rad, for the distance of a level."""
 LEVELS_OF = "cmu_walk"
+VERDICTS = {True: "met", False: "**missed**", None: "not measured yet"}
+"""Words for a goal that is met, missed, or whose row has no value."""
 Rows = Iterator[list[str]]
 Found = dict[str, Any]
 
@@ -150,7 +152,8 @@ def _goal(row: Found) -> str:
     if row["goal"] is None:
         return ""
     unit = row["unit"] if row["ratio"] is None else "times"
-    return f"{number(row['goal'])} {unit}, {'met' if row['met'] else '**missed**'}"
+    goal = " ".join(filter(None, [number(row["goal"]), unit]))
+    return f"{goal}, {VERDICTS[row['met']]}"
 
 
 def number(value: float) -> str:

@@ -12,8 +12,6 @@ from posefield.common.units import Floats
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.session import Session
 
-BATCH = 512
-"""Characters of a call, each at one time, as in a crowd."""
 ROUNDS = 7
 """Rounds of the benchmark: few, as it runs whenever a model is opened."""
 
@@ -21,7 +19,7 @@ ROUNDS = 7
 def seconds_per_pose(
     session: Session, progress: ProgressCallback = ignore_progress
 ) -> tuple[float, ...]:
-    """Return the seconds per pose of each level, in batches on one thread.
+    """Return the seconds per pose of each level, in batches as of a crowd.
 
     Each is the median of the rounds. The costs never increase from a level to the next coarser one,
     since a finer level that is cheaper can be used instead.
@@ -46,7 +44,8 @@ def benchmark_levels(
         taken.append([_time_call(*call) for call in calls])
         progress(done + 1, rounds + 1)
     # np.median imports masked arrays on first use, which takes longer than this measurement.
-    return np.sort(taken[1:], axis=0)[rounds // 2] / BATCH
+    rows = np.array([session.provider.calls.timed for session, _ in asked])
+    return np.sort(taken[1:], axis=0)[rounds // 2] / rows
 
 
 def monotone_costs(costs: Annotated[Floats, "levels"]) -> tuple[float, ...]:
@@ -58,10 +57,10 @@ def _sample_inputs(
     session: Session,
 ) -> tuple[PointControls, Annotated[Floats, "points 1"], PointLabels]:
     """Return controls (B, d) and times (B, 1), s, across the ranges, and zero labels (B, p)."""
-    card = session.card
+    card, rows = session.card, session.provider.calls.timed
     low, high = ([getattr(c, end) for c in card.controls] for end in ("minimum", "maximum"))
-    times = np.linspace(0.0, card.durations[0], BATCH)[:, None]
-    return np.linspace(low, high, BATCH), times, np.zeros((BATCH, sum(card.label_counts)))
+    times = np.linspace(0.0, card.durations[0], rows)[:, None]
+    return np.linspace(low, high, rows), times, np.zeros((rows, sum(card.label_counts)))
 
 
 def _time_call(session: Session, question: tuple[Floats, Floats, Floats], level: int) -> float:

@@ -20,9 +20,6 @@ from posefield.locomotion import floor_plane
 from posefield.locomotion.floor_plane import FloorVectors
 from posefield.model_file.model_card import ModelCard
 
-# For larger batches onnxruntime's buffers outgrow the caches, and a pose costs up to eight times as
-# much.
-BATCH = 1000
 # A time after the end of every clip, s; the graph limits times to the end.
 AFTER_END = 1e9
 
@@ -187,7 +184,7 @@ def contact_probabilities(
     durations: of the cycles (K,), s, as of `strides`; computed if they are not known.
     """
     found = np.empty((len(controls), len(session.card.contacts)))
-    for rows in batches(len(controls)):
+    for rows in batches(len(controls), session.provider.calls.walking):
         cancellation.check()
         own, names = controls[rows], labels[rows]
         if durations is None:
@@ -283,7 +280,7 @@ def _run_batches(
 ) -> list[Annotated[Floats, "points ..."]]:
     """Return the graph's outputs for any number of rows, computed in batches."""
     found: list[Floats] = []
-    for rows in batches(len(controls)):
+    for rows in batches(len(controls), session.provider.calls.walking):
         cancellation.check()
         own = controls[rows], times[rows]
         parts = session.run(*own, *outputs, labels=labels[rows], level=level)
@@ -296,11 +293,11 @@ def _run_batches(
     return found
 
 
-def batches(rows: int) -> Iterator[slice]:
-    """Yield the rows of each call of the graph."""
+def batches(rows: int, most: int) -> Iterator[slice]:
+    """Yield the rows of each call of the graph, at most so many."""
     first = 0
     while first < rows:
         # A matrix product with one row sums in another order, so no batch of several has one row.
-        count = BATCH - 1 if rows - first == BATCH + 1 else BATCH
+        count = most - 1 if rows - first == most + 1 else most
         yield slice(first, first + count)
         first += count

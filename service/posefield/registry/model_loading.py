@@ -9,8 +9,9 @@ from pathlib import Path
 from weakref import WeakValueDictionary
 
 from posefield.common.errors import ModelError
-from posefield.inference import session
+from posefield.inference import onnx_runtime, providers, session
 from posefield.inference.onnx_runtime import first_line
+from posefield.inference.providers import Provider
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.model_file import checked_file
 from posefield.registry import model_sources
@@ -33,15 +34,21 @@ class LoadFailure:
 
 
 def open_model(
-    name: str, place: str | Path, content: bytes, limits: TrialLimits = DEFAULT_LIMITS
+    name: str,
+    place: str | Path,
+    content: bytes,
+    limits: TrialLimits = DEFAULT_LIMITS,
+    provider: Provider | None = None,
 ) -> Synthesizer:
     """Return the model of a file that has been read.
 
-    Raises ModelError for a file that cannot be served and a name that cannot stand in a URL.
+    provider: of large calls; None for that of the environment. Raises ModelError for a file that
+    cannot be served and a name that cannot stand in a URL, and InvalidField for a provider that
+    cannot compute.
     """
     if not NAME.fullmatch(name):
         raise ModelError(place, f"name {name!r}, expected {NAME.pattern}")
-    return Synthesizer(name, session.load_bytes(content, str(place), limits))
+    return Synthesizer(name, session.load_bytes(content, str(place), limits, provider))
 
 
 class ModelLoader:
@@ -56,13 +63,21 @@ class ModelLoader:
     """
 
     def __init__(
-        self, places: Iterable[str | Path], most: int, limits: TrialLimits = DEFAULT_LIMITS
+        self,
+        places: Iterable[str | Path],
+        most: int,
+        limits: TrialLimits = DEFAULT_LIMITS,
+        provider: Provider | None = None,
     ) -> None:
         """Prepare to look at files, folders and URLs.
 
         most: largest number of versions of a name that are open, the newest. limits: of each file's
-        trial.
+        trial. provider: of large calls; None for that of the environment. Raises InvalidField for
+        a provider that cannot compute.
         """
+        self._provider = provider or providers.chosen_provider()
+        # Here, since an error while a file is opened is taken for a fault of the file.
+        onnx_runtime.require_provider(self._provider)
         self._limits = limits
         self._sources = {str(place): model_sources.open_source(place) for place in places}
         self._most = most
@@ -179,7 +194,7 @@ class ModelLoader:
         identity = f"{found.name}@{checked_file.digest(content)}"
         model = self._alive.get(identity)
         if model is None:
-            model = open_model(found.name, found.location, content, self._limits)
+            model = open_model(found.name, found.location, content, self._limits, self._provider)
             self._alive[identity] = model
             self.opened += 1
         return model

@@ -14,6 +14,7 @@ from posefield.common import cancellation
 from posefield.common.units import Booleans, Floats, Indices, Singles
 from posefield.inference import graph_ports, level_selection
 from posefield.inference.level_selection import LevelCriteria, LevelTable
+from posefield.inference.providers import CallSizes
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import blend, curves
 from posefield.motion.crowd_clip import CrowdPoses, Placement
@@ -22,10 +23,6 @@ from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import crowd_question, crowd_validation
 from posefield.validation.crowd_question import Blending, CharacterTakes, CrowdQuestion
 
-# Poses of one call: the fewest, the most, and the number of calls to aim for in between. Smaller
-# calls are dominated by their overhead; larger ones exceed a core's cache between operators. The
-# number of calls is fixed, not the number of cores: rounding depends on it.
-MIN_BATCH, BATCH, CALLS = 256, 1536, 8
 # Share of a clip's duration: the float32 rounding of a time that a client read from an answer.
 SLACK = 1e-5
 # Durations differ between levels, and a client does not know the level that its time is checked
@@ -185,7 +182,8 @@ def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _Gra
         _pose_takes(model, asked, block, level, np.arange(len(asked))[rows])
 
     # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
-    list(_WORKERS.map(cancellation.bind_context(fill), list(_calls(levels))))
+    calls = list(_calls(levels, model.session.provider.calls))
+    list(_WORKERS.map(cancellation.bind_context(fill), calls))
     return block
 
 
@@ -235,9 +233,9 @@ def _blend(
 _PER_TIME = ("rotations", "root_position", "travel", graph_ports.CURVES)
 
 
-def _calls(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
+def _calls(levels: Indices, sizes: CallSizes) -> Iterator[tuple[int, Indices | slice]]:
     """Yield the level and rows of each call; contiguous rows as a slice."""
-    most = min(max(len(levels) // CALLS, MIN_BATCH), BATCH)
+    most = sizes.rows_per_call(len(levels))
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
         for part in np.array_split(rows, -(-len(rows) // most)):

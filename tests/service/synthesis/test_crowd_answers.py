@@ -5,15 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import recorded
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import UP
+from posefield.inference import session
 from posefield.inference.level_selection import Camera, LevelCriteria
+from posefield.inference.providers import CPU, CUDA
 from posefield.motion import quat, skeleton
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import crowd_synthesis, poses
+from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.crowd_question import Blending, CrowdQuestion
 
 COUNT = 60
@@ -100,10 +104,31 @@ def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
     assert np.array_equal(changed, question.detail > 0)
 
 
+def test_a_crowd_in_large_calls_is_answered_like_one_in_small_ones(labelled_path, model):
+    """The calls of CUDA, computed by the CPU: one of each level, none, or fewer than the others."""
+    provider = replace(CUDA, execution=CPU.execution, device="cpu", options=())
+    opened = session.load_bytes(labelled_path.read_bytes(), "labelled", provider=provider)
+    runtimes, calls = zip(
+        *(recorded.session(each) for each in (opened, model.session)), strict=True
+    )
+    count = 3 * CUDA.smallest
+    levels = np.repeat([0, 1, 2], [2 * CUDA.smallest, CUDA.smallest - 100, 100])
+    question = asked(model, count, detail=levels)
+    large, small = (
+        crowd_synthesis.synthesize_crowd(Synthesizer("labelled", runtime), question)
+        for runtime in runtimes
+    )
+    sizes = [sorted(len(feed["time"]) for feed in each if "time" in feed) for each in calls]
+    assert sizes[0] == sorted(np.bincount(levels).tolist())
+    assert len(sizes[1]) > 8 and max(sizes[1]) <= CPU.calls.most
+    assert np.abs(of(model, large) - of(model, small)).max() < FLOAT32
+    assert np.abs(large.duration - small.duration).max() < FLOAT32
+
+
 def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
-    question = asked(model, 3 * crowd_synthesis.BATCH + 7)
+    question = asked(model, 3 * CPU.calls.most + 7)
     whole = crowd_synthesis.synthesize_crowd(model, question)
-    rows = np.array([0, 1, crowd_synthesis.BATCH, 2 * crowd_synthesis.BATCH + 5, len(question) - 1])
+    rows = np.array([0, 1, CPU.calls.most, 2 * CPU.calls.most + 5, len(question) - 1])
     part = crowd_synthesis.synthesize_crowd(
         model,
         replace(
