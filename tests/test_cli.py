@@ -290,7 +290,7 @@ def test_train_writes_a_model_and_says_what_it_measured(posefield, train_words, 
     assert said["clips"] == 30 and said["tensor"] == [94, 8, 30]
     assert 0.0 < said["parity_m"] < 1e-4
     steps = [line.split(" s  ")[1] for line in err.splitlines()]
-    assert steps[0].startswith("reading ") and steps[1] == "aligning 30 clips"
+    assert steps[0].startswith("reading ") and steps[1].startswith("aligning 30 clips")
     assert steps[-1] == "done"
     assert model_registry.load([path]).models["quick"].session.card.frames == 8
     assert [p.name for p in path.parent.iterdir()] == ["quick.onnx"]
