@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractAsyncContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from starlette.requests import Request
 from starlette.responses import Response
@@ -21,7 +22,7 @@ from posefield.http.decoding import clips_query, request_body
 from posefield.http.steps import Context, Steps, from_body, from_url, unlimited
 from posefield.question.motion_question import FileQuestion
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clips, standing_feet
+from posefield.synthesis import clips
 from posefield.synthesis.frame_times import MAX_POSES
 
 Clips = Context[ClipEncoder]
@@ -43,6 +44,13 @@ class ClipTask:
     delivery: Delivery | None = None
 
 
+class SynthesisedClip(NamedTuple):
+    """A clip, and its file if that was made in the same batch."""
+
+    answer: ClipAnswer
+    content: bytes | None = None
+
+
 async def validate(context: Clips, question: FileQuestion) -> ClipTask:
     """Return the question with the limits that its format sets; synthesis checks the rest."""
     encoder, model = context.form, context.model
@@ -54,8 +62,7 @@ async def validate(context: Clips, question: FileQuestion) -> ClipTask:
         convention, joints = delivery.convention, max(joints, delivery.joints)
     sizes = joints, encoder.bytes_per_joint, len(card.curves)
     fits = max_poses(context.service.settings.output_limit, *sizes)
-    stands = standing_feet.wants_standing_feet(card, question)
-    corrected = bool(model.solver.measures or question.has_constraints or stands)
+    corrected = not clips.is_predicted(model, question)
     return ClipTask(question, min(fits, MAX_POSES), convention, corrected, delivery)
 
 
@@ -78,16 +85,23 @@ def places(context: Clips, task: ClipTask) -> AbstractAsyncContextManager[None]:
     return worker_threads.SOLVER_LIMITER if long else nullcontext()
 
 
-async def synthesise(context: Clips, task: ClipTask) -> ClipAnswer:
-    """Return the clip."""
+async def synthesise(context: Clips, task: ClipTask) -> SynthesisedClip:
+    """Return the clip, with its file where several requests share the work on both."""
+    encoder, model, question = context.form, context.model, task.question
     if task.delivery is not None:
-        return await worker_threads.within(_delivered, context, task, task.delivery)
+        return SynthesisedClip(
+            await worker_threads.within(_delivered, context, task, task.delivery)
+        )
     if task.corrected:
         # A correction takes milliseconds, which would block the event loop.
-        return await worker_threads.within(
-            clips.synthesize_clip, context.model, task.question, task.most
+        answer = await worker_threads.within(clips.synthesize_clip, model, question, task.most)
+        return SynthesisedClip(answer)
+    if not encoder.inline_limit:
+        batcher = context.service.clip_batcher
+        return SynthesisedClip(
+            *await batcher.clip(model, question, task.most, encoder, task.convention)
         )
-    return clips.synthesize_clip(context.model, task.question, task.most)
+    return SynthesisedClip(clips.synthesize_clip(model, question, task.most))
 
 
 def _delivered(context: Clips, task: ClipTask, order: Delivery) -> ClipAnswer:
@@ -95,9 +109,11 @@ def _delivered(context: Clips, task: ClipTask, order: Delivery) -> ClipAnswer:
     return order.clip(answer, task.question, context.model.session.card.roles)
 
 
-async def encode(context: Clips, task: ClipTask, answer: ClipAnswer) -> bytes:
+async def encode(context: Clips, task: ClipTask, made: SynthesisedClip) -> bytes:
     """Return the clip as a file; long ones and those of templates in a thread."""
-    encoder = context.form
+    encoder, answer = context.form, made.answer
+    if made.content is not None:
+        return made.content
     if task.delivery is not None:
         return await worker_threads.within(task.delivery.encode, answer)
     if len(answer.clip) <= encoder.inline_limit:
@@ -105,14 +121,14 @@ async def encode(context: Clips, task: ClipTask, answer: ClipAnswer) -> bytes:
     return await context.service.clip_batcher.file(encoder, task.convention, answer)
 
 
-def respond(context: Clips, answer: ClipAnswer, content: bytes) -> Response:
+def respond(context: Clips, made: SynthesisedClip, content: bytes) -> Response:
     """Return the response, with the facts of trust in its headers."""
-    return responses.clip_file(content, context.form, context.form.noted(answer).trust)
+    return responses.clip_file(content, context.form, context.form.noted(made.answer).trust)
 
 
 # The default of Accept is binary USD.
 _steps = partial(
-    Steps[ClipEncoder, FileQuestion, ClipTask, ClipAnswer, bytes],
+    Steps[ClipEncoder, FileQuestion, ClipTask, SynthesisedClip, bytes],
     {"usdc": CLIP_ENCODERS["usdc"], **CLIP_ENCODERS},
     validate=validate,
     places=places,

@@ -17,7 +17,7 @@ from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
 from posefield.synthesis import frame_times, standing_feet
-from posefield.synthesis.poses import pose_outputs
+from posefield.synthesis.poses import OutputRow, pose_outputs
 from posefield.synthesis.standing_feet import WholeMotion
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import question_validation
@@ -48,12 +48,29 @@ def synthesize_clip(
     not cyclic, for joint names without roles and for more than `most` frames.
     """
     question = model.question(asked)
-    joints = _named_skeleton(model, asked)
+    named_skeleton(model, asked)
     goals = model.solver.constraints(question, asked)
     if goals:
         answer = _constrained(model, question, goals, asked, most)
-    else:
-        answer = _unconstrained(model, question, asked, most)
+        return _clip_answer(model, asked, answer)
+    when = frame_times.sample_times(asked, _duration(model, question), most)
+    return predicted_clip(model, question, asked, _predict(model, question, asked, when))
+
+
+def predicted_clip(
+    model: Synthesizer,
+    question: ValidatedQuestion,
+    asked: ClipQuestion,
+    answer: PoseAnswer[np.float64],
+) -> ClipAnswer:
+    """Return the clip of a question without constraints, of the prediction at its frames."""
+    return _clip_answer(model, asked, _unconstrained(model, question, asked, answer))
+
+
+def _clip_answer(
+    model: Synthesizer, asked: ClipQuestion, answer: PoseAnswer[np.float64]
+) -> ClipAnswer:
+    joints = model.skeleton(asked.names)
     turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
     clip = assemble(joints, turns, path, offsets, float(asked.fps))
     if answer.curves is not None:
@@ -61,11 +78,20 @@ def synthesize_clip(
     return ClipAnswer(clip, answer.trust)
 
 
+def is_predicted(model: Synthesizer, asked: ClipQuestion) -> bool:
+    """Return whether a clip is the model's prediction, without constraints or standing feet.
+
+    Raises as `standing_feet.wants_standing_feet` does.
+    """
+    stands = standing_feet.wants_standing_feet(model.session.card, asked)
+    return not (model.solver.measures or asked.has_constraints or stands)
+
+
 def check(model: Synthesizer, asked: ClipQuestion) -> None:
     """Raise the errors of `synthesize_clip` that are known before the duration of the clip is."""
     model.solver.constraints(model.question(asked), asked)
     standing_feet.wants_standing_feet(model.session.card, asked)
-    _named_skeleton(model, asked)
+    named_skeleton(model, asked)
     frame_times.time_window(asked, model.durations[1])
 
 
@@ -80,7 +106,7 @@ def preview_clip(
     """
     question = model.question(asked)
     standing_feet.wants_standing_feet(model.session.card, asked)
-    _named_skeleton(model, asked)
+    named_skeleton(model, asked)
     duration, misses = _duration_and_misses(model, question, asked)
     times = frame_times.sample_times(asked, duration, most)
     # A loop ends with its first frame again.
@@ -90,7 +116,7 @@ def preview_clip(
     return ClipPreview(len(times) + asked.loop, warnings, misses)
 
 
-def _named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
+def named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
     """Return the skeleton with the requested names.
 
     Raises InvalidField for names of a convention without roles, and for a loop of a model that is
@@ -104,11 +130,12 @@ def _named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
 
 
 def _unconstrained(
-    model: Synthesizer, question: ValidatedQuestion, asked: ClipQuestion, most: int
+    model: Synthesizer,
+    question: ValidatedQuestion,
+    asked: ClipQuestion,
+    answer: PoseAnswer[np.float64],
 ) -> PoseAnswer[np.float64]:
-    """Return the frames of a clip without constraints."""
-    when = frame_times.sample_times(asked, _duration(model, question), most)
-    answer = _predict(model, question, asked, when)
+    """Return the frames of a clip without constraints, of the prediction at these frames."""
     if model.solver.measures:
         predicted = model.solver.solve(question, NO_CONSTRAINTS)
         measured = model.solver.measured(question, predicted)
@@ -204,6 +231,17 @@ def _predict(
         labels=labels,
         level=level,
     )
-    rotations, root, offsets, duration, sigma, *curves = (a[0].astype(np.float64) for a in answers)
+    return pose_answer(model, question, asked, when, tuple(answer[0] for answer in answers))
+
+
+def pose_answer(
+    model: Synthesizer,
+    question: ValidatedQuestion,
+    asked: ClipQuestion,
+    when: Floats,
+    row: OutputRow,
+) -> PoseAnswer[np.float64]:
+    """Return the prediction at times (S,), s, of one row of the graph's outputs."""
+    rotations, root, offsets, duration, sigma, *curves = (a.astype(np.float64) for a in row)
     trust = model.trust(asked, question, float(duration), float(sigma))
     return PoseAnswer(when, rotations, root, offsets, trust, *curves)

@@ -46,6 +46,11 @@ class Synthesizer(NamedModel):
         return {}
 
     @cached_property
+    def exact_clip_levels(self) -> dict[int, bool]:
+        """Cache of `clip_batch.is_exact` by level."""
+        return {}
+
+    @cached_property
     def durations(self) -> tuple[float, float]:
         """Shortest and longest plausible duration, s."""
         return input_limits.duration_range(self.session.card)

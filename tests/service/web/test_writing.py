@@ -1,4 +1,4 @@
-"""Tests of batched encodings: files equal to those of single encodings."""
+"""Tests of batched clips and encodings: files equal to those of single ones."""
 
 import asyncio
 import gc
@@ -7,25 +7,35 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from posefield.common.errors import InvalidField
 from posefield.encode.files.file_convention import CENTIMETRES, METRES
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.concurrency import clip_batching
 from posefield.http.concurrency.clip_batching import ClipBatcher
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
-from posefield.synthesis import clips
+from posefield.synthesis import clips, frame_times
 from posefield.synthesis.synthesizer import Synthesizer
 
 USDC = CLIP_ENCODERS["usdc"]
 
 
 @pytest.fixture(scope="module")
-def answers(walk_path):
-    model = Synthesizer("walk", session.load(walk_path))
+def model(walk_path):
+    return Synthesizer("walk", session.load(walk_path))
+
+
+@pytest.fixture(scope="module")
+def questions(model):
     controls = {c.name: c.default for c in model.session.card.controls}
-    questions = (controls | {"haste": 3.0 + 0.1 * number} for number in range(40))
-    return [clips.synthesize_clip(model, ClipQuestion(controls=question)) for question in questions]
+    return [ClipQuestion(controls=controls | {"haste": 3.0 + 0.1 * number}) for number in range(40)]
+
+
+@pytest.fixture(scope="module")
+def answers(model, questions):
+    return [clips.synthesize_clip(model, question) for question in questions]
 
 
 @pytest.fixture
@@ -114,3 +124,47 @@ def test_a_client_that_went_away_is_passed_over(calls, answers):
     first, gone, last = asyncio.run(ask())
     assert isinstance(gone, asyncio.CancelledError) and made == [2]
     assert (first, last) == tuple(USDC.encode(a, METRES) for a in (answers[0], answers[2]))
+
+
+def made(model, asked, encoder=USDC, most=frame_times.MAX_POSES):
+    async def ask():
+        batcher = ClipBatcher()
+        asking = (batcher.clip(model, each, most, encoder, METRES) for each in asked)
+        return await asyncio.gather(*asking, return_exceptions=True)
+
+    return asyncio.run(ask())
+
+
+def test_clips_that_are_asked_for_at_once_are_made_together(calls, model, questions, answers):
+    encoder, sizes = calls
+    found = made(model, questions, encoder)
+    assert sum(sizes) == len(questions) and max(sizes) == clip_batching.MAX_BATCH
+    assert [own.content for own in found] == [USDC.encode(answer) for answer in answers]
+    assert [own.answer.trust for own in found] == [answer.trust for answer in answers]
+
+
+def test_levels_and_limits_are_not_mixed(calls, model, questions):
+    encoder, sizes = calls
+    levels = [structs.replace(questions[0], level=level) for level in (0, 1, 1)]
+    found = made(model, levels, encoder)
+    assert sizes == [1, 2]
+    assert found[0].answer.trust.level == 0 and found[1].answer.trust.level == 1
+    with pytest.raises(InvalidField, match="expected at most 3"):
+        raise made(model, questions[:1], most=3)[0]
+
+
+def test_an_error_concerns_its_own_question_alone(model, questions, answers):
+    wrong = structs.replace(questions[1], end=-1.0)
+    first, fault, last = made(model, [questions[0], wrong, questions[2]])
+    assert isinstance(fault, InvalidField) and fault.field == "end"
+    assert first.content == USDC.encode(answers[0]) and last.content == USDC.encode(answers[2])
+
+
+def test_a_clip_that_may_be_long_is_made_alone(calls, model, questions):
+    encoder, sizes = calls
+    long = structs.replace(questions[0], fps=990.0)
+    (found,) = made(model, [long], encoder)
+    assert len(found.answer.clip) > clip_batching.MAX_BATCHED_FRAMES
+    assert found.content == USDC.encode(clips.synthesize_clip(model, long))
+    made(model, [*questions[:2], long, long], encoder)
+    assert sorted(sizes) == [1, 1, 1, 2]

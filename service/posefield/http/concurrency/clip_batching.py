@@ -1,12 +1,15 @@
-"""Batching of concurrent clip encodings in a thread.
+"""Batching of concurrent clips in a thread: their synthesis and encoding, or their encoding alone.
 
-Encoders share much of their work among the clips of a call, and a thread switch takes a tenth of a
-millisecond. There is no timer: requests that arrive during a batch form the next one.
+Clips of a batch share much of the work, and a thread switch takes a tenth of a millisecond. There
+is no timer: requests that arrive during a batch form the next one.
 """
 
 import asyncio
 from asyncio import Future, Task
+from collections.abc import Callable, Hashable, Sequence
 from contextvars import Context, copy_context
+from functools import partial
+from typing import Any, NamedTuple
 
 from anyio import to_thread
 
@@ -14,47 +17,105 @@ from posefield.common import cancellation
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import ClipEncoder
 from posefield.http.concurrency import worker_threads
+from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer
+from posefield.synthesis import clip_batch, clips
+from posefield.synthesis.synthesizer import Synthesizer
 
 MAX_BATCH = 16
-"""Maximum files of a batch: all of its requests wait for the whole batch."""
+"""Maximum clips of a batch: all of its requests wait for the whole batch."""
 
 MAX_BATCHED_FRAMES = 1000
 """Maximum frames of a clip in a batch, so that short clips do not wait for long ones."""
 
-PendingClips = list[tuple[ClipAnswer, "Future[bytes]"]]
+Work = Callable[[Sequence[Any]], Sequence[Any]]
+"""Work on the items of a batch: returns their results in order, an exception for a failed item."""
+
+Pending = list[tuple[Any, "Future[Any]"]]
+
+
+class EncodedClip(NamedTuple):
+    """A clip and its file."""
+
+    answer: ClipAnswer
+    content: bytes
 
 
 class ClipBatcher:
-    """Queues of clips to encode in an event loop, by format and convention."""
+    """Queues of clips in an event loop, by the work to be done with them."""
 
     def __init__(self) -> None:
-        self._waiting: dict[tuple[str, Convention], PendingClips] = {}
+        self._waiting: dict[Hashable, Pending] = {}
         self._tasks: set[Task[None]] = set()
+
+    async def clip(
+        self,
+        model: Synthesizer,
+        question: ClipQuestion,
+        most: int,
+        encoder: ClipEncoder,
+        convention: Convention,
+    ) -> EncodedClip:
+        """Return the clip of a question and its file; the batch does not affect its bytes.
+
+        most: largest number of frames. Raises as `clips.synthesize_clip` does.
+        """
+        if clip_batch.longest(model, question) > MAX_BATCHED_FRAMES:
+            answer = await worker_threads.run_in_thread(
+                clips.synthesize_clip, model, question, most
+            )
+            return EncodedClip(answer, await self.file(encoder, convention, answer))
+        key = encoder.extension, convention, model.identity, question.level, most
+        work = partial(_encoded_clips, model, most, encoder, convention)
+        made: EncodedClip = await self._result(key, question, work)
+        return made
 
     async def file(self, encoder: ClipEncoder, convention: Convention, answer: ClipAnswer) -> bytes:
         """Return the file of an answer; the batch does not affect its bytes."""
         if len(answer.clip) > MAX_BATCHED_FRAMES:
             return await worker_threads.run_in_thread(encoder.encode, answer, convention)
-        future: Future[bytes] = asyncio.get_running_loop().create_future()
-        key = encoder.extension, convention
+        work = partial(_files, encoder, convention)
+        made: bytes = await self._result((encoder.extension, convention), answer, work)
+        return made
+
+    def _result(self, key: Hashable, item: Any, work: Work) -> "Future[Any]":
+        future: Future[Any] = asyncio.get_running_loop().create_future()
         if key not in self._waiting:
             self._waiting[key] = []
-            task = asyncio.create_task(
-                self._write(encoder, convention), context=_uncancelled_context()
-            )
+            task = asyncio.create_task(self._work(key, work), context=_uncancelled_context())
             # The event loop keeps only weak references to tasks.
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
-        self._waiting[key].append((answer, future))
-        return await future
+        self._waiting[key].append((item, future))
+        return future
 
-    async def _write(self, encoder: ClipEncoder, convention: Convention) -> None:
-        key = encoder.extension, convention
+    async def _work(self, key: Hashable, work: Work) -> None:
         while waiting := self._waiting[key]:
             self._waiting[key] = waiting[MAX_BATCH:]
-            await _encode_batch(encoder, convention, waiting[:MAX_BATCH])
+            await _work_batch(work, waiting[:MAX_BATCH])
         del self._waiting[key]
+
+
+def _encoded_clips(
+    model: Synthesizer,
+    most: int,
+    encoder: ClipEncoder,
+    convention: Convention,
+    asked: Sequence[ClipQuestion],
+) -> list[EncodedClip | Exception]:
+    answers = clip_batch.synthesize_clips(model, asked, most)
+    made = [answer for answer in answers if isinstance(answer, ClipAnswer)]
+    files = iter(encoder.write(made, convention))
+    return [
+        answer if isinstance(answer, Exception) else EncodedClip(answer, next(files))
+        for answer in answers
+    ]
+
+
+def _files(
+    encoder: ClipEncoder, convention: Convention, answers: Sequence[ClipAnswer]
+) -> list[bytes]:
+    return encoder.write(answers, convention)
 
 
 def _uncancelled_context() -> Context:
@@ -64,16 +125,17 @@ def _uncancelled_context() -> Context:
     return context
 
 
-async def _encode_batch(encoder: ClipEncoder, convention: Convention, own: PendingClips) -> None:
-    wanted = [(answer, future) for answer, future in own if not future.done()]
+async def _work_batch(work: Work, own: Pending) -> None:
+    wanted = [(item, future) for item, future in own if not future.done()]
     try:
-        answers = [answer for answer, _ in wanted]
-        files = await to_thread.run_sync(encoder.write, answers, convention) if wanted else []
+        items = [item for item, _ in wanted]
+        results = await to_thread.run_sync(work, items) if wanted else []
     except Exception as fault:
-        for _, future in wanted:
-            if not future.done():
-                future.set_exception(fault)
-        return
-    for (_, future), file in zip(wanted, files, strict=True):
-        if not future.done():
-            future.set_result(file)
+        results = [fault] * len(wanted)
+    for (_, future), result in zip(wanted, results, strict=True):
+        if future.done():
+            continue
+        if isinstance(result, Exception):
+            future.set_exception(result)
+        else:
+            future.set_result(result)
