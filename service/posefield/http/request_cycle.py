@@ -222,7 +222,7 @@ def revalidate(exchange: Exchange, route: Route) -> None:
     if key := scope["path_params"].get("model"):
         scope["model"] = model = scope["library"].find(key)
         if operation.pure:
-            delivered = "character" in exchange.request.query_params
+            delivered = _names_character(exchange)
             # The file of a character may change under the hash of a model too.
             exchange.lifetime = service.lifetime(key.partition("@")[0] if delivered else key)
             chosen = (scope["format"] or "").encode()
@@ -232,6 +232,15 @@ def revalidate(exchange: Exchange, route: Route) -> None:
     elif page := service.pages.get(operation.id):
         exchange.lifetime = caching.PUBLIC + caching.NO_CACHE
         _check_tag(exchange, page.digest)
+
+
+def _names_character(exchange: Exchange) -> bool:
+    """Return whether the query has the parameter `character`; few queries need parsing for it."""
+    query = exchange.scope["query_string"]
+    # A name may be escaped.
+    return (b"character" in query or b"%" in query) and (
+        "character" in exchange.request.query_params
+    )
 
 
 def _check_tag(exchange: Exchange, *parts: bytes) -> None:

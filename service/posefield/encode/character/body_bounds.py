@@ -8,6 +8,7 @@ bones, whose radius is the largest such mean of the points near to each.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -61,6 +62,18 @@ class BodyBounds:
         arms[:, self.ends == self.joints] = 0.0
         return self._spheres(self.highest * _lengths(arms))
 
+    @cached_property
+    def _groups_of_points(self) -> list[tuple[Indices, Indices, Indices]]:
+        """Return, for each end of the bones, the groups in the order of its points (K,).
+
+        With the points (P,), and the place in that order of each one's first group (P,).
+        """
+        found = []
+        for held in (self.joints, self.ends):
+            order = np.argsort(held, kind="stable")
+            found.append((order, *np.unique(held[order], return_index=True)))
+        return found
+
     def _spheres(self, differences: Floats) -> Floats:
         """Return the radius (M, J + E) about each joint and tip.
 
@@ -71,9 +84,7 @@ class BodyBounds:
         if not len(self.joints):
             return found
         radii = self.rest + differences.max(axis=1, keepdims=True)
-        for held in (self.joints, self.ends):
-            order = np.argsort(held, kind="stable")
-            points, firsts = np.unique(held[order], return_index=True)
+        for order, points, firsts in self._groups_of_points:
             most = np.maximum.reduceat(radii.take(order, axis=1), firsts, axis=1)
             found[:, points] = np.maximum(found[:, points], most)
         return found

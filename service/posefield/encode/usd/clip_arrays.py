@@ -92,7 +92,7 @@ def _clip_arrays(
     rig: CharacterRig, answer: SampledClip, samples: Samples, values: Mapping[str, Array]
 ) -> ClipArrays:
     cancellation.check()
-    facts = custom_data.split_facts(answer.trust.facts(), frozenset(rig.names))
+    facts = custom_data.split_facts(answer.trust.facts(), rig.words)
     content = LayerContent(samples, values, facts)
     names = answer.clip.curves.names if answer.clip.curves else ()
     return ClipArrays(rig, answer.clip.rate, content, tuple(names))

@@ -68,6 +68,7 @@ class CrateTemplate:
     places: Mapping[str, int]
     numbers: tuple[tuple[int, struct.Struct, int], ...]
     short: LayerPattern
+    known: Mapping[str, Array]
     apart: tuple[tuple[str, str], ...]
 
     def __len__(self) -> int:
@@ -80,7 +81,7 @@ class CrateTemplate:
         None where the result would differ from usd-core's.
         """
         spelt = _token_section(author, self.short, content.facts.texts)
-        if spelt is None or self._has_equal_arrays(author, content):
+        if spelt is None or self._has_equal_arrays(content):
             return None
         made = bytearray(self.values)
         for name, runs in self.samples.items():
@@ -94,8 +95,8 @@ class CrateTemplate:
             form.pack_into(made, at, content.facts.numbers[index])
         return b"".join((made, crate_sections.sections_and_table(made, (spelt, *self.sections))))
 
-    def _has_equal_arrays(self, author: LayerBuilder, content: LayerContent) -> bool:
-        every = _all_arrays(author, content)
+    def _has_equal_arrays(self, content: LayerContent) -> bool:
+        every = {**content.samples, **content.values, **self.known}
         return any(contents.alike(every[a], every[b]) for a, b in self.apart)
 
 
@@ -179,8 +180,9 @@ def _locate_values(
     missing = min((0, *places.values(), *(at for at, _, _ in numbers))) < 0
     if missing or not all(samples.values()):
         return None
-    short, apart = contents.single_frame_pattern(pattern), tuple(_equal_size_pairs(author, marks))
-    return CrateTemplate(values, found.sections[1:], samples, places, numbers, short, apart)
+    short, known = contents.single_frame_pattern(pattern), _known_arrays(author)
+    apart = tuple(_equal_size_pairs(known, marks))
+    return CrateTemplate(values, found.sections[1:], samples, places, numbers, short, known, apart)
 
 
 def _stored_numbers(pattern: LayerPattern, known: int) -> Iterator[tuple[struct.Struct, int]]:
@@ -217,14 +219,13 @@ def _even_runs(rows: list[int], places: list[int]) -> Iterator[SampleRun]:
         rows, places = rows[count:], places[count:]
 
 
-def _all_arrays(author: LayerBuilder, content: LayerContent) -> dict[str, Array]:
-    known = {f"known {index}": value for index, value in enumerate(author.values)}
-    return {**content.samples, **content.values, **known}
+def _known_arrays(author: LayerBuilder) -> dict[str, Array]:
+    return {f"known {index}": value for index, value in enumerate(author.values)}
 
 
-def _equal_size_pairs(author: LayerBuilder, marks: LayerContent) -> Iterator[tuple[str, str]]:
+def _equal_size_pairs(known: Mapping[str, Array], marks: LayerContent) -> Iterator[tuple[str, str]]:
     """Yield pairs of arrays, or of samples and an array, that have one size."""
-    every = _all_arrays(author, marks)
+    every = {**marks.samples, **marks.values, **known}
     of_one = {n: v.shape[1:] if n in marks.samples else v.shape for n, v in every.items()}
     for a, b in combinations(every, 2):
         if of_one[a] == of_one[b]:

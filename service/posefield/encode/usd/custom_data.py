@@ -1,7 +1,7 @@
 """Plain facts as values of USD dictionaries, which hold neither None nor mixed lists."""
 
 import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -66,7 +66,7 @@ def split_facts(facts: Mapping[str, Any], words: frozenset[str] = frozenset()) -
 
     words: that the layer holds anyway, as the names of joints; USD stores them once.
     """
-    parting = _FactSplitter(words.union(_fact_names(facts)))
+    parting = _FactSplitter(words, _fact_names(facts))
     shape = parting.shape(facts)
     return SplitFacts(shape, tuple(parting.numbers), tuple(parting.texts))
 
@@ -80,10 +80,11 @@ def usd_dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
 class _FactSplitter:
     """Numbers and texts of facts, collected in order.
 
-    names: of all facts, and words of the character. texts: index by text.
+    words: of the character. names: of all facts. texts: index by text.
     """
 
-    names: frozenset[str]
+    words: frozenset[str]
+    names: Set[str]
     numbers: list[float] = field(default_factory=list)
     texts: dict[str, int] = field(default_factory=dict)
 
@@ -104,7 +105,7 @@ class _FactSplitter:
         return ConstantFact(repr(fact), fact)
 
     def _text(self, text: str) -> Hashable:
-        if text in self.names:
+        if text in self.names or text in self.words:
             return ConstantFact(repr(text), text)
         if text in self.texts:
             return RepeatedText(self.texts[text])
@@ -112,15 +113,16 @@ class _FactSplitter:
         return TEXT
 
 
-def _fact_names(fact: Any) -> Iterator[str]:
-    """Yield the names of facts, nested ones included."""
-    if type(fact) is dict:
-        yield from fact
-        for each in fact.values():
-            yield from _fact_names(each)
-    if type(fact) is list:
-        for each in fact:
-            yield from _fact_names(each)
+def _fact_names(facts: Mapping[str, Any]) -> set[str]:
+    """Return the names of facts, nested ones included."""
+    found, rest = set[str](), list[Any]([facts])
+    while rest:
+        own = rest.pop()
+        if type(own) is dict:
+            found.update(own)
+            own = own.values()
+        rest += [each for each in own if type(each) is dict or type(each) is list]
+    return found
 
 
 def _join_facts(
