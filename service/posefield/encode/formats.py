@@ -19,6 +19,7 @@ from posefield.encode.files.media_types import ARROW, JSON, MSGPACK, NPZ, Format
 from posefield.encode.tables import clip_tables, crowd_tables, model_tables
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.arrow import arrow_stream
+from posefield.encode.tables.npz import npz_table
 from posefield.encode.tables.table import Table
 from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer
@@ -168,7 +169,7 @@ CLIP_ENCODERS = by_extension(
         convention_fixed=True,
         has_body=True,
     ),
-    ClipEncoder("npz", NPZ, table_writer(tables.npz_table), 24),
+    ClipEncoder("npz", NPZ, table_writer(npz_table), 24),
     ClipEncoder("arrow", ARROW, table_writer(arrow_stream), 24),
     ClipEncoder("msgpack", MSGPACK, table_writer(tables.msgpack_table), 24),
 )
@@ -200,13 +201,13 @@ POSE_ENCODERS: dict[str, TableEncoder[PoseAnswer[Any]]] = by_extension(
     TableEncoder(
         "msgpack", MSGPACK, clip_tables.pose_table, tables.msgpack_table, inline_limit=2000
     ),
-    TableEncoder("npz", NPZ, clip_tables.pose_table, tables.npz_table, inline_limit=2000),
+    TableEncoder("npz", NPZ, clip_tables.pose_table, npz_table, inline_limit=2000),
     TableEncoder("arrow", ARROW, clip_tables.pose_table, arrow_stream, inline_limit=2000),
 )
 
 CROWD_ENCODERS: dict[str, TableEncoder[CrowdPoses]] = by_extension(
     TableEncoder("arrow", ARROW, crowd_tables.table, arrow_stream),
-    TableEncoder("npz", NPZ, crowd_tables.table, tables.npz_table),
+    TableEncoder("npz", NPZ, crowd_tables.table, npz_table),
     TableEncoder("msgpack", MSGPACK, crowd_tables.table, tables.msgpack_table),
     TableEncoder(
         "json",
@@ -221,7 +222,7 @@ CROWD_ENCODERS: dict[str, TableEncoder[CrowdPoses]] = by_extension(
 GRID_ENCODERS: dict[str, TableEncoder[SigmaGrid]] = by_extension(
     TableEncoder("json", JSON, model_tables.table, tables.json_table, inline_limit=1024),
     TableEncoder("msgpack", MSGPACK, model_tables.table, tables.msgpack_table, inline_limit=1024),
-    TableEncoder("npz", NPZ, model_tables.table, tables.npz_table, inline_limit=1024),
+    TableEncoder("npz", NPZ, model_tables.table, npz_table, inline_limit=1024),
     # A stream of rows, one for each point of the grid.
     TableEncoder("arrow", ARROW, model_tables.points, arrow_stream, inline_limit=1024),
 )

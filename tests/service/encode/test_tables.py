@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import json
+import zipfile
 from contextvars import copy_context
 
 import msgpack
@@ -16,6 +17,7 @@ from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.arrow import arrow_stream
+from posefield.encode.tables.npz import npz_archive, npz_table
 from posefield.encode.tables.table import Table
 from posefield.question.results import PoseAnswer
 
@@ -111,7 +113,7 @@ def test_msgpack_is_little_endian_whatever_the_array(walk):
 FORMS = {
     "json": tables.json_table,
     "msgpack": tables.msgpack_table,
-    "npz": tables.npz_table,
+    "npz": npz_table,
     "arrow": arrow_stream,
 }
 
@@ -154,3 +156,27 @@ def test_writing_large_arrays_stops_when_it_is_cancelled():
     assert context.run(tables.json_object, small)
     with pytest.raises(Cancelled):
         context.run(tables.json_object, large)
+
+
+ARRAYS = {
+    "matrix": np.arange(6.0).reshape(2, 3),
+    "columns first": np.asfortranarray(np.arange(6.0).reshape(2, 3)),
+    "every second": np.arange(6)[::2],
+    "empty": np.zeros((0, 3), np.float32),
+    "big endian": np.arange(3, dtype=">f4"),
+    "truths": np.array([True, False]),
+    "number": np.array(1.5),
+    "text": np.array("a"),
+    "texts": np.array(["ab", "c"]),
+}
+
+
+def test_npz_has_the_bytes_of_zipfile_and_numpy():
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as made:
+        for name, values in ARRAYS.items():
+            member = zipfile.ZipInfo(f"{name}.npy", (1980, 1, 1, 0, 0, 0))
+            member.create_system, member.external_attr = 3, 0o644 << 16
+            with made.open(member, "w") as file:
+                np.lib.format.write_array(file, values, allow_pickle=False)
+    assert npz_archive(ARRAYS) == stream.getvalue()

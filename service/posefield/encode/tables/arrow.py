@@ -6,6 +6,8 @@ the card's.
 """
 
 import json
+import math
+from functools import cache, lru_cache
 from typing import Any
 
 import nanoarrow
@@ -26,8 +28,8 @@ _TYPES = {
 
 def arrow_stream(table: Table) -> bytes:
     """Return the Arrow IPC stream of a table; equal tables give equal bytes."""
-    rows = nanoarrow.struct({n: _field(c) for n, c in table.columns.items()}, nullable=False)
-    schema = nanoarrow.c_schema(rows).modify(metadata=_metadata(table))
+    kinds = tuple((name, _kind(column)) for name, column in table.columns.items())
+    schema = nanoarrow.c_schema(_rows(kinds)).modify(metadata=_metadata(table))
     batch = nanoarrow.c_array_from_buffers(
         schema, len(table), [None], children=[_array(c) for c in table.columns.values()]
     )
@@ -54,38 +56,52 @@ class _ChunkList(list[bytes]):
         return len(piece)
 
 
-def _field(column: Column) -> Any:
-    shape = list(column.shape[1:])
+Kind = tuple[str, tuple[int, ...]]
+"""Type of the numbers of a column, and the shape of a row. Types of kinds are cached: nanoarrow
+takes as long to build them as to write a crowd of a hundred characters."""
+
+
+def _kind(column: Column) -> Kind:
+    return column.dtype.name, column.shape[1:]
+
+
+@lru_cache(maxsize=64)
+def _rows(kinds: tuple[tuple[str, Kind], ...]) -> Any:
+    """Return the type of rows with columns of these names and kinds."""
+    return nanoarrow.struct({name: _field(*kind) for name, kind in kinds}, nullable=False)
+
+
+def _field(numbers: str, shape: tuple[int, ...]) -> Any:
     if not shape:
-        return _type(column)
+        return _TYPES[numbers](nullable=False)
     # Without spaces, as other writers have it.
-    metadata = json.dumps({"shape": shape}, separators=(",", ":"))
+    metadata = json.dumps({"shape": list(shape)}, separators=(",", ":"))
     return nanoarrow.extension_type(
-        _row_array(column), "arrow.fixed_shape_tensor", metadata, nullable=False
+        _list_type(numbers, math.prod(shape)), "arrow.fixed_shape_tensor", metadata, nullable=False
     )
+
+
+def _list_type(numbers: str, size: int) -> Any:
+    return nanoarrow.fixed_size_list(_TYPES[numbers](nullable=False), size, nullable=False)
 
 
 def _array(column: Column) -> Any:
     """Return the column as an Arrow array on the same memory."""
-    if column.dtype == bool:
-        return _boolean_array(column)
-    numbers = nanoarrow.c_array(column.reshape(-1), _type(column))
-    if column.ndim == 1:
-        return numbers
-    return nanoarrow.c_array_from_buffers(
-        _row_array(column), len(column), [None], children=[numbers]
-    )
+    numbers, shape = _kind(column)
+    # One bit for each boolean: nanoarrow would take NumPy's bytes for bits.
+    buffer = np.packbits(column, bitorder="little") if numbers == "bool" else column.reshape(-1)
+    made = nanoarrow.c_array_from_buffers(_storage(numbers), column.size, [None, buffer])
+    if not shape:
+        return made
+    kind = _list_storage(numbers, math.prod(shape))
+    return nanoarrow.c_array_from_buffers(kind, len(column), [None], children=[made])
 
 
-def _boolean_array(column: Column) -> Any:
-    """Return booleans as an array of one bit each; nanoarrow would take NumPy's bytes for bits."""
-    bits = np.packbits(column, bitorder="little")
-    return nanoarrow.c_array_from_buffers(_type(column), len(column), [None, bits])
+@cache
+def _storage(numbers: str) -> Any:
+    return nanoarrow.c_schema(_TYPES[numbers](nullable=False))
 
 
-def _row_array(column: Column) -> Any:
-    return nanoarrow.fixed_size_list(_type(column), column[0].size, nullable=False)
-
-
-def _type(column: Column) -> Any:
-    return _TYPES[column.dtype.name](nullable=False)
+@lru_cache(maxsize=256)
+def _list_storage(numbers: str, size: int) -> Any:
+    return nanoarrow.c_schema(_list_type(numbers, size))

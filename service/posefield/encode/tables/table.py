@@ -1,10 +1,8 @@
-"""Tables of arrays and facts, and their encoding as JSON, MessagePack and npz.
+"""Tables of arrays and facts, and their encoding as JSON and MessagePack.
 
 Poses, clips, crowds and grids are tables, so that each format has one encoder.
 """
 
-import io
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -90,43 +88,3 @@ def _msgpack_array(values: Column) -> dict[str, Any]:
     own = np.ascontiguousarray(values)
     plain = own.astype(own.dtype.newbyteorder("<"), copy=False)
     return {"dtype": plain.dtype.str, "shape": list(own.shape), "data": plain.tobytes()}
-
-
-def npz_table(table: Table) -> bytes:
-    """Return an archive that numpy.load opens without pickle.
-
-    Strings, numbers and lists of either are arrays too; other facts are JSON texts.
-    """
-    facts = {name: _array(value) for name, value in table.facts.items()}
-    return npz_archive({**table.arrays, **facts})
-
-
-def _array(value: Any) -> Column:
-    if isinstance(value, str | float):
-        return np.array(value)
-    if isinstance(value, list) and all(isinstance(each, str) for each in value):
-        return np.array(value, dtype=np.str_)
-    if isinstance(value, list) and all(isinstance(each, int) for each in value):
-        return np.array(value, dtype=np.int32)
-    return np.array(orjson.dumps(value).decode())
-
-
-# The earliest time of the zip format, so that the bytes depend on the arrays alone.
-MODIFICATION_TIME = (1980, 1, 1, 0, 0, 0)
-READABLE_MODE = 0o644 << 16
-
-
-def npz_archive(arrays: Mapping[str, npt.NDArray[Any]]) -> bytes:
-    """Return an archive of stored members that numpy.load opens without pickle."""
-    stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as made:
-        for name, values in arrays.items():
-            with made.open(_member(name), "w") as file:
-                np.lib.format.write_array(file, values, allow_pickle=False)
-    return stream.getvalue()
-
-
-def _member(name: str) -> zipfile.ZipInfo:
-    member: Any = zipfile.ZipInfo(f"{name}.npy", MODIFICATION_TIME)
-    member.create_system, member.external_attr = 3, READABLE_MODE
-    return member
