@@ -206,9 +206,9 @@ POSE_ENCODERS: dict[str, TableEncoder[PoseAnswer[Any]]] = by_extension(
 )
 
 CROWD_ENCODERS: dict[str, TableEncoder[CrowdPoses]] = by_extension(
-    TableEncoder("arrow", ARROW, crowd_tables.table, arrow_stream),
-    TableEncoder("npz", NPZ, crowd_tables.table, npz_table),
-    TableEncoder("msgpack", MSGPACK, crowd_tables.table, tables.msgpack_table),
+    TableEncoder("arrow", ARROW, crowd_tables.table, arrow_stream, inline_limit=1000),
+    TableEncoder("npz", NPZ, crowd_tables.table, npz_table, inline_limit=1000),
+    TableEncoder("msgpack", MSGPACK, crowd_tables.table, tables.msgpack_table, inline_limit=1000),
     TableEncoder(
         "json",
         JSON,

@@ -67,7 +67,9 @@ def _poses(model: Synthesizer, task: CrowdTask) -> CrowdPoses:
 
 
 async def encode_crowd(context: Crowds, task: CrowdTask, answer: CrowdPoses) -> bytes:
-    """Return the poses as a file."""
+    """Return the poses as a file, large ones in a thread."""
+    if len(answer.rotations) <= context.form.inline_limit:
+        return context.form.encode(answer)
     return await worker_threads.within(context.form.encode, answer)
 
 

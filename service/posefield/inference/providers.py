@@ -56,11 +56,11 @@ class Provider:
     options: tuple[tuple[str, str], ...] = ()
 
 
-# Smaller calls are dominated by their overhead; larger ones exceed a core's cache between
-# operators, and a pose of a walk costs up to eight times as much. The number of calls is fixed, not
-# the number of cores: rounding depends on it.
+# Smaller calls are dominated by their overhead and that of threads; larger ones exceed a core's
+# cache between operators, and a pose of a walk costs up to eight times as much. The number of calls
+# is fixed, not the number of cores: rounding depends on it.
 CPU = Provider(
-    "cpu", "CPUExecutionProvider", "cpu", CallSizes(256, 1536, 8, walking=1000, timed=512)
+    "cpu", "CPUExecutionProvider", "cpu", CallSizes(512, 1536, 8, walking=1000, timed=512)
 )
 CUDA = Provider(
     "cuda",

@@ -178,7 +178,8 @@ class Support:
             cancellation.check()
             some = scaled[rows]
             near = some @ own.slopes
-            near += own.offsets - np.float32(RATE) * np.sum(np.square(some), axis=1)[:, None]
+            near += own.offsets
+            near -= np.float32(RATE) * np.einsum("bd,bd->b", some, some)[:, None]
             np.exp(near, out=near)
             parts = near @ own.directions
             np.square(parts, out=parts)

@@ -183,7 +183,8 @@ def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _Gra
 
     # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
     calls = list(_calls(levels, model.session.provider.calls))
-    list(_WORKERS.map(cancellation.bind_context(fill), calls))
+    run = _WORKERS.map if len(calls) > 1 else map
+    list(run(cancellation.bind_context(fill), calls))
     return block
 
 

@@ -160,7 +160,6 @@ def _checked(
 
 def _check(field: str, column: Floats | Indices, good: Booleans, expected: str) -> None:
     """Raise InvalidField for the first character with an entry of `good` (N, ...) that is false."""
-    bad = np.flatnonzero(~good.reshape(len(column), -1).all(axis=1))
-    if len(bad):
-        first = int(bad[0])
+    if not good.all():
+        first = int(np.argmin(good.reshape(len(column), -1).all(axis=1)))
         raise InvalidField(field, f"{column[first].tolist()}, expected {expected}", first)

@@ -158,7 +158,7 @@ def _detail(body: CrowdBody, count: int) -> Indices | LevelCriteria:
     for name in ("previous_level", "camera", "pixels", "budget_ms"):
         if getattr(body, name) is not None:
             raise InvalidField(name, 'given without level "auto", expected only with it')
-    return _whole("level", body.level if isinstance(body.level, list) else [body.level] * count)
+    return _whole_column("level", body.level, count)
 
 
 def _whole(name: str, given: Sequence[float]) -> Indices:
@@ -171,6 +171,13 @@ def _whole(name: str, given: Sequence[float]) -> Indices:
     return values.astype(np.int64)
 
 
+def _whole_column(name: str, given: Numbers, count: int) -> Indices:
+    """Return whole numbers (N,), of a list or of one number for all; FormError for another."""
+    if isinstance(given, list):
+        return _whole(name, given)
+    return _whole(name, [given]).repeat(count)
+
+
 def _takes(body: CrowdBody, count: int) -> CharacterTakes | None:
     """Return the takes of the characters; "index" is a seed of its own for each, from 1 on."""
     if body.take == 0.0 and not body.detail:
@@ -178,7 +185,7 @@ def _takes(body: CrowdBody, count: int) -> CharacterTakes | None:
     if body.take == "index":
         seeds = 1 + np.arange(count)
     else:
-        seeds = _whole("take", body.take if isinstance(body.take, list) else [body.take] * count)
+        seeds = _whole_column("take", body.take, count)
     return CharacterTakes(seeds, _column(body.variety, count), np.full(count, body.detail))
 
 
