@@ -81,15 +81,15 @@ def _poses(
     ours: Server, other: Server, path: str, controls: Sequence[Control], rounds: int
 ) -> list[Row]:
     questions = pose_questions(controls)
-    asked = _asked(f"{path}/pose", questions)
+    asked = get_requests(f"{path}/pose", questions)
     tags = _asked_again(ours, f"{path}/pose", questions[:2000])
-    plain = _asked("/", questions)
+    plain = get_requests("/", questions)
     # Beside each other in time what is compared: neighbours come and go.
     runs = [
         (ours, Load(asked, ALONE)),
         (other, Load(plain, ALONE)),
         (ours, Load(tags, ALONE)),
-        (ours, Load(_asked(f"{path}/pose.msgpack", questions), ALONE)),
+        (ours, Load(get_requests(f"{path}/pose.msgpack", questions), ALONE)),
         (ours, Load(asked, TOGETHER)),
         (other, Load(plain, TOGETHER)),
         (ours, Load(tags, TOGETHER)),
@@ -105,7 +105,9 @@ def _poses(
 
 
 def _files(ours: Server, path: str, controls: Sequence[Control], rounds: int) -> list[Row]:
-    usdc, json = (_asked(f"{path}/clip.{e}", points(controls, QUESTIONS)) for e in ("usdc", "json"))
+    usdc, json = (
+        get_requests(f"{path}/clip.{e}", points(controls, QUESTIONS)) for e in ("usdc", "json")
+    )
     goal = "500 µs: 2,000 a second on one core"
     wanted = {
         f"clip as usdc, {TOGETHER} connections": (Load(usdc, TOGETHER), goal, 500.0),
@@ -121,7 +123,7 @@ def _files(ours: Server, path: str, controls: Sequence[Control], rounds: int) ->
 
 
 def _crowds(ours: Server, path: str, controls: Sequence[Control], rounds: int) -> list[Row]:
-    bodies = [_crowd(points(controls, MANY), shift) for shift in range(20)]
+    bodies = [crowd_body(points(controls, MANY), shift) for shift in range(20)]
     names = ("json", "arrow", "msgpack", "npz")
     runs = [
         (ours, Load(tuple(post(f"{path}/crowd.{name}", body) for body in bodies), ALONE))
@@ -142,7 +144,7 @@ def _crowd_row(name: str, own: Sequence[Cost], json: Sequence[Cost]) -> Row:
 
 def _waits(ours: Server, path: str, controls: Sequence[Control], rounds: int) -> list[Row]:
     """Latencies at half of the rate that saturates: many connections that each ask seldom."""
-    asked = _asked(f"{path}/pose", pose_questions(controls))
+    asked = get_requests(f"{path}/pose", pose_questions(controls))
     found = []
     for _ in range(rounds):
         most = run(ours, Load(asked, TOGETHER)).rate
@@ -157,7 +159,7 @@ def _waits(ours: Server, path: str, controls: Sequence[Control], rounds: int) ->
     return [Row("p99 of p50 at half the load", statistics.median(ratios), "×", words, None, 5.0)]
 
 
-def _asked(target: str, questions: Iterable[Numbers]) -> tuple[bytes, ...]:
+def get_requests(target: str, questions: Iterable[Numbers]) -> tuple[bytes, ...]:
     return tuple(get(f"{target}?{urlencode(question)}") for question in questions)
 
 
@@ -174,7 +176,7 @@ def _asked_again(ours: Server, target: str, questions: Sequence[Numbers]) -> tup
     return tuple(made)
 
 
-def _crowd(points: Sequence[Numbers], shift: int) -> bytes:
+def crowd_body(points: Sequence[Numbers], shift: int) -> bytes:
     columns = {name: [point[name] for point in points] for name in points[0]}
     moved = [round(0.001 * (shift + i), 4) for i in range(len(points))]
     places = [[float(i % 25), 0.0, float(i // 25)] for i in range(len(points))]

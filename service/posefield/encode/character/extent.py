@@ -149,7 +149,8 @@ def _point_positions(tree: PointTree, moves: AnimationSamples) -> Singles:
         here += _select_rows(places, each.parents)
         # In place: a joint's local rotation is not read after its orientation is computed.
         own = turns[:, each.turns]
-        _multiply_quaternions(held[:, : own.shape[1]], own)
+        if own.size:
+            _multiply_quaternions(held[:, : own.shape[1]], own)
     return places
 
 

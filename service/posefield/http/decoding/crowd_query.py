@@ -130,14 +130,18 @@ def _count(body: CrowdBody, most: float) -> int:
 
 
 def _column(values: Numbers, count: int) -> Floats:
-    """Return the values (N,), with 0 for -0."""
-    return (np.array(values) if isinstance(values, list) else np.full(count, values)) + 0.0
+    """Return the values (N,)."""
+    # np.fromiter takes two thirds of the time of np.array. Adding 0.0 turns -0 into 0.
+    given = (
+        np.fromiter(values, float, count) if isinstance(values, list) else np.full(count, values)
+    )
+    return given + 0.0
 
 
 def _positions(given: list[tuple[float, float, float]] | None, count: int) -> Floats:
     if given is None:
         return np.zeros((count, 3))
-    # np.fromiter takes half the time of np.array for tuples. Adding 0.0 turns -0 into 0.
+    # np.fromiter takes half the time of np.array for tuples.
     return np.fromiter(chain.from_iterable(given), float, 3 * len(given)).reshape(-1, 3) + 0.0
 
 
