@@ -307,3 +307,27 @@ def test_the_medoid_of_a_large_family_is_that_of_a_sample():
     assert abs(mixed[found[0]] - 0.8) < 0.1
     # Negative control: most clips lie farther from the middle.
     assert np.mean(np.abs(mixed - 0.8) < 0.1) < 0.2
+
+
+def raised(posture, count):
+    """Clips at an even pace whose arm rises by equal angles, half of them from a posture higher."""
+
+    def one(start):
+        angle = start + 0.8 * CANONICAL
+        turns = np.stack([0.0 * angle, 0.0 * angle, angle, 0.5 * angle], axis=1)
+        rotations = quat.from_axis_angle(np.array([0, 0, 1.0]), turns)
+        row = ClipRow(Path("x.bvh"), "clips.csv", 2, "", 0, None, np.array([start]), ())
+        path = np.tile([0.0, 0.9, 0.0], (FRAMES, 1))
+        own = clip.assemble(JOINTS, rotations, path, JOINTS.offsets, 60.0)
+        return Example(row, own, row.controls, (), jumps=())
+
+    return [one(0.0), one(posture)] * (count // 2)
+
+
+def test_a_large_family_is_aligned_by_movements_not_by_postures():
+    even = np.zeros((300, BASIS.knots))
+    found = aligned(raised(0.2, 300), 0).logs
+    assert disagreement(found, even) < 0.01
+    # Negative control: a small family trades time for posture.
+    assert disagreement(aligned(raised(0.2, 40), 0).logs, even[:40]) > 0.03
+    assert disagreement(aligned(raised(0.0, 300), 0).logs, even) < 1e-6

@@ -1,7 +1,8 @@
 """Temporal alignment of clips by dynamic time warping (Mukai & Kuriyama 2006, section 2).
 
 Clips are compared by joint positions relative to the root. In the first round the reference of
-every clip is the medoid; in later rounds it is the prediction from the other aligned clips.
+every clip is the medoid, and large families compare movements alone, without postures; in later
+rounds it is the prediction from the other aligned clips.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -38,7 +39,7 @@ COARSE, FINE = 25, 100
 # A landmark is one of 501 samples; the weight makes the fitted warp pass through it.
 LANDMARK_WEIGHT = 200.0
 # Clips up to which each is compared with all others for the medoid, and as many of more clips.
-LARGEST_COMPARED, MEDOID_SAMPLE = 300, 200
+LARGEST_COMPARED, MEDOID_SAMPLE = 299, 200
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,9 @@ def align(
     knees = _breakpoints(marks, marks.mean(axis=0))
     medoid = _medoid(_align_piecewise(traces, knees, COARSE))
     fine = _align_piecewise(traces, knees, FINE)
-    logs = _centre(_warps_to(fine, fine[medoid], knees, basis, jobs), knees, basis)
+    shown = fine if len(fine) <= LARGEST_COMPARED else _movements(fine)
+    logs = _centre(_warps_to(shown, shown[medoid], knees, basis, jobs), knees, basis)
+    del shown
     for _ in range(refinement.rounds):
         pairs = zip(traces, logs, strict=True)
         warped = _stack(
@@ -262,6 +265,15 @@ def _medoid(traces: Traces) -> int:
         return int(some[_medoid(traces[some])])
     totals = [float(np.sum(np.sqrt(dtw.total_cost(traces, reference)))) for reference in traces]
     return int(np.argmin(np.round(totals, 9)))
+
+
+def _movements(traces: Traces) -> Traces:
+    """Return traces (N, F, features) less their means over time (decision 0025).
+
+    Who sits and who stands differ more by posture than by movement, and time warping would trade
+    time for posture: equal phases of their motions would get different canonical times.
+    """
+    return traces - traces.mean(axis=1, keepdims=True)
 
 
 def _warps_to(
