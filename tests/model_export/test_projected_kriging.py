@@ -7,7 +7,12 @@ import pytest
 
 from posefield.kriging import kriging_model, leave_one_out
 from posefield_train.graph import training_notes
-from posefield_train.kriging import coefficient_models, sample_kriging, universal_kriging
+from posefield_train.kriging import (
+    coefficient_models,
+    kriging_tuning,
+    sample_kriging,
+    universal_kriging,
+)
 from posefield_train.kriging.projected import inducing_clips
 from posefield_train.kriging.projected.projected_kriging import ProjectedProcess
 from posefield_train.kriging.sample_points import SamplePoints
@@ -64,6 +69,11 @@ def test_residuals_of_left_out_groups_are_those_of_a_model_without_them(hyper, s
         basis = kriging_model.basis_functions(hyper, samples[own], inducing)
         expected = values[own] - basis @ others.dual(values[~own])
         assert np.abs(residuals[own] - expected).max() < SAME
+    uneven = np.minimum(groups, 17)
+    process = ProjectedProcess(hyper, samples, inducing)
+    expected_rows = process.leave_out(uneven) @ values
+    assert np.abs(process.residuals(values, uneven) - expected_rows).max() < SAME
+    assert np.abs(process.residuals(values, np.arange(60)) - expected_rows).max() > 1e-3
     whole = ProjectedProcess(hyper, samples, samples, NONE).leave_out(groups)
     assert np.abs(whole - leave_one_out.leave_out(hyper, samples, groups)).max() < SAME
     # Negative control: residuals of the fit itself are smaller.
@@ -207,6 +217,36 @@ def test_parameters_of_a_large_family_are_tuned_twice(rng):
     assert tuned.unexplained < 0.05
     few = coefficient_models.choose_covariance(settings, family.subset(np.arange(90)), smooth[:90])
     assert few.disagreement is None
+
+
+def _mean_square(residuals):
+    """Mean and standard error of the squared residuals of clips."""
+    squares = np.sum(np.square(residuals), axis=1)
+    return squares.mean(), squares.std() / np.sqrt(len(squares))
+
+
+def test_a_large_family_has_the_longest_ranges_within_a_standard_error(rng):
+    points = rng.uniform(-1.0, 1.0, (320, 2))
+    values = np.sin(3.0 * points @ rng.normal(size=(2, 3))) + 0.1 * rng.normal(size=(320, 3))
+    samples = large(points, inducing_clips.choose_inducing(points, 2, ()))
+    settings = Kriging(covariance="matern52")
+    tuned = kriging_tuning.tune(TuningProblem(samples, values), "matern52", None)
+    chosen = coefficient_models.choose_covariance(settings, samples, values)
+    share = chosen.hyper.scales / tuned.hyper.scales
+    assert share == pytest.approx(share[0])
+    assert 0.5 < share[0] < 1.0
+    assert replace(chosen.hyper, scales=tuned.hyper.scales) == tuned.hyper
+    (least, error), (found, _) = _mean_square(tuned.residuals), _mean_square(chosen.residuals)
+    assert least < found <= least + error
+    # The next longer ranges are beyond it.
+    longer = replace(chosen.hyper, scales=chosen.hyper.scales * 0.94)
+    beyond, _ = _mean_square(sample_kriging.residuals(longer, samples, values))
+    assert beyond > least + error
+    # Negative control: a small family is as tuned.
+    few = large(points[:90], None)
+    small = coefficient_models.choose_covariance(settings, few, values[:90])
+    alone = kriging_tuning.tune(TuningProblem(few, values[:90]), "matern52", None)
+    assert (small.hyper.scales == alone.hyper.scales).all()
 
 
 def test_tunings_that_disagree_are_noted(trained):

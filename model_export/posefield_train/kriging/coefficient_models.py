@@ -16,6 +16,7 @@ from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     OTHER_STRENGTH,
     POSE_STRENGTH,
+    SCALE_PRIOR,
     TINY,
     UNNAMED_STRENGTH,
     LeaveOneOutLoss,
@@ -31,6 +32,8 @@ from posefield_train.tensor.decoder import Proportions
 SAME_BONE = 5e-4
 # A Gaussian covariance is conditioned worse than Matérn's; it must reduce the error to this share.
 CLEAR_IMPROVEMENT = 0.95
+# Shares of the tuned scales, each of a longer range, that a large family is tried with.
+LONGER = np.geomspace(0.95, 0.5, 13)
 # Values that differ by less than this share of the largest are equal but for rounding.
 ROUNDING = 1e-12
 # Shares of a model that count as none, and as the whole of it.
@@ -71,9 +74,9 @@ def choose_covariance(
     )
     best = min(others, key=lambda field: field.unexplained, default=first)
     chosen = best if best.unexplained < CLEAR_IMPROVEMENT * first.unexplained else first
-    if len(samples.points) <= inducing_clips.LARGEST_TUNED:
-        return chosen
-    return _better_draw(problem, settings.fixed_degree, chosen, jobs)
+    if len(samples.points) > inducing_clips.LARGEST_TUNED:
+        chosen = _better_draw(problem, settings.fixed_degree, chosen, jobs)
+    return chosen if samples.inducing is None else _smoothest(chosen, samples, values)
 
 
 def _better_draw(
@@ -84,6 +87,34 @@ def _better_draw(
     better = min(first, second, key=lambda own: own.unexplained)
     errors = np.sqrt([first.unexplained, second.unexplained])
     return replace(better, disagreement=float(errors.max() / max(errors.min(), TINY) - 1.0))
+
+
+def _smoothest(tuned: TunedKriging, samples: SamplePoints, values: SampleValues) -> TunedKriging:
+    """Return the model of the longest ranges that predicts left-out takes as well as a tuned one.
+
+    As well: its mean squared residual is at most one standard error of the tuned model's above it
+    (Breiman et al. 1984, section 3.4.3). Takes of a large family have near neighbours, and so
+    hardly tell how far a clip says something about motions between them (decision 0025).
+    """
+    squares = _take_squares(samples, tuned.residuals)
+    limit = float(np.mean(squares) + np.std(squares) / np.sqrt(len(squares)))
+    found, least = tuned.hyper, np.exp(SCALE_PRIOR.low)
+    for share in LONGER:
+        longer = replace(tuned.hyper, scales=np.maximum(share * tuned.hyper.scales, least))
+        residuals = sample_kriging.residuals(longer, samples, values)
+        if float(np.mean(_take_squares(samples, residuals))) > limit:
+            break
+        found = longer
+    if found is tuned.hyper:
+        return tuned
+    evaluated = kriging_tuning.evaluate_fixed(found, samples, values)
+    return replace(evaluated, disagreement=tuned.disagreement)
+
+
+def _take_squares(samples: SamplePoints, residuals: SampleValues) -> Annotated[Floats, "takes"]:
+    """Return the squared residuals (g,) of each take, summed over its clips."""
+    _, takes = np.unique(samples.groups, return_inverse=True)
+    return np.bincount(takes, np.einsum("nm,nm->n", residuals, residuals))
 
 
 def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleValues) -> FittedModel:

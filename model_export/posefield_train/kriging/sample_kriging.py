@@ -43,3 +43,11 @@ def leave_out(
         return universal_kriging.leave_out(hyper, points, groups)
     process = ProjectedProcess(hyper, points, samples.points[samples.inducing])
     return process.leave_out(groups)
+
+
+def residuals(hyper: Hyper, samples: SamplePoints, values: SampleValues) -> SampleValues:
+    """Return the leave-one-group-out residuals (n, m) of values (n, m)."""
+    if samples.inducing is None:
+        return leave_out(hyper, samples) @ values
+    process = ProjectedProcess(hyper, samples.points, samples.points[samples.inducing])
+    return process.residuals(values, samples.groups)

@@ -58,6 +58,20 @@ class ProjectedProcess:
         apart = np.eye(len(left)) - left @ left.T
         return leave_one_out.divide_groups(apart, apart, leave_one_out.equal_sized_groups(groups))
 
+    def residuals(self, values: SampleValues, groups: Annotated[Indices, "samples"]) -> Floats:
+        """Return `leave_out` times values (n, v), without a matrix (n, n)."""
+        left = self._factors[0]
+        found: Floats = values - left @ (left.T @ values)
+        several = leave_one_out.equal_sized_groups(groups)
+        grouped = [
+            np.linalg.solve(np.eye(own.shape[1]) - left[own] @ left[own].swapaxes(1, 2), found[own])
+            for own in several
+        ]
+        found /= (1.0 - np.sum(np.square(left), axis=1))[:, None]
+        for own, rows in zip(several, grouped, strict=True):
+            found[own] = rows
+        return found
+
     @property
     def form(self) -> Annotated[Floats, "system system"]:
         """Return the quadratic form (m + k, m + k) by which the samples reduce the variance.
