@@ -14,13 +14,16 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rows import Row, record, table
 
+from posefield.common.units import Floats
 from posefield_train.evaluate import compared_motion, ground_truth, methods, motion_errors
+from posefield_train.evaluate.compared_motion import ComparedMotion
 from posefield_train.evaluate.methods import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
@@ -55,7 +58,7 @@ def measure(clips: int) -> dict[str, Any]:
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
     used = use(exported.content) if clips == USED else {}
     with single_thread.single_threaded():
-        truth, ratio = compare(own, trained)
+        compared = compare(own, trained)
     return {
         "clips": clips,
         "listed": exported.card.samples,
@@ -64,8 +67,7 @@ def measure(clips: int) -> dict[str, Any]:
         "memory_mb": round(memory / 1e6),
         "file_kb": round(len(exported.content) / 1e3, 1),
         "left_out_cm": round(100 * exported.card.diagnostics["leave_one_out_rms_m"], 3),
-        "truth_cm": round(100 * truth, 3),
-        "sigma_ratio": round(ratio, 3),
+        **compared,
         "disagreement": exported.card.diagnostics.get("projected", {}).get("disagreement"),
         "used": used,
     }
@@ -96,17 +98,16 @@ def _children_seconds(words: Sequence[object]) -> float:
     return round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, 1)
 
 
-def compare(own: recipe.Recipe, trained: TrainedModel) -> tuple[float, float]:
-    """Return the mean distance to the truth, m, and the error of new clips over their sigma.
+def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
+    """Return distances to the truth, cm, and the error of new clips over their sigma.
 
-    Distances are of joints after time warping, with the root's position; new clips have the noise
-    of the family, and errors and sigma are root mean squares.
+    truth_cm: over the whole range of the controls. among_cm: at control points among the clips, of
+    the three performers, standing and sitting. Distances are of joints after time warping, with the
+    root's position; new clips have the noise of the family, and errors and sigma are root mean
+    squares.
     """
     points = ground_truth.truth_points(ASKED)
-    found = methods.predict_posefield(own, trained, Queries(points, [{}] * len(points)))
-    truths = ground_truth.truth_motions(points, None)
-    pairs = zip(found, truths, strict=True)
-    errors = [motion_errors.compare_motions(made, true, ()) for made, true in pairs]
+    found = _answers(own, trained, points)
     rng = np.random.Generator(np.random.PCG64(SEED))
     clips = [sample_family.noisy_trial(parse_controls(list(point)), rng) for point in points]
     captured = [compared_motion.motion_of_clip(clip, None) for clip in clips]
@@ -117,8 +118,24 @@ def compare(own: recipe.Recipe, trained: TrainedModel) -> tuple[float, float]:
     bank = trained.model.bank
     places = bank.points(points, np.zeros((len(points), bank.label_count)))
     sigma = bank.sigma(bank.numpy(places)[VARIANCE])
-    mean = motion_errors.mean(errors)
-    return mean.absolute.mean, float(np.sqrt(np.mean(squares) / np.mean(np.square(sigma))))
+    among = np.array([astuple(controls) for _, controls in sample_family.design(ASKED)])
+    return {
+        "truth_cm": _distance(found, points),
+        "among_cm": _distance(_answers(own, trained, among), among),
+        "sigma_ratio": round(float(np.sqrt(np.mean(squares) / np.mean(np.square(sigma)))), 3),
+    }
+
+
+def _answers(own: recipe.Recipe, trained: TrainedModel, points: Floats) -> list[ComparedMotion]:
+    return methods.predict_posefield(own, trained, Queries(points, [{}] * len(points)))
+
+
+def _distance(found: Sequence[ComparedMotion], points: Floats) -> float:
+    """Return the mean distance, cm, of motions from the noise-free ones at control points."""
+    truths = ground_truth.truth_motions(points, None)
+    pairs = zip(found, truths, strict=True)
+    errors = [motion_errors.compare_motions(made, true, ()) for made, true in pairs]
+    return round(100 * motion_errors.mean(errors).absolute.mean, 3)
 
 
 def _cpu() -> float:
@@ -173,6 +190,7 @@ def _rows(own: dict[str, Any], first: dict[str, Any]) -> list[Row]:
             None,
             0.5 if largest else None,
         ),
+        Row(f"{name}: the same among the clips", own["among_cm"], "cm", "", None, None),
         Row(
             f"{name}: error of new clips over sigma",
             own["sigma_ratio"],

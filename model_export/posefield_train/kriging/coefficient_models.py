@@ -114,7 +114,8 @@ def _smoothest(tuned: TunedKriging, samples: SamplePoints, values: SampleValues)
 def _take_squares(samples: SamplePoints, residuals: SampleValues) -> Annotated[Floats, "takes"]:
     """Return the squared residuals (g,) of each take, summed over its clips."""
     _, takes = np.unique(samples.groups, return_inverse=True)
-    return np.bincount(takes, np.einsum("nm,nm->n", residuals, residuals))
+    squares = np.einsum("nm,nm->n", residuals, residuals)
+    return np.asarray(np.bincount(takes, squares), dtype=np.float64)
 
 
 def fit(settings: Kriging, pose: Hyper, samples: SamplePoints, values: SampleValues) -> FittedModel:
