@@ -22,6 +22,7 @@ from posefield.synthesis.poses import POSE_OUTPUTS
 from posefield_train.kriging import naive_kriging, variogram
 
 FRAMES, POSES = 100, 256
+TRAINING = "training, alignment and tuning included"
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ def _small_rows(made: Family, ours: Asked, asked: dict[str, Any]) -> list[Row]:
             None,
         ),
         Row("model file", len(made.exported.content) / 1e3, "kB", "", None, 120.0),
-        Row("training, alignment and tuning included", made.seconds, "s", "", None, 30.0),
+        Row(TRAINING, made.seconds, "s", "", None, 30.0),
     ]
 
 
