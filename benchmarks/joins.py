@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from rows import Row, record, table
 
-from posefield.feet import contact_estimates, foot_placement, footsteps, limb_choice
+from posefield.feet import body_plans, contact_estimates, foot_placement, limb_choice
 from posefield.feet.footsteps import Character, SampledMotion
 from posefield.feet.stances import FootPath
 from posefield.motion.clip import Clip
@@ -169,7 +169,7 @@ def _placed(own: Take, passage: Passage, cut: Cut) -> tuple[Passage, tuple[float
     """Return a passage with placed feet, how far feet that stand at the join slide, and the mean
     lowering of the pelvis near it, m."""
     motion = SampledMotion(passage.rotations, passage.roots, RATE)
-    plan = footsteps.plan_feet(own.character, motion, own.contacts, passage.contacts)
+    plan = body_plans.plan_feet(own.character, motion, own.contacts, passage.contacts)
     times = np.arange(len(passage)) / RATE
     found = foot_placement.place_feet(plan, times, passage.rotations, passage.roots)
     placed = Passage(found.rotations, found.roots, passage.contacts, passage.sigmas)

@@ -27,7 +27,7 @@ from posefield.encode.formats import CLIP_ENCODERS, CROWD_ENCODERS
 from posefield.http.decoding import crowd_query
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
-from posefield.synthesis import clip_batch, clips, crowd_synthesis
+from posefield.synthesis import clips, crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 
 ROOT = Path(__file__).parents[1]
@@ -146,7 +146,7 @@ def _together_rows(model: Synthesizer, many: Sequence[dict[str, float]]) -> list
     spent = _in_turn(
         {
             "alone": lambda: [clips.synthesize_clip(model, question) for question in questions],
-            "together": lambda: clip_batch.synthesize_clips(model, questions),
+            "together": lambda: clips.synthesize_clips(model, questions),
             "encoded": lambda: encoder.write(answers, METRES),
         }
     )

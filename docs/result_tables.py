@@ -11,7 +11,17 @@ import performed_tables
 import take_tables
 from evaluation_tables import Rows, known_performer, new_performer
 
-SPEED_FILES = ("training", "requests", "before", "viewer", "crowds", "gpu", "files")
+SPEED_FILES = (
+    "training",
+    "graph",
+    "requests",
+    "before",
+    "viewer",
+    "crowds",
+    "gpu",
+    "files",
+    "exports",
+)
 SPEED = tuple(f"speed/{name}" for name in SPEED_FILES)
 TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "equal_known": lambda: (equal_tables.BEST_COLUMNS, equal_tables.best("known")),

@@ -102,9 +102,9 @@ class _MotionCorrector:
     def held(self, begun: ConstrainedMotion, place: Floats) -> ConstrainedMotion:
         """Return the motion with the event's joint at a position (3,) at the event."""
         own = Measure("height", (self.event.joint,), "landmark")
-        return self.bench.solve(
-            begun, [PositionConstraint(("event",), own, (0, 1, 2), place, self.event.frame)]
-        )
+        aim = PositionConstraint(("event",), own, (0, 1, 2), place, self.event.frame)
+        (found,) = self.bench.solve_all([(begun, [aim])])
+        return found
 
     def motion(self, held: ConstrainedMotion) -> ComparedMotion:
         """Return a corrected motion as it is compared."""

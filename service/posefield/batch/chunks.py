@@ -17,7 +17,7 @@ from posefield.batch.target import open_target
 from posefield.common.errors import InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clips
+from posefield.synthesis import clips, frame_times
 from posefield.synthesis.synthesizer import Synthesizer
 
 CLIPS, POSES = 128, 8192
@@ -117,24 +117,54 @@ class _ChunkInProgress:
         return said | self.layout.describe(one.query.name, one.path, one.answer)
 
     def _synthesized_clips(self) -> Iterator[_SynthesizedClip]:
-        for number, row in enumerate(self.task.rows, self.task.first):
-            if isinstance(row, RowFault):
-                self._record_fault(row.place, row.message)
-                continue
-            try:
-                answer = self._answer(row)
-            except QueryError as fault:
-                self._record_fault(row.place, str(fault))
-            else:
-                noted = CLIP_ENCODERS[row.format].noted(answer)
-                yield _SynthesizedClip(path(number, row.name, row.format), row, noted)
+        for block in self._blocks():
+            queries = [row for _, row in block if isinstance(row, ClipQuery)]
+            answers = iter(
+                clips.synthesize_clips(self.synthesizer, [row.question for row in queries])
+            )
+            for number, row in block:
+                if isinstance(row, RowFault):
+                    self._record_fault(row.place, row.message)
+                    continue
+                answer = next(answers)
+                try:
+                    made = self._synthesized(number, row, answer)
+                except QueryError as fault:
+                    self._record_fault(row.place, str(fault))
+                else:
+                    yield made
 
-    def _answer(self, query: ClipQuery) -> ClipAnswer:
-        answer = clips.synthesize_clip(self.synthesizer, query.question)
+    def _blocks(self) -> Iterator[list[tuple[int, ClipQuery | RowFault]]]:
+        """Yield the rows with their indices, in blocks that are synthesised together."""
+        block: list[tuple[int, ClipQuery | RowFault]] = []
+        poses = 0.0
+        for number, row in enumerate(self.task.rows, self.task.first):
+            frames = self._most_frames(row) if isinstance(row, ClipQuery) else 0.0
+            if block and (len(block) == CLIPS or poses + frames > POSES):
+                yield block
+                block, poses = [], 0.0
+            block.append((number, row))
+            poses += frames
+        yield block
+
+    def _most_frames(self, query: ClipQuery) -> float:
+        """Return the number of frames of the longest clip; 0 for a rate that is refused."""
+        rate, longest = query.question.fps, self.synthesizer.session.bounds.duration_limits[1]
+        slowest, fastest = frame_times.FPS_RANGE
+        return rate * longest if slowest <= rate <= fastest else 0.0
+
+    def _synthesized(
+        self, number: int, query: ClipQuery, answer: ClipAnswer | QueryError
+    ) -> _SynthesizedClip:
+        """Return the clip of a query; raises QueryError for one that cannot be delivered."""
+        if isinstance(answer, QueryError):
+            raise answer
         delivery = character_clips.delivery_of(self.work, query.format)
-        if delivery is None:
-            return answer
-        return delivery.clip(answer, query.question, self.synthesizer.session.card.roles)
+        if delivery is not None:
+            roles = self.synthesizer.session.card.roles
+            answer = delivery.clip(answer, query.question, roles)
+        noted = CLIP_ENCODERS[query.format].noted(answer)
+        return _SynthesizedClip(path(number, query.name, query.format), query, noted)
 
     def _record_fault(self, place: str, message: str) -> None:
         # The table's folder is not part of the job and must not affect its files.

@@ -7,6 +7,7 @@ from posefield.batch import manifest
 from posefield.batch.rows.row_query import ClipQuery
 from posefield.characters.delivery import Delivery
 from posefield.common import cancellation
+from posefield.common.errors import QueryError
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import ClipEncoder, left_out
 from posefield.question.results import ClipAnswer
@@ -70,7 +71,9 @@ def archive_members(order: ArchiveOrder) -> Iterator[tuple[str, bytes]]:
 def _files(
     order: ArchiveOrder, queries: Sequence[ClipQuery], lines: bytearray
 ) -> Iterator[tuple[str, bytes]]:
-    answers = [order.encoder.noted(_clip(order, query)) for query in queries]
+    questions = [query.question for query in queries]
+    found = clips.synthesize_clips(order.model, questions)
+    answers = [order.encoder.noted(_clip(order, *own)) for own in zip(queries, found, strict=True)]
     if order.delivery is None:
         contents = order.encoder.write(answers, order.convention)
     else:
@@ -81,9 +84,11 @@ def _files(
         yield file, content
 
 
-def _clip(order: ArchiveOrder, query: ClipQuery) -> ClipAnswer:
+def _clip(order: ArchiveOrder, query: ClipQuery, answer: ClipAnswer | QueryError) -> ClipAnswer:
+    """Return the clip of a query, delivered; raises QueryError for one that cannot be."""
     cancellation.check()
-    answer = clips.synthesize_clip(order.model, query.question)
+    if isinstance(answer, QueryError):
+        raise answer
     if order.delivery is None:
         return answer
     return order.delivery.clip(answer, query.question, order.model.session.card.roles)

@@ -15,7 +15,8 @@ controls (d), functions of a drift (k), rows of the system (n + k), linear funct
 values (m), inducing clips. Tensors: dof of a pose (D), those varying (D'), freedoms (r1), times
 (r2) and modes (r3) of a reduced tensor, more_times and more_modes of one with the event's blend,
 rank of another decomposition, reduced motions (r2 r1), variables of a correction. Faces: curves
-(C).
+(C). Feet: rows (R) of feet with their runs and stances, foot_frames and all_frames of all of them,
+grid of a plan, chains of frames (chain_frames) of paths, systems of blocks, owners of bones.
 Any: batch, some, rows, columns, numbers, pairs, size.
 """
 

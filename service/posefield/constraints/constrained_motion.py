@@ -6,10 +6,12 @@ from typing import Annotated
 
 import numpy as np
 
+from posefield.common import frame_groups
 from posefield.common.array_shapes import Frames, RootPath, Rotations, Variables, Vector
 from posefield.common.units import Floats
 from posefield.constraints import constraint, gauss_newton
 from posefield.constraints.constraint import Constraint
+from posefield.constraints.correction_task import CorrectionTask
 from posefield.constraints.motion_variables import MotionVariables
 from posefield.inference import reduced_motion, residual_covariance
 from posefield.inference.reduced_motion import ReducedTensor
@@ -57,16 +59,44 @@ class ConstrainedMotion:
 
     def poses(self, frames: Frames) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, at canonical frames (S,)."""
+        return evaluate_poses([self], [frames])[0]
+
+    def roots(self, frames: Frames) -> RootPath:
+        """Return root positions (S, 3), m, at canonical frames (S,)."""
         scene = self.scene
-        rotations, roots = scene.reduced.poses(scene.motion(self.numbers), frames)
+        roots = scene.reduced.roots(scene.motion(self.numbers), frames)
         if not scene.cyclic:
-            return rotations, roots
+            return roots
         share = frames / (scene.reduced.frames - 1)
-        return root_travel.add_travel(rotations, roots, share[:, None] * self.travel)
+        return root_travel.moved_roots(roots, share[:, None] * self.travel)
 
     def curve_values(self, frames: Frames) -> Annotated[Floats, "frames curves"]:
         """Return the values (S, C) of the curves at canonical frames (S,)."""
         return self.scene.reduced.curve_values(self.scene.motion(self.numbers), frames)
+
+
+def evaluate_poses(
+    motions: Sequence[ConstrainedMotion], frames: Sequence[Frames]
+) -> list[tuple[Rotations, RootPath]]:
+    """Return rotations (S, J, 4) and root positions (S, 3), m, at canonical frames (S,) of each.
+
+    All are motions of one model, whose levels share the mean rotations. Each has the bytes that it
+    has alone.
+    """
+    if not motions:
+        return []
+    groups, first = frame_groups.of_lengths(frames), motions[0].scene
+    parts = [
+        own.scene.reduced.turn_products(own.scene.motion(own.numbers), at)
+        for own, at in zip(motions, frames, strict=True)
+    ]
+    products, roots = (np.concatenate(own) for own in zip(*parts, strict=True))
+    rotations = first.reduced.rotations_of(products)
+    if first.cyclic:
+        travel = np.array([own.travel for own in motions])[groups.group]
+        share = np.concatenate(frames) / (first.reduced.frames - 1)
+        rotations, roots = root_travel.add_travel(rotations, roots, share[:, None] * travel)
+    return list(zip(groups.split(rotations), groups.split(roots), strict=True))
 
 
 @dataclass(frozen=True)
@@ -89,19 +119,21 @@ class LevelCorrector:
         beside = [np.log(state.duration), *state.travel] if self.card.cyclic else []
         return ConstrainedMotion(scene, np.concatenate([inner, beside]), state, ())
 
-    def solve(self, begun: ConstrainedMotion, aims: Sequence[Constraint]) -> ConstrainedMotion:
-        """Return the nearest motion that satisfies the constraints."""
-        sigma, numbers = begun.state.sigma, begun.numbers
-        found = gauss_newton.correct(begun.scene, self.spread, sigma, numbers, aims)
-        return ConstrainedMotion(
-            begun.scene, found.numbers, begun.state, found.results, found.steps, found.distance
-        )
+    def solve_all(
+        self, every: Sequence[tuple[ConstrainedMotion, Sequence[Constraint]]]
+    ) -> list[ConstrainedMotion]:
+        """Return the nearest motions that satisfy constraints, from motions with these."""
+        found = gauss_newton.correct(self.spread, [_task(*own) for own in every])
+        return [
+            ConstrainedMotion(
+                begun.scene, own.numbers, begun.state, own.results, own.steps, own.distance
+            )
+            for (begun, _), own in zip(every, found, strict=True)
+        ]
 
     def distance(self, begun: ConstrainedMotion, aims: Sequence[Constraint]) -> float:
         """Return the Mahalanobis distance of the constraints from a predicted motion."""
-        return gauss_newton.distance(
-            begun.scene, self.spread, begun.state.sigma, begun.numbers, aims
-        )
+        return gauss_newton.distance(self.spread, _task(begun, aims))
 
     def measured(self, held: ConstrainedMotion) -> dict[str, float]:
         """Return the values of the card's measured controls on a motion."""
@@ -120,6 +152,10 @@ class LevelCorrector:
             for control in self.card.controls
             if control.name in found
         }
+
+
+def _task(begun: ConstrainedMotion, aims: Sequence[Constraint]) -> CorrectionTask:
+    return CorrectionTask(begun.scene, begun.state.sigma, begun.numbers, aims)
 
 
 def build_corrector(session: Session, level: int) -> LevelCorrector:
@@ -141,7 +177,7 @@ def _measured_body(scene: MotionVariables) -> MeasuredMotion:
 def to_strides(held: ConstrainedMotion) -> Strides:
     """Return the cycle of a motion, or its straight line from first to last pose."""
     last = held.scene.reduced.frames - 1.0
-    roots = floor_plane.project(held.poses(np.array([0.0, last]))[1])
+    roots = floor_plane.project(held.roots(np.array([0.0, last])))
     durations, turns = np.array([held.duration]), held.travel[2:]
     if not held.scene.cyclic:
         return Strides(durations, roots[1:] - roots[:1], np.zeros(1), roots[:1])

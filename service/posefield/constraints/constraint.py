@@ -1,6 +1,6 @@
 """Constraints of a motion: measured quantities, their target values and gradients."""
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Protocol
 
@@ -15,6 +15,10 @@ from posefield.motion.measures import POSITION_AXES, TRAVEL_QUANTITIES, Measure
 
 ValuesAndGradients = tuple[Values, Gradients]
 """Values (k,), and their gradients (k, numbers) with respect to the numbers of the motion."""
+
+StackedValues = Annotated[Floats, "motions values"]
+StackedGradients = Annotated[Floats, "motions values variables"]
+StackedVariables = Annotated[Floats, "motions variables"]
 
 
 class Constraint(Protocol):
@@ -34,6 +38,15 @@ class Constraint(Protocol):
 
     def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the values of a motion and their gradients."""
+
+    @property
+    def kind(self) -> Hashable:
+        """Return what constraints of several motions that are evaluated at once have in common."""
+
+    def evaluate_many(
+        self, scenes: Sequence[MotionVariables], numbers: StackedVariables
+    ) -> tuple[StackedValues, StackedGradients]:
+        """Return the values (M, k) of motions and their gradients (M, k, numbers)."""
 
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
@@ -73,6 +86,17 @@ class PositionConstraint:
         gradients = np.mean([gradient for _, gradient in found], axis=0)
         return values[list(self.axes)], gradients[list(self.axes)]
 
+    @property
+    def kind(self) -> Hashable:
+        """Return what constraints have in common that are evaluated at once: these are alone."""
+        return type(self), self.moment, (self.axes, self.at)
+
+    def evaluate_many(
+        self, scenes: Sequence[MotionVariables], numbers: StackedVariables
+    ) -> tuple[StackedValues, StackedGradients]:
+        """Return the values (M, k) of motions and their gradients (M, k, numbers)."""
+        return _stacked([self.evaluate(*own) for own in zip(scenes, numbers, strict=True)])
+
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
     ) -> Annotated[Floats, "motions values"]:
@@ -103,6 +127,17 @@ class StepLengthConstraint:
         sign = 1.0 if ahead >= 0.0 else -1.0
         return np.array([sign * ahead]), sign * (first[1] - second[1])[2:]
 
+    @property
+    def kind(self) -> Hashable:
+        """Return what constraints have in common that are evaluated at once: these are alone."""
+        return type(self), self.moment, None
+
+    def evaluate_many(
+        self, scenes: Sequence[MotionVariables], numbers: StackedVariables
+    ) -> tuple[StackedValues, StackedGradients]:
+        """Return the values (M, k) of motions and their gradients (M, k, numbers)."""
+        return _stacked([self.evaluate(*own) for own in zip(scenes, numbers, strict=True)])
+
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
     ) -> Annotated[Floats, "motions 1"]:
@@ -125,19 +160,30 @@ class TravelConstraint:
 
     def evaluate(self, scene: MotionVariables, numbers: Variables) -> ValuesAndGradients:
         """Return the value and its gradient."""
-        log_duration, travel = scene.duration_and_travel(numbers)
-        duration = float(np.exp(log_duration))
-        value = measures.travel_value(self.quantity, travel, duration)
-        gradients = np.zeros((1, len(numbers)))
-        way = max(float(np.hypot(*travel[:2])), 1e-9)
+        values, gradients = self.evaluate_many([scene], numbers[None])
+        return values[0], gradients[0]
+
+    @property
+    def kind(self) -> Hashable:
+        """Return what constraints have in common that are evaluated at once."""
+        return type(self), self.quantity
+
+    def evaluate_many(
+        self, scenes: Sequence[MotionVariables], numbers: StackedVariables
+    ) -> tuple[StackedValues, StackedGradients]:
+        """Return the values (M, 1) of cycles and their gradients (M, 1, numbers)."""
+        duration, travel = np.exp(numbers[:, -CYCLE_VARIABLES]), numbers[:, -CYCLE_VARIABLES + 1 :]
+        values = measures.travel_values(self.quantity, travel, duration)
+        gradients = np.zeros((len(numbers), 1, numbers.shape[1]))
         if self.quantity == "turn":
-            gradients[0, -1] = np.degrees(1.0)
-        else:
-            per = duration if self.quantity == "speed" else 1.0
-            gradients[0, -CYCLE_VARIABLES + 1 : -1] = travel[:2] / way / per
+            gradients[:, 0, -1] = np.degrees(1.0)
+            return values[:, None], gradients
+        way = np.maximum(np.hypot(travel[:, 0], travel[:, 1]), 1e-9)
+        per = duration if self.quantity == "speed" else np.ones(len(duration))
+        gradients[:, 0, -CYCLE_VARIABLES + 1 : -1] = travel[:, :2] / (way * per)[:, None]
         if self.quantity == "speed":
-            gradients[0, -CYCLE_VARIABLES] = -value
-        return np.array([value]), gradients
+            gradients[:, 0, -CYCLE_VARIABLES] = -values
+        return values[:, None], gradients
 
     def evaluate_motions(
         self, scene: MotionVariables, numbers: Variables, motions: ReducedMotions
@@ -149,10 +195,27 @@ class TravelConstraint:
 def evaluate(
     aims: Sequence[Constraint], scene: MotionVariables, numbers: Variables
 ) -> ValuesAndGradients:
-    """Return the concatenated values and gradients of several constraints."""
+    """Return the concatenated values and gradients of several constraints of one motion."""
+    values, gradients = evaluate_many(aims, [scene], numbers[None])
+    return values[0], gradients[0]
+
+
+def evaluate_many(
+    aims: Sequence[Constraint], scenes: Sequence[MotionVariables], numbers: StackedVariables
+) -> tuple[StackedValues, StackedGradients]:
+    """Return the values (M, k) and gradients (M, k, numbers) of several constraints of motions."""
     cancellation.check()
-    found = [aim.evaluate(scene, numbers) for aim in aims]
-    return np.concatenate([v for v, _ in found]), np.vstack([g for _, g in found])
+    found = [aim.evaluate_many(scenes, numbers) for aim in aims]
+    values, gradients = zip(*found, strict=True)
+    return np.concatenate(values, axis=1), np.concatenate(gradients, axis=1)
+
+
+def _stacked(
+    found: Sequence[ValuesAndGradients],
+) -> tuple[StackedValues, StackedGradients]:
+    """Return the values (M, k) and gradients (M, k, numbers) of motions."""
+    values, gradients = zip(*found, strict=True)
+    return np.stack(values), np.stack(gradients)
 
 
 def from_controls(asked: Sequence[tuple[str, Measure, float]], frames: int) -> list[Constraint]:

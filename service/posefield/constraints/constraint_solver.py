@@ -10,8 +10,9 @@ import numpy as np
 
 from posefield.common import cancellation
 from posefield.common.array_shapes import Frames
-from posefield.common.errors import InvalidField
+from posefield.common.errors import InvalidField, QueryError
 from posefield.common.units import Floats
+from posefield.common.value_cache import ValueCache
 from posefield.constraints import constrained_motion, constraint, overshoot
 from posefield.constraints import targets as goals
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
@@ -48,6 +49,25 @@ class _CacheKey:
     level: int
 
 
+@dataclass(frozen=True)
+class MotionTimes:
+    """A motion, predicted or corrected, and times (S,), s, of its poses."""
+
+    question: ValidatedQuestion
+    held: ConstrainedMotion
+    when: Frames
+    trust: Trust
+
+
+@dataclass(frozen=True)
+class _OpenMotion:
+    """A motion that is corrected. begun: predicted. held: by the last round."""
+
+    key: _CacheKey
+    begun: ConstrainedMotion
+    held: ConstrainedMotion
+
+
 class ConstraintSolver:
     """Constraint solver of one model."""
 
@@ -55,7 +75,7 @@ class ConstraintSolver:
         self._session = session
         self.variation = TakeVariation(session)
         self._correctors: dict[int, LevelCorrector] = {}
-        self._solve_cached = lru_cache(CACHE_SIZE)(self._solve)
+        self._solved = ValueCache[_CacheKey, ConstrainedMotion | QueryError](CACHE_SIZE)
         self._positions_cached = lru_cache(CACHE_SIZE)(self._captured_positions)
 
     @cached_property
@@ -125,8 +145,23 @@ class ConstraintSolver:
         Without constraints, it is the predicted motion or its take. Raises InvalidField for a
         target at a time outside the clip.
         """
-        point, labels = question.point.tobytes(), question.labels.tobytes()
-        return self._solve_cached(_CacheKey(question, found, point, labels, question.level))
+        (held,) = self.solve_all([(question, found)])
+        if isinstance(held, QueryError):
+            raise held
+        return held
+
+    def solve_all(
+        self, every: Sequence[tuple[ValidatedQuestion, ConstraintSet]]
+    ) -> list[ConstrainedMotion | QueryError]:
+        """Return the motions of questions as `solve` does, or the errors that it raises.
+
+        Each has the bytes that it has alone.
+        """
+        keys = [
+            _CacheKey(own, found, own.point.tobytes(), own.labels.tobytes(), own.level)
+            for own, found in every
+        ]
+        return self._solved.find_all(keys, self._solve)
 
     def corrector(self, level: int) -> LevelCorrector:
         """Return the data for corrections at a level, computed once."""
@@ -136,14 +171,29 @@ class ConstraintSolver:
         """Return the measured controls of a motion."""
         return self._corrector(question.level).measured(held)
 
-    def poses(
+    def poses_at(
         self, question: ValidatedQuestion, held: ConstrainedMotion, when: Frames, trust: Trust
     ) -> PoseAnswer[np.float64]:
-        """Return the poses of a motion at times (S,), s."""
-        frames = self._frames(question, held, when)
-        rotations, roots = held.poses(frames)
-        curves = held.curve_values(frames) if self._session.card.curves else None
-        return PoseAnswer(when, rotations, roots, held.state.bones, trust, curves)
+        """Return the poses of one motion at times (S,), s."""
+        (answer,) = self.poses([MotionTimes(question, held, when, trust)])
+        return answer
+
+    def poses(self, every: Sequence[MotionTimes]) -> list[PoseAnswer[np.float64]]:
+        """Return the poses of motions at their times; each has the bytes that it has alone."""
+        frames = [self._frames(own.question, own.held, own.when) for own in every]
+        poses = constrained_motion.evaluate_poses([own.held for own in every], frames)
+        named = bool(self._session.card.curves)
+        return [
+            PoseAnswer(
+                own.when,
+                rotations,
+                roots,
+                own.held.state.bones,
+                own.trust,
+                own.held.curve_values(at) if named else None,
+            )
+            for own, at, (rotations, roots) in zip(every, frames, poses, strict=True)
+        ]
 
     def _captured_positions(
         self, moment: Measure, time: float | None
@@ -182,29 +232,69 @@ class ConstraintSolver:
         own = self._session.state(question.point, shares, question.labels, question.level)
         return own.frames
 
-    def _solve(self, asked: _CacheKey) -> ConstrainedMotion:
-        question, bench = asked.question, self._corrector(asked.question.level)
-        state = self._session.state(question.point, np.zeros(1), question.labels, question.level)
+    def _solve(self, keys: Sequence[_CacheKey]) -> list[ConstrainedMotion | QueryError]:
+        """Return the motions of questions, or their errors."""
+        found = [self._begun(key) for key in keys]
+        open_ = [_OpenMotion(key, held, held) for key, held in zip(keys, found, strict=True)]
+        open_ = [own for own in open_ if own.key.constraints.corrects]
+        held = {id(own.key): own.held for own in self._corrected(open_)}
+        return [
+            self._checked(key, held[id(key)]) if id(key) in held else begun
+            for key, begun in zip(keys, found, strict=True)
+        ]
+
+    def _begun(self, key: _CacheKey) -> ConstrainedMotion:
+        """Return the predicted motion of a question, or its take."""
+        question, bench = key.question, self._corrector(key.level)
+        state = self._session.state(question.point, np.zeros(1), question.labels, key.level)
         begun = bench.predict(state)
-        if asked.constraints.take:
-            begun = self.variation.vary(bench, begun, question, asked.constraints.take)
-        held = begun
-        if not asked.constraints.corrects:
-            return begun
-        aims = constraint.from_controls(asked.constraints.controls, bench.reduced.frames)
-        last = bench.reduced.frames - 1.0
+        take = key.constraints.take
+        return self.variation.vary(bench, begun, question, take) if take else begun
+
+    def _corrected(self, every: Sequence[_OpenMotion]) -> list[_OpenMotion]:
+        """Return the motions, corrected: in rounds, as targets at times move with the duration."""
+        done: list[_OpenMotion] = []
         for _ in range(MAX_ROUNDS):
-            aimed = self._target_constraints(question, asked.constraints.targets, held)
-            found = bench.solve(begun, [*self._without_targeted(aims, aimed, last), *aimed])
-            settled = abs(found.duration / held.duration - 1.0) < DURATION_TOLERANCE
-            held = found
-            if settled:
+            if not every:
                 break
-        bounds = self._session.bounds
+            moved = self._next_round(every)
+            settled = [
+                abs(new.held.duration / old.held.duration - 1.0) < DURATION_TOLERANCE
+                for old, new in zip(every, moved, strict=True)
+            ]
+            done += [own for own, ends in zip(moved, settled, strict=True) if ends]
+            every = [own for own, ends in zip(moved, settled, strict=True) if not ends]
+        return [*done, *every]
+
+    def _next_round(self, every: Sequence[_OpenMotion]) -> list[_OpenMotion]:
+        """Return the motions, corrected with their targets where the last round places them."""
+        found: dict[int, ConstrainedMotion] = {}
+        levels = [own.key.level for own in every]
+        for level in dict.fromkeys(levels):
+            places = [place for place, own in enumerate(levels) if own == level]
+            tasks = [(every[place].begun, self._aims(every[place])) for place in places]
+            found |= zip(places, self._corrector(level).solve_all(tasks), strict=True)
+        return [replace(own, held=found[place]) for place, own in enumerate(every)]
+
+    def _aims(self, own: _OpenMotion) -> list[Constraint]:
+        """Return the constraints of a motion."""
+        goals, frames = own.key.constraints, own.begun.scene.reduced.frames
+        aims = constraint.from_controls(goals.controls, frames)
+        aimed = self._target_constraints(own.key.question, goals.targets, own.held)
+        return [*self._without_targeted(aims, aimed, frames - 1.0), *aimed]
+
+    def _checked(self, key: _CacheKey, held: ConstrainedMotion) -> ConstrainedMotion | QueryError:
+        """Return a corrected motion within the bounds, or the error of one of its targets."""
+        question, goals = key.question, key.constraints
+        bench, bounds = self._corrector(key.level), self._session.bounds
         if not bounds.is_inside(question.point):
-            held = overshoot.bring_back(bench, held, asked.constraints, question.controls, bounds)
-        self._check_times(asked.constraints.targets, held)
-        _check_duplicates(self._target_constraints(question, asked.constraints.targets, held), last)
+            held = overshoot.bring_back(bench, held, goals, question.controls, bounds)
+        try:
+            self._check_times(goals.targets, held)
+            aimed = self._target_constraints(question, goals.targets, held)
+            _check_duplicates(aimed, bench.reduced.frames - 1.0)
+        except QueryError as fault:
+            return fault
         return held
 
     def _without_targeted(

@@ -8,15 +8,23 @@ up to that spread.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Annotated
 
 import numpy as np
 
-from posefield.common import cancellation
-from posefield.common.array_shapes import Gradients, ValueMatrix, Values, Variables
+from posefield.common.array_shapes import Values, Variables
+from posefield.common.units import Booleans, Floats, Indices
 from posefield.constraints import constraint, reachability
-from posefield.constraints.constraint import Constraint, ValuesAndGradients
+from posefield.constraints.constraint import (
+    Constraint,
+    StackedGradients,
+    StackedValues,
+    StackedVariables,
+)
+from posefield.constraints.correction_task import CorrectionTask
 from posefield.constraints.motion_variables import MotionVariables
+from posefield.constraints.reachability import stacked_dot, stacked_solve
 from posefield.inference.residual_covariance import ResidualCovariance
 from posefield.question.results import ConstraintResult
 
@@ -47,135 +55,179 @@ class Correction:
 
 
 @dataclass(frozen=True)
-class _Problem:
-    """Constraints and metric of one correction.
+class _Problems:
+    """Constraints and metric of M corrections of one kind.
 
-    begun: numbers of the prediction. aims: constraints. weights (k,): of their values in the
-    squared error.
+    aims: of one of them, whose targets are not used. begun: (M, numbers). goals: values (M, k) to
+    reach. weights (M, k): of the values in the squared errors.
     """
 
-    scene: MotionVariables
+    scenes: Sequence[MotionVariables]
     spread: ResidualCovariance
-    begun: Variables
     aims: Sequence[Constraint]
-    weights: Values
+    begun: StackedVariables
+    goals: StackedValues
+    weights: StackedValues
 
-    def evaluate(self, numbers: Variables) -> ValuesAndGradients:
+    def select(self, chosen: Annotated[Indices, "chosen"]) -> "_Problems":
+        """Return some of the problems."""
+        return replace(
+            self,
+            scenes=[self.scenes[place] for place in chosen.tolist()],
+            begun=self.begun[chosen],
+            goals=self.goals[chosen],
+            weights=self.weights[chosen],
+        )
+
+    def evaluate(self, numbers: StackedVariables) -> tuple[StackedValues, StackedGradients]:
         """Return values and gradients of the aims."""
-        return constraint.evaluate(self.aims, self.scene, numbers)
+        return constraint.evaluate_many(self.aims, self.scenes, numbers)
 
-    def least_change(self, gradients: Gradients, toward: Values) -> Variables:
-        """Return the least change (numbers,) that moves values with these gradients by `toward`."""
+    def least_changes(self, gradients: StackedGradients, toward: StackedValues) -> StackedVariables:
+        """Return the least changes (M, numbers) that move values with gradients by `toward`."""
         carried = self.spread.apply_shrunk(gradients)
-        return carried @ _solve(gradients @ carried, toward)
+        share = _solve(gradients @ carried, toward)
+        return np.asarray((carried @ share[..., None])[..., 0])
+
+    def errors(self, values: StackedValues) -> Annotated[Floats, "motions"]:
+        """Return the squared errors (M,) of values (M, k)."""
+        return stacked_dot(self.weights, np.square(self.goals - values))
 
 
-def correct(
-    scene: MotionVariables,
-    spread: ResidualCovariance,
-    sigma: float,
-    begun: Variables,
-    aims: Sequence[Constraint],
-) -> Correction:
-    """Return the motion nearest to a prediction that satisfies the constraints.
+@dataclass(frozen=True)
+class _Iterates:
+    """Motions of M corrections. whole: whether to correct from the predictions anew (M,)."""
 
-    begun: its numbers. sigma: its standard deviation, m. Constraints beyond the spread of captured
-    motions are approached up to it.
+    numbers: StackedVariables
+    values: StackedValues
+    gradients: StackedGradients
+    whole: Annotated[Booleans, "motions"]
+
+    def select(self, chosen: Annotated[Indices, "chosen"]) -> "_Iterates":
+        """Return some of the iterates."""
+        return _Iterates(*(getattr(self, own.name)[chosen] for own in fields(self)))
+
+    def write(self, places: Annotated[Indices, "chosen"], found: "_Iterates") -> None:
+        """Replace some of the iterates by others."""
+        for own in fields(self):
+            getattr(self, own.name)[places] = getattr(found, own.name)
+
+
+def correct(spread: ResidualCovariance, tasks: Sequence[CorrectionTask]) -> list[Correction]:
+    """Return the motions nearest to predictions that satisfy the constraints.
+
+    Constraints beyond the spread of captured motions are approached up to it. Each motion has the
+    bytes that it has alone: products are those of one motion, stacked.
     """
-    if not aims:
-        return Correction(begun, (), 0, 0.0)
-    looked = constraint.evaluate(aims, scene, begun)
+    found: dict[int, Correction] = {
+        place: Correction(own.begun, (), 0, 0.0) for place, own in enumerate(tasks) if not own.aims
+    }
+    kinds = [own.kind for own in tasks]
+    for kind in dict.fromkeys(kinds):
+        places = [at for at, own in enumerate(kinds) if own == kind and tasks[at].aims]
+        if places:
+            made = _correct_alike(spread, [tasks[place] for place in places])
+            found |= zip(places, made, strict=True)
+    return [found[place] for place in range(len(tasks))]
+
+
+def _correct_alike(spread: ResidualCovariance, tasks: Sequence[CorrectionTask]) -> list[Correction]:
+    """Return the corrections of tasks of one kind."""
+    scenes, aims = [own.scene for own in tasks], tasks[0].aims
+    begun = np.stack([own.begun for own in tasks])
+    looked = constraint.evaluate_many(aims, scenes, begun)
     judged, seen = begun, looked
-    if scene.predicted is not None:
+    if scenes[0].predicted is not None:
         # A take deviates from the prediction already; the spread is that about the prediction.
-        judged, seen = scene.predicted, constraint.evaluate(aims, scene, scene.predicted)
-    found = reachability.assess(scene, spread, sigma, judged, aims, seen)
-    task = _Problem(scene, spread, begun, aims, found.weights)
-    numbers, values, steps = _descend(task, looked, seen[0] + found.reachable)
-    return Correction(numbers, tuple(_constraint_results(aims, values)), steps, found.distance)
+        judged = np.stack([own.scene.predicted for own in tasks if own.scene.predicted is not None])
+        seen = constraint.evaluate_many(aims, scenes, judged)
+    found = reachability.assess(spread, tasks, judged, seen)
+    problems = _Problems(scenes, spread, aims, begun, seen[0] + found.reachable, found.weights)
+    last, steps = _descend(problems, looked)
+    return [
+        Correction(numbers, tuple(_constraint_results(own.aims, values)), count, float(distance))
+        for own, numbers, values, count, distance in zip(
+            tasks, last.numbers, last.values, steps, found.distance, strict=True
+        )
+    ]
 
 
 def _descend(
-    task: _Problem, looked: ValuesAndGradients, goal: Values
-) -> tuple[Variables, Values, int]:
-    """Return the corrected numbers, their values, and the number of steps."""
-    numbers, whole = task.begun, True
-    for step in range(MAX_STEPS):
-        if _largest_error(goal - looked[0]) < TOLERANCE:
-            return numbers, looked[0], step
-        moved = _next_iterate(task, numbers, looked, goal, whole)
-        if moved is None:
-            return numbers, looked[0], step
-        numbers, looked, whole = moved
-    return numbers, looked[0], MAX_STEPS
+    problems: _Problems, looked: tuple[StackedValues, StackedGradients]
+) -> tuple[_Iterates, list[int]]:
+    """Return the corrected motions, and the number of steps of each."""
+    count = len(problems.begun)
+    now = _Iterates(problems.begun.copy(), *looked, np.ones(count, bool))
+    steps, active = np.zeros(count, np.int64), np.arange(count)
+    for _ in range(MAX_STEPS):
+        left = np.abs(problems.goals[active] - now.values[active]).max(axis=1)
+        active = active[left >= TOLERANCE]
+        if not len(active):
+            break
+        moved, found = _next_iterates(problems.select(active), now.select(active))
+        active = active[moved]
+        now.write(active, found)
+        steps[active] += 1
+    return now, steps.tolist()
 
 
-def _next_iterate(
-    task: _Problem,
-    numbers: Variables,
-    looked: ValuesAndGradients,
-    goal: Values,
-    whole: bool,
-) -> tuple[Variables, ValuesAndGradients, bool] | None:
-    """Return the next numbers, their values and gradients, and whether the step was shortened.
+def _next_iterates(
+    problems: _Problems, now: _Iterates
+) -> tuple[Annotated[Booleans, "motions"], _Iterates]:
+    """Return which motions a step brings nearer, and their next iterates.
 
-    whole: correct from the prediction anew. None if no step reduces the error.
+    The others have no step that reduces the error.
     """
-    values, gradients = looked
-    left = goal - values
-    share = min(1.0, TRUST_RADIUS / max(_largest_distance(task.aims, left), 1e-12))
-    base = task.begun if whole else numbers
+    left = problems.goals - now.values
+    far = np.maximum(_largest_distances(problems.aims, left), 1e-12)
+    share = np.minimum(1.0, TRUST_RADIUS / far)
+    base = np.where(now.whole[:, None], problems.begun, now.numbers)
+    along = (now.gradients @ (now.numbers - base)[..., None])[..., 0]
+    before = problems.errors(now.values)
+    found = now.select(np.arange(len(left)))
+    pending = np.arange(len(left))
     for _ in range(MAX_HALVINGS):
-        cancellation.check()
-        toward = share * left + gradients @ (numbers - base)
-        tried = base + task.least_change(gradients, toward)
-        found = task.evaluate(tried)
-        if _is_better(task, goal - values, goal - found[0]):
-            return tried, found, bool(share < 1.0)
-        share *= 0.5
-    return None
+        own = problems.select(pending)
+        toward = share[pending, None] * left[pending] + along[pending]
+        tried = base[pending] + own.least_changes(now.gradients[pending], toward)
+        values, gradients = own.evaluate(tried)
+        better = own.errors(values) < SUFFICIENT_DECREASE * before[pending]
+        done = pending[better]
+        shortened = share[done] < 1.0
+        found.write(done, _Iterates(tried[better], values[better], gradients[better], shortened))
+        pending = pending[~better]
+        if not len(pending):
+            break
+        share[pending] *= 0.5
+    moved = np.ones(len(left), bool)
+    moved[pending] = False
+    return moved, found.select(np.flatnonzero(moved))
 
 
-def _is_better(task: _Problem, before: Values, after: Values) -> bool:
-    """Return whether a step reduces the error of the constraints."""
-    old, new = (_weighted_error(left, task.weights) for left in (before, after))
-    return new < SUFFICIENT_DECREASE * old
-
-
-def _largest_error(left: Values) -> float:
-    return float(np.abs(left).max(initial=0.0))
-
-
-def _solve(matrix: ValueMatrix, right: Values) -> Values:
-    """Return the solution of a covariance's system.
+def _solve(
+    matrices: Annotated[Floats, "motions values values"], right: StackedValues
+) -> StackedValues:
+    """Return the solutions (M, k) of covariances' systems.
 
     A ridge distributes the error between contradicting constraints.
     """
-    ridge = 1e-9 * np.diag(np.diagonal(matrix)) + 1e-300 * np.eye(len(matrix))
-    return np.asarray(np.linalg.solve(matrix + ridge, right), np.float64)
+    eye = np.eye(matrices.shape[-1])
+    return stacked_solve(matrices + 1e-9 * matrices * eye + 1e-300 * eye, right)
 
 
-def _largest_distance(aims: Sequence[Constraint], left: Values) -> float:
-    """Return the largest distance, m, among the values (k,) in metres."""
-    units = [aim.unit for aim in aims for _ in aim.target]
-    places = zip(left[: len(units)], units, strict=True)
-    return max((abs(value) for value, unit in places if unit == "m"), default=0.0)
+def _largest_distances(
+    aims: Sequence[Constraint], left: StackedValues
+) -> Annotated[Floats, "motions"]:
+    """Return the largest distances (M,), m, among the values (M, k) in metres."""
+    metres = np.array([aim.unit == "m" for aim in aims for _ in aim.target])
+    return np.abs(left[:, metres]).max(axis=1, initial=0.0)
 
 
-def _weighted_error(left: Values, worth: Values) -> float:
-    return float(np.sum(worth * np.square(left)))
-
-
-def distance(
-    scene: MotionVariables,
-    spread: ResidualCovariance,
-    sigma: float,
-    numbers: Variables,
-    aims: Sequence[Constraint],
-) -> float:
-    """Return the Mahalanobis distance of the constraints from a motion (numbers,)."""
-    looked = constraint.evaluate(aims, scene, numbers)
-    return reachability.assess(scene, spread, sigma, numbers, aims, looked).distance
+def distance(spread: ResidualCovariance, task: CorrectionTask) -> float:
+    """Return the Mahalanobis distance of the constraints from a motion."""
+    numbers = task.begun[None]
+    looked = constraint.evaluate_many(task.aims, [task.scene], numbers)
+    return float(reachability.assess(spread, [task], numbers, looked).distance[0])
 
 
 def _constraint_results(aims: Sequence[Constraint], found: Values) -> list[ConstraintResult]:

@@ -13,10 +13,9 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common import cancellation
-from posefield.common.array_shapes import Gradients, ReducedMotions, ValueMatrix, Values, Variables
-from posefield.common.units import Floats
-from posefield.constraints.constraint import Constraint, ValuesAndGradients
-from posefield.constraints.motion_variables import MotionVariables
+from posefield.common.units import Floats, Indices
+from posefield.constraints.constraint import StackedGradients, StackedValues, StackedVariables
+from posefield.constraints.correction_task import CorrectionTask
 from posefield.inference.residual_covariance import ResidualCovariance
 
 # Weight in the covariance of an equal share for all values of a constraint, so that none has zero
@@ -29,75 +28,127 @@ SHARE_CORRELATION = 0.99
 # in 300. At 4, a tenth of the targets 20 cm too far are accepted; at 3.25, one captured clip in 70
 # is not.
 MAX_DEVIATIONS = 3.7
+# Halvings of the interval of the price at which differences are within the largest distance.
+HALVINGS = 40
+
+StackedMatrices = Annotated[Floats, "motions values values"]
 
 
 @dataclass(frozen=True)
 class Reachability:
-    """Differences (k,) between constraints and a motion, with their covariance.
+    """Differences (M, k) between constraints and motions, with their covariances.
 
-    differences: differences of the values from their targets. covariance: (k, k). members (k,
+    differences: differences of the values from their targets. covariance: (M, k, k). members (k,
     aims): 1 where a value belongs to a constraint, else 0.
     """
 
-    differences: Values
-    covariance: ValueMatrix
+    differences: StackedValues
+    covariance: StackedMatrices
     members: Annotated[Floats, "values aims"]
 
     @cached_property
-    def distance(self) -> float:
-        """Mahalanobis distance of the constraints."""
-        return float(np.sqrt(self.differences @ np.linalg.solve(self.covariance, self.differences)))
+    def distance(self) -> Annotated[Floats, "motions"]:
+        """Mahalanobis distances (M,) of the constraints."""
+        solved = stacked_solve(self.covariance, self.differences)
+        return np.asarray(np.sqrt(stacked_dot(self.differences, solved)))
 
     @cached_property
-    def weights(self) -> Values:
-        """Weight (k,) of each value in the squared error.
+    def weights(self) -> StackedValues:
+        """Weight (M, k) of each value in the squared error.
 
         The inverse mean variance of its constraint, so that metres and degrees compare.
         """
-        return 1.0 / (self.members @ _means(self.members, np.diagonal(self.covariance)))
+        sizes = self.members.sum(axis=0)
+        variances = np.diagonal(self.covariance, axis1=1, axis2=2)
+        means = (variances[:, None] @ self.members) / sizes
+        return np.asarray(1.0 / (means @ self.members.T)[:, 0])
 
     @property
-    def reachable(self) -> Values:
-        """Reachable part (k,) of the differences.
+    def reachable(self) -> StackedValues:
+        """Reachable parts (M, k) of the differences.
 
         All of them within the largest plausible distance; else a share of each constraint's
         difference, chosen for the least remaining error at that distance.
         """
-        limit = distance_limit(len(self.differences))
-        if self.distance <= limit:
-            return self.differences
-        each = self.members * self.differences[:, None]
-        apart = each.T @ np.linalg.solve(self.covariance, each)
-        misses = np.diag(each.T**2 @ self.weights)
-        low, high = 0.0, 1.0
-        while _length(apart, _shares(apart, misses, high)) > limit:
-            low, high = high, 4.0 * high
-        for _ in range(40):
+        found = self.differences.copy()
+        far = np.flatnonzero(self.distance > distance_limit(found.shape[1]))
+        if len(far):
+            found[far] = self._nearest(far)
+        return found
+
+    def _nearest(self, far: Annotated[Indices, "chosen"]) -> Annotated[Floats, "chosen values"]:
+        """Return the reachable parts (m, k) of differences beyond the largest distance."""
+        limit = distance_limit(self.differences.shape[1])
+        each = self.members * self.differences[far][:, :, None]
+        across = each.swapaxes(1, 2)
+        apart = across @ np.linalg.solve(self.covariance[far], each)
+        misses = (across**2 @ self.weights[far][..., None])[..., 0]
+        shares = _Shares.of(apart, misses)
+        low, high = np.zeros(len(far)), np.ones(len(far))
+        while (outside := shares.squared_lengths(high) > limit**2).any():
+            low, high = np.where(outside, high, low), np.where(outside, 4.0 * high, high)
+        for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            outside = _length(apart, _shares(apart, misses, middle)) > limit
-            low, high = (middle, high) if outside else (low, middle)
-        return np.asarray(each @ _shares(apart, misses, high), np.float64)
+            outside = shares.squared_lengths(middle) > limit**2
+            low, high = np.where(outside, middle, low), np.where(outside, high, middle)
+        return np.asarray((each @ shares.at(high)[..., None])[..., 0])
+
+
+@dataclass(frozen=True)
+class _Shares:
+    """Shares (m, aims) of differences for the least error plus distance, at any price.
+
+    apart: (m, aims, aims), inner products of the differences by the inverse covariance. scale,
+    values, vectors: of the eigenvalues, in which the systems of all prices are diagonal. loads: the
+    right sides in them.
+    """
+
+    apart: StackedMatrices
+    scale: StackedValues
+    values: StackedValues
+    vectors: StackedMatrices
+    loads: StackedValues
+
+    @classmethod
+    def of(cls, apart: StackedMatrices, misses: StackedValues) -> "_Shares":
+        """Return the shares for squared errors `misses` (m, aims)."""
+        # A constraint that is met already has a difference of zero.
+        scale = 1.0 / np.sqrt(np.where(misses == 0.0, 1.0, misses))
+        values, vectors = np.linalg.eigh(scale[:, :, None] * apart * scale[:, None])
+        loads = ((scale * misses)[:, None] @ vectors)[:, 0]
+        return cls(apart, scale, values, vectors, loads)
+
+    def at(self, price: Annotated[Floats, "motions"]) -> StackedValues:
+        """Return the shares (m, aims); price: weight of the squared distance."""
+        found = self.loads / (1.0 + price[:, None] * self.values)
+        free = self.scale * (self.vectors @ found[..., None])[..., 0]
+        return np.asarray(np.minimum(np.maximum(free, 0.0), 1.0))
+
+    def squared_lengths(self, price: Annotated[Floats, "motions"]) -> Annotated[Floats, "motions"]:
+        """Return the squared Mahalanobis lengths (m,) of the shares of the differences."""
+        own = self.at(price)[:, None]
+        return np.asarray((own @ self.apart @ own.swapaxes(1, 2))[:, 0, 0])
 
 
 def assess(
-    scene: MotionVariables,
     spread: ResidualCovariance,
-    sigma: float,
-    numbers: Variables,
-    aims: Sequence[Constraint],
-    looked: ValuesAndGradients,
+    tasks: Sequence[CorrectionTask],
+    numbers: StackedVariables,
+    looked: tuple[StackedValues, StackedGradients],
 ) -> Reachability:
-    """Return the reachability of constraints from a motion (numbers,).
+    """Return the reachability of the constraints of tasks of one kind from motions (M, numbers).
 
-    sigma: standard deviation of the motion, m. looked: its values and gradients, those of `aims`
-    first.
+    looked: values and gradients of the motions.
     """
-    members = np.repeat(np.eye(len(aims)), [len(aim.target) for aim in aims], axis=0)
-    values, gradients = (seen[: len(members)] for seen in looked)
-    covariance = sigma**2 * _blend_equal_shares(
-        _residual_covariance(scene, spread, numbers, aims, gradients), members
+    sizes = [len(aim.target) for aim in tasks[0].aims]
+    members = np.repeat(np.eye(len(sizes)), sizes, axis=0)
+    values, gradients = looked
+    sigmas = np.array([own.sigma for own in tasks])
+    covariance = np.square(sigmas)[:, None, None] * _blend_equal_shares(
+        _residual_covariances(spread, tasks, numbers, gradients), members
     )
-    return Reachability(np.concatenate([aim.target for aim in aims]) - values, covariance, members)
+    targets = np.stack([np.concatenate([aim.target for aim in own.aims]) for own in tasks])
+    return Reachability(targets - values, covariance, members)
 
 
 def distance_limit(values: int) -> float:
@@ -112,39 +163,33 @@ def distance_limit(values: int) -> float:
     return float(np.sqrt(values * (1.0 - own**2 + share * own) ** 3))
 
 
-def _residual_covariance(
-    scene: MotionVariables,
+def _residual_covariances(
     spread: ResidualCovariance,
-    numbers: Variables,
-    aims: Sequence[Constraint],
-    gradients: Gradients,
-) -> ValueMatrix:
-    """Return the covariance (k, k) of leave-one-out residuals in the constrained values.
+    tasks: Sequence[CorrectionTask],
+    numbers: StackedVariables,
+    gradients: StackedGradients,
+) -> StackedMatrices:
+    """Return the covariances (M, k, k) of leave-one-out residuals in the constrained values.
 
-    For a sigma of one metre, with the skeleton and the travel of this motion.
+    For a sigma of one metre, with the skeletons and the travels of these motions.
     """
     motions = np.concatenate([spread.captured, spread.predicted])
-    found = np.hstack([_evaluate_motions(aim, scene, numbers, motions) for aim in aims])
     clips = len(spread.captured)
-    strays = (found[:clips] - found[clips:]) / spread.sigmas[:, None]
-    beside = gradients[:, motions.shape[1] :]
-    return np.asarray(strays.T @ strays + beside @ spread.beside @ beside.T, np.float64)
-
-
-def _evaluate_motions(
-    aim: Constraint,
-    scene: MotionVariables,
-    numbers: Variables,
-    motions: ReducedMotions,
-) -> Annotated[Floats, "motions values"]:
-    cancellation.check()
-    return aim.evaluate_motions(scene, numbers, motions)
+    strays = np.empty((len(tasks), clips, gradients.shape[1]))
+    for place, own in enumerate(tasks):
+        cancellation.check()
+        found = [aim.evaluate_motions(own.scene, numbers[place], motions) for aim in own.aims]
+        every = np.hstack(found)
+        strays[place] = (every[:clips] - every[clips:]) / spread.sigmas[:, None]
+    beside = gradients[:, :, motions.shape[1] :]
+    own_part = strays.swapaxes(1, 2) @ strays
+    return np.asarray(own_part + beside @ spread.beside @ beside.swapaxes(1, 2))
 
 
 def _blend_equal_shares(
-    covariance: ValueMatrix, members: Annotated[Floats, "values aims"]
-) -> ValueMatrix:
-    """Return the covariance blended with equal shares for all values of a constraint.
+    covariance: StackedMatrices, members: Annotated[Floats, "values aims"]
+) -> StackedMatrices:
+    """Return covariances (M, k, k) blended with equal shares for all values of a constraint.
 
     The shares correlate between constraints as their mean covariances do; otherwise two
     contradicting constraints would seem near.
@@ -155,27 +200,16 @@ def _blend_equal_shares(
     alike = (place[:, None] == place) & (beside[:, None] == beside)
     shared = members.T @ (alike * covariance) @ members / sizes
     # A value that never varies has a variance of zero.
-    own = np.diag(np.maximum(np.diagonal(shared), 1e-12))
+    own = np.maximum(shared, 1e-12) * np.eye(len(sizes))
     shared = SHARE_CORRELATION * shared + (1.0 - SHARE_CORRELATION) * own
     return (1.0 - EQUAL_SHARE) * covariance + EQUAL_SHARE * alike * (members @ shared @ members.T)
 
 
-def _means(members: Annotated[Floats, "values aims"], values: Values) -> Annotated[Floats, "aims"]:
-    return np.asarray(members.T @ values / members.sum(axis=0), np.float64)
+def stacked_solve(matrices: StackedMatrices, right: StackedValues) -> StackedValues:
+    """Return the solutions (M, k) of systems, each by a factorisation of its own."""
+    return np.asarray(np.linalg.solve(matrices, right[..., None])[..., 0])
 
 
-def _shares(
-    apart: Annotated[Floats, "aims aims"], misses: Annotated[Floats, "aims aims"], price: float
-) -> Annotated[Floats, "aims"]:
-    """Return the shares (aims,) of the differences for the least error plus weighted distance.
-
-    price: weight of the squared distance.
-    """
-    # A constraint that is met already has a difference of zero.
-    met = np.diag((np.diagonal(misses) == 0.0).astype(float))
-    found = np.linalg.solve(price * apart + misses + met, np.diagonal(misses))
-    return np.asarray(np.clip(found, 0.0, 1.0), np.float64)
-
-
-def _length(apart: Annotated[Floats, "aims aims"], shares: Annotated[Floats, "aims"]) -> float:
-    return float(np.sqrt(shares @ apart @ shares))
+def stacked_dot(a: StackedValues, b: StackedValues) -> Annotated[Floats, "motions"]:
+    """Return the dot products (M,) of vectors (M, k), each by a product of its own."""
+    return np.asarray((a[:, None] @ b[..., None])[:, 0, 0])

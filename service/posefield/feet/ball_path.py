@@ -1,32 +1,33 @@
-"""Path of the joint that contacts: the smoothest change of the predicted path that stands.
+"""Paths of the joints that contact: the smoothest changes of the predicted paths that stand.
 
-The path y minimises the sum of |y - f|² + (tau r)⁴ |D² (y - f)|² and is constant in each stance: a
-thin-plate prior on the change, conditioned on standing. f is the predicted path, r the rate and D²
-the second difference. Places over the floor are complex numbers, so that the turn of a cycle is a
-factor, and a cycle closes exactly.
+The change over the floor is that of `smooth_change`: a thin-plate prior on the change, conditioned
+on standing. Heights have the same change with given heights of stances, and swings are lifted.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-import numpy.typing as npt
 
 from posefield.common.array_shapes import RootPath
-from posefield.common.units import UP, Floats, Indices
-from posefield.feet import banded_systems, stances
-from posefield.feet.stances import Cycle, FootPath, Interval
+from posefield.common.frame_groups import FrameGroups
+from posefield.common.units import UP, Booleans, Floats, Indices
+from posefield.feet import stance_rows
+from posefield.feet.smooth_change import smooth_change
+from posefield.feet.stance_rows import FootRows, Mask, PerRun, Runs
+from posefield.feet.stances import (
+    FULL_STEP,
+    LEAST_LIFT,
+    UNEVEN,
+    Interval,
+    highest_lift,
+    lift_shares,
+)
 from posefield.locomotion import floor_plane
-from posefield.motion.foot_contacts import FootContact
-from posefield.question.floor import LEVEL_FLOOR, Floor
+from posefield.locomotion.floor_plane import FloorVectors
 
-# Time over which a change of the path is spread, s.
-SPREAD = 0.1
 # A foot keeps its place over the floor for this time before and after a swing, while it is low, s.
 HOLD = 0.05
-
-Numbers = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -41,210 +42,186 @@ class Footsteps:
     stances: tuple[Interval, ...]
     anchors: Annotated[Floats, "stances 3"]
 
-    def on_floor(self, floor: Floor) -> "Footsteps":
-        """Return the steps of a floor at height 0 on another floor."""
-        if floor == LEVEL_FLOOR:
-            return self
-        moved = self.positions + floor.heights(self.positions)[:, None] * UP
-        anchors = self.anchors + floor.heights(self.anchors)[:, None] * UP
-        return Footsteps(moved, self.stances, anchors)
 
+def plan_paths(
+    feet: FootRows,
+    found: Runs,
+    goal: Annotated[Floats, "frames 3"],
+    places: Annotated[FloorVectors, "runs"] | None = None,
+) -> Annotated[Floats, "frames 3"]:
+    """Return the paths (N, 3), m, of feet that stand in the runs `found`.
 
-def plan_path(
-    path: FootPath, found: Sequence[Interval], foot: FootContact, goal: RootPath | None = None
-) -> Footsteps:
-    """Return the path of a foot that stands in the intervals `found`.
-
-    goal: points (F, 3), m, that the path goes through; not a number in other frames.
+    goal: points (N, 3), m, that the paths go through; not a number in other frames. places: of the
+    stances over the floor, if they are given.
     """
-    height = foot.height
-    goal = np.full(path.positions.shape, np.nan) if goal is None else goal
-    held = _held(path, found, goal)
-    floor_path = smooth_change(
-        path.floor, held, path.rate, path.cycle, fixed=floor_plane.project(goal)
+    led = ~np.isnan(goal[:, 0])
+    over, up = (floor_plane.project(goal), goal @ UP) if led.any() else (None, None)
+    floor = smooth_change(feet, feet.floor, held(feet, found, led), places, over)
+    heights = smooth_change(feet, feet.heights, found, feet.height[found.rows], up)
+    added, least = lifts(feet, floor, heights, found, goal @ UP)
+    own = feet.height[feet.rows.groups.group]
+    return floor_plane.at_height(floor, np.maximum(heights + added, own + least))
+
+
+def mean_places(feet: FootRows, found: Runs) -> Annotated[FloorVectors, "runs"]:
+    """Return the mean predicted places of feet over the floor in stances that end in their row."""
+    run, frames = found.frames()
+    own = FrameGroups(found.lengths)
+    first = feet.floor[feet.rows.flat(found.rows, found.begins)]
+    # From each stance's start, so that sums stay small.
+    gone = feet.floor[feet.rows.flat(found.rows[run], frames)] - first[run]
+    means: FloorVectors = first + own.means(gone.real) + 1j * own.means(gone.imag)
+    return means
+
+
+def lifts(
+    feet: FootRows,
+    floor: Annotated[FloorVectors, "frames"],
+    heights: Annotated[Floats, "frames"],
+    found: Runs,
+    led: Annotated[Floats, "frames"],
+) -> tuple[Annotated[Floats, "frames"], Annotated[Floats, "frames"]]:
+    """Return how much swinging feet are lifted (N,), m, and their least heights (N,) in swings.
+
+    floor, heights: paths (N,) without lifts. led: heights (N,), m, of points to which feet are led;
+    not a number in other frames. Such a point ends a swing. A foot whose prediction is lifted as
+    captured feet are is not lifted more. Zero in stances, or less where a foot is led below the
+    floor.
+    """
+    rows = feet.rows
+    added = np.zeros(len(floor))
+    lowest = _led_heights(feet, found, led)
+    ended = found.mask(rows) | ~np.isnan(led)
+    swings = stance_rows.runs(~ended, rows)
+    swings = swings.select(_between_stances(swings, feet))
+    if not len(swings.rows):
+        return added, lowest
+    run, frames = swings.frames()
+    flat, own = rows.flat(swings.rows[run], frames), FrameGroups(swings.lengths)
+    ends = _ends(swings, feet)
+    first, last = (lowest[rows.flat(swings.rows, end)] for end in ends)
+    least = _least_lifts(swings, feet, floor, ends)
+    least = np.where(np.minimum(first, last) < -UNEVEN, 0.0, least)
+    share, whole = _shares(swings, feet)
+    rise = lift_shares(share, whole[run] / rows.rates[swings.rows[run]])
+    lifted = np.maximum(own.largest(heights[flat]) - feet.height[swings.rows], 0.0)
+    extra = np.maximum(least * own.largest(rise) - lifted, 0.0)
+    added[flat] = extra[run] * rise
+    between = first[run] + share * (last - first)[run]
+    lowest[flat] = np.minimum(least, LEAST_LIFT)[run] * rise + between
+    return added, lowest
+
+
+def _led_heights(
+    feet: FootRows, found: Runs, led: Annotated[Floats, "frames"]
+) -> Annotated[Floats, "frames"]:
+    """Return how far below their heights feet are led (N,), m: in a stance in all of its frames."""
+    height = feet.height[feet.rows.groups.group]
+    lowest = np.fmin(led - height, 0.0)
+    if lowest.any():
+        run, frames = found.frames()
+        flat = feet.rows.flat(found.rows[run], frames)
+        lowest[flat] = FrameGroups(found.lengths).smallest(lowest[flat])[run]
+    return lowest
+
+
+def _between_stances(swings: Runs, feet: FootRows) -> Annotated[Booleans, "runs"]:
+    """Return which swings have a stance before or after them."""
+    found: Booleans = swings.lengths < feet.rows.counts[swings.rows]
+    return found
+
+
+def _least_lifts(
+    swings: Runs,
+    feet: FootRows,
+    floor: Annotated[FloorVectors, "frames"],
+    ends: tuple[PerRun, PerRun],
+) -> Annotated[Floats, "runs"]:
+    """Return how high feet are lifted in swings at least, m."""
+    begin, end = (stance_rows.places(feet, floor, swings.rows, own) for own in ends)
+    least = feet.clearance[swings.rows] * np.minimum(np.abs(end - begin) / FULL_STEP, 1.0)
+    highest = highest_lift(swings.lengths / feet.rows.rates[swings.rows])
+    return np.where(swings.inner(feet.rows), np.minimum(least, highest), least)
+
+
+def _shares(swings: Runs, feet: FootRows) -> tuple[Annotated[Floats, "frames"], PerRun]:
+    """Return the shares of swings at their frames, 0 to 1, and the steps from stance to stance.
+
+    A swing at an end of a clip goes on outside it, for the usual duration.
+    """
+    rows = feet.rows
+    usual = np.round((feet.swing * rows.rates)[swings.rows]).astype(np.int64)
+    inner = swings.inner(rows)
+    whole = 1 + np.where(inner, swings.lengths, np.maximum(swings.lengths, usual))
+    leads = (swings.begins == 0) & ~inner
+    run, frames = swings.frames()
+    steps = frames - swings.begins[run] + 1.0
+    found: Floats = (steps + ((whole - 1 - swings.lengths) * leads)[run]) / whole[run]
+    return found, whole
+
+
+def _ends(swings: Runs, feet: FootRows) -> tuple[PerRun, PerRun]:
+    """Return the frames in which feet stand before and after swings, or the clips' ends."""
+    counts, cyclic = feet.rows.counts[swings.rows], feet.rows.cyclic[swings.rows]
+    after = np.where(cyclic & (swings.begins == 0), counts, 0)
+    begins, ends = swings.begins - 1 + after, swings.ends + after
+    return (
+        np.where(cyclic, begins, np.maximum(begins, 0)),
+        np.where(cyclic, ends, np.minimum(ends, counts - 1)),
     )
-    heights = smooth_change(
-        path.heights,
-        found,
-        path.rate,
-        None if path.cycle is None else Cycle(0.0, 0.0),
-        np.full(len(found), height),
-        goal[:, 1],
-    )
-    placed = FootPath(floor_plane.at_height(floor_path, heights), path.rate, path.cycle)
-    added, least = stances.lifts(placed, found, foot, goal[:, 1])
-    heights = np.maximum(heights + added, height + least)
-    positions = floor_plane.at_height(floor_path, heights)
-    anchors = positions[[stance.begin for stance in found]].reshape(-1, 3)
-    return Footsteps(positions, tuple(found), anchors)
 
 
-def smooth_change(
-    path: Numbers,
-    intervals: Sequence[Interval],
-    rate: float,
-    cycle: Cycle | None = None,
-    values: Floats | None = None,
-    fixed: Numbers | None = None,
-) -> Numbers:
-    """Return the path (F,) of smoothest change that is constant in each interval.
-
-    path: (F,), real or complex. rate: frames a second. cycle: motion from frame 0 to frame F; None
-    where the path does not repeat. values: of the intervals, if they are given. fixed: values (F,)
-    of single frames, and thereby of the intervals that they are in; not a number in other frames.
-    A path with fixed values does not repeat.
-    """
-    through = np.flatnonzero(~np.isnan(fixed)) if fixed is not None else np.zeros(0, np.int64)
-    if not intervals and not len(through):
-        return path
-    count = len(path)
-    groups, firsts = _groups(count, intervals)
-    bends = _bends(count, cycle)
-    factor, way = (1.0, 0.0) if cycle is None else (cycle.factor, cycle.way)
-    # y = scale * u[groups] + shift: a stance that goes on over the end has its place in the next
-    # cycle, which is moved back.
-    after = stances.mask([Interval(0, i.end - count) for i in intervals if i.end > count], count)
-    scale = np.where(after, np.conj(factor), 1.0)
-    shift = np.where(after, -np.conj(factor) * way, 0.0)
-    if np.isrealobj(path):
-        scale, shift = scale.real, shift.real
-    stiffness = (SPREAD * rate) ** 4
-    goal = _right_side(bends, groups, scale, stiffness, path - shift)
-    known = np.zeros(len(firsts), path.dtype)
-    free = np.ones(len(firsts), bool)
-    if values is not None:
-        own = groups[[interval.begin for interval in intervals]]
-        known[own], free[own] = values, False
-    if fixed is not None:
-        known[groups[through]], free[groups[through]] = fixed[through], False
-    if cycle is None:
-        bands = _normal_bands(bends, groups, stiffness)
-        known = banded_systems.solve(bands, goal, ~free, known)
-    elif free.any():
-        matrix = _normal_matrix(bends, groups, scale, stiffness)
-        goal = goal - matrix @ known
-        known[free] = np.linalg.solve(matrix[np.ix_(free, free)], goal[free])
-    found: Numbers = scale * known[groups] + shift
-    return found
-
-
-@dataclass(frozen=True)
-class _Bends:
-    """Second differences: frames (R, 3) of each, and their factors (R, 3)."""
-
-    frames: Annotated[Indices, "rows 3"]
-    factors: Annotated[Numbers, "rows 3"]
-
-
-def _bends(count: int, cycle: Cycle | None) -> _Bends:
-    """Return the second differences of F frames; those of a cycle go on over its end."""
-    if cycle is None:
-        frames = np.arange(max(count - 2, 0))[:, None] + np.arange(3)
-        return _Bends(frames, np.tile([1.0, -2.0, 1.0], (len(frames), 1)))
-    frames = np.arange(count)[:, None] + np.arange(-1, 2)
-    factor = cycle.factor
-    turned = np.where(frames < 0, np.conj(factor), np.where(frames >= count, factor, 1.0))
-    return _Bends(frames % count, turned * [1.0, -2.0, 1.0])
-
-
-def _normal_matrix(
-    bends: _Bends, groups: Annotated[Indices, "frames"], scale: Numbers, stiffness: float
-) -> Numbers:
-    """Return the matrix (U, U) of the quadratic form of the unknowns."""
-    columns = groups[bends.frames]
-    values = _matching(bends.factors, scale) * scale[bends.frames]
-    size = int(groups.max()) + 1
-    found = np.zeros((size, size), values.dtype)
-    for row in range(3):
-        for column in range(3):
-            own = stiffness * np.conj(values[:, row]) * values[:, column]
-            np.add.at(found, (columns[:, row], columns[:, column]), own)
-    found[np.arange(size), np.arange(size)] += np.bincount(groups)
-    return found
-
-
-def _normal_bands(
-    bends: _Bends, groups: Annotated[Indices, "frames"], stiffness: float
-) -> Annotated[Floats, "3 size"]:
-    """Return the diagonals of the matrix of a path that does not repeat.
-
-    Unknowns are in the order of their frames, so a second difference couples neighbours alone.
-    """
-    columns, size = groups[bends.frames], int(groups.max()) + 1
-    found = np.zeros((3, size))
-    found[0] = np.bincount(groups, minlength=size)
-    for row in range(3):
-        for column in range(row, 3):
-            first, apart = columns[:, row], columns[:, column] - columns[:, row]
-            # A product off the diagonal of the frames counts twice on that of a stance.
-            share = np.where((apart == 0) & (row != column), 2.0, 1.0)
-            own = stiffness * share * bends.factors[:, row] * bends.factors[:, column]
-            found += np.bincount(apart * size + first, own, 3 * size).reshape(3, size)
-    return found
-
-
-def _right_side(
-    bends: _Bends,
-    groups: Annotated[Indices, "frames"],
-    scale: Numbers,
-    stiffness: float,
-    path: Numbers,
-) -> Numbers:
-    """Return the right side (U,) of the normal equations."""
-    factors = _matching(bends.factors, scale)
-    bent = np.sum(factors * path[bends.frames], axis=-1)
-    weighted = path.copy()
-    np.add.at(weighted, bends.frames, stiffness * np.conj(factors) * bent[:, None])
-    found = np.zeros(int(groups.max()) + 1, path.dtype)
-    np.add.at(found, groups, np.conj(scale) * weighted)
-    return found
-
-
-def _matching(factors: Numbers, like: Numbers) -> Numbers:
-    """Return factors that are real where others are."""
-    return factors.real if np.isrealobj(like) else factors
-
-
-def _groups(
-    count: int, intervals: Sequence[Interval]
-) -> tuple[Annotated[Indices, "frames"], Annotated[Indices, "groups"]]:
-    """Return the unknown of each frame (F,), and the first frame of each unknown.
-
-    All frames of an interval share one unknown; the others have one each.
-    """
-    leader = np.arange(count)
-    for interval in intervals:
-        leader[np.arange(interval.begin, interval.end) % count] = interval.begin
-    firsts, groups = np.unique(leader, return_inverse=True)
-    return groups, firsts
-
-
-def _held(path: FootPath, found: Sequence[Interval], goal: RootPath) -> list[Interval]:
+def held(feet: FootRows, found: Runs, led: Mask) -> Runs:
     """Return the stances with the ends of the swings in which the foot keeps its place.
 
     A point to which it is led ends a swing.
     """
-    count, hold, led = len(path), round(HOLD * path.rate), ~np.isnan(goal[:, 0])
-    longer = []
-    for index, stance in enumerate(found):
-        ways = led[: stance.begin][::-1], led[stance.end :]
-        gaps = _gap(found, index - 1, path), _gap(found, index, path)
-        before, after = (
-            min(hold, min(gap, int(np.argmax(way)) if way.any() else gap) // 4)
-            for gap, way in zip(gaps, ways, strict=True)
-        )
-        longer.append(Interval(stance.begin - before, stance.end + after))
-    if path.cycle is None:
-        return [Interval(max(i.begin, 0), min(i.end, count)) for i in longer]
-    return [Interval(i.begin % count, i.begin % count + min(len(i), count)) for i in longer]
+    rows = feet.rows
+    counts, cyclic = rows.counts[found.rows], rows.cyclic[found.rows]
+    hold = np.round(HOLD * rows.rates[found.rows]).astype(np.int64)
+    gaps = _gaps(found, feet)
+    before, after = (
+        np.minimum(hold, np.minimum(gap, far) // 4)
+        for gap, far in zip(gaps, _led_distances(found, feet, led), strict=True)
+    )
+    begins, ends = found.begins - before, found.ends + after
+    lengths = np.minimum(ends - begins, counts)
+    begins = np.where(cyclic, begins % counts, np.maximum(begins, 0))
+    return Runs(found.rows, begins, np.where(cyclic, begins + lengths, np.minimum(ends, counts)))
 
 
-def _gap(found: Sequence[Interval], index: int, path: FootPath) -> int:
-    """Return the number of frames from a stance to the next; 0 to an end of the clip."""
-    count = len(path)
-    if path.cycle is not None:
-        own, after = found[index % len(found)], found[(index + 1) % len(found)]
-        return int((after.begin - own.end) % count)
-    if not 0 <= index < len(found) - 1:
-        return 0
-    return found[index + 1].begin - found[index].end
+def _gaps(found: Runs, feet: FootRows) -> tuple[Indices, Indices]:
+    """Return the numbers of frames from the stance before to each, and from each to the next.
+
+    Zero to an end of a motion that does not repeat.
+    """
+    rows, many = found.rows, len(found.rows)
+    number = np.bincount(rows, minlength=len(feet.rows.counts))
+    start = (np.cumsum(number) - number)[rows]
+    place = np.arange(many) - start
+    following = start + (place + 1) % number[rows]
+    cyclic = feet.rows.cyclic[rows]
+    after = (found.begins[following] - found.ends) % feet.rows.counts[rows]
+    after = np.where(cyclic | (place + 1 < number[rows]), after, 0)
+    before = np.zeros(many, np.int64)
+    before[following] = after
+    return before, after
+
+
+def _led_distances(found: Runs, feet: FootRows, led: Mask) -> tuple[Indices, Indices]:
+    """Return the numbers of frames between each stance and the led frames before and after it."""
+    far = len(led)
+    frames = np.flatnonzero(led)
+    if not len(frames):
+        return (np.full(len(found.rows), far),) * 2
+    start = feet.rows.groups.starts[found.rows]
+    begins, ends = start + found.begins, start + found.ends
+    before = np.searchsorted(frames, begins) - 1
+    after = np.searchsorted(frames, ends)
+    last = frames[np.maximum(before, 0)]
+    first = frames[np.minimum(after, len(frames) - 1)]
+    stop = start + feet.rows.counts[found.rows]
+    return (
+        np.where((before >= 0) & (last >= start), begins - 1 - last, far),
+        np.where((after < len(frames)) & (first < stop), first - ends, far),
+    )

@@ -5,8 +5,10 @@ from typing import Annotated
 
 import numpy as np
 
+from posefield.common.frame_groups import FrameRows
 from posefield.common.units import Booleans, Floats
-from posefield.feet import stances
+from posefield.feet import stance_rows, stances
+from posefield.feet.stance_rows import Runs
 from posefield.feet.stances import FootPath, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.contacts import contact_detection
@@ -19,15 +21,9 @@ STANDING, DECIMALS = 0.5, 6
 DEFAULT_SWING, DEFAULT_LONGEST = 0.3, 0.5
 
 
-def from_probabilities(
-    paths: Sequence[FootPath], likely: Annotated[Floats, "frames feet"]
-) -> list[list[Interval]]:
-    """Return the contacts of each foot, whose probabilities are (F, K)."""
-    down = np.round(likely, DECIMALS) > STANDING
-    return [
-        stances.tidy(own, path.rate, path.cycle is not None)
-        for own, path in zip(down.T, paths, strict=True)
-    ]
+def from_probabilities(likely: Annotated[Floats, "frames"], rows: FrameRows) -> Runs:
+    """Return the contacts of feet, whose probabilities are (N,)."""
+    return stance_rows.tidy(np.round(likely, DECIMALS) > STANDING, rows)
 
 
 def from_motion(paths: Sequence[FootPath]) -> list[list[Interval]]:
@@ -68,13 +64,23 @@ def statistics(joint: int, path: FootPath, found: Sequence[Interval]) -> FootCon
 
 
 def heights_above(
-    paths: Sequence[FootPath],
-    down: Sequence[Sequence[Interval]],
-    known: Sequence[FootContact],
-) -> list[float]:
-    """Return how much higher each foot stands than captured feet do, by its median, m."""
-    found = []
-    for path, own, foot in zip(paths, down, known, strict=True):
-        standing = path.heights[stances.mask(own, len(path))]
-        found.append(float(np.median(standing)) - foot.height if len(standing) else 0.0)
-    return found
+    heights: Annotated[Floats, "frames"],
+    found: Runs,
+    usual: Annotated[Floats, "rows"],
+    rows: FrameRows,
+) -> Annotated[Floats, "rows"]:
+    """Return how much higher feet stand than captured ones do (R,), by their medians, m.
+
+    heights: (N,), m. usual: heights (R,), m, of captured feet.
+    """
+    run, frames = found.frames()
+    row = found.rows[run]
+    standing = heights[rows.flat(row, frames)]
+    standing = standing[np.lexsort((standing, row))]
+    counts = np.bincount(row, minlength=len(usual))
+    above = np.zeros(len(usual))
+    stands = counts > 0
+    first, count = (np.cumsum(counts) - counts)[stands], counts[stands]
+    middle = 0.5 * (standing[first + (count - 1) // 2] + standing[first + count // 2])
+    above[stands] = middle - usual[stands]
+    return above

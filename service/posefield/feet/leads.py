@@ -50,6 +50,14 @@ class Led:
         return up, down
 
 
+def joined(found: Sequence[Led]) -> Led:
+    """Return the leads of motions whose frames lie one after another."""
+    feet, limbs = (
+        np.concatenate([getattr(own, n) for own in found], axis=1) for n in ("feet", "limbs")
+    )
+    return Led(feet, limbs, np.concatenate([own.root for own in found]))
+
+
 def always(feet: int, limbs: int, frames: int) -> Led:
     """Return the leads of a motion in which no foot is led, and kept limbs are all the time."""
     return Led(np.zeros((feet, frames), bool), np.ones((limbs, frames)), np.zeros(frames, bool))

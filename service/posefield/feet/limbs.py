@@ -1,5 +1,6 @@
 """Limbs of two bones, found in a skeleton, and the positions of their joints."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,7 +8,9 @@ from typing import Annotated
 
 import numpy as np
 
+from posefield.common import frame_groups
 from posefield.common.array_shapes import Bones
+from posefield.common.frame_groups import FrameGroups
 from posefield.common.units import Floats
 from posefield.motion import skeleton
 
@@ -35,14 +38,16 @@ class LimbPoses:
     """Some limbs of one character in F poses, or of N characters (N, F).
 
     parents: of the compact skeleton. joints: of the whole skeleton, by compact joint. bones:
-    offsets (..., C, 3), m. positions: (..., F, C, 3), m. orientations: (..., F, C, 4).
+    offsets (..., C, 3), m. positions: (..., F, C, 3), m. orientations: (..., F, C, 4). groups: of
+    the frames of several motions, whose bones are (M, C, 3); None for the frames of one motion.
     """
 
     joints: tuple[int, ...]
     parents: tuple[int, ...]
-    bones: Annotated[Floats, "*characters chain 3"]
+    bones: Annotated[Floats, "*owners chain 3"]
     positions: Annotated[Floats, "*characters frames chain 3"]
     orientations: Annotated[Floats, "*characters frames chain 4"]
+    groups: FrameGroups | None = None
 
     @cached_property
     def _places(self) -> dict[int, int]:
@@ -60,10 +65,27 @@ class LimbPoses:
         """Return the orientations (..., F, 4) of a joint's parent."""
         return self.orientations[..., self.parents[self._places[joint]], :]
 
-    def length(self, joint: int) -> Annotated[Floats, "*characters 1"]:
-        """Return the length (..., 1) of the bone that ends at a joint, m."""
+    def length(self, joint: int) -> Annotated[Floats, "*owners"]:
+        """Return the length (..., 1) of the bone that ends at a joint, m; (F,) for groups."""
         found: Floats = np.linalg.norm(self.bones[..., self._places[joint], :], axis=-1)
-        return found[..., None]
+        return found[..., None] if self.groups is None else found[self.groups.group]
+
+    def split(self) -> "list[LimbPoses]":
+        """Return the poses of each motion of the groups."""
+        assert self.groups is not None
+        parts = zip(
+            self.bones,
+            self.groups.split(self.positions),
+            self.groups.split(self.orientations),
+            strict=True,
+        )
+        return [LimbPoses(self.joints, self.parents, *own) for own in parts]
+
+    def mean(self, values: Points) -> Annotated[Floats, "*characters _ 3"]:
+        """Return the mean (..., 1, 3) of values (..., F, 3) over a motion; (F, 3) for groups."""
+        if self.groups is None:
+            return np.asarray(np.mean(values, axis=-2, keepdims=True))
+        return self.groups.means(values)[self.groups.group]
 
 
 def find_limb(parents: Sequence[int], bones: Bones, tip: int) -> Limb | None:
@@ -110,6 +132,36 @@ def evaluate_poses(
     return evaluate_joints(parents, bones, [limb.tip for limb in limbs], rotations, roots)
 
 
+def evaluate_motions(
+    parents: Sequence[int],
+    bones: Annotated[Floats, "motions joints 3"],
+    limbs: Sequence[Limb],
+    rotations: Annotated[Floats, "frames joints 4"],
+    roots: Annotated[Floats, "frames 3"],
+    groups: FrameGroups,
+) -> LimbPoses:
+    """Return the poses of the limbs of several motions, one after another; bones (M, J, 3), m."""
+    joints, own = _compact(parents, [limb.tip for limb in limbs])
+    arms = bones[:, list(joints)]
+    moved = arms[groups.group]
+    moved[:, 0] = roots
+    found = skeleton.forward_kinematics(own, rotations[:, list(joints)], moved)
+    return LimbPoses(joints, own, arms, *found, groups)
+
+
+def join(found: Sequence[LimbPoses]) -> LimbPoses:
+    """Return the poses of the same limbs in several motions, each without groups, as groups."""
+    first = found[0]
+    return LimbPoses(
+        first.joints,
+        first.parents,
+        np.stack([own.bones for own in found]),
+        np.concatenate([own.positions for own in found]),
+        np.concatenate([own.orientations for own in found]),
+        frame_groups.of_lengths([own.positions for own in found]),
+    )
+
+
 def evaluate_joints(
     parents: Sequence[int],
     bones: Annotated[Floats, "*characters joints 3"],
@@ -118,19 +170,26 @@ def evaluate_joints(
     roots: Points,
 ) -> LimbPoses:
     """Return the poses of joints and of those above them; arguments as for `evaluate_poses`."""
-    needed = {0}
-    for joint in wanted:
-        needed.update(skeleton.joint_chain(tuple(parents), joint))
-    joints = tuple(sorted(needed))
-    places = {joint: place for place, joint in enumerate(joints)}
-    own = tuple(places.get(parents[joint], -1) for joint in joints)
+    joints, own = _compact(parents, wanted)
     arms = bones[..., list(joints), :]
     moved = skeleton.translations(arms, roots)
     found = skeleton.forward_kinematics(own, rotations[..., list(joints), :], moved)
     return LimbPoses(joints, own, arms, *found)
 
 
+def _compact(
+    parents: Sequence[int], wanted: Sequence[int]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return joints with those above them, in order, and the place of each one's parent."""
+    needed = {0}
+    for joint in wanted:
+        needed.update(skeleton.joint_chain(tuple(parents), joint))
+    joints = tuple(sorted(needed))
+    places = {joint: place for place, joint in enumerate(joints)}
+    return joints, tuple(places.get(parents[joint], -1) for joint in joints)
+
+
 def _similarity(bones: Bones, limb: Limb) -> float:
     """Return the shorter of the limb's two bones over the longer one."""
-    lengths = np.linalg.norm(bones[[limb.middle, limb.lower]], axis=-1)
-    return float(lengths.min() / lengths.max()) if lengths.max() > 0.0 else 0.0
+    lengths = [math.hypot(*bones[joint].tolist()) for joint in (limb.middle, limb.lower)]
+    return min(lengths) / max(lengths) if max(lengths) > 0.0 else 0.0

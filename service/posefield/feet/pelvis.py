@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from posefield.common.array_shapes import Frames
+from posefield.common.frame_groups import FrameRows
 from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import two_bone
 from posefield.feet.limbs import Limb, LimbPoses, Points, Values
@@ -15,6 +16,8 @@ from posefield.feet.limbs import Limb, LimbPoses, Points, Values
 SPREAD, SMOOTHING = 0.06, 0.03
 # It is lowered no more than this, m.
 MOST = 0.05
+
+Lowering = Annotated[Floats, "frames"]
 
 
 def need(
@@ -46,28 +49,44 @@ def room(poses: LimbPoses, limbs: Sequence[Limb]) -> tuple[Frames, Frames]:
     return np.maximum(up, 0.0), np.maximum(down, 0.0)
 
 
-def lower(needs: Sequence[Values], most: Values, rate: float, cyclic: bool) -> Values:
-    """Return how much the pelvis is lowered (..., F), m: smoothly, by `most` (..., F) at most."""
+def lower(needs: Sequence[Lowering], most: Lowering, rows: FrameRows) -> Lowering:
+    """Return how much the pelvis is lowered (N,), m: smoothly, by `most` (N,) at most.
+
+    needs: of each leg (N,), m. rows: of the motions, one after another.
+    """
     wanted = np.minimum(np.max([np.zeros(most.shape), *needs], axis=0), most)
-    smooth = cover(wanted, rate, cyclic)
-    excess = cover(np.maximum(smooth - most, 0.0), rate, cyclic)
+    smooth = cover(wanted, rows)
+    excess = cover(np.maximum(smooth - most, 0.0), rows)
     return np.maximum(smooth - excess, 0.0)
 
 
-def cover(needed: Values, rate: float, cyclic: bool) -> Values:
-    """Return a smooth path (..., F) that is nowhere below the needed one, which is not negative.
+def cover(needed: Lowering, rows: FrameRows) -> Lowering:
+    """Return smooth paths (N,) that are nowhere below the needed ones, which are not negative.
 
     The largest value of the neighbourhood, smoothed with a kernel that is no wider than that.
     """
-    half = max(1, round(SPREAD * rate))
-    if not needed.any():
-        return needed
-    kernel = np.exp(-0.5 * np.square(np.arange(-half, half + 1) / (SMOOTHING * rate)))
-    wide = np.max(_neighbours(needed, half, cyclic), axis=0)
     found = np.zeros(needed.shape)
-    # Not a matrix product, whose sums could go in another order for more characters.
-    for share, moved in zip(kernel / kernel.sum(), _neighbours(wide, half, cyclic), strict=True):
-        found += share * moved
+    if not needed.any():
+        return found
+    halves = np.maximum(1, np.round(SPREAD * rows.rates)).astype(np.int64)
+    for half in np.unique(halves).tolist():
+        own = halves == half
+        frames = own[rows.groups.group]
+        found[frames] = _covered(needed[frames], rows.select(np.flatnonzero(own)), half)
+    return found
+
+
+def _covered(needed: Lowering, rows: FrameRows, half: int) -> Lowering:
+    """Return smooth paths as `cover` does, of rows whose neighbourhoods are of one size."""
+    around = range(-half, half + 1)
+    kernel = [np.exp(-0.5 * np.square(offset / (SMOOTHING * rows.rates))) for offset in around]
+    beside = [rows.beside(offset) for offset in around]
+    wide = np.max([needed[frames] for frames in beside], axis=0)
+    found = np.zeros(needed.shape)
+    # Not a matrix product, whose sums could go in another order for more motions.
+    total = sum(kernel)
+    for share, frames in zip(kernel, beside, strict=True):
+        found += (share / total)[rows.groups.group] * wide[frames]
     return found
 
 
@@ -75,10 +94,3 @@ def beyond(needed: Values, most: Values) -> Booleans:
     """Return whether a leg needs more than the pelvis can be lowered (..., F)."""
     found: Booleans = needed > most + 1e-9
     return found
-
-
-def _neighbours(values: Values, half: int, cyclic: bool) -> list[Values]:
-    """Return the values (..., F) moved by -half to half frames."""
-    around = [(0, 0)] * (values.ndim - 1) + [(half, half)]
-    wide = np.pad(values, around, mode="wrap" if cyclic else "edge")
-    return [wide[..., first : first + values.shape[-1]] for first in range(2 * half + 1)]

@@ -1,74 +1,38 @@
-"""Stances and swings of the feet of many walkers at once, by the rules of `stances`.
+"""Stances and swings of many feet: from contact probabilities, as captured feet step.
 
-Each row is one foot of one walker, whose motion does not repeat. Stances of a row depend on no
-other row.
+Each row is one foot of one motion. Its frames lie on a grid of equal steps of time, and those of
+all rows one after another. A stance of a cycle may go on over its end: its frames are then counted
+beyond the last. Stances of a row depend on no other row.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 
-from posefield.common.units import MICROMETRES, UP, Booleans, Floats, Indices
+from posefield.common.frame_groups import FrameGroups, FrameRows
+from posefield.common.units import MICROMETRES, Booleans, Floats, Indices
 from posefield.feet.stances import (
     LIFTED,
     SHORTEST_CONTACT,
     SHORTEST_GAP,
     SHORTEST_STEP,
+    FootPath,
+    Interval,
 )
 from posefield.locomotion import floor_plane
+from posefield.locomotion.floor_plane import FloorVectors
 from posefield.motion.foot_contacts import FootContact
 
-Rows = Annotated[Booleans, "rows frames"]
+Mask = Annotated[Booleans, "frames"]
 PerRow = Annotated[Floats, "rows"]
 PerRun = Annotated[Indices, "runs"]
 
 
 @dataclass(frozen=True)
-class FootRows:
-    """Feet of walkers: predicted paths, and how captured feet contact and swing.
-
-    positions: (R, F, 3), m. rate: frames a second. height, swing, longest_swing, clearance: (R,),
-    as of `FootContact`.
-    """
-
-    positions: Annotated[Floats, "rows frames 3"]
-    rate: float
-    height: PerRow
-    swing: PerRow
-    longest_swing: PerRow
-    clearance: PerRow
-
-    def select(self, rows: Annotated[Indices, "chosen"]) -> "FootRows":
-        """Return some of the rows."""
-        own = (self.height, self.swing, self.longest_swing, self.clearance)
-        return FootRows(self.positions[rows], self.rate, *(part[rows] for part in own))
-
-    @property
-    def heights(self) -> Annotated[Floats, "rows frames"]:
-        """Return the heights (R, F), m."""
-        found: Floats = self.positions @ UP
-        return found
-
-
-def foot_rows(
-    positions: Annotated[Floats, "rows frames 3"],
-    rate: float,
-    contacts: tuple[FootContact, ...],
-    height: PerRow,
-) -> FootRows:
-    """Return rows of feet (R, F, 3), m, whose contacts repeat, with their own heights (R,), m."""
-    walkers = len(positions) // len(contacts)
-    swing, longest, clearance = (
-        np.tile([getattr(own, name) for own in contacts], walkers)
-        for name in ("swing", "longest_swing", "clearance")
-    )
-    return FootRows(positions, rate, height, swing, longest, clearance)
-
-
-@dataclass(frozen=True)
 class Runs:
-    """Runs of true frames, row by row and in order: frames `begins` to `ends`, exclusive."""
+    """Runs of frames, row by row and in order: frames `begins` to `ends`, exclusive."""
 
     rows: PerRun
     begins: PerRun
@@ -83,81 +47,222 @@ class Runs:
         """Return some of the runs."""
         return Runs(self.rows[chosen], self.begins[chosen], self.ends[chosen])
 
-    def inner(self, frames: int) -> Annotated[Booleans, "runs"]:
-        """Return which runs touch no end of the F frames."""
-        found: Booleans = (self.begins > 0) & (self.ends < frames)
+    def inner(self, rows: FrameRows) -> Annotated[Booleans, "runs"]:
+        """Return which runs touch no end of their row; those of cycles do not."""
+        touches = (self.begins == 0) | (self.ends >= rows.counts[self.rows])
+        found: Booleans = rows.cyclic[self.rows] | ~touches
         return found
 
-    def mask(self, shape: tuple[int, ...]) -> Rows:
-        """Return whether each frame (R, F) is in one of the runs, which do not overlap."""
-        edges = np.zeros((shape[0], shape[1] + 1), np.int8)
-        np.add.at(edges, (self.rows, self.begins), 1)
-        np.add.at(edges, (self.rows, self.ends), -1)
-        found: Booleans = np.cumsum(edges, axis=1, dtype=np.int8)[:, :-1] > 0
+    def mask(self, rows: FrameRows) -> Mask:
+        """Return whether each frame (N,) is in one of the runs."""
+        found = np.zeros(len(rows.groups.group), bool)
+        run, frames = self.frames()
+        found[rows.flat(self.rows[run], frames)] = True
         return found
 
     def frames(self) -> tuple[PerRun, PerRun]:
         """Return the run and the frame of all frames of all runs, run after run."""
-        run = np.repeat(np.arange(len(self.rows)), self.lengths)
-        starts = np.cumsum(self.lengths) - self.lengths
-        return run, np.arange(len(run)) - starts[run] + self.begins[run]
+        own = FrameGroups(self.lengths)
+        return own.group, own.frame + self.begins[own.group]
+
+    def sort(self) -> "Runs":
+        """Return the runs row by row and in order."""
+        return self.select(np.lexsort((self.begins, self.rows)))
+
+    def of_rows(self, rows: Annotated[Indices, "chosen"]) -> "Runs":
+        """Return the runs of some rows, in order, which are counted anew."""
+        own = self.select(np.isin(self.rows, rows))
+        return replace(own, rows=np.searchsorted(rows, own.rows))
+
+    def by_row(self, rows: int) -> list[tuple[Interval, ...]]:
+        """Return the runs of each of R rows."""
+        found: list[list[Interval]] = [[] for _ in range(rows)]
+        ends = zip(self.begins.tolist(), self.ends.tolist(), strict=True)
+        for row, (begin, end) in zip(self.rows.tolist(), ends, strict=True):
+            found[row].append(Interval(begin, end))
+        return [tuple(own) for own in found]
 
 
-def runs(down: Rows) -> Runs:
-    """Return the runs of true frames."""
-    edges = np.diff(np.pad(down.astype(np.int8), ((0, 0), (1, 1))), axis=1)
-    rows, begins = np.nonzero(edges == 1)
-    return Runs(rows, begins, np.nonzero(edges == -1)[1])
+@dataclass(frozen=True)
+class FootRows:
+    """Feet: predicted paths, and how captured feet contact and swing.
+
+    floor: (N,), over the floor. heights: (N,), m. height, swing, longest_swing, clearance: (R,), as
+    of `FootContact`. ways, factors: (R,), of a cycle, as of `Cycle`. walking: whether the motion
+    walks (N,).
+    """
+
+    rows: FrameRows
+    floor: Annotated[FloorVectors, "frames"]
+    heights: Annotated[Floats, "frames"]
+    height: PerRow
+    swing: PerRow
+    longest_swing: PerRow
+    clearance: PerRow
+    ways: Annotated[FloorVectors, "rows"]
+    factors: Annotated[FloorVectors, "rows"]
+    walking: Mask
+
+    def select(self, rows: Annotated[Indices, "chosen"]) -> "FootRows":
+        """Return some of the rows."""
+        frames = np.isin(self.rows.groups.group, rows)
+        parts = {name: getattr(self, name)[frames] for name in ("floor", "heights", "walking")}
+        names = ("height", "swing", "longest_swing", "clearance", "ways", "factors")
+        parts |= {name: getattr(self, name)[rows] for name in names}
+        return replace(self, rows=self.rows.select(rows), **parts)
+
+    @property
+    def positions(self) -> Annotated[Floats, "frames 3"]:
+        """Return the paths (N, 3), m."""
+        return floor_plane.at_height(self.floor, self.heights)
+
+    def paths(self) -> list[FootPath]:
+        """Return the path of each row, of motions without cycles."""
+        parts = self.rows.groups.split(self.positions)
+        return [
+            FootPath(own, float(rate)) for own, rate in zip(parts, self.rows.rates, strict=True)
+        ]
+
+    def contact(self, row: int) -> FootContact:
+        """Return the statistics of one row's contacts."""
+        own = (self.height, self.swing, self.longest_swing, self.clearance)
+        return FootContact(0, *(float(values[row]) for values in own))
+
+    def places(self, rows: PerRun, frames: PerRun) -> Annotated[FloorVectors, "runs"]:
+        """Return floor points of rows at frames, which may lie within later cycles."""
+        return places(self, self.floor, rows, frames)
 
 
-def tidy(down: Rows, rate: float) -> Rows:
-    """Return frames (R, F) with short gaps closed, then short contacts dropped."""
-    count = down.shape[1]
-    gaps = runs(~down)
-    short = gaps.inner(count) & (gaps.lengths < SHORTEST_GAP * rate)
-    found = runs(down | gaps.select(short).mask(down.shape))
-    kept = ~found.inner(count) | (found.lengths >= SHORTEST_CONTACT * rate)
-    return found.select(kept).mask(down.shape)
+def places(
+    feet: FootRows, floor: Annotated[FloorVectors, "frames"], rows: PerRun, frames: PerRun
+) -> Annotated[FloorVectors, "runs"]:
+    """Return floor points of paths (N,) at frames, which may lie within later cycles."""
+    found: FloorVectors = floor[feet.rows.flat(rows, frames)]
+    later = np.where(feet.rows.cyclic[rows], frames // feet.rows.counts[rows], 0)
+    for cycle in range(int(later.max(initial=0))):
+        moved = feet.ways[rows] + feet.factors[rows] * found
+        found = np.where(later > cycle, moved, found)
+    return found
 
 
-def discipline(down: Rows, feet: FootRows) -> Rows:
-    """Return frames (R, F) in which feet stand, with swings as captured ones are."""
-    swings = runs(~down)
-    swinging = _swing_frames(swings, feet)
-    grounded = feet.heights < (feet.height + LIFTED)[:, None]
-    return tidy(down | (~down & ~swinging & grounded), feet.rate)
+def from_intervals(found: Sequence[Sequence[Interval]]) -> Runs:
+    """Return the runs of rows, each with its intervals."""
+    runs = [(row, own.begin, own.end) for row, every in enumerate(found) for own in every]
+    return Runs(*np.array(runs, np.int64).reshape(-1, 3).T)
 
 
-def _swing_frames(swings: Runs, feet: FootRows) -> Rows:
-    """Return the frames (R, F) of swings in which the foot swings indeed."""
-    floor = floor_plane.project(feet.positions)
-    shape = floor.shape
-    first, last = np.maximum(swings.begins - 1, 0), np.minimum(swings.ends, shape[1] - 1)
-    steps = np.abs(floor[swings.rows, last] - floor[swings.rows, first])
-    goes = ~swings.inner(shape[1]) | (steps >= SHORTEST_STEP)
-    long = swings.lengths > feet.longest_swing[swings.rows] * feet.rate
+def shortest(rows: FrameRows) -> PerRow:
+    """Return the least number of frames of a stance (R,); one frame is none in a cycle."""
+    return np.asarray(np.maximum(SHORTEST_CONTACT * rows.rates, 1.0 + rows.cyclic))
+
+
+def runs(down: Mask, rows: FrameRows) -> Runs:
+    """Return the runs of true frames (N,); one of a cycle may go over its end."""
+    starts, counts = rows.groups.starts, rows.counts
+    before, after = np.zeros((2, len(down)), bool)
+    before[1:], after[:-1] = down[:-1], down[1:]
+    before[starts] = after[starts + counts - 1] = False
+    begins, ends = np.flatnonzero(down & ~before), np.flatnonzero(down & ~after) + 1
+    row = rows.groups.group[begins]
+    return _join_over_ends(Runs(row, begins - starts[row], ends - starts[row]), rows)
+
+
+def _join_over_ends(found: Runs, rows: FrameRows) -> Runs:
+    """Return the runs, in which the last run of a cycle goes on as its first one."""
+    cyclic, counts = rows.cyclic[found.rows], rows.counts[found.rows]
+    first = np.flatnonzero(cyclic & (found.begins == 0))
+    last = np.flatnonzero(cyclic & (found.ends == counts))
+    _, own, other = np.intersect1d(
+        found.rows[first], found.rows[last], assume_unique=True, return_indices=True
+    )
+    first, last = first[own], last[other]
+    apart = first != last
+    first, last = first[apart], last[apart]
+    ends = found.ends.copy()
+    ends[last] += found.ends[first]
+    kept = np.ones(len(ends), bool)
+    kept[first] = False
+    return replace(found, ends=ends).select(kept)
+
+
+def tidy(down: Mask, rows: FrameRows) -> Runs:
+    """Return the runs of true frames; short gaps are closed, then short contacts dropped.
+
+    A gap at an end of a motion is a part of a swing, and a contact there may have begun before it.
+    """
+    gaps = runs(~down, rows)
+    short = gaps.inner(rows) & (gaps.lengths < SHORTEST_GAP * rows.rates[gaps.rows])
+    found = runs(down | gaps.select(short).mask(rows), rows)
+    return found.select(~found.inner(rows) | (found.lengths >= shortest(rows)[found.rows]))
+
+
+def discipline(stances: Runs, feet: FootRows) -> Runs:
+    """Return stances whose swings are as captured ones: they go somewhere, and do not last.
+
+    A swing that goes less than 3 cm is none. One that lasts longer than the captured ones is cut
+    to their median duration, where the predicted foot goes most. Slow walkers take longer steps in
+    time than most captured ones: swings within a walk stay as they are. A foot that is in the air
+    does not stand.
+    """
+    down = stances.mask(feet.rows)
+    swinging = _swing_frames(runs(~down, feet.rows), feet)
+    grounded = feet.heights < (feet.height + LIFTED)[feet.rows.groups.group]
+    return tidy(down | (~swinging & grounded), feet.rows)
+
+
+def _swing_frames(swings: Runs, feet: FootRows) -> Mask:
+    """Return the frames (N,) of swings in which the foot swings indeed."""
+    if not len(swings.rows):
+        return np.zeros(len(feet.floor), bool)
+    before = np.maximum(swings.begins - 1, 0)
+    steps = feet.places(swings.rows, swings.ends) - feet.places(swings.rows, before)
+    goes = ~swings.inner(feet.rows) | (np.abs(steps) >= SHORTEST_STEP)
+    long = swings.lengths > (feet.longest_swing * feet.rows.rates)[swings.rows]
     begins, ends = swings.begins.copy(), swings.ends.copy()
-    for run in np.flatnonzero(goes & long):
-        row, size = swings.rows[run], int(swings.lengths[run])
-        length = min(max(2, round(float(feet.swing[row]) * feet.rate)), size - 1)
-        places = floor[row, begins[run] : ends[run]]
-        gone = np.round(np.abs(places[length:] - places[:-length]), MICROMETRES)
-        begins[run] += int(np.argmax(gone))
-        ends[run] = begins[run] + length
-    return Runs(swings.rows, begins, ends).select(goes).mask(shape)
+    for run in np.flatnonzero(goes & long & ~_walks(swings, feet)):
+        begins[run], ends[run] = _cut(feet, swings.rows[run], begins[run], ends[run])
+    return Runs(swings.rows, begins, ends).select(goes).mask(feet.rows)
 
 
-def shortened(down: Rows, beyond: Rows, rate: float) -> Rows:
-    """Return stances (R, F) without the frames beyond reach: of each the longest run that is left.
+def _walks(swings: Runs, feet: FootRows) -> Annotated[Booleans, "runs"]:
+    """Return whether the motion walks during each whole swing."""
+    run, frames = swings.frames()
+    own = feet.walking[feet.rows.flat(swings.rows[run], frames)]
+    return FrameGroups(swings.lengths).every(own)
+
+
+def _cut(feet: FootRows, row: int, begin: int, end: int) -> tuple[int, int]:
+    """Return the frames of a long swing, for the median duration, in which the foot goes most."""
+    length = min(max(2, round(float(feet.swing[row] * feet.rows.rates[row]))), end - begin - 1)
+    frames = np.arange(begin, end)
+    places = feet.places(np.full(len(frames), row), frames)
+    gone = np.round(np.abs(places[length:] - places[:-length]), MICROMETRES)
+    first = begin + int(np.argmax(gone))
+    return first, first + length
+
+
+def shortened(found: Runs, beyond: Mask, rows: FrameRows) -> Runs:
+    """Return stances without the frames (N,) beyond reach: of each the longest run that is left.
 
     A stance that becomes too short is dropped.
     """
-    label = np.cumsum(down & ~np.pad(down, ((0, 0), (1, 0)))[:, :-1], axis=1)
-    parts = runs(down & ~beyond)
-    parts = parts.select(parts.lengths >= SHORTEST_CONTACT * rate)
-    whose = label[parts.rows, parts.begins]
-    order = np.lexsort((parts.begins, -parts.lengths, whose, parts.rows))
-    best = parts.select(order)
-    whose = whose[order]
-    same = (best.rows[1:] == best.rows[:-1]) & (whose[1:] == whose[:-1])
-    return best.select(np.concatenate([[True], ~same])[: len(whose)]).mask(down.shape)
+    run, frames = found.frames()
+    kept = ~beyond[rows.flat(found.rows[run], frames)]
+    whole = FrameRows(
+        FrameGroups(found.lengths), rows.rates[found.rows], np.zeros(len(found.rows), bool)
+    )
+    parts = runs(kept, whole)
+    parts = parts.select(np.lexsort((parts.begins, -parts.lengths, parts.rows)))
+    first = np.ones(len(parts.rows), bool)
+    first[1:] = parts.rows[1:] != parts.rows[:-1]
+    parts = parts.select(first & (parts.lengths >= shortest(rows)[found.rows[parts.rows]]))
+    row, begins = found.rows[parts.rows], found.begins[parts.rows] + parts.begins
+    # A stance of a cycle begins within it.
+    begins = np.where(begins >= rows.counts[row], begins - rows.counts[row], begins)
+    return Runs(row, begins, begins + parts.lengths).sort()
+
+
+def changed_rows(before: Runs, after: Runs, rows: FrameRows) -> Annotated[Indices, "changed"]:
+    """Return the rows whose stances `after` lack frames that they had before."""
+    lost = before.mask(rows) & ~after.mask(rows)
+    return np.asarray(np.unique(rows.groups.group[lost]))

@@ -54,7 +54,9 @@ def firm_reach(poses: LimbPoses, limb: Limb) -> Values:
 
 
 def soften(
-    distance: Values, firm: Values, length: float | Annotated[Floats, "*characters 1"]
+    distance: Values,
+    firm: Values,
+    length: float | Annotated[Floats, "*characters _"] | Annotated[Floats, "_"],
 ) -> Values:
     """Return distances (..., F), m, that exceed the firm reach softly, and never the length.
 
@@ -125,7 +127,7 @@ def _bend_direction(poses: LimbPoses, limb: Limb, towards: Points) -> Points:
     bone = middle - upper
     bend = bone - np.sum(bone * old, axis=-1, keepdims=True) * old
     frame = poses.orientation(limb.upper)
-    mean = np.mean(quat.rotate(quat.conj(frame), quat.cross(bone, old)), axis=-2, keepdims=True)
+    mean = poses.mean(quat.rotate(quat.conj(frame), quat.cross(bone, old)))
     size = np.linalg.norm(mean, axis=-1, keepdims=True)
     least = LEAST_BEND * poses.length(limb.middle)[..., None]
     axis = quat.rotate(frame, np.broadcast_to(mean / np.maximum(size, 1e-9), bend.shape))

@@ -12,14 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common import cancellation
+from posefield.common.frame_groups import FrameGroups, FrameRows
 from posefield.common.units import UP, Booleans, Floats
-from posefield.feet import limbs, pelvis, stance_rows, step_rows, two_bone
+from posefield.feet import ball_path, contact_estimates, limbs, pelvis, stance_rows, two_bone
+from posefield.feet.body_plans import ROUNDS
 from posefield.feet.contact_estimates import DECIMALS, STANDING
-from posefield.feet.footsteps import ROUNDS
 from posefield.feet.limbs import Limb, LimbPoses
-from posefield.feet.stance_rows import FootRows, Rows
+from posefield.feet.stance_rows import FootRows, Runs
 from posefield.feet.stances import UNEVEN
-from posefield.feet.step_rows import StepRows
+from posefield.locomotion import floor_plane
 from posefield.motion.foot_contacts import FootContact
 
 Scalar = TypeVar("Scalar", np.float64, np.bool_)
@@ -76,16 +77,26 @@ def stand(
         walkers.parents, walkers.bones, legs, walkers.rotations, walkers.roots
     )
     before = np.stack([poses.position(leg.tip) for leg in legs], axis=2)
-    down = stance_rows.tidy(_rows(np.round(likely, DECIMALS) > STANDING), walkers.rate)
-    feet, sunk = _grounded_feet(_rows(before), down, tuple(contacts), walkers.rate)
-    steps, lowered = _reachable_steps(poses, legs, feet, stance_rows.discipline(down, feet), sunk)
+    rows = _frame_rows(likely.shape, walkers.rate)
+    down = stance_rows.tidy((np.round(_rows(likely), DECIMALS) > STANDING).ravel(), rows)
+    feet, sunk = _grounded_feet(_rows(before).reshape(-1, 3), down, tuple(contacts), rows)
+    found = stance_rows.discipline(down, feet)
+    paths, found, lowered = _reachable_steps(poses, legs, feet, found, sunk)
     shift = -(sunk[:, None] + lowered)[..., None] * UP
-    targets = _walkers(steps.positions, len(legs))
+    targets = _walkers(paths.reshape(-1, likely.shape[1], 3), len(legs))
     turns, after = _placed_legs(poses, legs, shift, targets)
-    standing = _walkers(steps.down, len(legs))
+    standing = _walkers(found.mask(rows).reshape(-1, likely.shape[1]), len(legs))
     away = np.linalg.norm((after - targets) * (1.0 - UP), axis=-1) * standing
     drift, most = away.max(axis=(1, 2)), lowered.max(axis=1)
     return WalkersFeet(turns, walkers.roots + shift, before, after, standing, drift, most)
+
+
+def _frame_rows(shape: tuple[int, ...], rate: float) -> FrameRows:
+    """Return the rows of feet of walkers (M, F, K)."""
+    walkers, frames, feet = shape
+    count = walkers * feet
+    groups = FrameGroups(np.full(count, frames))
+    return FrameRows(groups, np.full(count, rate), np.zeros(count, bool))
 
 
 def _rows(
@@ -104,67 +115,80 @@ def _walkers(
 
 
 def _grounded_feet(
-    paths: Annotated[Floats, "rows frames 3"],
-    down: Rows,
+    paths: Annotated[Floats, "all_frames 3"],
+    down: Runs,
     contacts: tuple[FootContact, ...],
-    rate: float,
+    rows: FrameRows,
 ) -> tuple[FootRows, PerWalker]:
     """Return feet whose walkers stand on the floor, and how far each walker is lowered (M,), m."""
-    captured = np.tile([own.height for own in contacts], len(paths) // len(contacts))
-    above = _median_heights(paths @ UP, down, captured) - captured
+    count = len(rows.counts)
+    captured, swing, longest, clearance = (
+        np.tile([getattr(own, name) for own in contacts], count // len(contacts))
+        for name in ("height", "swing", "longest_swing", "clearance")
+    )
+    above = contact_estimates.heights_above(paths @ UP, down, captured, rows)
     mean = above.reshape(-1, len(contacts)).mean(axis=1)
     sunk = np.sign(mean) * np.maximum(np.abs(mean) - UNEVEN, 0.0)
     own = np.repeat(sunk, len(contacts))
     height = captured + np.clip(above - own, -UNEVEN, UNEVEN)
-    grounded = paths - own[:, None, None] * UP
-    return stance_rows.foot_rows(grounded, rate, contacts, height), sunk
-
-
-def _median_heights(
-    heights: Annotated[Floats, "rows frames"], down: Rows, usual: Annotated[Floats, "rows"]
-) -> Annotated[Floats, "rows"]:
-    """Return the median heights (R,), m, of feet that stand; the usual ones of others."""
-    ordered = np.sort(np.where(down, heights, np.inf), axis=1)
-    count, rows = down.sum(axis=1), np.arange(len(down))
-    low, high = ordered[rows, np.maximum(count - 1, 0) // 2], ordered[rows, count // 2]
-    return np.where(count > 0, 0.5 * (low + high), usual)
+    heights = paths @ UP - own[rows.groups.group]
+    still = np.zeros(count, np.complex128)
+    walking = np.zeros(len(paths), bool)
+    floor = floor_plane.project(paths)
+    return FootRows(
+        rows, floor, heights, height, swing, longest, clearance, still, still + 1.0, walking
+    ), sunk
 
 
 def _reachable_steps(
-    poses: LimbPoses, legs: Sequence[Limb], feet: FootRows, down: Rows, sunk: PerWalker
-) -> tuple[StepRows, Annotated[Floats, "walkers frames"]]:
-    """Return the steps, and how much the pelvis is lowered for them (M, F), m.
+    poses: LimbPoses, legs: Sequence[Limb], feet: FootRows, found: Runs, sunk: PerWalker
+) -> tuple[Annotated[Floats, "all_frames 3"], Runs, Annotated[Floats, "walkers frames"]]:
+    """Return the paths, the stances, and how much the pelvis is lowered for them (M, F), m.
 
     Stances whose leg does not reach are shortened.
     """
-    steps = step_rows.plan_paths(feet, down)
+    paths = _plan_paths(feet, found)
+    needs = _needs(poses, legs, feet, paths, sunk)
     for _ in range(ROUNDS):
         cancellation.check()
-        needs = _needs(poses, legs, feet, steps, sunk)
         beyond = pelvis.beyond(needs, np.full(needs.shape, pelvis.MOST))
-        shorter = stance_rows.shortened(steps.down, beyond, feet.rate)
-        changed = np.flatnonzero((shorter != steps.down).any(axis=1))
-        if not len(changed):
+        shorter = stance_rows.shortened(found, beyond, feet.rows)
+        rows = stance_rows.changed_rows(found, shorter, feet.rows)
+        if not len(rows):
             break
-        again = step_rows.plan_paths(feet.select(changed), shorter[changed])
-        steps.positions[changed], steps.down[changed] = again.positions, again.down
-    else:
-        needs = _needs(poses, legs, feet, steps, sunk)
-    own = list(_walkers(needs, len(legs)).transpose(2, 0, 1))
-    most = np.full(own[0].shape, pelvis.MOST)
-    return steps, pelvis.lower(own, most, feet.rate, False)
+        own = np.isin(feet.rows.groups.group, rows)
+        paths[own] = _plan_paths(feet.select(rows), shorter.of_rows(rows))
+        needs, found = _needs(poses, legs, feet, paths, sunk), shorter
+    walkers, frames = poses.positions.shape[:2]
+    each = needs.reshape(walkers, len(legs), frames).swapaxes(0, 1).reshape(len(legs), -1)
+    grids = _frame_rows((walkers, frames, 1), float(feet.rows.rates[0]))
+    most = np.full(walkers * frames, pelvis.MOST)
+    return paths, found, pelvis.lower(list(each), most, grids).reshape(walkers, frames)
+
+
+def _plan_paths(feet: FootRows, found: Runs) -> Annotated[Floats, "all_frames 3"]:
+    """Return the paths of feet, each at the mean of its predicted places in a stance."""
+    free = np.full((len(feet.floor), 3), np.nan)
+    longer = ball_path.held(feet, found, np.zeros(len(feet.floor), bool))
+    return ball_path.plan_paths(feet, found, free, ball_path.mean_places(feet, longer))
 
 
 def _needs(
-    poses: LimbPoses, legs: Sequence[Limb], feet: FootRows, steps: StepRows, sunk: PerWalker
-) -> Annotated[Floats, "rows frames"]:
-    """Return how much lower each leg needs the pelvis to be (R, F), m."""
-    changes = _walkers(steps.positions - feet.positions, len(legs)) - sunk[:, None, None, None] * UP
+    poses: LimbPoses,
+    legs: Sequence[Limb],
+    feet: FootRows,
+    paths: Annotated[Floats, "all_frames 3"],
+    sunk: PerWalker,
+) -> Annotated[Floats, "all_frames"]:
+    """Return how much lower each leg needs the pelvis to be (R F,), m."""
+    frames = poses.positions.shape[1]
+    moved = (paths - feet.positions).reshape(-1, frames, 3)
+    changes = _walkers(moved, len(legs)) - sunk[:, None, None, None] * UP
     needs = [
         pelvis.need(poses, leg, poses.position(leg.lower) + changes[:, :, foot], sunk[:, None])
         for foot, leg in enumerate(legs)
     ]
-    return _rows(np.stack(needs, axis=2))
+    return _rows(np.stack(needs, axis=2)).ravel()
 
 
 def _placed_legs(

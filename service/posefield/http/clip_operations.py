@@ -22,7 +22,7 @@ from posefield.http.decoding import clips_query, request_body
 from posefield.http.steps import Context, Steps, from_body, from_url, unlimited
 from posefield.question.motion_question import FileQuestion
 from posefield.question.results import ClipAnswer
-from posefield.synthesis import clips
+from posefield.synthesis import clip_drafts, clips
 from posefield.synthesis.frame_times import MAX_POSES
 
 Clips = Context[ClipEncoder]
@@ -62,7 +62,7 @@ async def validate(context: Clips, question: FileQuestion) -> ClipTask:
         convention, joints = delivery.convention, max(joints, delivery.joints)
     sizes = joints, encoder.bytes_per_joint, len(card.curves)
     fits = max_poses(context.service.settings.output_limit, *sizes)
-    corrected = not clips.is_predicted(model, question)
+    corrected = not clip_drafts.is_predicted(model, question)
     return ClipTask(question, min(fits, MAX_POSES), convention, corrected, delivery)
 
 

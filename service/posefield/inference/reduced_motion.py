@@ -90,13 +90,44 @@ class ReducedTensor:
         self, motion: Annotated[Floats, "times freedoms"], places: Frames
     ) -> tuple[Rotations, RootPath]:
         """Return rotations (S, J, 4) and root positions (S, 3), m, of a reduced motion (r2, r1)."""
-        numbers = self.mean + self.moves(motion, places) @ self.directions
-        return self.turns(numbers), numbers[:, :3]
+        products, roots = self.turn_products(motion, places)
+        return self.rotations_of(products), roots
 
     def turns(self, numbers: Annotated[Floats, "poses dof"]) -> Rotations:
         """Return rotations (S, J, 4) of pose vectors (S, D)."""
         own = numbers[:, 3 : 3 + 3 * len(self.rotations)].reshape(len(numbers), -1, 3)
         return quat.mul(self.rotations, CHARTS[self.chart].quaternions(own))
+
+    def turn_products(
+        self, motion: Annotated[Floats, "times freedoms"], places: Frames
+    ) -> tuple[Annotated[Floats, "frames joints 4"], RootPath]:
+        """Return what `rotations_of` needs (S, J, 4), and root positions (S, 3), m.
+
+        The former are linear in the reduced motion (r2, r1), by products of one motion.
+        """
+        moves = self.moves(motion, places)
+        mean, turns = self._mean_products
+        return (mean + moves @ turns).reshape(len(places), -1, 4), self._roots(moves)
+
+    def roots(self, motion: Annotated[Floats, "times freedoms"], places: Frames) -> RootPath:
+        """Return the root positions (S, 3), m, of a reduced motion (r2, r1)."""
+        return self._roots(self.moves(motion, places))
+
+    def rotations_of(
+        self, products: Annotated[Floats, "poses joints 4"]
+    ) -> Annotated[Floats, "poses joints 4"]:
+        """Return rotations (S, J, 4) of mean rotations times the chart's share of the numbers.
+
+        products: (S, J, 4), as long as the share of the numbers; they are overwritten.
+        """
+        squares = np.einsum("njk,njk->nj", products, products)
+        real, factor = CHARTS[self.chart].terms(squares)
+        products *= factor[..., None]
+        products += real[..., None] * self.rotations
+        return products
+
+    def _roots(self, moves: Annotated[Floats, "frames freedoms"]) -> RootPath:
+        return np.asarray(self.mean[:3] + moves @ self.directions[:, :3])
 
     def poses_of_moves(
         self, moves: Annotated[Floats, "poses freedoms"]
@@ -107,17 +138,12 @@ class ReducedTensor:
     ]:
         """Return rotations (S, J, 4), root positions (S, 3), m, and values (S, C) of the curves.
 
-        moves: coefficients (S, r1) of the directions. As `poses`, in half of its time, up to the
-        rounding of mean rotations.
+        moves: coefficients (S, r1) of the directions.
         """
         others = np.r_[:3, 3 + 3 * len(self.rotations) : len(self.mean)]
         numbers = self.mean[others] + moves @ self.directions[:, others]
         mean, turns = self._mean_products
-        found = (mean + moves @ turns).reshape(len(moves), -1, 4)
-        squares = np.einsum("njk,njk->nj", found, found)
-        real, factor = CHARTS[self.chart].terms(squares)
-        found *= factor[..., None]
-        found += real[..., None] * self.rotations
+        found = self.rotations_of((mean + moves @ turns).reshape(len(moves), -1, 4))
         return found, numbers[:, :3], curves.clamp(self.curves, numbers[:, 3:])
 
     @cached_property

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
-from posefield.common.array_shapes import Gradients, PerSample, Samples
+from posefield.common.array_shapes import PerSample, Samples
 from posefield.common.units import Floats, Indices
 from posefield.inference.reduced_motion import GraphConstants, ReducedTensor
 from posefield.kriging import kriging_model, leave_one_out
@@ -44,15 +44,18 @@ class ResidualCovariance:
     predicted: Annotated[Floats, "samples reduced"]
     sigmas: PerSample
 
-    def apply_shrunk(self, gradients: Gradients) -> Annotated[Floats, "variables values"]:
-        """Return the shrunk covariance times gradients (k, r2 r1 + b): (r2 r1 + b, k)."""
-        inner = gradients[:, : len(self.residuals)]
+    def apply_shrunk(
+        self, gradients: Annotated[Floats, "*motions values variables"]
+    ) -> Annotated[Floats, "*motions variables values"]:
+        """Return the shrunk covariance times gradients (..., k, r2 r1 + b): (..., r2 r1 + b, k)."""
+        inner = gradients[..., : len(self.residuals)]
         r2, r1 = len(self.time), len(self.freedoms)
-        blocks = self.time @ inner.reshape(-1, r2, r1) @ self.freedoms
-        even = blocks.reshape(len(gradients), -1)
+        blocks = self.time @ inner.reshape(*inner.shape[:-1], r2, r1) @ self.freedoms
+        even = blocks.reshape(inner.shape)
         own = (inner @ self.residuals) @ self.residuals.T
         both = MARGINAL_WEIGHT * even + (1.0 - MARGINAL_WEIGHT) * own
-        return np.hstack([both, gradients[:, len(self.residuals) :] @ self.beside]).T
+        beside = gradients[..., len(self.residuals) :] @ self.beside
+        return np.concatenate([both, beside], axis=-1).swapaxes(-1, -2)
 
 
 def estimate(

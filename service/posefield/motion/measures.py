@@ -7,12 +7,13 @@ constrain them.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, Positions, RootPath, Vector
 from posefield.common.bounded_types import Index, Share
+from posefield.common.units import Floats
 from posefield.motion import blend, skeleton
 
 Quantity = Literal[
@@ -101,14 +102,21 @@ def evaluate(measure: Measure, seen: MeasuredMotion) -> float:
 
 
 def travel_value(quantity: str, travel: Vector, duration: float) -> float:
-    """Return the distance, m, the speed, m/s, or the change of heading, degrees, of a travel (3,).
+    """Return the value of `travel_values` for a travel (3,) and a duration, s."""
+    return float(travel_values(quantity, travel[None], np.array([duration]))[0])
 
-    duration: s.
+
+def travel_values(
+    quantity: str, travels: Annotated[Floats, "motions 3"], durations: Annotated[Floats, "motions"]
+) -> Annotated[Floats, "motions"]:
+    """Return distances, m, speeds, m/s, or changes of heading, degrees, of travels (M, 3).
+
+    durations: (M,), s.
     """
     if quantity == "turn":
-        return float(np.degrees(travel[2]))
-    way = float(np.hypot(travel[0], travel[1]))
-    return way / duration if quantity == "speed" else way
+        return np.asarray(np.degrees(travels[:, 2]))
+    ways = np.hypot(travels[:, 0], travels[:, 1])
+    return np.asarray(ways / durations if quantity == "speed" else ways)
 
 
 def moment_frame(measure: Measure, positions: Positions, landmark: float) -> float:

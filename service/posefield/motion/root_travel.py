@@ -2,8 +2,6 @@
 
 from typing import Annotated
 
-import numpy as np
-
 from posefield.common.units import UP, Floats
 from posefield.motion import quat
 
@@ -17,7 +15,15 @@ def add_travel(
 
     gone: travel to the left and ahead, m, and change of heading, rad.
     """
-    moved = roots + gone[..., :2] @ np.eye(3)[[0, 2]]
     turned = rotations.copy()
     turned[..., 0, :] = quat.mul(quat.from_axis_angle(UP, gone[..., 2]), rotations[..., 0, :])
-    return turned, moved
+    return turned, moved_roots(roots, gone)
+
+
+def moved_roots(
+    roots: Annotated[Floats, "*poses 3"], gone: Annotated[Floats, "*poses 3"]
+) -> Annotated[Floats, "*poses 3"]:
+    """Return root positions (..., 3), m, moved by the travel over the floor in (..., 3)."""
+    moved = roots.copy()
+    moved[..., [0, 2]] += gone[..., :2]
+    return moved

@@ -275,6 +275,7 @@ def _rotated(
     return np.asarray(found)
 
 
+@lru_cache(1024)
 def joint_chain(parents: tuple[int, ...], joint: int) -> tuple[int, ...]:
     """Return the joints from the root to a joint, each the parent of the next."""
     found = [joint]

@@ -8,7 +8,7 @@ import orjson
 from posefield.common import cancellation
 from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.errors import InvalidField
-from posefield.feet import foot_placement, footsteps
+from posefield.feet import body_plans, foot_placement
 from posefield.feet.foot_placement import PlacedFrames
 from posefield.feet.footsteps import FeetPlan, SampledMotion
 from posefield.motion import joint_roles, quat
@@ -54,7 +54,7 @@ def perform(script: Script, most: int) -> PerformanceAnswer:
     planned: FeetPlan | None = None
     if script.question.feet == "stand" and script.character.feet:
         planned = plan_feet(script, composed)
-        told = standing_feet.describe(planned, script.character.skeleton.names)
+        (told,) = standing_feet.describe([planned], script.character.skeleton.names)
     every = _place_feet(planned, np.arange(len(composed.motion)) / RATE, composed.motion)
     judged = _judge_joins(script, composed, every)
     rotations, roots = _at_times(script, composed.motion, planned, every, times)
@@ -189,7 +189,7 @@ def plan_feet(script: Script, composed: Composed) -> FeetPlan:
     frames = range(timeline.begin, timeline.begin + len(own))
     body, led = limb_targets.find_leads(character.body, timeline.targets, frames)
     motion = SampledMotion(own.rotations, own.roots, RATE, walking=composed.walking)
-    return footsteps.plan_feet(body, motion, script.contacts, own.contacts, led=led)
+    return body_plans.plan_feet(body, motion, script.contacts, own.contacts, led=led)
 
 
 def _place_feet(planned: FeetPlan | None, times: Frames, motion: Passage) -> PlacedFrames:

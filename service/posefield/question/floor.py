@@ -1,11 +1,14 @@
 """Floor on which feet stand: a plane in the frame of a clip."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 from msgspec import Struct
 
-from posefield.common.units import UP, Floats
+from posefield.common.frame_groups import FrameGroups
+from posefield.common.units import UP, Booleans, Floats
 from posefield.motion import quat
 
 
@@ -55,3 +58,35 @@ def at_height(height: float) -> Floor:
 
 LEVEL_FLOOR = at_height(0.0)
 """Floor at height 0, on which motions are captured."""
+
+
+@dataclass(frozen=True)
+class Floors:
+    """Floors of several motions, whose frames (N,) lie one after another."""
+
+    floors: Sequence[Floor]
+    groups: FrameGroups
+
+    @property
+    def sloped(self) -> Annotated[Booleans, "frames"]:
+        """Return whether the floor of each frame (N,) has a slope."""
+        return np.array([not own.is_level for own in self.floors])[self.groups.group]
+
+    @property
+    def tilts(self) -> Annotated[Floats, "frames 4"]:
+        """Return the rotation from the vertical to the floor's normal at each frame (N, 4)."""
+        return np.array([own.tilt for own in self.floors])[self.groups.group]
+
+    def heights(self, points: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames"]:
+        """Return the heights (N,), m, of the floors below or above points (N, 3), m."""
+        if all(own == LEVEL_FLOOR for own in self.floors):
+            return np.zeros(len(points))
+        parts = zip(self.floors, self.groups.split(points), strict=True)
+        return np.concatenate([own.heights(part) for own, part in parts])
+
+    def tilted(self, vectors: Annotated[Floats, "frames 3"]) -> Annotated[Floats, "frames 3"]:
+        """Return vectors (N, 3) turned as the floors are tilted; level floors turn none."""
+        if all(own.is_level for own in self.floors):
+            return vectors
+        turned = quat.rotate(self.tilts, vectors)
+        return np.where(self.sloped[:, None], turned, vectors)

@@ -132,7 +132,7 @@ class FeetResult:
     def facts(self) -> dict[str, Any]:
         """Return the fields as plain values, without the floor at height 0."""
         found = {own.name: getattr(self, own.name) for own in fields(self)}
-        found["stances"] = tuple(asdict(stance) for stance in self.stances)
+        found["stances"] = tuple(dict(vars(stance)) for stance in self.stances)
         if self.floor is None:
             return {name: fact for name, fact in found.items() if name != "floor"}
         return found | {"floor": structs.asdict(self.floor)}
@@ -201,7 +201,7 @@ class Trust:
         more = {
             "inferred": list(self.inferred),
             "measured": dict(self.measured),
-            "targets": [asdict(met) for met in self.targets],
+            "targets": [dict(vars(met)) for met in self.targets],
             "joint_sigma": list(self.joint_sigma),
             "deviations": [deviation.facts() for deviation in self.deviations],
             "labels": dict(self.labels),

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
+from posefield.common import frame_groups
 from posefield.common.array_shapes import Frames, RootPath, Rotations
 from posefield.common.units import UP, Booleans, Floats
 from posefield.feet import pelvis, two_bone
@@ -118,7 +119,7 @@ def plant(rig: PosedRig, feet: SourceFeet, soles: RigSoles, rate: float) -> Plan
         for (leg, poses), target in zip(legs, targets, strict=True)
     ]
     most = np.full(len(paths), DEEPEST * rig.body.leg_length)
-    lowered = pelvis.lower(needs, most, rate, False)
+    lowered = pelvis.lower(needs, most, frame_groups.one_row(len(most), rate))
     rotations = rig.rotations.copy()
     shift = -lowered[:, None] * UP
     for (leg, poses), target in zip(legs, targets, strict=True):

@@ -1,19 +1,19 @@
-"""Clips of several questions in few calls of the graph, each with the bytes that it has alone.
+"""Predictions of several clips in few calls of the graph, each with the bytes that it has alone.
 
 A call takes as long for the operators of its graph as for 40 frames of a clip, so clips share it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeVar, TypeVarTuple
 
 import numpy as np
 
+from posefield.common.errors import QueryError
 from posefield.common.units import Floats
 from posefield.inference.graph_ports import CURVES
 from posefield.question.motion_question import ClipQuestion
-from posefield.question.results import ClipAnswer
-from posefield.synthesis import clips, frame_times, poses
+from posefield.synthesis import clip_drafts, frame_times, poses
+from posefield.synthesis.clip_drafts import ClipDraft, ClipRequest
 from posefield.synthesis.poses import OutputRow
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.question_validation import ValidatedQuestion
@@ -21,35 +21,48 @@ from posefield.validation.question_validation import ValidatedQuestion
 MAX_FRAMES = 512
 """Frames of one call, those included that pad shorter clips: more exceed the processor's cache."""
 
-Result = TypeVar("Result")
-Arguments = TypeVarTuple("Arguments")
-
 
 @dataclass(frozen=True)
 class _PlannedClip:
     """A clip whose frames are known: its place in the batch, and times (F,), s."""
 
     place: int
-    asked: ClipQuestion
     question: ValidatedQuestion
     when: Floats
 
 
-def synthesize_clips(
-    model: Synthesizer, asked: Sequence[ClipQuestion], most: int = frame_times.MAX_POSES
-) -> list[ClipAnswer | Exception]:
-    """Return the clip of each question, equal to that of `clips.synthesize_clip`, or its error.
+def draft_predictions(
+    model: Synthesizer, requests: Mapping[int, ClipRequest]
+) -> dict[int, ClipDraft]:
+    """Return the drafts of clips that can share calls of the graph, by their places.
 
-    asked: questions of one level. most: largest number of frames of a clip.
+    requests: of clips without constraints. Those that cannot share calls have no draft: fewer than
+    two of a level, outside the sampled ranges, clips of one frame, and those with errors.
     """
-    found: dict[int, ClipAnswer | Exception] = {}
-    for part in _calls(_plan(model, asked, most)):
-        for own, row in zip(part, _run(model, part), strict=True):
-            found[own.place] = _attempt(_answer, model, own, row)
-    for place, question in enumerate(asked):
-        if place not in found:
-            found[place] = _attempt(clips.synthesize_clip, model, question, most)
-    return [found[place] for place in range(len(asked))]
+    found = {}
+    for own in _by_level(model, requests):
+        for part in _calls(_plan(model, own)):
+            for planned, row in zip(part, _run(model, part), strict=True):
+                request, row = own[planned.place], _own_frames(model, planned, row)
+                answer = clip_drafts.pose_answer(model, request, planned.when, row)
+                found[planned.place] = clip_drafts.predicted(model, request, answer)
+    return found
+
+
+def _by_level(
+    model: Synthesizer, requests: Mapping[int, ClipRequest]
+) -> Iterator[dict[int, ClipRequest]]:
+    """Yield the requests of each level that may share calls, where there are several."""
+    # Durations outside the sampled ranges are bounded by further calls.
+    inside = {
+        place: own
+        for place, own in requests.items()
+        if model.session.bounds.is_inside(own.question.point)
+    }
+    for level in sorted({own.question.level for own in inside.values()}):
+        own = {place: each for place, each in inside.items() if each.question.level == level}
+        if len(own) > 1 and is_exact(model, level):
+            yield own
 
 
 def longest(model: Synthesizer, asked: ClipQuestion) -> float:
@@ -61,50 +74,26 @@ def longest(model: Synthesizer, asked: ClipQuestion) -> float:
     return (last - asked.start) * asked.fps + 1.0
 
 
-def _attempt(work: Callable[[*Arguments], Result], *arguments: *Arguments) -> Result | Exception:
-    """Return the result or the exception of one question, which concerns no other."""
-    try:
-        return work(*arguments)
-    except Exception as fault:
-        return fault
-
-
-def _plan(model: Synthesizer, asked: Sequence[ClipQuestion], most: int) -> list[_PlannedClip]:
-    """Return the clips that share calls; the others, and those with errors, are made alone."""
-    if len(asked) < 2:
-        return []
-    checked = [(place, _attempt(_validated, model, each)) for place, each in enumerate(asked)]
-    valid = [(place, own) for place, own in checked if isinstance(own, ValidatedQuestion)]
-    if not valid or not is_exact(model, asked[0].level):
-        return []
+def _plan(model: Synthesizer, requests: Mapping[int, ClipRequest]) -> list[_PlannedClip]:
+    """Return the clips with their frames; those with errors are made alone, which tells them."""
+    questions = [own.question for own in requests.values()]
     planned = []
-    for (place, question), duration in zip(valid, _durations(model, valid), strict=True):
-        when = _attempt(_times, model, asked[place], duration, most)
+    for (place, own), duration in zip(requests.items(), _durations(model, questions), strict=True):
+        try:
+            when = frame_times.sample_times(own.asked, model.check_duration(duration), own.most)
+        except QueryError:
+            continue
         # A matrix product with one row sums in another order.
-        if not isinstance(when, Exception) and len(when) > 1:
-            planned.append(_PlannedClip(place, asked[place], question, when))
+        if len(when) > 1:
+            planned.append(_PlannedClip(place, own.question, when))
     return planned
 
 
-def _validated(model: Synthesizer, asked: ClipQuestion) -> ValidatedQuestion | None:
-    """Return the validated question of a clip that may share calls, None for another one."""
-    question = model.question(asked)
-    clips.named_skeleton(model, asked)
-    # Durations outside the sampled ranges are bounded by further calls.
-    shares = clips.is_predicted(model, asked) and model.session.bounds.is_inside(question.point)
-    return question if shares else None
-
-
-def _durations(model: Synthesizer, valid: Sequence[tuple[int, ValidatedQuestion]]) -> list[float]:
-    points, labels = (
-        np.concatenate([getattr(own, name) for _, own in valid]) for name in ("point", "labels")
-    )
-    found: list[float] = model.session.durations(points, labels, valid[0][1].level).tolist()
+def _durations(model: Synthesizer, questions: Sequence[ValidatedQuestion]) -> list[float]:
+    points = np.concatenate([own.point for own in questions])
+    labels = np.concatenate([own.labels for own in questions])
+    found: list[float] = model.session.durations(points, labels, questions[0].level).tolist()
     return found
-
-
-def _times(model: Synthesizer, asked: ClipQuestion, duration: float, most: int) -> Floats:
-    return frame_times.sample_times(asked, model.check_duration(duration), most)
 
 
 def _calls(planned: Sequence[_PlannedClip]) -> Iterator[list[_PlannedClip]]:
@@ -135,12 +124,6 @@ def _run(model: Synthesizer, part: Sequence[_PlannedClip]) -> list[OutputRow]:
     return [tuple(answer[row] for answer in answers) for row in range(len(part))]
 
 
-def _answer(model: Synthesizer, own: _PlannedClip, row: OutputRow) -> ClipAnswer:
-    row = _own_frames(model, own, row)
-    answer = clips.pose_answer(model, own.question, own.asked, own.when, row)
-    return clips.predicted_clip(model, own.question, own.asked, answer)
-
-
 def _own_frames(model: Synthesizer, own: _PlannedClip, row: OutputRow) -> OutputRow:
     """Return the outputs of a clip without the frames that pad it."""
     names = poses.pose_outputs(model.session.card)
@@ -162,11 +145,11 @@ def is_exact(model: Synthesizer, level: int) -> bool:
     if level not in known:
         shares = np.linspace(0.0, 1.0, poses.SAMPLE_SIZE)
         sample = [_sample(model, place, share, level) for place, share in enumerate(shares)]
-        valid = [(own.place, own.question) for own in sample]
-        alone = [_durations(model, [each])[0] for each in valid]
+        questions = [own.question for own in sample]
+        alone = [_durations(model, [each])[0] for each in questions]
         rows = zip(sample, _run(model, sample), strict=True)
         pairs = [(own, _run(model, [own])[0], row) for own, row in rows]
-        known[level] = alone == _durations(model, valid) and all(
+        known[level] = alone == _durations(model, questions) and all(
             np.array_equal(a, b)
             for own, single, row in pairs
             for a, b in zip(single, _own_frames(model, own, row), strict=True)
@@ -180,4 +163,4 @@ def _sample(model: Synthesizer, place: int, share: float, level: int) -> _Planne
     controls = {c.name: c.minimum + share * (c.maximum - c.minimum) for c in card.controls}
     asked = ClipQuestion(controls=controls, extrapolate="ok", level=level)
     when = np.linspace(0.0, card.durations[0], place + 2)
-    return _PlannedClip(place, asked, model.question(asked), when)
+    return _PlannedClip(place, model.question(asked), when)

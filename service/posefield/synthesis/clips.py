@@ -1,27 +1,29 @@
 """Synthesis of clips, and their frame count, warnings and solver cost before synthesis."""
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
 
 import numpy as np
 
-from posefield.common.errors import InvalidField
-from posefield.common.units import Floats
-from posefield.constraints import constrained_motion
-from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
-from posefield.feet.stances import Cycle
-from posefield.locomotion import stride
+from posefield.common import cancellation
+from posefield.common.errors import QueryError
+from posefield.constraints.constraint_solver import MotionTimes
 from posefield.locomotion.stride import Strides
 from posefield.motion.clip import assemble
 from posefield.motion.curves import CurveValues
-from posefield.motion.skeleton import Skeleton
 from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import ClipAnswer, PoseAnswer, split_results
-from posefield.synthesis import frame_times, standing_feet
-from posefield.synthesis.poses import OutputRow, pose_outputs
-from posefield.synthesis.standing_feet import WholeMotion
+from posefield.synthesis import clip_batch, clip_drafts, frame_times, standing_feet
+from posefield.synthesis.clip_drafts import ClipDraft, ClipRequest
+from posefield.synthesis.standing_feet import StandRequest
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation import question_validation
 from posefield.validation.question_validation import ValidatedQuestion
+
+Given = TypeVar("Given")
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -47,51 +49,119 @@ def synthesize_clip(
     at fps. Raises as `poses.synthesize_poses` does, and InvalidField for a loop of a model that is
     not cyclic, for joint names without roles and for more than `most` frames.
     """
-    question = model.question(asked)
-    named_skeleton(model, asked)
-    goals = model.solver.constraints(question, asked)
-    if goals:
-        answer = _constrained(model, question, goals, asked, most)
-        return _clip_answer(model, asked, answer)
-    when = frame_times.sample_times(asked, _duration(model, question), most)
-    return predicted_clip(model, question, asked, _predict(model, question, asked, when))
+    (found,) = synthesize_clips(model, [asked], most)
+    if isinstance(found, QueryError):
+        raise found
+    return found
 
 
-def predicted_clip(
-    model: Synthesizer,
-    question: ValidatedQuestion,
-    asked: ClipQuestion,
-    answer: PoseAnswer[np.float64],
-) -> ClipAnswer:
-    """Return the clip of a question without constraints, of the prediction at its frames."""
-    return _clip_answer(model, asked, _unconstrained(model, question, asked, answer))
+def synthesize_clips(
+    model: Synthesizer, every: Sequence[ClipQuestion], most: int = frame_times.MAX_POSES
+) -> list[ClipAnswer | QueryError]:
+    """Return the clips of questions, each with the bytes that it has alone.
+
+    Clips share the calls of NumPy, which take most of the time of one clip. A question that cannot
+    be answered has the error that `synthesize_clip` raises.
+    """
+    asked = _each(partial(clip_drafts.validate, model, most), every)
+    drafts = _drafts(model, _solved(model, asked))
+    answers = iter(_clips(model, [own for own in drafts if isinstance(own, ClipDraft)]))
+    return [next(answers) if isinstance(own, ClipDraft) else own for own in drafts]
 
 
-def _clip_answer(
-    model: Synthesizer, asked: ClipQuestion, answer: PoseAnswer[np.float64]
-) -> ClipAnswer:
-    joints = model.skeleton(asked.names)
+def _solved(
+    model: Synthesizer, every: Sequence[ClipRequest | QueryError]
+) -> list[ClipRequest | QueryError]:
+    """Return the requests with the motions of those that have constraints."""
+    found = list(every)
+    places = [at for at, own in enumerate(every) if isinstance(own, ClipRequest) and own.goals]
+    asked = [own for own in every if isinstance(own, ClipRequest) and own.goals]
+    motions = model.solver.solve_all([(own.question, own.goals) for own in asked])
+    for place, own, held in zip(places, asked, motions, strict=True):
+        found[place] = held if isinstance(held, QueryError) else replace(own, held=held)
+    return found
+
+
+def _drafts(
+    model: Synthesizer, every: Sequence[ClipRequest | QueryError]
+) -> list[ClipDraft | QueryError]:
+    """Return the motions of requests; predictions share calls of the graph."""
+    predicted = {
+        place: own
+        for place, own in enumerate(every)
+        if isinstance(own, ClipRequest) and own.held is None
+    }
+    shared = clip_batch.draft_predictions(model, predicted)
+    rest = [own for place, own in enumerate(every) if place not in shared]
+    alone = iter(_each(partial(clip_drafts.draft, model), rest))
+    return [shared[place] if place in shared else next(alone) for place in range(len(every))]
+
+
+def _each(
+    make: Callable[[Given], Found], every: Iterable[Given | QueryError]
+) -> list[Found | QueryError]:
+    """Return what is made of each, or the error of those of which nothing can be made."""
+    found: list[Found | QueryError] = []
+    for own in every:
+        cancellation.check()
+        try:
+            found.append(own if isinstance(own, QueryError) else make(own))
+        except QueryError as fault:
+            found.append(fault)
+    return found
+
+
+def _clips(model: Synthesizer, drafts: Sequence[ClipDraft]) -> list[ClipAnswer]:
+    """Return the clips of motions."""
+    poses = _poses(model, drafts)
+    answers = [
+        frame_times.part(own, slice(len(draft.when)))
+        for own, draft in zip(poses, drafts, strict=True)
+    ]
+    standing = [place for place, draft in enumerate(drafts) if draft.whole is not None]
+    requests = [_stand_request(drafts[place], answers[place], poses[place]) for place in standing]
+    for place, answer in zip(standing, standing_feet.stand(model, requests), strict=True):
+        answers[place] = answer
+    return [_clip(model, *own) for own in zip(drafts, answers, strict=True)]
+
+
+def _stand_request(
+    draft: ClipDraft, answer: PoseAnswer[np.float64], poses: PoseAnswer[np.float64]
+) -> StandRequest:
+    """Return the request for standing feet. poses: at the frames, then at the plan's times."""
+    assert draft.whole is not None
+    own, whole = draft.request, frame_times.part(poses, slice(len(draft.when), None))
+    return StandRequest(own.question, own.goals, answer, draft.whole, whole, own.asked.ground)
+
+
+def _poses(model: Synthesizer, drafts: Sequence[ClipDraft]) -> list[PoseAnswer[np.float64]]:
+    """Return the poses of motions at the times of their frames and of the plans of their feet."""
+    held = [
+        MotionTimes(own.request.question, own.held, own.times, own.trust)
+        for own in drafts
+        if own.held is not None
+    ]
+    computed = iter(model.solver.poses(held))
+    return [next(computed) if own.predicted is None else own.predicted for own in drafts]
+
+
+def _clip(model: Synthesizer, draft: ClipDraft, answer: PoseAnswer[np.float64]) -> ClipAnswer:
+    """Return the clip of a motion with the poses of its frames."""
+    asked = draft.request.asked
+    if draft.request.routed and draft.way is not None:
+        answer = _apply_root_options(model, answer, draft.way, asked)
     turns, path, offsets = answer.rotations, answer.root_position, answer.bone_offsets
-    clip = assemble(joints, turns, path, offsets, float(asked.fps))
+    clip = assemble(draft.request.joints, turns, path, offsets, float(asked.fps))
     if answer.curves is not None:
         clip = replace(clip, curves=CurveValues(model.session.card.curves, answer.curves))
     return ClipAnswer(clip, answer.trust)
-
-
-def is_predicted(model: Synthesizer, asked: ClipQuestion) -> bool:
-    """Return whether a clip is the model's prediction, without constraints or standing feet.
-
-    Raises as `standing_feet.wants_standing_feet` does.
-    """
-    stands = standing_feet.wants_standing_feet(model.session.card, asked)
-    return not (model.solver.measures or asked.has_constraints or stands)
 
 
 def check(model: Synthesizer, asked: ClipQuestion) -> None:
     """Raise the errors of `synthesize_clip` that are known before the duration of the clip is."""
     model.solver.constraints(model.question(asked), asked)
     standing_feet.wants_standing_feet(model.session.card, asked)
-    named_skeleton(model, asked)
+    clip_drafts.named_skeleton(model, asked)
     frame_times.time_window(asked, model.durations[1])
 
 
@@ -106,7 +176,7 @@ def preview_clip(
     """
     question = model.question(asked)
     standing_feet.wants_standing_feet(model.session.card, asked)
-    named_skeleton(model, asked)
+    clip_drafts.named_skeleton(model, asked)
     duration, misses = _duration_and_misses(model, question, asked)
     times = frame_times.sample_times(asked, duration, most)
     # A loop ends with its first frame again.
@@ -114,78 +184,6 @@ def preview_clip(
         question.warnings, question.deviations, asked.extrapolate
     )
     return ClipPreview(len(times) + asked.loop, warnings, misses)
-
-
-def named_skeleton(model: Synthesizer, asked: ClipQuestion) -> Skeleton:
-    """Return the skeleton with the requested names.
-
-    Raises InvalidField for names of a convention without roles, and for a loop of a model that is
-    not cyclic.
-    """
-    if asked.loop and not model.session.card.cyclic:
-        raise InvalidField(
-            "loop", "true, expected false: this model's last pose does not lead into its first"
-        )
-    return model.skeleton(asked.names)
-
-
-def _unconstrained(
-    model: Synthesizer,
-    question: ValidatedQuestion,
-    asked: ClipQuestion,
-    answer: PoseAnswer[np.float64],
-) -> PoseAnswer[np.float64]:
-    """Return the frames of a clip without constraints, of the prediction at these frames."""
-    if model.solver.measures:
-        predicted = model.solver.solve(question, NO_CONSTRAINTS)
-        measured = model.solver.measured(question, predicted)
-        answer = replace(answer, trust=replace(answer.trust, measured=measured))
-    stands = standing_feet.wants_standing_feet(model.session.card, asked)
-    routed = asked.loop or asked.root == "in_place"
-    way = _strides(model, question) if stands or routed else None
-    if stands:
-        motion = WholeMotion(
-            lambda times: _predict(model, question, asked, times),
-            answer.trust.duration,
-            cycle=_cycle(model, way),
-        )
-        answer = standing_feet.stand(model, question, NO_CONSTRAINTS, answer, motion, asked.ground)
-    return _apply_root_options(model, answer, way, asked) if way and routed else answer
-
-
-def _strides(model: Synthesizer, question: ValidatedQuestion) -> Strides:
-    """Return the cycle of a motion, or its straight line from first to last pose."""
-    measure = stride.strides if model.session.card.cyclic else stride.straight_strides
-    return measure(model.session, question.point, question.labels, question.level)
-
-
-def _cycle(model: Synthesizer, way: Strides | None) -> Cycle | None:
-    return standing_feet.cycle_of(way) if way and model.session.card.cyclic else None
-
-
-def _constrained(
-    model: Synthesizer,
-    question: ValidatedQuestion,
-    goals: ConstraintSet,
-    asked: ClipQuestion,
-    most: int,
-) -> PoseAnswer[np.float64]:
-    """Return the frames of a clip that meets constraints."""
-    held = model.solve_constraints(question, goals, asked.extrapolate)
-    when = frame_times.sample_times(asked, model.check_duration(held.duration), most)
-    trust = model.constrained_trust(asked, question, held)
-    answer = model.solver.poses(question, held, when, trust)
-    way = constrained_motion.to_strides(held)
-    if standing_feet.wants_standing_feet(model.session.card, asked):
-        motion = WholeMotion(
-            lambda times: model.solver.poses(question, held, times, trust),
-            held.duration,
-            held.state.duration / held.duration,
-            _cycle(model, way),
-        )
-        answer = standing_feet.stand(model, question, goals, answer, motion, asked.ground)
-    routed = asked.loop or asked.root == "in_place"
-    return _apply_root_options(model, answer, way, asked) if routed else answer
 
 
 def _duration_and_misses(
@@ -198,17 +196,11 @@ def _duration_and_misses(
     goals = model.solver.constraints(question, asked)
     strict = asked.extrapolate == "refuse" or model.session.card.cyclic
     if not (goals.targets or (goals and strict)):
-        return _duration(model, question), False
+        return clip_drafts.duration(model, question), False
     held = model.solve_constraints(question, goals, asked.extrapolate)
     _, targets = split_results(held.results, len(goals.targets))
     misses = asked.extrapolate != "ok" and not all(met.reached for met in targets)
     return model.check_duration(held.duration), misses
-
-
-def _duration(model: Synthesizer, question: ValidatedQuestion) -> float:
-    """Return the duration of the clip, s; OutsideSamples if extrapolation makes it implausible."""
-    durations = model.session.durations(question.point, question.labels, question.level)
-    return model.check_duration(float(durations[0]))
 
 
 def _apply_root_options(
@@ -218,30 +210,3 @@ def _apply_root_options(
     stays = asked.root == "in_place" and model.session.card.root == "travelling"
     answer = frame_times.remove_travel(answer, way) if stays else answer
     return frame_times.close_loop(answer, None if stays else way) if asked.loop else answer
-
-
-def _predict(
-    model: Synthesizer, question: ValidatedQuestion, asked: ClipQuestion, when: Floats
-) -> PoseAnswer[np.float64]:
-    labels, level = question.labels, question.level
-    answers = model.session.run(
-        question.point,
-        when[None],
-        *pose_outputs(model.session.card),
-        labels=labels,
-        level=level,
-    )
-    return pose_answer(model, question, asked, when, tuple(answer[0] for answer in answers))
-
-
-def pose_answer(
-    model: Synthesizer,
-    question: ValidatedQuestion,
-    asked: ClipQuestion,
-    when: Floats,
-    row: OutputRow,
-) -> PoseAnswer[np.float64]:
-    """Return the prediction at times (S,), s, of one row of the graph's outputs."""
-    rotations, root, offsets, duration, sigma, *curves = (a.astype(np.float64) for a in row)
-    trust = model.trust(asked, question, float(duration), float(sigma))
-    return PoseAnswer(when, rotations, root, offsets, trust, *curves)

@@ -80,6 +80,29 @@ def close_loop(answer: PoseAnswer[np.float64], way: Strides | None) -> PoseAnswe
     )
 
 
+def join(first: PoseAnswer[np.float64], last: PoseAnswer[np.float64]) -> PoseAnswer[np.float64]:
+    """Return the poses of one motion at the times of two answers, with the trust of the first."""
+    curves = None if first.curves is None else np.concatenate([first.curves, last.curves])
+    return replace(
+        first,
+        times=np.append(first.times, last.times),
+        rotations=np.concatenate([first.rotations, last.rotations]),
+        root_position=np.concatenate([first.root_position, last.root_position]),
+        curves=curves,
+    )
+
+
+def part(answer: PoseAnswer[np.float64], frames: slice) -> PoseAnswer[np.float64]:
+    """Return some of the poses of an answer."""
+    return replace(
+        answer,
+        times=answer.times[frames],
+        rotations=answer.rotations[frames],
+        root_position=answer.root_position[frames],
+        curves=None if answer.curves is None else answer.curves[frames],
+    )
+
+
 def _check_count(frames: int, most: int) -> None:
     if frames > most:
         raise InvalidField("fps", f"{frames} frames, expected at most {most}")

@@ -100,7 +100,7 @@ def synthesize_constrained(
     found = model.solve_constraints(question, goals, given.extrapolate)
     when = _check_times(asked, model.check_duration(found.duration))
     trust = model.constrained_trust(given, question, found)
-    return model.solver.poses(question, found, when, trust)
+    return model.solver.poses_at(question, found, when, trust)
 
 
 def run_batch(model: Synthesizer, asked: Sequence[PreparedPoseQuestion]) -> list[OutputRow]:

@@ -1,6 +1,6 @@
 """Feet of clips that stand: which clips, and the plan over the whole motion."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -9,8 +9,10 @@ import numpy as np
 from posefield.common.errors import InvalidField
 from posefield.common.units import UP, Floats, round_micrometres
 from posefield.constraints.targets import ConstraintSet
-from posefield.feet import foot_placement, footsteps, limb_choice, limbs, stances
-from posefield.feet.footsteps import FeetPlan, SampledMotion
+from posefield.feet import body_plans, foot_placement, limb_choice, limbs
+from posefield.feet.foot_placement import PlacementRequest
+from posefield.feet.footsteps import FeetPlan, PlanRequest, SampledMotion
+from posefield.feet.limb_choice import LimbChoice
 from posefield.feet.limbs import LimbPoses
 from posefield.feet.stances import Cycle
 from posefield.inference.graph_ports import CONTACTS
@@ -41,11 +43,10 @@ UNREACHED = "does not stand: its leg does not reach the floor"
 class WholeMotion:
     """A motion from its start to its end.
 
-    poses: at times (S,), s. duration: s. stretch: duration of the prediction over this duration.
-    cycle: floor motion of a cycle; None for a motion without cycles.
+    duration: s. stretch: duration of the prediction over this duration. cycle: floor motion of a
+    cycle; None for a motion without cycles.
     """
 
-    poses: Callable[[Floats], PoseAnswer[np.float64]]
     duration: float
     stretch: float = 1.0
     cycle: Cycle | None = None
@@ -115,82 +116,137 @@ def cycle_of(way: Strides) -> Cycle:
     return Cycle(complex(start + gap - np.exp(1j * turn) * start), turn)
 
 
-def stand(
-    model: Synthesizer,
-    question: ValidatedQuestion,
-    goals: ConstraintSet,
-    answer: PoseAnswer[np.float64],
-    motion: WholeMotion,
-    floor: Floor = LEVEL_FLOOR,
-) -> PoseAnswer[np.float64]:
-    """Return the poses of an answer with standing feet, and with the facts about them in `trust`.
+@dataclass(frozen=True)
+class StandRequest:
+    """A motion whose feet stand.
 
-    goals: constraints that the motion meets, which stay met.
+    goals: constraints that the motion meets, which stay met. answer: its poses at the frames that
+    are asked for; whole: those at the times of the motion.
     """
-    if not floor.is_level:
-        # A cycle that climbs does not repeat.
-        motion = replace(motion, cycle=None)
-    card, times = model.session.card, motion.times
-    poses = motion.poses(times)
+
+    question: ValidatedQuestion
+    goals: ConstraintSet
+    answer: PoseAnswer[np.float64]
+    motion: WholeMotion
+    whole: PoseAnswer[np.float64]
+    floor: Floor = LEVEL_FLOOR
+
+
+def stand(model: Synthesizer, requests: Sequence[StandRequest]) -> list[PoseAnswer[np.float64]]:
+    """Return the answers with standing feet, and with the facts about them in `trust`.
+
+    Each has the bytes that it has alone.
+    """
+    card = model.session.card
     known = [own for own in card.contacts if own.joint in card.feet]
     feet = [own.joint for own in known] if known else list(card.feet)
-    choice = limb_choice.choose_limbs(
-        card.skeleton.parents, answer.bone_offsets, feet, _held_joints(goals)
-    )
-    left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in choice.left)
-    if not choice.feet:
-        return replace(
-            answer, trust=replace(answer.trust, feet=FeetResult(left=left, floor=_told(floor)))
+    choices = [
+        limb_choice.choose_limbs(
+            card.skeleton.parents, own.answer.bone_offsets, feet, _held_joints(own.goals)
         )
+        for own in requests
+    ]
+    placed = [place for place, choice in enumerate(choices) if choice.feet]
+    plans = body_plans.plan_motions(
+        [_plan_request(model, requests[place], choices[place], known) for place in placed]
+    )
+    frames = foot_placement.place_motions(
+        [
+            PlacementRequest(plan, own.times, own.rotations, own.root_position)
+            for plan, own in zip(plans, (requests[place].answer for place in placed), strict=True)
+        ]
+    )
+    told = describe(plans, card.skeleton.names)
+    found = [_unplaced(card, *own) for own in zip(requests, choices, strict=True)]
+    for place, plan, poses, facts in zip(placed, plans, frames, told, strict=True):
+        answer = found[place]
+        left = answer.trust.feet.left if answer.trust.feet else ()
+        measured = _measured(card, requests[place], plan)
+        trust = replace(
+            answer.trust, feet=replace(facts, left=left + facts.left), measured=measured
+        )
+        found[place] = replace(
+            answer, rotations=poses.rotations, root_position=poses.roots, trust=trust
+        )
+    return found
+
+
+def _unplaced(card: ModelCard, request: StandRequest, choice: LimbChoice) -> PoseAnswer[np.float64]:
+    """Return an answer with the feet that are not placed in `trust`, each with the reason."""
+    left = tuple(f"{card.skeleton.names[foot]} {why}" for foot, why in choice.left)
+    feet = FeetResult(left=left, floor=_told(request.floor))
+    return replace(request.answer, trust=replace(request.answer.trust, feet=feet))
+
+
+def _plan_request(
+    model: Synthesizer, request: StandRequest, choice: LimbChoice, known: Sequence[FootContact]
+) -> PlanRequest:
+    """Return the request for the plan of a motion. known: contacts of the model's feet."""
+    motion, times = request.motion, request.motion.times
     rate = (len(times) - (motion.cycle is None)) / motion.duration
+    poses = request.whole
     sampled = SampledMotion(poses.rotations, poses.root_position, rate, motion.cycle)
     own = [known[place] for place in choice.feet] if known else []
-    likely = _probabilities(model, question, own, times * motion.stretch) if known else None
-    character = replace(choice.character, raised=_may_rise(goals))
-    plan = footsteps.plan_feet(character, sampled, own, likely, floor)
-    told = describe(plan, card.skeleton.names)
-    told = replace(told, left=left + told.left)
-    measured = _measured(card, goals, answer, poses, plan)
-    placed = foot_placement.place_feet(plan, answer.times, answer.rotations, answer.root_position)
-    trust = replace(answer.trust, feet=told, measured=measured)
-    return replace(answer, rotations=placed.rotations, root_position=placed.roots, trust=trust)
+    likely = _probabilities(model, request.question, own, times * motion.stretch) if known else None
+    character = replace(choice.character, raised=_may_rise(request.goals))
+    return PlanRequest(character, sampled, own, likely, request.floor)
 
 
-def describe(plan: FeetPlan, names: Sequence[str]) -> FeetResult:
-    """Return the facts about the placed feet of a whole motion."""
-    whole = foot_placement.foot_paths(plan)
-    found, swings, drift = [], 0, 0.0
-    count, cyclic = len(plan.lowered), plan.cycle is not None
-    for foot, (leg, steps) in enumerate(zip(plan.character.legs, plan.steps, strict=True)):
-        swings += len(stances.runs(~stances.mask(steps.stances, count), cyclic))
-        for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
-            frames = np.arange(stance.begin, min(stance.end, count))
-            away = (whole.after[frames, foot] - anchor)[:, [0, 2]]
-            drift = max(drift, float(np.linalg.norm(away, axis=-1).max()))
-            position = tuple(map(round_micrometres, anchor.tolist()))
-            begin, end = stance.begin / plan.rate, (stance.end - 1) / plan.rate
-            found.append(
-                StanceResult(
-                    names[leg.tip], round_micrometres(begin), round_micrometres(end), position
-                )
-            )
+def describe(plans: Sequence[FeetPlan], names: Sequence[str]) -> list[FeetResult]:
+    """Return the facts about the placed feet of whole motions."""
+    paths = foot_placement.foot_paths(plans)
     # Feet on a slope are low where they are near it.
-    level = whole.after - plan.floor.heights(whole.after)[..., None] * UP
-    before, after = (
-        float(foot_skate.mean_skate_speed(paths, plan.rate)) for paths in (whole.before, level)
+    level = [
+        own.after - plan.floor.heights(own.after)[..., None] * UP
+        for plan, own in zip(plans, paths, strict=True)
+    ]
+    rates = [plan.rate for plan in plans]
+    skates = (
+        foot_skate.mean_skate_speeds([own.before for own in paths], rates),
+        foot_skate.mean_skate_speeds(level, rates),
     )
-    lowered = float((plan.lowered - plan.followed).max())
-    return FeetResult(
-        tuple(found),
-        swings,
-        round_micrometres(before),
-        round_micrometres(after),
-        round_micrometres(drift),
-        round_micrometres(lowered),
-        round_micrometres(plan.grounded),
-        tuple(f"{names[plan.character.legs[leg].tip]} {UNREACHED}" for leg in plan.unreached),
-        _told(plan.floor),
+    drifts = foot_placement.largest_drifts(plans, [own.after for own in paths])
+    return [
+        FeetResult(
+            _stances(plan, names),
+            _swings(plan),
+            round_micrometres(before),
+            round_micrometres(after),
+            round_micrometres(drift),
+            round_micrometres(float((plan.lowered - plan.followed).max())),
+            round_micrometres(plan.grounded),
+            tuple(f"{names[plan.character.legs[leg].tip]} {UNREACHED}" for leg in plan.unreached),
+            _told(plan.floor),
+        )
+        for plan, before, after, drift in zip(plans, *skates, drifts, strict=True)
+    ]
+
+
+def _stances(plan: FeetPlan, names: Sequence[str]) -> tuple[StanceResult, ...]:
+    """Return the stances of the feet, foot after foot."""
+    return tuple(
+        StanceResult(
+            names[leg.tip],
+            round_micrometres(stance.begin / plan.rate),
+            round_micrometres((stance.end - 1) / plan.rate),
+            tuple(map(round_micrometres, anchor)),
+        )
+        for leg, steps in zip(plan.character.legs, plan.steps, strict=True)
+        for stance, anchor in zip(steps.stances, steps.anchors.tolist(), strict=True)
     )
+
+
+def _swings(plan: FeetPlan) -> int:
+    """Return the number of swings of all feet: the gaps between stances, which do not touch."""
+    count, found = len(plan.lowered), 0
+    for steps in plan.steps:
+        standing = sum(map(len, steps.stances))
+        if plan.cycle is not None:
+            found += max(len(steps.stances), 1) * (standing < count)
+        else:
+            ends = [(own.begin == 0) + (own.end == count) for own in steps.stances]
+            found += len(steps.stances) + 1 - sum(ends)
+    return found
 
 
 def _told(floor: Floor) -> Floor | None:
@@ -226,17 +282,12 @@ def _probabilities(
     return likely[0][:, [joints.index(own.joint) for own in feet]].astype(np.float64)
 
 
-def _measured(
-    card: ModelCard,
-    goals: ConstraintSet,
-    answer: PoseAnswer[np.float64],
-    before: PoseAnswer[np.float64],
-    plan: FeetPlan,
-) -> dict[str, float]:
+def _measured(card: ModelCard, request: StandRequest, plan: FeetPlan) -> dict[str, float]:
     """Return the measured controls of an answer, changed as the placing of the feet changes them.
 
-    before: the whole motion, on the grid of the plan. Controls that constrain it stay.
+    Controls that constrain it stay.
     """
+    answer, before, goals = request.answer, request.whole, request.goals
     found, held = dict(answer.trust.measured), {name for name, _, _ in goals.controls}
     moving = [
         (control.name, control.measure)

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from few_feet import change_smoothly, plan_path
 
-from posefield.feet import ball_path, stances
+from posefield.feet import smooth_change, stances
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion import foot_skate
@@ -23,7 +24,7 @@ def energy(change, cycle=None):
         turned = cycle.factor
         around = np.concatenate([[change[-1] / turned], change, [change[0] * turned]])
         bends = np.diff(around, 2)
-    stiffness = (ball_path.SPREAD * RATE) ** 4
+    stiffness = (smooth_change.SPREAD * RATE) ** 4
     return np.sum(np.abs(change) ** 2) + stiffness * np.sum(np.abs(bends) ** 2)
 
 
@@ -31,7 +32,7 @@ def energy(change, cycle=None):
 def test_no_other_path_that_stands_changes_less(rng, cycle):
     path = np.cumsum(rng.normal(size=50) + 1j * rng.normal(size=50)) * 0.01
     held = [Interval(5, 17), Interval(40, 55 if cycle else 50)]
-    found = ball_path.smooth_change(path, held, RATE, cycle)
+    found = change_smoothly(path, held, RATE, FOOT, cycle)
     least = energy(found - path, cycle)
     for _ in range(20):
         other = found + 1e-3 * change_that_stands(rng, held, cycle)
@@ -51,7 +52,7 @@ def change_that_stands(rng, held, cycle):
 def test_a_foot_keeps_one_place_in_each_stance(rng):
     path = FootPath(np.cumsum(rng.normal(size=(80, 3)), axis=0) * 0.01, RATE)
     held = (Interval(0, 20), Interval(40, 66))
-    found = ball_path.plan_path(path, held, FOOT)
+    found = plan_path(path, held, FOOT)
     for stance, anchor in zip(found.stances, found.anchors, strict=True):
         assert (found.positions[stance.begin : stance.end] == anchor).all()
         assert anchor[1] == FOOT.height
@@ -62,7 +63,7 @@ def test_a_stance_over_the_end_of_a_cycle_is_one_place():
     cycle = Cycle(0.9 + 0.2j, 0.3)
     phase = np.linspace(0.0, 1.0, 50, endpoint=False)
     positions = floor_plane.at_height(phase * cycle.way, 0.04 + 0.05 * np.sin(np.pi * phase))
-    found = ball_path.plan_path(FootPath(positions, RATE, cycle), [Interval(40, 60)], FOOT)
+    found = plan_path(FootPath(positions, RATE, cycle), [Interval(40, 60)], FOOT)
     planned = FootPath(found.positions, RATE, cycle)
     assert np.ptp(np.abs(planned.places(range(40, 60)) - planned.places([40])[0])) < 1e-12
 
@@ -73,8 +74,8 @@ def test_a_long_path_is_that_of_its_parts():
     times = np.arange(frames) / RATE
     path = 1.2 * times + 0.05j * np.sin(times)
     held = [Interval(first, first + 40) for first in range(0, frames - period, period)]
-    whole = ball_path.smooth_change(path, held, RATE)
-    part = ball_path.smooth_change(path[8000:9600], held[:19], RATE)
+    whole = change_smoothly(path, held, RATE, FOOT)
+    part = change_smoothly(path[8000:9600], held[:19], RATE, FOOT)
     # A change falls by e every 0.14 s: four seconds from an end it is the same.
     assert whole[8240:9120] == pytest.approx(part[240:-480], abs=1e-9)
     assert np.abs(whole[8000:8040] - part[:40]).max() > 1e-6
@@ -82,18 +83,18 @@ def test_a_long_path_is_that_of_its_parts():
 
 def test_a_path_without_stances_is_as_predicted(rng):
     path = rng.normal(size=40) + 0j
-    assert (ball_path.smooth_change(path, [], RATE) == path).all()
+    assert (change_smoothly(path, [], RATE, FOOT) == path).all()
 
 
 def test_a_dragged_swing_is_lifted_and_a_lifted_one_is_not():
     ahead = np.concatenate([np.zeros(20), np.linspace(0.0, 0.4, 20), np.full(20, 0.4)])
     positions = floor_plane.at_height(ahead + 0j, np.full(60, 0.04))
     held = [Interval(0, 20), Interval(40, 60)]
-    low = ball_path.plan_path(FootPath(positions, RATE), held, FOOT)
+    low = plan_path(FootPath(positions, RATE), held, FOOT)
     assert low.positions[:, 1].max() == pytest.approx(FOOT.height + FOOT.clearance, abs=2e-3)
     lifted = positions.copy()
     lifted[20:40, 1] += 0.2 * np.sin(np.pi * np.linspace(0.0, 1.0, 20)) ** 2
-    high = ball_path.plan_path(FootPath(lifted, RATE), held, FOOT)
+    high = plan_path(FootPath(lifted, RATE), held, FOOT)
     assert high.positions[:, 1].max() == pytest.approx(lifted[:, 1].max(), abs=5e-3)
 
 
@@ -103,11 +104,11 @@ def test_a_swing_at_an_end_of_the_clip_is_lifted(ends):
     ahead = [*ahead, *[0.3] * 30] if ends == "leads" else [*[0.0] * 30, *ahead]
     path = FootPath(floor_plane.at_height(np.array(ahead) + 0j, np.full(42, 0.04)), RATE)
     held = [Interval(12, 42)] if ends == "leads" else [Interval(0, 30)]
-    heights = ball_path.plan_path(path, held, FOOT).positions[:, 1]
+    heights = plan_path(path, held, FOOT).positions[:, 1]
     swing = ~stances.mask(held, 42)
     assert heights[swing].max() > FOOT.height + 0.6 * FOOT.clearance
     still = replace(FOOT, clearance=0.0)
-    low = ball_path.plan_path(path, held, still).positions[swing, 1]
+    low = plan_path(path, held, still).positions[swing, 1]
     assert np.abs(low - FOOT.height).max() < 1e-12
 
 
@@ -116,8 +117,8 @@ def test_locking_a_dragged_foot_without_swing_rules_makes_it_slide_faster():
     ahead = np.linspace(0.0, 0.4, 60) + 0j
     path = FootPath(floor_plane.at_height(ahead, np.full(60, FOOT.height)), RATE)
     held = [Interval(0, 22), Interval(38, 60)]
-    locked = ball_path.smooth_change(path.floor, held, RATE)
-    planned = ball_path.plan_path(path, held, FOOT).positions
+    locked = change_smoothly(path.floor, held, RATE, FOOT)
+    planned = plan_path(path, held, FOOT).positions
     slid, lock, plan = (
         foot_skate.mean_skate_speed(found[:, None], RATE)
         for found in (path.positions, floor_plane.at_height(locked, path.heights), planned)
@@ -133,7 +134,7 @@ def test_a_foot_is_lifted_less_in_a_short_swing(frames, most):
     places = np.zeros((count, 3))
     places[:, 1], places[:, 2] = FOOT.height, np.repeat([0.0, 0.0, 0.3], [20, frames, 20])
     found = [Interval(0, 20), Interval(20 + frames, count)]
-    planned = ball_path.plan_path(FootPath(places, RATE), found, FOOT).positions
+    planned = plan_path(FootPath(places, RATE), found, FOOT).positions
     assert planned[:, 1].max() - FOOT.height == pytest.approx(most, rel=0.05)
 
 
@@ -142,7 +143,7 @@ def test_a_foot_leaves_the_floor_and_comes_back_at_rest():
     places = np.zeros((60, 3))
     places[:, 1], places[:, 2] = FOOT.height, np.repeat([0.0, 0.0, 0.15], [20, 20, 20])
     found = [Interval(0, 20), Interval(40, 60)]
-    planned = ball_path.plan_path(FootPath(places, RATE), found, FOOT).positions
+    planned = plan_path(FootPath(places, RATE), found, FOOT).positions
     heights = planned[:, 1] - FOOT.height
     first, last = heights[20], heights[39]
     assert max(first, last) < 0.1 * heights.max()
@@ -161,8 +162,8 @@ def test_a_path_goes_through_the_points_to_which_it_is_led(rng):
     path, goal = FootPath(places, RATE), np.full((80, 3), np.nan)
     goal[30] = places[30] + [0.02, 0.3, 0.01]
     found = (Interval(0, 20), Interval(45, 66))
-    planned = ball_path.plan_path(path, found, FOOT, goal).positions
+    planned = plan_path(path, found, FOOT, goal).positions
     assert planned[30] == pytest.approx(goal[30], abs=1e-12)
-    assert np.abs(ball_path.plan_path(path, found, FOOT).positions[30] - goal[30]).max() > 0.1
+    assert np.abs(plan_path(path, found, FOOT).positions[30] - goal[30]).max() > 0.1
     # The change is as smooth as one that stands.
     assert np.abs(np.diff(planned - places, 2, axis=0)).max() < 0.05

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from few_feet import frame_rows
 
-from posefield.feet import foot_placement, footsteps, limb_choice, limbs, pelvis, stances
+from posefield.feet import body_plans, foot_placement, limb_choice, limbs, pelvis, stances
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
 from posefield.motion.foot_contacts import FootContact
@@ -69,7 +70,7 @@ def placed(motion, plan):
 
 def test_four_feet_stand_and_step():
     motion = sliding()
-    plan = footsteps.plan_feet(
+    plan = body_plans.plan_feet(
         body(), motion, [contact(motion, foot) for foot in FEET], alternating()
     )
     feet = feet_of(placed(motion, plan))
@@ -78,14 +79,14 @@ def test_four_feet_stand_and_step():
         for stance, anchor in zip(steps.stances, steps.anchors, strict=True):
             apart = feet[stance.begin : stance.end, foot] - anchor
             assert np.abs(apart).max() < 1e-9
-    told = foot_placement.foot_paths(plan)
+    (told,) = foot_placement.foot_paths([plan])
     assert np.abs(told.after - feet).max() < 1e-9
     assert np.abs(told.before - feet_of(motion)).max() < 1e-9
 
 
 def test_only_limbs_above_the_wanted_joints_are_turned():
     motion, times = sliding(), np.arange(FRAMES) / RATE
-    plan = footsteps.plan_feet(body(), motion, [contact(motion, foot) for foot in FEET])
+    plan = body_plans.plan_feet(body(), motion, [contact(motion, foot) for foot in FEET])
     whole = placed(motion, plan)
     wanted = {FEET[1], len(PARENTS) - 1}
     found = foot_placement.place_feet(plan, times, motion.rotations, motion.roots, wanted)
@@ -106,7 +107,7 @@ def test_a_join_of_two_motions_is_planned_as_one():
     motion = SampledMotion(before.rotations, roots, RATE)
     likely = np.ones((FRAMES, 4))
     likely[half - 10 : half + 10, :2] = 0.0
-    plan = footsteps.plan_feet(body(), motion, [contact(motion, f) for f in FEET], likely)
+    plan = body_plans.plan_feet(body(), motion, [contact(motion, f) for f in FEET], likely)
     assert [len(steps.stances) for steps in plan.steps][2:] == [1, 1]
     feet = feet_of(placed(motion, plan))
     assert np.ptp(feet[:, 2:], axis=0).max() < 1e-9
@@ -117,7 +118,7 @@ def test_a_character_that_floats_is_moved_to_the_floor(floats):
     motion = sliding()
     known = [contact(motion, foot) for foot in FEET]
     lifted = SampledMotion(motion.rotations, np.add(motion.roots, [0.0, floats, 0.0]), RATE)
-    plan = footsteps.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)))
+    plan = body_plans.plan_feet(body(), lifted, known, np.ones((FRAMES, 4)))
     assert plan.grounded == pytest.approx(floats - np.sign(floats) * stances.UNEVEN)
     heights = feet_of(placed(lifted, plan))[..., 1]
     assert np.abs(heights - known[0].height).max() <= stances.UNEVEN + 1e-9
@@ -130,8 +131,8 @@ FLOORS = [at_height(0.5), at_height(-0.5), Floor(0.1, 0.0, 0.25), Floor(0.0, 0.2
 def test_feet_stand_and_swing_on_a_given_floor(floor):
     motion = sliding()
     known, likely = [contact(motion, foot) for foot in FEET], alternating()
-    usual = footsteps.plan_feet(body(), motion, known, likely)
-    plan = footsteps.plan_feet(body(), motion, known, likely, floor)
+    usual = body_plans.plan_feet(body(), motion, known, likely)
+    plan = body_plans.plan_feet(body(), motion, known, likely, floor)
     feet, level = feet_of(placed(motion, plan)), feet_of(placed(motion, usual))
     # Places over the floor, and heights above it, are those of a floor at height 0.
     above = feet[..., 1] - floor.heights(feet)
@@ -160,7 +161,7 @@ def test_feet_are_tilted_as_the_floor_is():
     assert [leg.lower for leg in character.legs] == list(FEET)
     height = skeleton.positions(parents, rotations, skeleton.translations(bones, motion.roots))
     known = [FootContact(ball, float(height[0, ball, 1]), 0.3, 0.5, 0.05) for ball in balls]
-    plan = footsteps.plan_feet(character, whole, known, alternating(), floor)
+    plan = body_plans.plan_feet(character, whole, known, alternating(), floor)
     found = foot_placement.place_feet(plan, np.arange(FRAMES) / RATE, whole.rotations, whole.roots)
     moved = skeleton.translations(bones, found.roots)
     after = skeleton.positions(parents, found.rotations, moved)
@@ -169,24 +170,24 @@ def test_feet_are_tilted_as_the_floor_is():
         assert arm == pytest.approx(
             np.tile(floor.tilted(height[0, ball] - height[0, leg]), (FRAMES, 1)), abs=1e-9
         )
-    told = foot_placement.foot_paths(plan)
+    (told,) = foot_placement.foot_paths([plan])
     assert np.abs(told.after - after[:, list(balls)]).max() < 1e-9
 
 
 def test_a_floor_out_of_reach_of_a_fixed_body_is_told():
     motion = sliding()
     known, likely = [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
-    plan = footsteps.plan_feet(body(held={0}), motion, known, likely, at_height(-0.3))
+    plan = body_plans.plan_feet(body(held={0}), motion, known, likely, at_height(-0.3))
     assert not plan.lowered.any() and plan.unreached == (0, 1, 2, 3)
-    assert footsteps.plan_feet(body(held={0}), motion, known, likely).unreached == ()
+    assert body_plans.plan_feet(body(held={0}), motion, known, likely).unreached == ()
     free = replace(body(held={0}), raised=True)
-    risen = footsteps.plan_feet(free, motion, known, likely, at_height(-0.3))
+    risen = body_plans.plan_feet(free, motion, known, likely, at_height(-0.3))
     assert risen.lowered == pytest.approx(0.3) and risen.unreached == ()
 
 
 def test_the_pelvis_is_lowered_within_its_limit_and_stances_end_that_need_more():
     motion = sliding(speed=1.2)
-    plan = footsteps.plan_feet(
+    plan = body_plans.plan_feet(
         body(), motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
     )
     assert 0.0 < (plan.lowered - plan.grounded).max() <= pelvis.MOST + 1e-12
@@ -198,7 +199,7 @@ def test_a_kept_limb_keeps_its_path_while_the_pelvis_is_lowered():
     character = body(FEET[:2], {FEET[2]})
     assert [limb.tip for limb in character.kept] == [FEET[2]]
     known = [contact(motion, foot) for foot in FEET[:2]]
-    plan = footsteps.plan_feet(character, motion, known, np.ones((FRAMES, 2)))
+    plan = body_plans.plan_feet(character, motion, known, np.ones((FRAMES, 2)))
     assert plan.lowered.max() > 0.0
     kept = feet_of(placed(motion, plan))[:, 2] - feet_of(motion)[:, 2]
     assert np.abs(kept).max() < 1e-9
@@ -207,7 +208,7 @@ def test_a_kept_limb_keeps_its_path_while_the_pelvis_is_lowered():
 def test_a_motion_of_a_trunk_target_keeps_its_height():
     motion = sliding(speed=0.8)
     character = body(held={0})
-    plan = footsteps.plan_feet(
+    plan = body_plans.plan_feet(
         character, motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
     )
     assert character.fixed and not plan.lowered.any()
@@ -216,6 +217,10 @@ def test_a_motion_of_a_trunk_target_keeps_its_height():
 def test_the_cover_is_smooth_and_nowhere_below(rng):
     needed = np.maximum(rng.normal(size=200), 0.0)
     for cyclic in (False, True):
-        found = pelvis.cover(needed, RATE, cyclic)
+        rows = frame_rows([needed[:150], needed[150:]], RATE, cyclic)
+        found = pelvis.cover(needed, rows)
         assert (found >= needed - 1e-12).all()
+        # Of each motion alone, the frames of the other are no neighbours.
+        alone = pelvis.cover(needed[:150], frame_rows([needed[:150]], RATE, cyclic))
+        assert (found[:150] == alone).all()
     assert limbs.find_limb(PARENTS, BONES, 3) is not None

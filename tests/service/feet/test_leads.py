@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_footsteps import FEET, FRAMES, RATE, alternating, body, contact, feet_of, placed, sliding
 
-from posefield.feet import footsteps, leads
+from posefield.feet import body_plans, leads
 from posefield.feet.leads import Led
 from posefield.feet.stances import FootPath, Interval
 from posefield.motion import quat
@@ -31,7 +31,7 @@ def kicking():
 
 def planned(motion, led=None):
     known = [contact(sliding(), foot) for foot in FEET]
-    return footsteps.plan_feet(body(), motion, known, alternating(), led=led)
+    return body_plans.plan_feet(body(), motion, known, alternating(), led=led)
 
 
 def test_a_led_foot_is_where_the_motion_has_it_and_stands_before_and_after():
@@ -91,7 +91,7 @@ def test_limbs_keep_their_ends_as_far_as_they_are_led():
     (kept,) = character.kept
     share = np.clip(np.abs(np.arange(FRAMES) - 45.0) / 20.0, 0.0, 1.0)[None]
     likely = alternating()[:, 1:]
-    plan = footsteps.plan_feet(
+    plan = body_plans.plan_feet(
         character,
         motion,
         known,
@@ -101,7 +101,7 @@ def test_limbs_keep_their_ends_as_far_as_they_are_led():
     assert plan.lowered.max() > 0.001
     moved = feet_of(placed(motion, plan))[:, FEET.index(kept.tip)] - feet_of(motion)[:, 0]
     assert -moved[:, 1] == pytest.approx((1.0 - share[0]) * plan.lowered, abs=1e-3)
-    always = footsteps.plan_feet(character, motion, known, likely)
+    always = body_plans.plan_feet(character, motion, known, likely)
     own = feet_of(placed(motion, always))[:, 0] - feet_of(motion)[:, 0]
     assert np.abs(own).max() < 1e-6
 

@@ -1,81 +1,98 @@
-"""Stances of many feet at once: the same as those of each foot alone."""
+"""Stances of many feet at once: the same as those of each foot alone, by loops."""
 
 import numpy as np
+import one_foot
+import pytest
+from few_feet import foot_rows, frame_rows
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from posefield.common.units import UP
 from posefield.feet import stance_rows, stances
-from posefield.feet.stances import FootPath
+from posefield.feet.stances import Cycle, FootPath
 from posefield.motion.foot_contacts import FootContact
 
-RATE, ROWS, FRAMES = 30.0, 3, 60
+RATE, LENGTHS = 30.0, (60, 45, 70)
+FRAMES = sum(LENGTHS)
 FOOT = FootContact(0, 0.04, 0.3, 0.5, 0.05)
-CONTACTS = arrays.arrays(bool, (ROWS, 12)).map(lambda few: np.repeat(few, 5, axis=1))
-FLICKERS = arrays.arrays(bool, (ROWS, FRAMES))
+CYCLE = Cycle(0.7 + 0.1j, 0.2)
+CONTACTS = arrays.arrays(bool, FRAMES // 5).map(lambda few: np.repeat(few, 5))
+FLICKERS = arrays.arrays(bool, FRAMES)
+CYCLIC = st.booleans()
 
 
-def feet(seed):
+def each(values):
+    return np.split(values, np.cumsum(LENGTHS)[:-1])
+
+
+def rows(cyclic):
+    return frame_rows([np.empty(length) for length in LENGTHS], RATE, cyclic)
+
+
+def feet(seed, cyclic):
     """Feet that go on, pause, and are lifted now and then."""
     stream = np.random.default_rng(seed)
-    places = np.zeros((ROWS, FRAMES, 3))
-    places[..., 2] = np.cumsum(stream.uniform(-0.005, 0.04, (ROWS, FRAMES)), axis=1)
-    places[..., 1] = 0.04 + 0.1 * (stream.uniform(size=(ROWS, FRAMES)) > 0.8)
-    return stance_rows.foot_rows(places, RATE, (FOOT,), np.full(ROWS, FOOT.height))
+    found = []
+    for length in LENGTHS:
+        places = np.zeros((length, 3))
+        places[:, 2] = np.cumsum(stream.uniform(-0.005, 0.04, length))
+        places[:, 1] = 0.04 + 0.1 * (stream.uniform(size=length) > 0.8)
+        found.append(FootPath(places, RATE, CYCLE if cyclic else None))
+    return found
 
 
-@given(FLICKERS)
-def test_runs_are_those_of_each_row(down):
-    found = stance_rows.runs(down)
-    expected = [(row, run.begin, run.end) for row in range(ROWS) for run in each(down[row])]
-    assert list(zip(found.rows, found.begins, found.ends, strict=True)) == expected
-    assert (found.mask(down.shape) == down).all()
-    run, frame = found.frames()
-    assert sorted(zip(found.rows[run], frame, strict=True)) == list(
-        zip(*np.nonzero(down), strict=True)
-    )
+def listed(runs):
+    return [list(own) for own in runs.by_row(len(LENGTHS))]
 
 
-def each(down):
-    return stances.runs(down, False)
+@given(FLICKERS, CYCLIC)
+def test_runs_are_those_of_each_row(down, cyclic):
+    found = stance_rows.runs(down, rows(cyclic))
+    assert listed(found) == [stances.runs(own, cyclic) for own in each(down)]
+    assert (found.mask(rows(cyclic)) == down).all()
 
 
-@given(st.one_of(FLICKERS, CONTACTS))
-def test_contacts_are_tidied_as_those_of_one_foot(down):
-    expected = [stances.mask(stances.tidy(own, RATE, False), FRAMES) for own in down]
-    assert (stance_rows.tidy(down, RATE) == expected).all()
+@given(st.one_of(FLICKERS, CONTACTS), CYCLIC)
+def test_contacts_are_tidied_as_those_of_one_foot(down, cyclic):
+    expected = [one_foot.tidy(own, RATE, cyclic) for own in each(down)]
+    assert listed(stance_rows.tidy(down, rows(cyclic))) == expected
 
 
-@given(CONTACTS, st.integers(0, 99))
-def test_swings_become_as_captured_ones_as_those_of_one_foot(down, seed):
-    rows = feet(seed)
-    down = stance_rows.tidy(down, RATE)
+@given(CONTACTS, st.integers(0, 99), CYCLIC)
+def test_swings_become_as_captured_ones_as_those_of_one_foot(down, seed, cyclic):
+    paths = feet(seed, cyclic)
+    found = stance_rows.discipline(stance_rows.tidy(down, rows(cyclic)), foot_rows(paths, FOOT))
     expected = [
-        stances.mask(
-            stances.discipline(stances.tidy(own, RATE, False), FootPath(path, RATE), FOOT), FRAMES
-        )
-        for own, path in zip(down, rows.positions, strict=True)
+        one_foot.discipline(one_foot.tidy(own, RATE, cyclic), path, FOOT)
+        for own, path in zip(each(down), paths, strict=True)
     ]
-    assert (stance_rows.discipline(down, rows) == expected).all()
+    assert listed(found) == expected
 
 
-@given(CONTACTS, FLICKERS)
-def test_of_a_stance_out_of_reach_the_longest_part_stays(down, beyond):
-    found = stance_rows.shortened(down, beyond, RATE)
-    assert not (found & ~(down & ~beyond)).any()
-    for row in range(ROWS):
-        for stance in each(down[row]):
-            inside = slice(stance.begin, stance.end)
-            parts, left = each(~beyond[row, inside]), each(found[row, inside])
-            longest = max(map(len, parts), default=0)
-            assert [len(own) for own in left] == [longest] * (longest >= 3)
-            first = next((own for own in parts if len(own) == longest), None)
-            assert not left or left == [first]
+@given(CONTACTS, FLICKERS, CYCLIC)
+def test_of_a_stance_out_of_reach_the_longest_part_stays(down, beyond, cyclic):
+    found = stance_rows.shortened(stance_rows.runs(down, rows(cyclic)), beyond, rows(cyclic))
+    expected = [
+        one_foot.shortened(stances.runs(own, cyclic), far, path)
+        for own, far, path in zip(each(down), each(beyond), feet(0, cyclic), strict=True)
+    ]
+    assert listed(found) == expected
 
 
-def test_a_row_can_be_chosen():
-    rows = feet(0)
-    one = rows.select(np.array([2]))
-    assert (one.positions == rows.positions[2:]).all() and (one.heights == rows.heights[2:]).all()
-    assert (rows.heights == rows.positions @ UP).all()
+@pytest.mark.parametrize("cyclic", [False, True])
+def test_rows_can_be_chosen(cyclic):
+    every, one = foot_rows(feet(0, cyclic), FOOT), foot_rows(feet(0, cyclic)[1:], FOOT)
+    chosen = every.select(np.array([1, 2]))
+    assert (chosen.positions == one.positions).all()
+    assert chosen.rows.counts.tolist() == list(LENGTHS[1:])
+    down = np.arange(FRAMES) % 20 < 12
+    whole = stance_rows.runs(down, every.rows)
+    assert whole.of_rows(np.array([1, 2])).by_row(2) == whole.by_row(3)[1:]
+    assert stance_rows.from_intervals(whole.by_row(3)).by_row(3) == whole.by_row(3)
+
+
+def test_rows_that_lost_frames_are_found():
+    whole = stance_rows.runs(np.ones(FRAMES, bool), rows(False))
+    less = stance_rows.runs(np.arange(FRAMES) != 70, rows(False))
+    assert stance_rows.changed_rows(whole, less, rows(False)).tolist() == [1]
+    assert not len(stance_rows.changed_rows(whole, whole, rows(False)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from passages import FEET, PARENTS, character
 
-from posefield.feet import foot_placement, footsteps
+from posefield.feet import body_plans, foot_placement
 from posefield.feet.footsteps import SampledMotion
 from posefield.motion import quat, skeleton
 from posefield.motion.foot_contacts import FootContact
@@ -38,7 +38,7 @@ def joined(before, after, cut=CUT):
 
 def slides(passage):
     """Largest way over the floor of each foot while it stands, after the plan."""
-    plan = footsteps.plan_feet(
+    plan = body_plans.plan_feet(
         character(),
         SampledMotion(passage.rotations, passage.roots, RATE),
         CONTACTS,

@@ -79,7 +79,7 @@ def test_a_question_gets_the_same_answer_whatever_it_is_asked_with(model, count,
         )
         for _ in range(count)
     ]
-    found = clip_batch.synthesize_clips(model, asked, most=150)
+    found = clips.synthesize_clips(model, asked, most=150)
     assert [facts(each) for each in found] == [facts(alone(model, each, 150)) for each in asked]
 
 
@@ -104,7 +104,7 @@ def spread(model, count, **more):
 def test_clips_share_one_call_for_their_durations_and_few_for_their_frames(model_path):
     model, feeds = counted(model_path)
     asked = spread(model, 12)
-    found = clip_batch.synthesize_clips(model, asked)
+    found = clips.synthesize_clips(model, asked)
     sizes = [len(feed["controls"]) for feed in feeds]
     assert sizes[0] == sum(sizes[1:]) == 12
     padded = [feed["time"].size for feed in feeds[1:]]
@@ -126,7 +126,7 @@ def test_a_model_whose_clips_depend_on_their_batch_is_asked_one_by_one(model_pat
     assert not clip_batch.is_exact(model, 0)
     feeds.clear()
     asked = spread(model, 3)
-    found = clip_batch.synthesize_clips(model, asked)
+    found = clips.synthesize_clips(model, asked)
     assert {len(feed["controls"]) for feed in feeds} == {1}
     assert list(map(facts, found)) == [facts(clips.synthesize_clip(model, each)) for each in asked]
 

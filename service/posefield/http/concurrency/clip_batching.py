@@ -103,7 +103,7 @@ def _encoded_clips(
     convention: Convention,
     asked: Sequence[ClipQuestion],
 ) -> list[EncodedClip | Exception]:
-    answers = clip_batch.synthesize_clips(model, asked, most)
+    answers = clips.synthesize_clips(model, asked, most)
     made = [answer for answer in answers if isinstance(answer, ClipAnswer)]
     files = iter(encoder.write(made, convention))
     return [

@@ -23,6 +23,11 @@ class Begun:
     def joint(self, name) -> int:
         return self.opened.card.skeleton.names.index(name)
 
+    def solve(self, held, aims) -> ConstrainedMotion:
+        """Return the nearest motion that satisfies constraints."""
+        (found,) = self.bench.solve_all([(held, aims)])
+        return found
+
     def place(self, name, frame, by=(0.0, 0.0, 0.0)) -> PositionConstraint:
         """Return a constraint that moves a joint by `by` at a frame, m."""
         joint = self.joint(name)

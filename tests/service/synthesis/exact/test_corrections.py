@@ -25,7 +25,7 @@ def roughness(begun, held) -> float:
 def test_a_linear_aim_is_met_by_the_mean_of_the_gaussian_that_meets_it(reaching):
     """Oracle: the least-norm solution by a singular value decomposition, in white coordinates."""
     begun = reaching.held
-    held = reaching.bench.solve(begun, [reaching.place("Hips", 30.0, (0.004, -0.003, 0.005))])
+    held = reaching.solve(begun, [reaching.place("Hips", 30.0, (0.004, -0.003, 0.005))])
     _, gradients = begun.scene.position_and_gradient(begun.numbers, reaching.joint("Hips"), 30.0)
     root = np.linalg.cholesky(covariance(reaching) + 1e-12 * np.eye(len(begun.numbers)))
 
@@ -43,11 +43,11 @@ def test_a_linear_aim_is_met_by_the_mean_of_the_gaussian_that_meets_it(reaching)
 
 def test_where_nothing_is_missing_nothing_changes(reaching):
     begun = reaching.held
-    held = reaching.bench.solve(begun, [reaching.place("RightHand", 20.0)])
+    held = reaching.solve(begun, [reaching.place("RightHand", 20.0)])
     assert held.numbers.tobytes() == begun.numbers.tobytes()
     assert (held.steps, held.distance) == (0, 0.0)
     # Negative control: a tenth of a millimetre changes something.
-    near = reaching.bench.solve(begun, [reaching.place("RightHand", 20.0, (1e-4, 0.0, 0.0))])
+    near = reaching.solve(begun, [reaching.place("RightHand", 20.0, (1e-4, 0.0, 0.0))])
     assert near.numbers.tobytes() != begun.numbers.tobytes()
 
 
@@ -59,7 +59,7 @@ def test_what_is_near_is_met_in_a_few_steps(name, end, request, rng):
         unit = begun.place(end, frame, 0.01 * way)
         far = begun.bench.distance(begun.held, [unit])
         aim = begun.place(end, frame, 0.02 * way / far)
-        held = begun.bench.solve(begun.held, [aim])
+        held = begun.solve(begun.held, [aim])
         assert held.results[0].reached and held.results[0].miss < 2e-5
         assert held.steps <= 5
         joint = begun.joint(end)
@@ -73,12 +73,12 @@ def test_what_is_near_is_met_in_a_few_steps(name, end, request, rng):
 
 def test_what_is_out_of_reach_is_told_and_approached_as_far_as_motions_go(reaching):
     """However far off it is, the way that is gone is the same."""
-    begun, bench = reaching.held, reaching.bench
+    begun = reaching.held
     last = float(begun.scene.reduced.frames - 1)
     away = np.array([0.6, 0.0, 0.8])
 
     def held(metres):
-        return bench.solve(begun, [reaching.place("RightHand", last, metres * away)])
+        return reaching.solve(begun, [reaching.place("RightHand", last, metres * away)])
 
     one, ten = held(1.0), held(10.0)
     assert not one.results[0].reached and not ten.results[0].reached
@@ -101,7 +101,7 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
         reaching.place("RightHand", 20.0, (0.02, 0.0, 0.0)),
         reaching.place("RightHand", 20.0 + apart, (-0.02, 0.0, 0.0)),
     ]
-    held = reaching.bench.solve(reaching.held, aims)
+    held = reaching.solve(reaching.held, aims)
     rotations, roots = poses(reaching, held)
     assert np.isfinite(rotations).all() and np.isfinite(roots).all()
     misses = [met.miss for met in held.results]
@@ -110,7 +110,7 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
     before = roughness(reaching, reaching.held)
     assert roughness(reaching, held) < 2.0 * before
     # Negative control: alone each of them is met.
-    alone = [reaching.bench.solve(reaching.held, [aim]).results[0].miss for aim in aims]
+    alone = [reaching.solve(reaching.held, [aim]).results[0].miss for aim in aims]
     assert max(alone) < 1e-5
     # And of a motion so uncertain that nothing is far the hand jerks from one to the other, where
     # there is time for it.
@@ -118,7 +118,7 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
     uncertain = replace(
         reaching.held, state=replace(state, sigma=100.0 / reachability.MAX_DEVIATIONS * state.sigma)
     )
-    jerked = reaching.bench.solve(uncertain, aims)
+    jerked = reaching.solve(uncertain, aims)
     assert (roughness(reaching, jerked) > 2.5 * before) == (apart > 0.0)
 
 
@@ -127,8 +127,8 @@ def test_the_order_of_aims_says_nothing(reaching):
         reaching.place("RightHand", 20.0, (0.01, 0.0, 0.0)),
         reaching.place("LeftHand", 30.0, (0.0, 0.5, 0.0)),
     ]
-    one = reaching.bench.solve(reaching.held, aims)
-    other = reaching.bench.solve(reaching.held, aims[::-1])
+    one = reaching.solve(reaching.held, aims)
+    other = reaching.solve(reaching.held, aims[::-1])
     assert np.abs(one.numbers - other.numbers).max() < 1e-8
     assert [met.what for met in one.results] == ["RightHand", "LeftHand"]
     assert [met.miss for met in one.results] == pytest.approx([m.miss for m in other.results[::-1]])
@@ -139,11 +139,11 @@ def test_only_the_axes_that_are_asked_for_are_held(reaching):
     now, _ = reaching.held.scene.position_and_gradient(reaching.held.numbers, joint, 20.0)
     moment = Measure("height", (joint,), "landmark")
     aim = PositionConstraint(("height",), moment, (1,), now[1:2] + 0.01, 20.0)
-    held = reaching.bench.solve(reaching.held, [aim])
+    held = reaching.solve(reaching.held, [aim])
     then, _ = held.scene.position_and_gradient(held.numbers, joint, 20.0)
     assert then[1] - now[1] == pytest.approx(0.01, abs=1e-5)
     assert np.abs(then - now)[[0, 2]].max() > 1e-4
     whole = replace(aim, axes=(0, 1, 2), target=now + np.array([0.0, 0.01, 0.0]))
-    held = reaching.bench.solve(reaching.held, [whole])
+    held = reaching.solve(reaching.held, [whole])
     then, _ = held.scene.position_and_gradient(held.numbers, joint, 20.0)
     assert np.abs(then - now)[[0, 2]].max() < 1e-5

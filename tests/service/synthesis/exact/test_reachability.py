@@ -6,15 +6,20 @@ from scipy.spatial import distance as apart
 from scipy.stats import chi
 
 from posefield.constraints import constraint, reachability
+from posefield.constraints.correction_task import CorrectionTask
 from posefield.constraints.reachability import Reachability
 
 
 def looked_at(begun, aims) -> Reachability:
     scene, numbers = begun.held.scene, begun.held.numbers
-    seen = constraint.evaluate(aims, scene, numbers)
-    return reachability.assess(
-        scene, begun.bench.spread, begun.held.state.sigma, numbers, aims, seen
-    )
+    seen = constraint.evaluate_many(aims, [scene], numbers[None])
+    task = CorrectionTask(scene, begun.held.state.sigma, numbers, aims)
+    return reachability.assess(begun.bench.spread, [task], numbers[None], seen)
+
+
+def judged(differences, covariance, members):
+    """Return the reachability of one motion."""
+    return Reachability(differences[None], covariance[None], members)
 
 
 @pytest.mark.parametrize("values", [1, 2, 3, 6, 12, 30])
@@ -47,18 +52,18 @@ def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
     own = 0.9 * total + 0.1 * np.trace(total) / 3.0 * np.eye(3)
     own *= walking.held.state.sigma**2
     expected = apart.mahalanobis([0.02, 0.01, -0.03], np.zeros(3), np.linalg.inv(own))
-    assert found.distance == pytest.approx(expected, rel=1e-6)
-    assert found.distance == pytest.approx(walking.bench.distance(walking.held, [aim]))
+    assert found.distance[0] == pytest.approx(expected, rel=1e-6)
+    assert found.distance[0] == pytest.approx(walking.bench.distance(walking.held, [aim]))
     # Negative control: the other way round it is another distance.
     other = apart.mahalanobis([-0.03, 0.02, 0.01], np.zeros(3), np.linalg.inv(own))
     assert abs(other / expected - 1.0) > 1e-3
 
 
 def test_all_of_the_way_is_gone_within_the_limit():
-    near = Reachability(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), np.ones((3, 1)))
+    near = judged(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), np.ones((3, 1)))
     assert near.distance < reachability.distance_limit(3)
     assert np.array_equal(near.reachable, near.differences)
-    far = Reachability(10.0 * near.differences, near.covariance, near.members)
+    far = judged(10.0 * near.differences[0], near.covariance[0], near.members)
     assert np.allclose(
         far.reachable,
         reachability.distance_limit(3) / far.distance * far.differences,
@@ -71,9 +76,10 @@ def test_all_of_the_way_is_gone_within_the_limit():
 def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
     left = np.array([0.01, 0.0, 0.02, 3.0, 2.0, 1.0])
     own = 0.02 * rng.standard_normal((6, 6))
-    found = Reachability(left, own @ own.T + 1e-3 * np.eye(6), np.repeat(np.eye(2), 3, axis=0))
-    shares = found.reachable / np.where(left == 0.0, 1.0, left)
-    length = np.sqrt(found.reachable @ np.linalg.solve(found.covariance, found.reachable))
+    found = judged(left, own @ own.T + 1e-3 * np.eye(6), np.repeat(np.eye(2), 3, axis=0))
+    (reached,) = found.reachable
+    shares = reached / np.where(left == 0.0, 1.0, left)
+    length = np.sqrt(reached @ np.linalg.solve(found.covariance[0], reached))
     assert length <= reachability.distance_limit(6) * (1.0 + 1e-6)
     assert np.ptp(shares[[0, 2]]) < 1e-9 and np.ptp(shares[3:]) < 1e-9
     assert np.all((0.0 <= shares) & (shares <= 1.0))
@@ -82,8 +88,8 @@ def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
 
 def test_the_worth_of_values_does_not_hang_on_their_units():
     """Metres and degrees: what is missed counts in its own scatter."""
-    mixed = Reachability(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), np.eye(2))
-    counted = mixed.weights * np.square(mixed.differences)
+    mixed = judged(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), np.eye(2))
+    (counted,) = mixed.weights * np.square(mixed.differences)
     assert counted[0] == pytest.approx(counted[1])
-    alike = Reachability(mixed.differences, mixed.covariance, np.ones((2, 1)))
-    assert alike.weights[0] == alike.weights[1]
+    alike = judged(mixed.differences[0], mixed.covariance[0], np.ones((2, 1)))
+    assert alike.weights[0, 0] == alike.weights[0, 1]

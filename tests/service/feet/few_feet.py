@@ -1,0 +1,67 @@
+"""Rows of feet for tests, and the functions of many feet for one foot."""
+
+import numpy as np
+
+from posefield.common.frame_groups import FrameRows, of_lengths
+from posefield.common.units import UP
+from posefield.feet import ball_path, smooth_change, stance_rows
+from posefield.feet.ball_path import Footsteps
+from posefield.feet.stance_rows import FootRows
+from posefield.feet.stances import Cycle, FootPath
+from posefield.locomotion import floor_plane
+
+
+def frame_rows(lengths, rate, cyclic=False):
+    """Return rows with these arrays, or arrays of their lengths."""
+    groups = of_lengths(lengths)
+    return FrameRows(groups, np.full(len(groups), rate), np.full(len(groups), cyclic))
+
+
+def foot_rows(paths, foot):
+    """Return the rows of several feet with equal statistics."""
+    rows = FrameRows(
+        of_lengths([own.positions for own in paths]),
+        np.array([own.rate for own in paths], float),
+        np.array([own.cycle is not None for own in paths]),
+    )
+    cycles = [own.cycle or Cycle(0.0, 0.0) for own in paths]
+    places = np.concatenate([own.positions for own in paths])
+    walking = [np.zeros(len(own), bool) if own.walking is None else own.walking for own in paths]
+    every = (foot.height, foot.swing, foot.longest_swing, foot.clearance)
+    return FootRows(
+        rows,
+        floor_plane.project(places),
+        places @ UP,
+        *(np.full(len(paths), own, float) for own in every),
+        np.array([own.way for own in cycles], complex),
+        np.array([own.factor for own in cycles], complex),
+        np.concatenate(walking),
+    )
+
+
+def tidy(down, rate, cyclic):
+    """Return the stances of one foot."""
+    rows = frame_rows([down], rate, cyclic)
+    return list(stance_rows.tidy(down, rows).by_row(1)[0])
+
+
+def discipline(stances, path, foot):
+    """Return the stances of one foot whose swings are as captured ones."""
+    found = stance_rows.discipline(stance_rows.from_intervals([stances]), foot_rows([path], foot))
+    return list(found.by_row(1)[0])
+
+
+def plan_path(path, found, foot, goal=None):
+    """Return the steps of one foot."""
+    goal = np.full(path.positions.shape, np.nan) if goal is None else goal
+    runs = stance_rows.from_intervals([found])
+    positions = ball_path.plan_paths(foot_rows([path], foot), runs, goal)
+    anchors = positions[[own.begin for own in found]].reshape(-1, 3)
+    return Footsteps(positions, tuple(found), anchors)
+
+
+def change_smoothly(path, held, rate, foot, cycle=None):
+    """Return the path of one foot over the floor that is constant in each stance."""
+    whole = FootPath(floor_plane.at_height(path, np.zeros(len(path))), rate, cycle)
+    feet = foot_rows([whole], foot)
+    return smooth_change.smooth_change(feet, feet.floor, stance_rows.from_intervals([held]))
