@@ -282,7 +282,8 @@ def test_a_placed_walk_is_the_same_walk(walk, walking):
     found = walk_passage.walk_passage(walk, there)
     assert np.allclose(found.roots, own.placed(by).roots, atol=1e-4)
     same = np.abs(np.sum(found.rotations * own.placed(by).rotations, axis=-1))
-    assert same.min() > 1.0 - 1e-6
+    # A quarter of a degree: phases are found to a part of a frame.
+    assert same.min() > 1.0 - 2e-6
 
 
 REFUSED = [
