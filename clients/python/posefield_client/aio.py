@@ -253,6 +253,7 @@ class AsyncModel:
     sigma = _ask_model(questions.sigma)
     read_card = _ask_model(questions.card)
     character = _ask_model(questions.character)
+    kernel = _ask_model(questions.kernel)
     clip = _lazy(AsyncClip, files.clip)
     clips = _lazy(AsyncSaving, files.clips)
     crowd = _lazy(AsyncCrowd, files.crowd)

@@ -266,6 +266,7 @@ class Model:
     sigma = _ask_model(questions.sigma)
     read_card = _ask_model(questions.card)
     character = _ask_model(questions.character)
+    kernel = _ask_model(questions.kernel)
     clip = _lazy(Clip, files.clip)
     clips = _lazy(Saving, files.clips)
     crowd = _lazy(Crowd, files.crowd)

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "4.3.0"
+CONTRACT = "4.4.0"
 """Version of the contract that this client was made for."""
 
 
@@ -910,6 +910,13 @@ OPERATIONS = {
             "getCharacter", "GET", "/v1/models/{model}/character.glb", ("model/gltf-binary",), {}
         ),
         Operation(
+            "getKernel",
+            "GET",
+            "/v1/models/{model}/kernel.safetensors",
+            ("application/vnd.safetensors",),
+            {},
+        ),
+        Operation(
             "getPose",
             "GET",
             "/v1/models/{model}/pose",
@@ -1240,6 +1247,7 @@ OPERATIONS = {
         Operation("getContract", "GET", "/openapi.yaml", ("application/yaml",), {}),
         Operation("getContractJson", "GET", "/openapi.json", ("application/json",), {}),
         Operation("getViewer", "GET", "/", ("text/html",), {}),
+        Operation("getViewerCrowd", "GET", "/crowd-webgpu.js", ("text/javascript",), {}),
         Operation("getDocs", "GET", "/docs", ("text/html",), {}),
         Operation("getProblems", "GET", "/problems", ("text/html",), {}),
     )

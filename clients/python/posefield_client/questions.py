@@ -68,6 +68,11 @@ def character(model: str, /) -> Call[bytes]:
     return Call(asking.plain("getCharacter", model), _content)
 
 
+def kernel(model: str, /) -> Call[bytes]:
+    """Return the model's numbers for a graphics card, a safetensors file."""
+    return Call(asking.plain("getKernel", model), _content)
+
+
 def pose(
     model: str,
     /,

@@ -106,7 +106,7 @@ class ReducedTensor:
         The former are linear in the reduced motion (r2, r1), by products of one motion.
         """
         moves = self.moves(motion, places)
-        mean, turns = self._mean_products
+        mean, turns = self.mean_products
         return (mean + moves @ turns).reshape(len(places), -1, 4), self._roots(moves)
 
     def roots(self, motion: Annotated[Floats, "times freedoms"], places: Frames) -> RootPath:
@@ -142,15 +142,15 @@ class ReducedTensor:
         """
         others = np.r_[:3, 3 + 3 * len(self.rotations) : len(self.mean)]
         numbers = self.mean[others] + moves @ self.directions[:, others]
-        mean, turns = self._mean_products
+        mean, turns = self.mean_products
         found = self.rotations_of((mean + moves @ turns).reshape(len(moves), -1, 4))
         return found, numbers[:, :3], curves.clamp(self.curves, numbers[:, 3:])
 
     @cached_property
-    def _mean_products(
+    def mean_products(
         self,
     ) -> tuple[Annotated[Floats, "joints_4"], Annotated[Floats, "freedoms joints_4"]]:
-        """Mean rotations times the chart's share of the numbers (J 4): their mean, by direction.
+        """Return mean rotations times the chart's share of the numbers (J 4): mean, by direction.
 
         They are linear in the moves, and as long as the share of the numbers.
         """

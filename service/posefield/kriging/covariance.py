@@ -47,3 +47,12 @@ COVARIANCE_MODELS: dict[str, Callable[[Floats], Floats]] = {
     formula.__name__: formula for formula in (exponential, gaussian, spherical, matern32, matern52)
 }
 """Covariance models by the names that recipes and cards use."""
+
+KERNEL_GAINS = {
+    "exponential": 9.0,
+    "gaussian": 3.0,
+    "spherical": 1.0,
+    "matern32": RATE32**2,
+    "matern52": RATE52**2,
+}
+"""Factors of squared distances with which a kernel on a graphics card computes fewer products."""

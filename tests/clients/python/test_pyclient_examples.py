@@ -38,7 +38,7 @@ NOT_ASKED = {
     },
     **{
         (name, None): "for people to read"
-        for name in ("getViewer", "getDocs", "getProblems", "getContract")
+        for name in ("getViewer", "getViewerCrowd", "getDocs", "getProblems", "getContract")
     },
     ("getMetrics", None): "for Prometheus",
     ("getContractJson", None): "asked by itself where an answer is none of the contract",
@@ -126,6 +126,7 @@ CALLS = {
     ("getReadiness", None): lambda client, r: client.ready(),
     ("getModel", None): lambda client, r: model(client, r).card,
     ("getCharacter", None): lambda client, r: model(client, r).character(),
+    ("getKernel", None): lambda client, r: model(client, r).kernel(),
     ("getPoseInFormat", "msgpack"): pose,
     ("queryPoseInFormat", "msgpack"): pose,
     ("getWhy", None): why,

@@ -18,7 +18,14 @@ def static_pages(agreed: Contract) -> dict[str, StaticPage]:
         "getContractJson": StaticPage("application/json", lambda: orjson.dumps(agreed.document)),
         "getDocs": _html_page(partial(static_page.built_page, static_page.DOCS)),
         "getProblems": _html_page(_problems),
-        "getViewer": _html_page(partial(static_page.built_page, static_page.VIEWER)),
+        "getViewerCrowd": StaticPage(
+            "text/javascript", partial(static_page.viewer_script, static_page.VIEWER_SCRIPT)
+        ),
+        "getViewer": StaticPage(
+            "text/html",
+            partial(static_page.built_page, static_page.VIEWER),
+            partial(static_page.headers, loads_scripts=True),
+        ),
     }
 
 

@@ -40,7 +40,10 @@ class StaticPage:
 
 _PAGES = Path(__file__).parent
 VIEWER = _PAGES / "viewer/index.html"
+VIEWER_SCRIPT = _PAGES / "viewer/crowd-webgpu.js"
 DOCS = _PAGES / "docs/index.html"
+NO_SOURCE = "'none'"
+"""Sources of a Content-Security-Policy that allow nothing."""
 
 
 def built_page(path: Path) -> bytes:
@@ -53,12 +56,26 @@ def built_page(path: Path) -> bytes:
         return templates.render("missing.html", title="posefield").encode()
 
 
-def headers(content: bytes) -> dict[str, str]:
-    """Return the headers of a page, which allow its inline scripts and styles only."""
+def viewer_script(path: Path) -> bytes:
+    """Return the script beside the viewer that `make page` has built; one that fails if missing."""
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        return b'throw new Error("not built: run make page");\n'
+
+
+def headers(content: bytes, loads_scripts: bool = False) -> dict[str, str]:
+    """Return the headers of a page, which allow its inline scripts and styles only.
+
+    loads_scripts: whether a page with scripts may load others of its own origin.
+    """
     found = _InlineTextParser()
     found.feed(content.decode())
     found.close()
-    return security_headers.page_headers(found.sources("script"), found.sources("style"))
+    script = found.sources("script")
+    if loads_scripts and script != NO_SOURCE:
+        script = f"'self' {script}"
+    return security_headers.page_headers(script, found.sources("style"))
 
 
 class _InlineTextParser(HTMLParser):
@@ -84,4 +101,4 @@ class _InlineTextParser(HTMLParser):
     def sources(self, tag: str) -> str:
         """Return the hashes of a tag's texts as sources of a Content-Security-Policy."""
         digests = (b64encode(sha256(text.encode()).digest()).decode() for text in self._texts[tag])
-        return " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
+        return " ".join(f"'sha256-{digest}'" for digest in digests) or NO_SOURCE
