@@ -15,24 +15,109 @@ export const TAKES = Math.floor(2000 / (FRAMES + 1));
 /** Captured clips that are tried, and the fastest turn, rad/s, of who walks a gentle way. */
 const [TRIED, SHARPEST] = [120, 0.2];
 
-export interface Library {
+/** What the characters of a crowd do: how long a clip lasts, and where it leads. */
+export interface Motions {
   readonly levels: number;
   readonly count: number;
   /** Whether characters go somewhere; else they stay and repeat their clip there and back. */
   readonly walks: boolean;
-  /** SIZE numbers for each level, motion, frame (FRAMES + 1) and joint: what moves the skin. */
-  readonly poses: Float32Array;
   /** For each motion: seconds, metres a second, rad to the left of the heading, rad a second. */
   readonly seconds: Float32Array;
   readonly speeds: Float32Array;
   readonly drifts: Float32Array;
   readonly turning: Float32Array;
+  /** x and z of the root at the beginning of each motion, m. */
+  readonly starts: Float32Array;
+}
+
+/** Motions whose poses lie ready. */
+export interface Library extends Motions {
+  /** SIZE numbers for each level, motion, frame (FRAMES + 1) and joint: what moves the skin. */
+  readonly poses: Float32Array;
+}
+
+/** Motions as the graphics card computes them: controls, and weights of all labels, of each. */
+export interface ComputedMotions extends Motions {
+  readonly points: Float32Array<ArrayBuffer>;
 }
 
 interface Row {
   readonly controls: readonly number[];
   readonly performer: string | null;
   readonly labels: Readonly<Record<string, string>>;
+}
+
+type Ask = (
+  rows: readonly Row[],
+  rest: Partial<CrowdQuestion> & Pick<CrowdQuestion, "time">,
+) => Promise<CrowdPoses>;
+
+/** Asks for poses of rows, and counts the answers among so many. */
+function asker(
+  source: Source,
+  model: string,
+  card: ModelCard,
+  signal: AbortSignal,
+  progress: (share: number) => void,
+  questions: number,
+): Ask {
+  let answered = 0;
+  return async (rows, rest) => {
+    const poses = await source.crowd(model, { ...asked(card, rows), ...rest }, signal);
+    answered += 1;
+    progress(answered / questions);
+    return poses;
+  };
+}
+
+function walking(card: ModelCard): boolean {
+  return card.cyclic && card.root === "travelling";
+}
+
+/** Which of the rows a crowd may do: those of a walk that turn gently, if there are enough. */
+function fitting(tried: readonly Row[], ways: Ways, walks: boolean): number[] {
+  const all = tried.map((_, i) => i);
+  const gentle = all.filter((i) => Math.abs(ways.turning[i]!) <= SHARPEST);
+  return walks && gentle.length >= 6 ? gentle : all;
+}
+
+/** Two questions: all motions that fit, whose poses the graphics card computes. */
+export async function computedMotions(
+  source: Source,
+  model: string,
+  card: ModelCard,
+  signal: AbortSignal,
+  progress: (share: number) => void,
+): Promise<ComputedMotions> {
+  const [tried, walks] = [rows(card), walking(card)];
+  const ways = await journeys(tried, asker(source, model, card, signal, progress, 2));
+  const chosen = fitting(tried, ways, walks);
+  const points = Float32Array.from(chosen.flatMap((i) => point(card, tried[i]!)));
+  return { ...motions(card, ways, chosen, walks), points };
+}
+
+function motions(card: ModelCard, ways: Ways, chosen: readonly number[], walks: boolean): Motions {
+  const pick = (all: Float32Array) => Float32Array.from(chosen, (i) => all[i]!);
+  const starts = chosen.flatMap((i) => [ways.starts[2 * i]!, ways.starts[2 * i + 1]!]);
+  return {
+    levels: card.levels.length,
+    count: chosen.length,
+    walks,
+    seconds: pick(ways.seconds),
+    speeds: pick(ways.speeds),
+    drifts: pick(ways.drifts),
+    turning: pick(ways.turning),
+    starts: Float32Array.from(starts),
+  };
+}
+
+/** Controls in the order of the card, and a weight for each name of each label set. */
+function point({ labels = [] }: ModelCard, row: Row): number[] {
+  const weights = labels.flatMap(({ name, names }) => {
+    const own = name === "performer" ? row.performer : row.labels[name];
+    return names.map((each) => (each === own ? 1 : 0));
+  });
+  return [...row.controls, ...weights];
 }
 
 /**
@@ -48,23 +133,10 @@ export async function library(
   progress: (share: number) => void,
   takes = false,
 ): Promise<Library> {
-  const questions = 2 + 2 * card.levels.length;
-  let answered = 0;
-  const walks = card.cyclic && card.root === "travelling";
-  const tried = rows(card);
-  const ask = async (
-    rows: readonly Row[],
-    rest: Partial<CrowdQuestion> & Pick<CrowdQuestion, "time">,
-  ) => {
-    const poses = await source.crowd(model, { ...asked(card, rows), ...rest }, signal);
-    answered += 1;
-    progress(answered / questions);
-    return poses;
-  };
+  const ask = asker(source, model, card, signal, progress, 2 + 2 * card.levels.length);
+  const [tried, walks] = [rows(card), walking(card)];
   const ways = await journeys(tried, ask);
-  const gentle = tried.map((_, i) => i).filter((i) => Math.abs(ways.turning[i]!) <= SHARPEST);
-  const fit = walks && gentle.length >= 6 ? gentle : tried.map((_, i) => i);
-  const some = spread(fit, MOTIONS);
+  const some = spread(fitting(tried, ways, walks), MOTIONS);
   // Takes last and travel as the prediction does, so that several may share a captured clip.
   const chosen = takes ? Array.from({ length: TAKES }, (_, i) => some[i % some.length]!) : some;
   const rest = standing(card, Float32Array.from(card.skeleton.offsets.flat()));
@@ -84,19 +156,7 @@ export async function library(
       lay(all.subarray(level * size, (level + 1) * size), rest, poses, walks);
     }),
   );
-  const pick = (all: Float32Array) => Float32Array.from(chosen, (i) => all[i]!);
-  const [seconds, speeds] = [pick(ways.seconds), pick(ways.speeds)];
-  const [drifts, turning] = [pick(ways.drifts), pick(ways.turning)];
-  return {
-    levels: card.levels.length,
-    count: chosen.length,
-    walks,
-    poses: all,
-    seconds,
-    speeds,
-    drifts,
-    turning,
-  };
+  return { ...motions(card, ways, chosen, walks), poses: all };
 }
 
 function rows(card: ModelCard): Row[] {
@@ -128,15 +188,10 @@ function asked(
   return { controls, performer, labels };
 }
 
-type Ask = (
-  rows: readonly Row[],
-  rest: Partial<CrowdQuestion> & Pick<CrowdQuestion, "time">,
-) => Promise<CrowdPoses>;
-
-type Journeys = Pick<Library, "seconds" | "speeds" | "drifts" | "turning">;
+type Ways = Pick<Motions, "seconds" | "speeds" | "drifts" | "turning" | "starts">;
 
 /** How far clips lead: an arc, gone evenly (service/posefield/locomotion/stride.py says the same). */
-async function journeys(rows: readonly Row[], ask: Ask): Promise<Journeys> {
+async function journeys(rows: readonly Row[], ask: Ask): Promise<Ways> {
   const start = await ask(rows, { time: 0 });
   const end = await ask(rows, { time: [...start.duration] });
   const joints = start.names.length;
@@ -159,6 +214,9 @@ async function journeys(rows: readonly Row[], ask: Ask): Promise<Journeys> {
     speeds: Float32Array.from(found, ({ speed }) => speed),
     drifts: Float32Array.from(found, ({ drift }) => drift),
     turning: Float32Array.from(found, ({ turn }, i) => turn / start.duration[i]!),
+    starts: Float32Array.from(
+      rows.flatMap((_, i) => [start.rootPosition[3 * i]!, start.rootPosition[3 * i + 2]!]),
+    ),
   };
 }
 

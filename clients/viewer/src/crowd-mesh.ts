@@ -19,6 +19,7 @@ import {
 } from "three";
 
 import type { Character } from "./character.ts";
+import type { Library } from "./crowd-library.ts";
 import type { Crowd } from "./crowd-walk.ts";
 
 /** Numbers of a joint's matrix: three rows of four. */
@@ -158,9 +159,11 @@ export class CrowdMesh implements CrowdDrawing {
   readonly #near: Part;
   readonly #far: Part;
   readonly #tints = Array.from({ length: MOST_LEVELS }, () => new Color());
+  readonly #library: Library;
 
   /** most: characters. */
-  constructor(character: Character, joints: number, most: number) {
+  constructor(character: Character, library: Library, joints: number, most: number) {
+    this.#library = library;
     this.#near = new Part(character, character.fine, joints, NEAREST, 4, this.#tints);
     this.#far = new Part(character, character.coarse, joints, most, 1, this.#tints);
     this.group.add(this.#near.mesh, this.#far.mesh);
@@ -176,7 +179,7 @@ export class CrowdMesh implements CrowdDrawing {
 
   add(near: boolean, crowd: Crowd, i: number): void {
     const part = near && this.#near.count < NEAREST ? this.#near : this.#far;
-    crowd.lay(part.add(crowd.level[i]!), i);
+    crowd.lay(part.add(crowd.level[i]!), this.#library, i);
   }
 
   end(): void {

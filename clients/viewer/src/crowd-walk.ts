@@ -2,7 +2,7 @@
 
 import type { Vector3 } from "three";
 
-import { FRAMES, type Library } from "./crowd-library.ts";
+import { FRAMES, type Library, type Motions } from "./crowd-library.ts";
 import { SIZE } from "./crowd-mesh.ts";
 import { choose, type Ladder, type Lens, pixels } from "./detail.ts";
 
@@ -26,17 +26,17 @@ export class Crowd {
   readonly counts: Int32Array;
   readonly #phase: Float32Array;
   readonly #motion: Uint16Array;
-  readonly #library: Library;
+  readonly #motions: Motions;
 
-  constructor(library: Library, count: number) {
-    this.#library = library;
+  constructor(motions: Motions, count: number) {
+    this.#motions = motions;
     this.count = count;
     this.half = half(count);
     [this.x, this.z] = [new Float32Array(count), new Float32Array(count)];
     [this.heading, this.#phase] = [new Float32Array(count), new Float32Array(count)];
     this.#motion = new Uint16Array(count);
     this.level = new Int8Array(count).fill(-1);
-    this.counts = new Int32Array(library.levels);
+    this.counts = new Int32Array(motions.levels);
     this.#scatter();
   }
 
@@ -50,13 +50,13 @@ export class Crowd {
       this.z[i] = ((i % side) + 0.2 + 0.6 * random()) * cell - this.half;
       this.heading[i] = 2 * Math.PI * random();
       this.#phase[i] = random();
-      this.#motion[i] = Math.floor(random() * this.#library.count);
+      this.#motion[i] = Math.floor(random() * this.#motions.count);
     }
   }
 
   /** Everybody goes on for so many seconds; who leaves the field comes back at its other side. */
   step(seconds: number): void {
-    const { seconds: lasting, speeds, drifts, turning, walks } = this.#library;
+    const { seconds: lasting, speeds, drifts, turning, walks } = this.#motions;
     const [half, side] = [this.half, 2 * this.half];
     for (let i = 0; i < this.count; i++) {
       const motion = this.#motion[i]!;
@@ -102,13 +102,46 @@ export class Crowd {
     standing[4 * at + 1] = this.z[i]!;
     standing[4 * at + 2] = this.heading[i]!;
     standing[4 * at + 3] = this.#folded(i);
-    motion[2 * at] = level * this.#library.count + this.#motion[i]!;
+    motion[2 * at] = level * this.#motions.count + this.#motion[i]!;
     motion[2 * at + 1] = level;
   }
 
+  /** Character `i` as the graphics card computes it (webgpu/kernel.wgsl), eight numbers. */
+  embody(out: Float32Array, at: number, i: number): void {
+    const [motion, phase] = [this.#motion[i]!, this.#folded(i)];
+    const { walks, seconds, turning, starts } = this.#motions;
+    const gone = walks ? seconds[motion]! * phase : 0;
+    const heading = this.heading[i]! - turning[motion]! * gone;
+    const [half, across] = [Math.cos(heading / 2), Math.sin(heading / 2)];
+    out[at] = half;
+    out[at + 1] = across;
+    out[at + 2] = this.x[i]!;
+    out[at + 3] = this.z[i]!;
+    out[at + 4] = phase;
+    out[at + 5] = this.level[i]!;
+    out[at + 6] = motion;
+    out[at + 7] = 1;
+    if (!walks) return;
+    // A clip leads from its beginning along an arc: it begins where that arc ends here.
+    const [cos, sin] = [1 - 2 * across * across, 2 * half * across];
+    const [ahead, left] = this.#gone(motion, gone);
+    const [dx, dz] = [left + starts[2 * motion]!, ahead + starts[2 * motion + 1]!];
+    out[at + 2]! -= cos * dx + sin * dz;
+    out[at + 3]! -= cos * dz - sin * dx;
+  }
+
+  /** Where a motion has led after some seconds: metres ahead and to the left of its beginning. */
+  #gone(motion: number, seconds: number): [ahead: number, left: number] {
+    const { speeds, drifts, turning } = this.#motions;
+    const [speed, drift, rate] = [speeds[motion]!, drifts[motion]!, turning[motion]!];
+    const half = (rate * seconds) / 2;
+    // The chord of an arc.
+    const way = speed * seconds * (Math.abs(half) < 1e-6 ? 1 : Math.sin(half) / half);
+    return [way * Math.cos(drift + half), way * Math.sin(drift + half)];
+  }
+
   /** The matrices of character `i`'s joints in the world, SIZE numbers each, written into `out`. */
-  lay(out: Float32Array, i: number): void {
-    const { poses, count } = this.#library;
+  lay(out: Float32Array, { poses, count }: Library, i: number): void {
     const [cos, sin] = [Math.cos(this.heading[i]!), Math.sin(this.heading[i]!)];
     const phase = this.#folded(i);
     const frame = Math.min(FRAMES - 1, Math.floor(phase * FRAMES));

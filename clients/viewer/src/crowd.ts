@@ -15,10 +15,11 @@ import {
 import "./crowd.css";
 import { levelColour } from "./colours.ts";
 import { BakedCrowd } from "./crowd-baked.ts";
-import { type Library, library } from "./crowd-library.ts";
+import { type Library, library, type Motions } from "./crowd-library.ts";
 import { type CrowdDrawing, CrowdMesh } from "./crowd-mesh.ts";
 import { Panel } from "./crowd-panel.ts";
 import { Crowd, half, REACH } from "./crowd-walk.ts";
+import { type ComputedCrowd, open, WebGpuCrowd } from "./crowd-webgpu.ts";
 import { type Ladder, ladder, lens, pixels } from "./detail.ts";
 import { understood } from "./faults.ts";
 import { served } from "./page.ts";
@@ -46,6 +47,9 @@ class CrowdView {
   readonly #frustum = new Frustum();
   readonly #sphere = new Sphere(new Vector3(), REACH);
   #library: Library | null = null;
+  /** In browsers with WebGPU, in place of a library. */
+  #computed: ComputedCrowd | null = null;
+  #lost = false;
   #loading = false;
   #crowd: Crowd | null = null;
   #mesh: CrowdDrawing | null = null;
@@ -75,6 +79,7 @@ class CrowdView {
       this.#leave();
       this.#group.removeFromParent();
       this.#bare();
+      this.#computed?.drawing.dispose();
     });
     theme.listen(() => this.#paint(), signal);
     this.#paint();
@@ -86,7 +91,7 @@ class CrowdView {
       if (state.view === "crowd") this.#enter();
       else this.#leave();
     }
-    if (changed.has("crowd") && this.#library) this.#people();
+    if (changed.has("crowd") && this.#motions) this.#people();
     if (changed.has("varied")) this.#again();
     // The page says so when the service is back, and one may move a control to try again.
     if (changed.has("controls")) this.#want();
@@ -98,13 +103,24 @@ class CrowdView {
     const { camera, orbit } = this.#page.scene;
     this.#before = { position: camera.position.clone(), target: orbit.target.clone() };
     this.#group.visible = true;
+    this.#cover();
     this.#panel.show(true);
     this.#look();
     this.#want();
   }
 
   #want(): void {
-    if (this.#group.visible && !this.#library && !this.#loading) void this.#load();
+    if (this.#group.visible && !this.#motions && !this.#loading) void this.#load();
+  }
+
+  get #motions(): Motions | null {
+    return this.#computed?.motions ?? this.#library;
+  }
+
+  /** Shows the canvas of a crowd that has its own, while the crowd is shown. */
+  #cover(): void {
+    const own = this.#mesh instanceof WebGpuCrowd && this.#group.visible;
+    this.#page.scene.cover(own ? this.#computed!.drawing.canvas : null);
   }
 
   /** The clip of one body ends where it does not loop; a crowd does not. */
@@ -115,6 +131,7 @@ class CrowdView {
 
   #leave(): void {
     this.#group.visible = false;
+    this.#cover();
     this.#panel.show(false);
     if (!this.#before) return;
     const { camera, orbit } = this.#page.scene;
@@ -137,7 +154,18 @@ class CrowdView {
   /** Other motions; those that are there go on until then. */
   #again(): void {
     this.#library = null;
+    this.#forget();
     this.#want();
+  }
+
+  #forget(): void {
+    if (this.#mesh instanceof WebGpuCrowd) {
+      this.#mesh = null;
+      this.#crowd = null;
+      this.#cover();
+    }
+    this.#computed?.drawing.dispose();
+    this.#computed = null;
   }
 
   async #load(): Promise<void> {
@@ -148,7 +176,14 @@ class CrowdView {
       this.#panel.say("Computing the motions …");
       const done = (share: number) => this.#panel.progress(share);
       const takes = varied && served(source);
-      this.#library = await library(source, store.state.model, card, signal, done, takes);
+      if (!takes && !this.#lost) {
+        this.#computed = await open(this.#page, done, MOST, () => {
+          this.#lost = true;
+          this.#again();
+        });
+      }
+      if (!this.#computed)
+        this.#library = await library(source, store.state.model, card, signal, done, takes);
       this.#panel.say("");
       if (!signal.aborted) this.#people();
     } catch (fault) {
@@ -163,24 +198,28 @@ class CrowdView {
   }
 
   #people(): void {
-    const own = this.#library!;
-    const { card, character, scene } = this.#page;
-    this.#crowd = new Crowd(own, Math.min(MOST, this.#page.store.state.crowd));
+    this.#crowd = new Crowd(this.#motions!, Math.min(MOST, this.#page.store.state.crowd));
     this.#bare();
-    const [joints, { count }] = [card.skeleton.names.length, this.#crowd];
-    this.#mesh =
-      scene.software && count <= ONE_MESH
-        ? new CrowdMesh(character, joints, count)
-        : new BakedCrowd(character, own, joints, count);
+    this.#mesh = this.#computed?.drawing ?? this.#drawn(this.#library!, this.#crowd.count);
+    this.#cover();
     this.#group.add(this.#mesh.group);
     this.#ground = ground(this.#crowd.half);
     this.#group.add(this.#ground);
     this.#paint();
   }
 
+  /** Who draws so many by WebGL. */
+  #drawn(own: Library, count: number): CrowdDrawing {
+    const { card, character, scene } = this.#page;
+    const joints = card.skeleton.names.length;
+    return scene.software && count <= ONE_MESH
+      ? new CrowdMesh(character, own, joints, count)
+      : new BakedCrowd(character, own, joints, count);
+  }
+
   #bare(): void {
     this.#mesh?.group.removeFromParent();
-    this.#mesh?.dispose();
+    if (!(this.#mesh instanceof WebGpuCrowd)) this.#mesh?.dispose();
     this.#ground?.geometry.dispose();
     this.#ground?.material.dispose();
     this.#ground?.removeFromParent();

@@ -19,7 +19,7 @@ export type Source = Pick<
 };
 
 /** A service also gives files and says what an answer is made of; a table in the page does not. */
-export function served(source: Source): source is Source & Pick<Client, "file"> {
+export function served(source: Source): source is Source & Pick<Client, "file" | "kernel"> {
   return "file" in source;
 }
 

@@ -35,6 +35,8 @@ export class Scene {
   #floor = 0;
   readonly #sun = sun();
   #asked = false;
+  #cover: HTMLCanvasElement | null = null;
+  readonly #drawn = new Set<() => void>();
   #last = 0;
 
   constructor(host: HTMLElement) {
@@ -65,6 +67,29 @@ export class Scene {
     this.#steps.add(step);
     this.redraw();
     return () => this.#steps.delete(step);
+  }
+
+  /** Height of the ground, m. */
+  get floor(): number {
+    return this.#floor;
+  }
+
+  /** What is to be seen: the stage, and what lies over it. */
+  get canvases(): readonly HTMLCanvasElement[] {
+    return [this.renderer.domElement, ...(this.#cover ? [this.#cover] : [])];
+  }
+
+  /** Puts a canvas over the stage, which its owner draws, or takes it away. */
+  cover(canvas: HTMLCanvasElement | null): void {
+    this.#cover?.remove();
+    this.#cover = canvas;
+    if (canvas) this.renderer.domElement.after(canvas);
+  }
+
+  /** Calls after each drawing; returns how to end that. */
+  watch(seen: () => void): () => void {
+    this.#drawn.add(seen);
+    return () => this.#drawn.delete(seen);
   }
 
   /** Draws once at the next chance, and on while a step asks for it. */
@@ -148,6 +173,7 @@ export class Scene {
     this.#asked = false;
     const goOn = [...this.#steps].map((step) => step(seconds)).some(Boolean);
     this.renderer.render(this.root, this.camera);
+    for (const seen of this.#drawn) seen();
     if (goOn) this.redraw();
   }
 

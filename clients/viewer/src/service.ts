@@ -29,6 +29,7 @@ export class Service implements Source {
   readonly clip: Source["clip"] = (...words) => this.#client.clip(...words);
   readonly crowd: Source["crowd"] = (...words) => this.#client.crowd(...words);
   readonly sigma: Source["sigma"] = (...words) => this.#client.sigma(...words);
+  readonly kernel: Client["kernel"] = (...words) => this.#client.kernel(...words);
   readonly file: Client["file"] = (...words) => this.#client.file(...words);
   readonly why: Source["why"] = (...words) => this.#client.why(...words);
 

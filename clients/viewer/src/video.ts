@@ -41,7 +41,8 @@ export function record(
   seconds: number,
   signal: AbortSignal,
 ): Promise<Blob> {
-  const stream = scene.renderer.domElement.captureStream(RATE);
+  const film = filmed(scene);
+  const stream = film.canvas.captureStream(RATE);
   const recorder = new MediaRecorder(stream, {
     mimeType: format.mediaType,
     videoBitsPerSecond: BITS,
@@ -55,9 +56,23 @@ export function record(
     recorder.addEventListener("error", failed);
     recorder.addEventListener("stop", () => {
       clearTimeout(timer);
+      film.end();
       for (const track of stream.getTracks()) track.stop();
       done(new Blob(parts, { type: format.mediaType }));
     });
     recorder.start();
   });
+}
+
+/** A canvas with all that is to be seen, drawn until the end. */
+function filmed(scene: Scene): { canvas: HTMLCanvasElement; end: () => void } {
+  const [stage, cover] = scene.canvases;
+  if (!cover) return { canvas: stage!, end: () => {} };
+  const { width, height } = stage!;
+  const canvas = Object.assign(document.createElement("canvas"), { width, height });
+  const pen = canvas.getContext("2d")!;
+  const end = scene.watch(() => {
+    for (const each of scene.canvases) pen.drawImage(each, 0, 0, width, height);
+  });
+  return { canvas, end };
 }

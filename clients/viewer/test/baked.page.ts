@@ -6,10 +6,9 @@ import { after, before, describe, it } from "node:test";
 import type { Browser, Page } from "playwright-core";
 
 import { browser, SERVICE } from "./harness.ts";
-import { until } from "./look.ts";
+import { hideRenderer, lights, unlike, until } from "./look.ts";
 
 const STILL = "/#cmu_walk?~view=crowd&~playing=no&~time=0";
-const [WIDTH, HEIGHT] = [640, 360];
 
 describe("the crowd of a graphics card", () => {
   let from: Browser;
@@ -67,34 +66,3 @@ describe("the crowd of a graphics card", () => {
     await page.context().close();
   });
 });
-
-/** In the page: WebGL names another renderer than the one it has. */
-function hideRenderer(): void {
-  const own = WebGL2RenderingContext.prototype.getParameter;
-  WebGL2RenderingContext.prototype.getParameter = function (this: WebGL2RenderingContext, name) {
-    return name === 0x9246 ? "a graphics card" : (own.call(this, name) as unknown);
-  };
-}
-
-/** Brightness of the stage's pixels, small, so that smoothed edges do not count. */
-async function lights(page: Page): Promise<number[]> {
-  const png = (await page.locator("#stage canvas").screenshot()).toString("base64");
-  return page.evaluate(
-    async ({ png, width, height }) => {
-      const image = Object.assign(new Image(), { src: `data:image/png;base64,${png}` });
-      await image.decode();
-      const pen = Object.assign(document.createElement("canvas"), { width, height }).getContext(
-        "2d",
-      )!;
-      pen.drawImage(image, 0, 0, width, height);
-      const { data } = pen.getImageData(0, 0, width, height);
-      return Array.from({ length: width * height }, (_, at) => data[4 * at + 1]!);
-    },
-    { png, width: WIDTH / 2, height: HEIGHT / 2 },
-  );
-}
-
-/** Share of pixels that differ by more than a tenth of the brightness. */
-function unlike(one: readonly number[], other: readonly number[]): number {
-  return one.filter((value, at) => Math.abs(value - other[at]!) > 25).length / one.length;
-}

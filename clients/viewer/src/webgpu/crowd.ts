@@ -27,6 +27,8 @@ export interface View {
 /** Numbers of the view in the shader: matrix, ground in a row of four, colours. */
 const VIEW = 16 + 4 + 4 * MOST_LEVELS;
 const DEPTH = "depth24plus";
+/** Of a pixel, which smooth edges. */
+const SAMPLES = 4;
 
 /** Corners of triangles and how many joints move their points. */
 interface Part {
@@ -39,8 +41,6 @@ interface Part {
 export interface CrowdOptions extends Omit<KernelOptions, "dumped"> {
   readonly canvas: HTMLCanvasElement;
   readonly skin: Skin;
-  /** Samples of a pixel: 4 where edges are smoothed, else 1. */
-  readonly samples: 1 | 4;
 }
 
 export class Drawing {
@@ -52,6 +52,8 @@ export class Drawing {
   readonly #skin: readonly GPUBuffer[];
   readonly #parts: readonly Part[];
   readonly #numbers = new Float32Array(VIEW);
+  readonly #format: GPUTextureFormat;
+  /** Depths and colours before edges are smoothed. */
   #targets: readonly GPUTexture[] = [];
 
   /** Fails where the device cannot do it. */
@@ -76,7 +78,7 @@ export class Drawing {
         fragment: { module, targets: [{ format }] },
         primitive: { cullMode: "back" },
         depthStencil: { format: DEPTH, depthWriteEnabled: true, depthCompare: "less" },
-        multisample: { count: options.samples },
+        multisample: { count: SAMPLES },
       });
     const pipelines = await Promise.all([pipeline(4), pipeline(1)]);
     return new Drawing(device, kernel, pipelines, format, options);
@@ -92,6 +94,7 @@ export class Drawing {
     this.#device = device;
     this.#kernel = kernel;
     this.#options = options;
+    this.#format = format;
     this.#context = options.canvas.getContext("webgpu")!;
     this.#context.configure({ device, format, alphaMode: "premultiplied" });
     const { points, normals, joints, weights, fine, coarse } = options.skin;
@@ -152,22 +155,26 @@ export class Drawing {
   }
 
   #pass({ width, height }: View): GPURenderPassDescriptor {
-    const { canvas, samples } = this.#options;
+    const { canvas } = this.#options;
     if (canvas.width !== width || canvas.height !== height || !this.#targets.length) {
       Object.assign(canvas, { width, height });
       for (const texture of this.#targets) texture.destroy();
       const [size, usage] = [[width, height], GPUTextureUsage.RENDER_ATTACHMENT];
-      const formats = [DEPTH, this.#context.getCurrentTexture().format] as const;
-      this.#targets = formats
-        .slice(0, samples > 1 ? 2 : 1)
-        .map((format) => this.#device.createTexture({ size, usage, format, sampleCount: samples }));
+      this.#targets = ([DEPTH, this.#format] as const).map((format) =>
+        this.#device.createTexture({ size, usage, format, sampleCount: SAMPLES }),
+      );
     }
-    const shown = this.#context.getCurrentTexture().createView();
-    const [depth, smooth] = this.#targets.map((texture) => texture.createView());
-    const colour = smooth ? { view: smooth, resolveTarget: shown } : { view: shown };
-    const clearing = { loadOp: "clear", storeOp: "store" } as const;
+    const [depth, colour] = this.#targets.map((texture) => texture.createView());
     return {
-      colorAttachments: [{ ...colour, ...clearing, clearValue: [0, 0, 0, 0] }],
+      colorAttachments: [
+        {
+          view: colour!,
+          resolveTarget: this.#context.getCurrentTexture().createView(),
+          loadOp: "clear",
+          storeOp: "discard",
+          clearValue: [0, 0, 0, 0],
+        },
+      ],
       depthStencilAttachment: {
         view: depth!,
         depthClearValue: 1,
