@@ -100,8 +100,8 @@ def test_the_start_line_names_a_provider_other_than_the_cpu():
 @pytest.mark.parametrize(
     ("provider", "crowd", "rows"),
     [
-        ("cpu", 100, 256),
-        ("cpu", 4000, 500),
+        ("cpu", 100, 512),
+        ("cpu", 4000, 512),
         ("cpu", 10_000, 1250),
         ("cpu", 1_000_000, 1536),
         ("cuda", 100, 65_536),

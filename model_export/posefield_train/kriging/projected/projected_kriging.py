@@ -58,7 +58,9 @@ class ProjectedProcess:
         apart = np.eye(len(left)) - left @ left.T
         return leave_one_out.divide_groups(apart, apart, leave_one_out.equal_sized_groups(groups))
 
-    def residuals(self, values: SampleValues, groups: Annotated[Indices, "samples"]) -> Floats:
+    def residuals(
+        self, values: SampleValues, groups: Annotated[Indices, "samples"]
+    ) -> SampleValues:
         """Return `leave_out` times values (n, v), without a matrix (n, n)."""
         left = self._factors[0]
         found: Floats = values - left @ (left.T @ values)
