@@ -108,7 +108,7 @@ def test_the_service_alone_shows_a_walk_and_tells_how_to_get_the_training_comman
     for words in (["train", "a.toml", "--output", "b.onnx"], ["sample", "--help"]):
         told = run(bin_ / "posefield", *words, cwd=tmp_path, code=2).stderr
         # Another package may have brought pydantic.
-        missing = "posefield_train, scipy, onnx, (pydantic, )?matplotlib"
+        missing = "posefield_train, scipy, onnx, (pydantic, )?matplotlib, joblib"
         line = re.escape(': pip install "posefield[train]"\n')
         assert re.fullmatch(f"posefield: needs {missing}{line}", told), told
 

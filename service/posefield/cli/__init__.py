@@ -50,8 +50,8 @@ INTERRUPTED = 130
 
 # Modules that each extra provides; the first extra with a missing module is told.
 EXTRAS = {
-    "train": ("posefield_train", "scipy", "onnx", "pydantic", "matplotlib"),
-    "evaluate": ("joblib", "sklearn"),
+    "train": ("posefield_train", "scipy", "onnx", "pydantic", "matplotlib", "joblib"),
+    "evaluate": ("sklearn",),
     "dask": ("distributed",),
     "store": ("obstore",),
     "jwt": ("jwt", "cryptography"),
