@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield.kriging.covariance import COVARIANCE_MODELS, RATE32, RATE52
+from posefield.kriging.covariance import COVARIANCE_MODELS, KERNEL_GAINS, RATE32, RATE52
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 
 
@@ -83,11 +83,12 @@ def _matern52_slope(squared: Floats) -> Floats:
 
 
 _GRAPHS = {
-    "exponential": (_exponential_slope, _exponential_onnx, 9.0),
-    "gaussian": (_gaussian_slope, _gaussian_onnx, -3.0),
-    "spherical": (_spherical_slope, _spherical_onnx, 1.0),
-    "matern32": (_matern32_slope, _matern32_onnx, RATE32**2),
-    "matern52": (_matern52_slope, _matern52_onnx, RATE52**2),
+    "exponential": (_exponential_slope, _exponential_onnx, KERNEL_GAINS["exponential"]),
+    # The nodes of a Gaussian take negative squares, which saves a negation.
+    "gaussian": (_gaussian_slope, _gaussian_onnx, -KERNEL_GAINS["gaussian"]),
+    "spherical": (_spherical_slope, _spherical_onnx, KERNEL_GAINS["spherical"]),
+    "matern32": (_matern32_slope, _matern32_onnx, KERNEL_GAINS["matern32"]),
+    "matern52": (_matern52_slope, _matern52_onnx, KERNEL_GAINS["matern52"]),
 }
 COVARIANCES = {
     name: Covariance(formula, *_GRAPHS[name]) for name, formula in COVARIANCE_MODELS.items()

@@ -97,9 +97,9 @@ class PoseChart:
     def far_joints(self, rotations: ClipRotations) -> list[Finding]:
         """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
         return [
-            replace(own, clip=rows.start + own.clip)
+            own
             for rows in clip_blocks.clip_blocks(len(rotations))
-            for own in _far_joints(self.rotation_vectors(rotations[rows]))
+            for own in _far_joints(self.rotation_vectors(rotations[rows]), rows.start)
         ]
 
     def _check_angles(self, vectors: ClipPositions) -> None:
@@ -124,12 +124,12 @@ def fit_chart(rotations: ClipRotations) -> tuple[PoseChart, list[Finding]]:
     It is stereographic unless a rotation lies farther than FARTHEST from its mean.
     """
     plain = PoseChart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])), "rotation_vector")
-    farthest = max(
-        float(np.linalg.norm(_unwrap(plain.rotation_vectors(rotations[rows])), axis=-1).max())
-        for rows in clip_blocks.clip_blocks(len(rotations))
-    )
-    own = plain if farthest > FARTHEST else replace(plain, chart="stereographic")
-    return own, own.far_joints(rotations)
+    farthest, far = 0.0, []
+    for rows in clip_blocks.clip_blocks(len(rotations)):
+        vectors = plain.rotation_vectors(rotations[rows])
+        far += _far_joints(vectors, rows.start)
+        farthest = max(farthest, float(np.linalg.norm(_unwrap(vectors), axis=-1).max()))
+    return plain if farthest > FARTHEST else replace(plain, chart="stereographic"), far
 
 
 def _jumps(vectors: ClipPositions) -> Annotated[Booleans, "clips joints"]:
@@ -139,11 +139,14 @@ def _jumps(vectors: ClipPositions) -> Annotated[Booleans, "clips joints"]:
     return jumps
 
 
-def _far_joints(vectors: ClipPositions) -> list[Finding]:
+def _far_joints(vectors: ClipPositions, first: int) -> list[Finding]:
+    """Return the far joints of rotation vectors (N, T, J, 3); first: number of the first clip."""
     largest = np.linalg.norm(vectors, axis=-1).max(axis=1)
     jumps = _jumps(vectors)
     return [
-        Finding("wrap" if jumps[clip, joint] else "far", int(joint), int(clip), float(angle))
+        Finding(
+            "wrap" if jumps[clip, joint] else "far", int(joint), first + int(clip), float(angle)
+        )
         for (clip, joint), angle in np.ndenumerate(largest)
         if angle > REPORTED_ANGLE
     ]

@@ -72,6 +72,5 @@ SampleValues = Annotated[Floats, "samples values"]
 # Of corrections.
 Variables = Annotated[Floats, "variables"]
 Values = Annotated[Floats, "values"]
-ValueMatrix = Annotated[Floats, "values values"]
 Gradients = Annotated[Floats, "values variables"]
 ReducedMotions = Annotated[Floats, "motions reduced"]

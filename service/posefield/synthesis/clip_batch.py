@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from posefield.common import cancellation
 from posefield.common.errors import QueryError
 from posefield.common.units import Floats
 from posefield.inference.graph_ports import CURVES
@@ -42,6 +43,7 @@ def draft_predictions(
     found = {}
     for own in _by_level(model, requests):
         for part in _calls(_plan(model, own)):
+            cancellation.check()
             for planned, row in zip(part, _run(model, part), strict=True):
                 request, row = own[planned.place], _own_frames(model, planned, row)
                 answer = clip_drafts.pose_answer(model, request, planned.when, row)
