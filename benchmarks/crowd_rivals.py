@@ -16,7 +16,7 @@ import onnxruntime
 from crowd_frames import Answer, Questions
 from crowd_scene import AUTO, Scene
 from family import Family
-from naive_graphs import VECTORS
+from naive_graphs import VECTORS, Contents
 from rows import Row
 from scipy.interpolate import RBFInterpolator
 from timing import in_turn
@@ -25,7 +25,6 @@ from posefield.common.units import Indices, Singles
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.providers import CPU
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.kriging import naive_kriging, variogram
 
 BATCH = CPU.calls.most
 
@@ -57,21 +56,15 @@ class Asked:
 
 def rows(made: Family, model: Synthesizer) -> list[Row]:
     """Ours, at levels by view and at the finest, against every rival."""
-    field = naive_kriging.fit_naive(
-        made.trained.model.bank.pose.samples,
-        naive_graphs.positions(made),
-        naive_graphs.numbers(made, VECTORS),
-        "matern52",
-        variogram.fit_by_grid,
-    )
-    _check(made, field, _asked(made, crowd_scene.around(model, CHECKED)))
+    content = naive_graphs.fitted(made, VECTORS)
+    _check(content, _asked(made, crowd_scene.around(model, CHECKED)))
     asked = _asked(made, crowd_scene.around(model, MANY))
     few = _asked(made, crowd_scene.around(model, FEW))
     levels = asked.scene.poses(AUTO)().levels
     runs = {
         "auto": _ours(asked.scene, levels),
         "finest": _ours(asked.scene, np.zeros_like(levels)),
-        **_naive(made, field, asked),
+        **_naive(content, asked),
     }
     taken = in_turn(runs, rounds=9, repeats=1)
     scipys = (
@@ -112,8 +105,8 @@ def _ours(scene: Scene, levels: Indices) -> Callable[[], None]:
     return run
 
 
-def _naive(made: Family, field: naive_kriging.NaiveKriging, asked: Asked) -> dict[str, Answer]:
-    content, questions = naive_graphs.Contents(made, field, VECTORS), asked.questions
+def _naive(content: Contents, asked: Asked) -> dict[str, Answer]:
+    made, field, questions = content.made, content.field, asked.questions
     return {
         SOLVED: crowd_frames.solved(made, field, questions),
         DUAL: crowd_frames.dual(made, field, questions),
@@ -156,8 +149,7 @@ def _scipy(made: Family, questions: Questions) -> Answer:
     return run
 
 
-def _check(made: Family, field: naive_kriging.NaiveKriging, asked: Asked) -> None:
+def _check(content: Contents, asked: Asked) -> None:
     scene = asked.scene
-    rivals = _naive(made, field, asked)
-    content = naive_graphs.Contents(made, field, VECTORS)
+    rivals = _naive(content, asked)
     naive_graphs.check(content, rivals, scene.controls, scene.times[:, None])

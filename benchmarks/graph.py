@@ -17,7 +17,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from statistics import median
 
@@ -91,8 +92,7 @@ def _times(checkout: Path | None) -> dict[str, list[list[float]]]:
     for run in runs:
         run()
     taken: dict[str, list[list[float]]] = {"ours": [], "earlier": []}
-    with tempfile.TemporaryDirectory() as folder:
-        other = _earlier(checkout, folder) if checkout else None
+    with _earlier(checkout) if checkout else nullcontext() as other:
         for _ in range(ROUNDS):
             if other:
                 taken["earlier"].append(other())
@@ -107,22 +107,26 @@ def _seconds(run: Callable[[], object]) -> float:
     return (time.process_time() - start) / REPEATS
 
 
-def _earlier(checkout: Path, folder: str) -> Callable[[], list[float]]:
-    """Return a function that times a round in a process of the earlier commit's code."""
-    words = [sys.executable, "-c", EARLIER, str(checkout), folder, str(MANY)]
-    process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    sent, answers = process.stdin, process.stdout
-    assert sent is not None and answers is not None
-    if answers.readline() != "ready\n":
-        raise RuntimeError(f"{checkout}: its code does not run, expected commit fa93c04")
+@contextmanager
+def _earlier(checkout: Path) -> Iterator[Callable[[], list[float]]]:
+    """Yield a function that times a round in a process of the earlier commit's code."""
+    with tempfile.TemporaryDirectory() as folder:
+        words = [sys.executable, "-c", EARLIER, str(checkout), folder, str(MANY)]
+        with subprocess.Popen(
+            words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        ) as process:
+            sent, answers = process.stdin, process.stdout
+            assert sent is not None and answers is not None
+            if answers.readline() != "ready\n":
+                raise RuntimeError(f"{checkout}: its code does not run, expected commit fa93c04")
 
-    def ask() -> list[float]:
-        sent.write(f"{REPEATS}\n")
-        sent.flush()
-        found: list[float] = json.loads(answers.readline())
-        return found
+            def ask() -> list[float]:
+                sent.write(f"{REPEATS}\n")
+                sent.flush()
+                found: list[float] = json.loads(answers.readline())
+                return found
 
-    return ask
+            yield ask
 
 
 def main() -> None:

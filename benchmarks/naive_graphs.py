@@ -16,7 +16,7 @@ from posefield.model_file import subgraph
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.align import time_alignment
-from posefield_train.kriging import kriging_graph
+from posefield_train.kriging import kriging_graph, naive_kriging, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.naive_kriging import NaiveKriging
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
@@ -203,6 +203,14 @@ class Contents:
         shape = net.indices(len(means), 1, -1)
         found = quaternion_graph.quaternions(net, self.chart, rows, innermost, shape)
         return quaternion_graph.rows_of_poses(net, found, len(means))
+
+
+def fitted(made: Family, chart: ChartName) -> Contents:
+    """Return the graphs of a naive field, fitted frame by frame to numbers in a chart."""
+    samples = made.trained.model.bank.pose.samples
+    values = positions(made), numbers(made, chart)
+    field = naive_kriging.fit_naive(samples, *values, "matern52", variogram.fit_by_grid)
+    return Contents(made, field, chart)
 
 
 def check(

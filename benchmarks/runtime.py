@@ -17,9 +17,7 @@ from timing import in_turn
 
 from posefield.model_file import subgraph
 from posefield.model_file.row_values import ROW_VALUES
-from posefield.motion.rotation_charts import ChartName
 from posefield.synthesis.poses import POSE_OUTPUTS
-from posefield_train.kriging import naive_kriging, variogram
 
 FRAMES, POSES = 100, 256
 TRAINING = "training, alignment and tuning included"
@@ -40,7 +38,9 @@ class Asked:
 def rows(made: Family) -> list[Row]:
     """A clip of 100 frames, a single pose, what pruning saves, and the file's size."""
     model = made.trained.model
-    content, same = (_naive(made, chart) for chart in (naive_graphs.VECTORS, "stereographic"))
+    content, same = (
+        naive_graphs.fitted(made, chart) for chart in (naive_graphs.VECTORS, "stereographic")
+    )
     point = _between(made)
     duration = model.evaluate(point, np.zeros((1, 1))).duration[0]
     times = np.linspace(0.0, duration, FRAMES)[None]
@@ -64,17 +64,6 @@ def rows(made: Family) -> list[Row]:
         *_batch_rows(made, content, ours["ours"]),
         *_small_rows(made, ours["ours"], asked),
     ]
-
-
-def _naive(made: Family, chart: ChartName) -> Contents:
-    field = naive_kriging.fit_naive(
-        made.trained.model.bank.pose.samples,
-        naive_graphs.positions(made),
-        naive_graphs.numbers(made, chart),
-        "matern52",
-        variogram.fit_by_grid,
-    )
-    return Contents(made, field, chart)
 
 
 def _own(made: Family, outputs: tuple[str, ...]) -> Any:

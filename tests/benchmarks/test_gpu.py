@@ -1,4 +1,4 @@
-"""Tests of the benchmark on a GPU: its code by the CPU, and its words where there is no GPU."""
+"""Tests of the GPU benchmark: its code on the CPU, and its message on a machine without a GPU."""
 
 import os
 import subprocess
