@@ -29,11 +29,19 @@ from posefield.inference.providers import CPU, CUDA, TOLERANCE, Provider
 from posefield.inference.session import Session
 from posefield.model_file import subgraph
 from posefield.model_file.model_card import ModelCard
+from posefield.motion.crowd_clip import Placement
 from posefield.registry import shipped_models
+from posefield.synthesis import crowd_synthesis
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield.validation.crowd_question import CrowdQuestion
 
 RESULTS = Path(__file__).parents[1] / "docs/results/speed"
 COMMAND = "python benchmarks/gpu.py --record"
 POSES, ROUNDS, GOAL = 1_000_000, 7, 16.7
+ON_DEVICE = 262_144
+"""Rows of a call whose answers stay on the GPU. Answers that come back are computed in the
+provider's sizes: arrays above 32 MB get new pages of memory in every call."""
+CROWDS = 10_000, 100_000
 CALLS = tuple(1 << power for power in range(8, 17))
 """Rows of a call with arrays in memory, to find from which on a GPU is faster."""
 SUBJECT = "a million poses of the shipped walk"
@@ -61,15 +69,16 @@ class BoundCall:
         return dict(zip(self.outputs, self.binding.copy_outputs_to_cpu(), strict=True))
 
 
-def bound_calls(opened: Session, level: int, provider: Provider, asked: Feed) -> list[BoundCall]:
-    """Return the calls for many questions, in the provider's sizes; inputs are on its device."""
+def bound_calls(
+    opened: Session, level: int, provider: Provider, asked: Feed, most: int
+) -> list[BoundCall]:
+    """Return calls of at most `most` rows for many questions; inputs are on the device."""
     names = graph_ports.outputs(opened.card)
     content = subgraph.select_outputs(subgraph.fix_level(opened.content, level), *names)
     runtime = onnx_runtime.open_session(content, opened.card.name, provider)
     count = len(asked["time"])
-    parts = -(-count // provider.calls.rows_per_call(count))
     found = []
-    for rows in np.array_split(np.arange(count), parts):
+    for rows in np.array_split(np.arange(count), -(-count // most)):
         binding = runtime.io_binding()
         for name, values in asked.items():
             own = onnxruntime.OrtValue.ortvalue_from_numpy(values[rows], provider.device, 0)
@@ -102,11 +111,12 @@ def measured_rows(
     asked = questions(opened.card, poses)
     found: dict[str, float] = {}
     for name, level in levels.items():
-        calls = bound_calls(opened, level, provider, asked)
-        runs = {f"{name} left": partial(_leave, calls), f"{name} copied": partial(_copy, calls)}
+        left = bound_calls(opened, level, provider, asked, ON_DEVICE)
+        copied = bound_calls(opened, level, provider, asked, provider.calls.most)
+        runs = {f"{name} left": partial(_leave, left), f"{name} copied": partial(_copy, copied)}
         found |= {key: 1e3 * taken for key, taken in in_turn(runs, rounds, 1).items()}
     few = {key: values[: CALLS[-1]] for key, values in asked.items()}
-    here, there = (bound_calls(opened, 0, each, few) for each in (CPU, provider))
+    here, there = (bound_calls(opened, 0, each, few, each.calls.most) for each in (CPU, provider))
     taken = in_turn({"cpu": partial(_leave, here)}, 3, 1)["cpu"]
     _leave(there)
     apart = [
@@ -114,7 +124,8 @@ def measured_rows(
         for one, other in zip(_rotations(here), _rotations(there), strict=True)
     ]
     found |= {"cpu": 1e3 * taken * poses / len(few["time"]), "apart": float(max(apart))}
-    return _rows(found | _break_even(opened, provider, few, rounds))
+    found |= _in_memory(opened, provider, few, rounds)
+    return _rows(found | _crowds(opened, provider, poses, rounds))
 
 
 def _leave(calls: Sequence[BoundCall]) -> None:
@@ -132,20 +143,62 @@ def _rotations(calls: Sequence[BoundCall]) -> Singles:
     return np.concatenate([call.copied()["rotations"] for call in calls])
 
 
-def _break_even(opened: Session, provider: Provider, asked: Feed, rounds: int) -> dict[str, float]:
-    """Return the rows of the smallest call, with arrays in memory, that a provider makes faster."""
+def _in_memory(opened: Session, provider: Provider, asked: Feed, rounds: int) -> dict[str, float]:
+    """Return figures of calls with arrays in memory, one thread of the CPU beside a provider.
+
+    break even: rows of the smallest call of `CALLS` from which on the provider is faster. large:
+    time of all that is asked, ms, and large ratio: of the CPU's time to it.
+    """
     names = [*graph_ports.outputs(opened.card)]
     content = subgraph.select_outputs(subgraph.fix_level(opened.content, 0), *names)
     both = [onnx_runtime.open_session(content, "", each) for each in (CPU, provider)]
-    for rows in CALLS:
+    found: dict[str, float] = {}
+    for rows in [each for each in CALLS if each <= len(asked["time"])]:
         own = {key: values[:rows] for key, values in asked.items()}
         cpu, gpu = in_turn(
             {str(each): partial(run.run, names, own) for each, run in enumerate(both)}, rounds, 3
         ).values()
         print(f"{rows} poses a call: CPU {1e3 * cpu:.2f} ms, {provider.name} {1e3 * gpu:.2f} ms")
-        if gpu < cpu:
-            return {"break even": rows}
-    return {}
+        if gpu >= cpu:
+            found.pop("break even", None)
+        else:
+            found.setdefault("break even", rows)
+        found |= {"large": 1e3 * gpu, "large ratio": cpu / gpu}
+    return found
+
+
+def _crowds(opened: Session, provider: Provider, most: int, rounds: int) -> dict[str, float]:
+    """Return times, ms, of whole calls for crowds, of at most `most`, and the CPU's time to them.
+
+    Validation, support and placement are part of a call, and the CPU computes with all its threads.
+    """
+    models = [
+        Synthesizer("walk", session.open_checked(opened.content, opened.card, "", each))
+        for each in (CPU, provider)
+    ]
+    found = {}
+    for crowd in CROWDS:
+        asked = _crowd_question(opened.card, min(crowd, most))
+        runs = {
+            str(each): partial(crowd_synthesis.synthesize_crowd, model, asked)
+            for each, model in enumerate(models)
+        }
+        cpu, gpu = in_turn(runs, rounds, 1).values()
+        found |= {f"crowd {crowd}": 1e3 * gpu, f"crowd {crowd} ratio": cpu / gpu}
+    return found
+
+
+def _crowd_question(card: ModelCard, count: int) -> CrowdQuestion:
+    asked = questions(card, count)
+    # Durations between the clips may be shorter than the shortest of them.
+    times = 0.5 * asked["time"][:, 0].astype(float)
+    controls = zip(card.controls, asked["controls"].T.astype(float), strict=True)
+    indices = np.zeros(count, int)
+    placement = Placement(np.zeros((count, 3)), np.zeros(count))
+    columns = {control.name: values for control, values in controls}
+    return CrowdQuestion(
+        columns, times, placement, (None,), indices, indices, "travel", extrapolate="ok"
+    )
 
 
 def _rows(found: dict[str, float]) -> list[Row]:
@@ -154,6 +207,10 @@ def _rows(found: dict[str, float]) -> list[Row]:
     def row(name: str, key: str, unit: str = "ms", goal: float | None = None) -> Row:
         return Row(name, found.get(key), unit, "", None, goal)
 
+    def beside(name: str, key: str, threads: str) -> Row:
+        ratio = found.get(f"{key} ratio")
+        return Row(name, found.get(key), "ms", f"CPU, {threads}", ratio, None)
+
     return [
         row(f"{SUBJECT}, finest level, left on the GPU", "finest left", goal=GOAL),
         row(f"{SUBJECT}, finest level, copied to memory", "finest copied"),
@@ -161,6 +218,13 @@ def _rows(found: dict[str, float]) -> list[Row]:
         row(f"{SUBJECT}, coarsest level, copied to memory", "coarsest copied"),
         row(f"{SUBJECT}, finest level, CPU, one thread", "cpu"),
         row("smallest call that the GPU computes faster", "break even", "poses", CUDA.smallest),
+        beside(
+            f"{CALLS[-1]:,} poses of it, questions and answers in memory", "large", "one thread"
+        ),
+        *(
+            beside(f"a crowd of {crowd:,}, whole call", f"crowd {crowd}", "all threads")
+            for crowd in CROWDS
+        ),
         row("a quaternion's number, largest difference from the CPU", "apart", "", TOLERANCE),
     ]
 

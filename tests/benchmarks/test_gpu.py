@@ -34,7 +34,7 @@ def walk():
 @pytest.mark.parametrize("level", [0, 3])
 def test_bound_calls_give_the_answers_of_the_service(walk, level):
     asked = gpu.questions(walk.card, 1100)
-    calls = gpu.bound_calls(walk, level, SMALL, asked)
+    calls = gpu.bound_calls(walk, level, SMALL, asked, 512)
     names, sizes = graph_ports.outputs(walk.card), [367, 367, 366]
     parts = np.split(np.arange(1100), np.cumsum(sizes)[:-1])
     assert len(calls) == len(parts)
@@ -50,7 +50,7 @@ def test_bound_calls_give_the_answers_of_the_service(walk, level):
 def test_a_call_that_runs_again_has_the_answers_of_its_own_questions(walk):
     """Outputs are reused; calls of other rows, the negative control, have other answers."""
     asked = gpu.questions(walk.card, 1024)
-    calls = gpu.bound_calls(walk, 0, SMALL, asked)
+    calls = gpu.bound_calls(walk, 0, SMALL, asked, 512)
     for call in (*calls, *calls):
         call.run()
     first, second = (call.copied()["rotations"].copy() for call in calls)
