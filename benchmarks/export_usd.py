@@ -21,15 +21,10 @@ from timing import in_turn
 from posefield.encode.character import character, joint_names
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.formats import METRES
-from posefield.encode.usd import (
-    crate_template,
-    template_cache,
-    text_template,
-    usd_animation,
-    usd_clip,
-    usd_library,
-)
-from posefield.encode.usd.layer_content import LayerContent
+from posefield.encode.usd import usd_animation, usd_clip, usd_library
+from posefield.encode.usd_layers import crate_template, layer_metadata, text_template
+from posefield.encode.usd_layers.layer_content import LayerBuilder, LayerContent
+from posefield.encode.usd_layers.text_cache import TEXTS
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -43,18 +38,30 @@ FOLDER = Path("/dev/shm") if Path("/dev/shm").is_dir() else None
 
 @dataclass(frozen=True)
 class Form:
-    """A form of USD: how clips are written in it, by which press, and how usd-core does."""
+    """A form of USD: how clips and layers are written in it, how usd-core does, and as a text."""
 
     name: str
     write: Callable[..., list[bytes]]
-    press: template_cache.TemplateCache
-    ordinary: Callable[..., bytes]
+    fill: Callable[[LayerBuilder, LayerContent], bytes]
+    ordinary: Callable[[LayerBuilder, LayerContent], bytes]
+    text: Callable[[bytes], str]
     goals: tuple[float | None, float | None]
 
 
+def _crate(author: LayerBuilder, content: LayerContent) -> bytes:
+    return layer_metadata.crate_bytes(author.layer(content))
+
+
 FORMS = (
-    Form("usdc", usd_clip.usdc, template_cache.CRATE_CACHE, crate_template.ordinary, (200.0, 20.0)),
-    Form("usda", usd_clip.usda, template_cache.TEXTS, text_template.ordinary, (None, None)),
+    Form(
+        "usdc",
+        usd_clip.usdc,
+        crate_template.usdc,
+        _crate,
+        layer_metadata.crate_text,
+        (200.0, 20.0),
+    ),
+    Form("usda", usd_clip.usda, TEXTS.write, text_template.ordinary, bytes.decode, (None, None)),
 )
 
 
@@ -67,14 +74,14 @@ def rows() -> list[Row]:
 
 def _form(answers: list[ClipAnswer], form: Form) -> list[Row]:
     one, made = answers[0], list(usd_clip.builders_and_contents(answers, METRES))
-    expected = [form.ordinary(*each) for each in made]
-    if any(form.write(answers, METRES) != expected for _ in range(2)):
+    expected = [form.text(form.ordinary(*each)) for each in made]
+    if any(list(map(form.text, form.write(answers, METRES))) != expected for _ in range(2)):
         raise AssertionError(f"{form.name} differs from what usd-core writes")
     with TemporaryDirectory(dir=FOLDER) as folder:
         path, (author, content) = Path(folder, f"clip.{form.name}"), made[0]
         taken = in_turn(
             {
-                "filled": lambda: [form.press.write(*each) for each in made],
+                "filled": lambda: [form.fill(*each) for each in made],
                 "ours": lambda: form.write(answers, METRES),
                 "alone": lambda: form.write([one], METRES),
                 "sdf": lambda: form.ordinary(*_first([one])),
@@ -112,7 +119,7 @@ def _package(answers: list[ClipAnswer]) -> list[Row]:
     taken = in_turn(
         {
             "usdz": lambda: usd_clip.usdz(answers, METRES),
-            "sdf": lambda: usd_clip.usdz_package(crate_template.ordinary(*_first([one]))),
+            "sdf": lambda: usd_clip.usdz_package(_crate(*_first([one]))),
         },
         rounds=15,
         repeats=2,
@@ -123,7 +130,7 @@ def _package(answers: list[ClipAnswer]) -> list[Row]:
 
 
 def _others(answers: list[ClipAnswer]) -> list[Row]:
-    """Time an animation alone, a clip that warns, the first clips of a length, a library."""
+    """Time an animation alone, a clip that warns, the first clips of a kind, a library."""
     taken = in_turn(
         {
             "whole": lambda: usd_clip.usdc(answers, METRES),
@@ -146,7 +153,7 @@ def _others(answers: list[ClipAnswer]) -> list[Row]:
         Row(
             "clip as usdc, against", each["warned"], "ms", "with warnings of its own", warned, None
         ),
-        Row("template of a new length", 1e3 * taken["new"], "ms", "and three clips", None, None),
+        Row("template of a new kind", 1e3 * taken["new"], "ms", "and three clips", None, None),
         Row(f"library stage of {ENTRIES} clips", stage, "s", "", None, None),
     ]
 
@@ -163,9 +170,8 @@ SERIAL = itertools.count()
 
 
 def _new(answers: list[ClipAnswer]) -> None:
-    fresh = template_cache.TemplateCache(crate_template, template_cache.CRATE_CACHE.limit)
-    for each in usd_clip.builders_and_contents(answers, METRES):
-        fresh.write(*each)
+    crate_template.template.cache_clear()
+    usd_clip.usdc(answers, METRES)
 
 
 def _stage(answer: ClipAnswer, entries: list[usd_library.LibraryEntry]) -> bytes:
@@ -223,7 +229,7 @@ def _schemas(clip: Clip, content: LayerContent, convert: Convert, path: Path) ->
     stage.SetFramesPerSecond(30)
     stage.SetStartTimeCode(0)
     stage.SetEndTimeCode(FRAMES - 1)
-    stage.SetMetadata("customLayerData", {"posefield": content.facts.join()["controls"]})
+    stage.SetMetadata("customLayerData", {"posefield": content.facts["controls"]})
     root = UsdSkel.Root.Define(stage, "/Character")
     stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)

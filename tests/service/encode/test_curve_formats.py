@@ -12,12 +12,12 @@ from pxr import Usd, UsdSkel
 from posefield.encode.character import joint_names
 from posefield.encode.files.file_convention import METRES
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd import (
+from posefield.encode.usd import usd_animation, usd_clip, usd_library
+from posefield.encode.usd_layers import (
     crate_template,
+    layer_content,
+    layer_metadata,
     text_template,
-    usd_animation,
-    usd_clip,
-    usd_library,
 )
 from posefield.motion.curves import Curve, CurveValues
 from posefield.question.results import ClipAnswer
@@ -96,22 +96,22 @@ def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
             values = np.round(2.0 * values) / 2.0
         made = with_curves(walk, CurveValues(own.curves, values))
         ((author, content),) = usd_clip.builders_and_contents([made], METRES)
-        for form, write in ((crate_template, usd_clip.usdc), (text_template, usd_clip.usda)):
-            assert write([made], METRES)[0] == form.ordinary(author, content)
+        expected = text_template.ordinary(author, content)
+        assert usd_clip.usda([made], METRES) == [expected]
+        (binary,) = usd_clip.usdc([made], METRES)
+        assert layer_metadata.crate_text(binary).encode() == expected
 
 
-def test_weights_that_usd_does_not_compress_are_filled_in_a_template(walk):
+def test_weights_are_filled_in_a_template(walk):
     made = with_curves(walk, curves(52, len(walk.clip)))
     ((author, content),) = usd_clip.builders_and_contents([made], METRES)
-    for form in (crate_template, text_template):
-        found = form.template(author, content, form.pattern(author, content))
-        assert found is not None
-        assert found.write(author, content) == form.ordinary(author, content)
-    # Equal to the ordinary file of other weights it would be no template.
-    ((_, other),) = usd_clip.builders_and_contents(
-        [with_curves(walk, curves(52, len(walk.clip), seed=1))], METRES
-    )
-    assert found.write(author, content) != form.ordinary(author, other)
+    found = text_template.template(author, content, text_template.pattern(content))
+    assert found.write(author, content) == text_template.ordinary(author, content)
+    pattern = layer_content.first_frame(content).pattern
+    assert crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
+    # Other weights have other files.
+    (other,) = usd_clip.usdc([with_curves(walk, curves(52, len(walk.clip), seed=1))], METRES)
+    assert other != usd_clip.usdc([made], METRES)[0]
 
 
 def test_a_library_binds_the_weights_of_its_clips_to_shapes_of_its_body(face, tmp_path):

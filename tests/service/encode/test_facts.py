@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pxr import Sdf
 
-from posefield.encode.usd import custom_data
+from posefield.encode.usd_layers import custom_data
 
 GIVEN = {
     "model": "walk@1",
@@ -54,29 +54,3 @@ def plain(value):
 def test_what_is_no_plain_fact_is_an_error():
     with pytest.raises(TypeError, match="a fact of type object, expected text, a number or"):
         custom_data.usd_dictionary({"what": object()})
-
-
-def test_facts_in_parts_are_whole_again():
-    plain = {"a": 1.5, "name": "a", "who": None, "also": ["x", "y", "x"], "of": [{"what": "x"}] * 2}
-    found = custom_data.split_facts(plain)
-    assert found.join() == plain
-    assert (found.numbers, found.texts) == ((1.5,), ("x", "y"))
-
-
-def test_facts_that_differ_in_numbers_and_texts_alone_have_one_shape():
-    one, other = ({"of": [{"what": what, "miss": miss}]} for what, miss in (("u", 0.1), ("v", 0.2)))
-    assert custom_data.split_facts(one).shape == custom_data.split_facts(other).shape
-    twice = {"of": 2 * one["of"]}
-    assert (
-        custom_data.split_facts(twice).shape
-        != custom_data.split_facts({"of": [*one["of"], *other["of"]]}).shape
-    )
-
-
-def test_words_of_the_character_belong_to_the_shape():
-    one, other = ({"of": [{"joint": joint, "by": "u"}]} for joint in ("ltoes", "rtoes"))
-    words = frozenset(("ltoes", "rtoes"))
-    found = custom_data.split_facts(one, words)
-    assert (found.join(), found.texts) == (one, ("u",))
-    assert found.shape != custom_data.split_facts(other, words).shape
-    assert found.texts != custom_data.split_facts(one).texts

@@ -10,7 +10,8 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 from posefield.check import check
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CENTIMETRES, METRES
-from posefield.encode.usd import clip_arrays, crate_template, usd_animation, usd_library
+from posefield.encode.usd import clip_arrays, usd_animation, usd_library
+from posefield.encode.usd_layers import layer_metadata
 from posefield.question.results import ClipAnswer
 
 INCHES = Convention(0.0254, "z")
@@ -150,10 +151,12 @@ def test_layers_say_what_their_clips_are_worth(answers, tmp_path):
 def test_layers_are_as_usd_writes_them(answers, convention):
     many = [answers[index] for index in (0, 1, 0, 2, 1)]
     expected = [
-        crate_template.ordinary(
-            usd_animation.AnimationLayerBuilder(take.rate, convention, take.rig.paths), take.content
-        )
+        usd_animation.AnimationLayerBuilder(take.rate, convention, take.rig.paths)
+        .layer(take.content)
+        .ExportToString()
         for take in clip_arrays.arrays_without_character(many, convention)
     ]
-    assert usd_animation.usdc(many, convention) == expected
-    assert usd_animation.usdc(many[1:2], convention) == expected[1:2]
+    found = usd_animation.usdc(many, convention)
+    assert [layer_metadata.crate_text(each) for each in found] == expected
+    assert usd_animation.usdc(many[1:2], convention) == found[1:2]
+    assert len(set(expected)) == 3

@@ -6,7 +6,7 @@ import struct
 import pytest
 from pxr import Sdf
 
-from posefield.encode.usd import crate_sections, layer_metadata
+from posefield.encode.usd_layers import crate_sections, layer_metadata
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def with_table(data, place):
 
 def test_pieces_are_put_together_again(data):
     found = crate_sections.split_crate(data)
-    assert crate_sections.join_crate(found.values, found.sections) == data
+    assert crate_sections.join_crate(bytearray(found.values), found.sections) == data
 
 
 @pytest.mark.parametrize("count", [0, -1, 1, 2**40])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from pxr import Sdf, Vt
 
-from posefield.encode.usd import text_template
-from posefield.encode.usd.prim_specs import ValueTypes, prim, varying_attribute
+from posefield.encode.usd_layers import text_template
+from posefield.encode.usd_layers.prim_specs import ValueTypes, prim, varying_attribute
 
 
 def usd(values):

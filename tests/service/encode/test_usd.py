@@ -8,7 +8,7 @@ from pxr import Sdf, Usd, UsdGeom, UsdSkel
 
 from posefield.encode.character import joint_names
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd import layer_metadata
+from posefield.encode.usd_layers import layer_metadata
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import forward_kinematics

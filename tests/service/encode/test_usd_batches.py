@@ -1,4 +1,4 @@
-"""Comparison of clips encoded in batches with usd-core's files, byte for byte."""
+"""Comparison of clips encoded in batches with usd-core's layers: of text, byte for byte."""
 
 import math
 from dataclasses import replace
@@ -6,18 +6,18 @@ from dataclasses import replace
 import conftest
 import numpy as np
 import pytest
-from counted import Counted
 
 from posefield.encode.body.bone_boxes import TINTS
 from posefield.encode.files.file_convention import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
-from posefield.encode.usd import (
-    clip_arrays,
+from posefield.encode.usd import clip_arrays, usd_clip
+from posefield.encode.usd_layers import (
     crate_template,
-    template_cache,
+    layer_content,
+    layer_metadata,
     text_template,
-    usd_clip,
 )
+from posefield.encode.usd_layers.text_cache import TextCache
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
@@ -45,9 +45,10 @@ def _answer(rng, frames, person, said):
     return ClipAnswer(made, replace(trust, **said))
 
 
-def ordinary(given, convention=METRES, form=crate_template):
+def ordinary(given, convention=METRES):
+    """Texts of the layers of usd-core."""
     return [
-        form.ordinary(*each)
+        text_template.ordinary(*each)
         for one in given
         for each in usd_clip.builders_and_contents([one], convention)
     ]
@@ -61,10 +62,13 @@ def written(given, convention=METRES, write=usd_clip.usdc):
 
 
 def both(given, convention=METRES):
-    """Return whether both forms equal usd-core's output."""
-    return written(given, convention) == ordinary(given, convention) and (
-        written(given, convention, usd_clip.usda) == ordinary(given, convention, text_template)
-    )
+    """Return whether both forms hold what usd-core's layers do, the binary one by a template."""
+    author, content = next(usd_clip.builders_and_contents(given, convention))
+    pattern = layer_content.first_frame(content).pattern
+    assert crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
+    texts = ordinary(given, convention)
+    read = [layer_metadata.crate_text(each).encode() for each in written(given, convention)]
+    return read == texts and written(given, convention, usd_clip.usda) == texts
 
 
 def moved(answer, translations=None, rotations=None):
@@ -111,7 +115,7 @@ def test_clips_too_long_to_be_made_together_are_written():
     given = [*answers(2, 1700), *answers(1, 3300, seed=1)]
     lengths = [len(answer.clip) for answer in given]
     assert max(lengths[:2]) < clip_arrays.FRAMES_AT_ONCE < min(sum(lengths[:2]), lengths[2])
-    assert written(given) == ordinary(given)
+    assert both(given)
 
 
 def closed(answer):
@@ -206,34 +210,6 @@ def test_what_clips_were_held_to_is_written_as_usd_does(reached):
         assert both(list(held(4, 23, reached)), convention)
 
 
-def pressed(form, given):
-    """Count usd-core's writes and the new templates when a new cache writes clips."""
-    counted = Counted(form)
-    own = template_cache.TemplateCache(counted, 64_000_000)
-    for author, content in usd_clip.builders_and_contents(given, METRES):
-        own.write(author, content)
-    return counted.calls
-
-
-@pytest.mark.parametrize("form", [crate_template, text_template])
-def test_clips_that_are_held_to_different_places_share_a_template(form):
-    given = list(held(7, 39))
-    assert pressed(form, given) == {"ordinary": 1, "template": 1}
-    fewer = replace(given[3].trust, targets=given[3].trust.targets[:2])
-    found = pressed(form, [*given, replace(given[3], trust=fewer)])
-    # Text says facts in its head, which is no part of a template.
-    assert found == {"ordinary": 2 if form is crate_template else 1, "template": 1}
-
-
-@pytest.mark.parametrize("form", [crate_template, text_template])
-def test_clips_whose_facts_name_a_joint_share_a_template(form):
-    given = list(held(4, 39))
-    joint = given[0].clip.skeleton.names[-1]
-    named = [replace(one, trust=replace(one.trust, inferred=(joint,))) for one in given]
-    assert pressed(form, named) == {"ordinary": 1, "template": 1}
-    assert usd_clip.usdc(named, METRES) == [usd_clip.usdc([one], METRES)[0] for one in named]
-
-
 def chain(joints):
     names = tuple(f"j{joint}" for joint in range(joints))
     offsets = np.random.default_rng(1).uniform(0.1, 0.5, (joints, 3))
@@ -272,10 +248,32 @@ def test_awkward_numbers_are_written_as_usd_does():
     assert both(given, INCHES)
 
 
-@pytest.mark.parametrize("form", [crate_template, text_template])
-def test_templates_are_used(form):
+def test_templates_of_text_are_used():
     """Else all that is above would hold without them."""
-    given = answers(3, 37)
-    assert pressed(form, given) == {"ordinary": 1, "template": 1}
-    assert pressed(form, [*given, *answers(1, 38)]) == {"ordinary": 2, "template": 1}
-    assert template_cache.TEXTS.used_bytes <= template_cache.TEXTS.limit
+    cache, given = TextCache(8_000_000), [*usd_clip.builders_and_contents(answers(4, 37), METRES)]
+    sizes = [0]
+    for author, content in given:
+        cache.write(author, replace(content, facts={"number": len(sizes)}))
+        sizes.append(cache.used_bytes)
+    # The first occurrence is noted, the second makes a template.
+    assert 0 < sizes[1] < 5000 < sizes[2] == sizes[3] == sizes[4]
+    ((author, content),) = usd_clip.builders_and_contents(answers(1, 38), METRES)
+    cache.write(author, content)
+    assert cache.used_bytes == sizes[4] + sizes[1]
+
+
+def test_templates_of_text_are_kept_within_a_limit():
+    size = TextCache(8_000_000)
+    given = [*usd_clip.builders_and_contents(answers(2, 37), METRES)]
+    for each in given:
+        size.write(*each)
+    cache = TextCache(int(2.5 * size.used_bytes))
+    for frames in (30, 31, 32, 33, 30):
+        for author, content in usd_clip.builders_and_contents(answers(3, frames), METRES):
+            found = cache.write(author, content)
+            assert found == text_template.ordinary(author, content)
+            assert cache.used_bytes <= cache.limit
+    assert cache.used_bytes > size.used_bytes
+    nothing = TextCache(0)
+    assert nothing.write(*given[0]) == text_template.ordinary(*given[0])
+    assert nothing.used_bytes == 0

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -42,11 +42,6 @@ class CharacterRig:
     tree: PointTree
     body: SkinnedMesh | None
     bounds: BodyBounds
-
-    @cached_property
-    def words(self) -> frozenset[str]:
-        """Names of the joints, without order."""
-        return frozenset(self.names)
 
 
 def rig(skeleton: Skeleton, body: BodyKind = DEFAULT_BODY) -> CharacterRig:

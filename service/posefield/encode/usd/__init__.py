@@ -1,1 +1,1 @@
-"""USD clips: layers written from cached templates."""
+"""USD clips: characters, animations, performances and libraries."""

@@ -15,9 +15,9 @@ from posefield.encode.character import joint_names
 from posefield.encode.character.character import CharacterArrays, CharacterRig
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import METRES, Convention
-from posefield.encode.usd import prim_specs
-from posefield.encode.usd.layer_content import WEIGHTS
-from posefield.encode.usd.prim_specs import ValueTypes
+from posefield.encode.usd_layers import prim_specs
+from posefield.encode.usd_layers.layer_content import WEIGHTS
+from posefield.encode.usd_layers.prim_specs import ValueTypes
 
 BINDING_SCHEMAS = ("SkelBindingAPI",)
 PRIMVAR_READER = "UsdPrimvarReader_float3"
@@ -65,16 +65,6 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
 
 def _normals(mesh: SkinnedMesh, convention: Convention) -> Singles:
     return np.ascontiguousarray(axis_conversion.convert_directions(convention, mesh.normals))
-
-
-def fixed_vectors(
-    rig: CharacterRig, convention: Convention, curves: Sequence[str] = ()
-) -> tuple[Singles, ...]:
-    """Return the arrays of vectors that all characters of a rig with named curves share."""
-    if rig.body is None:
-        return ()
-    shapes = (NO_OFFSET,) if curves else ()
-    return _normals(rig.body, convention), body_colours.colours(rig.body), *shapes
 
 
 def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = METRES) -> Any:

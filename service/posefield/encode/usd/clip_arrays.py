@@ -14,8 +14,7 @@ from posefield.encode.character.animation_samples import AnimationSamples
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.usd import custom_data
-from posefield.encode.usd.layer_content import WEIGHTS, Array, LayerContent, Samples
+from posefield.encode.usd_layers.layer_content import WEIGHTS, Array, LayerContent, Samples
 from posefield.motion.clip import Clip
 from posefield.question.results import SampledClip
 
@@ -92,8 +91,7 @@ def _clip_arrays(
     rig: CharacterRig, answer: SampledClip, samples: Samples, values: Mapping[str, Array]
 ) -> ClipArrays:
     cancellation.check()
-    facts = custom_data.split_facts(answer.trust.facts(), rig.words)
-    content = LayerContent(samples, values, facts)
+    content = LayerContent(samples, values, answer.trust.facts())
     names = answer.clip.curves.names if answer.clip.curves else ()
     return ClipArrays(rig, answer.clip.rate, content, tuple(names))
 

@@ -20,17 +20,11 @@ from pxr import Sdf, Vt
 
 from posefield.common.units import Booleans
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.usd import (
-    character_prims,
-    clip_arrays,
-    custom_data,
-    layer_metadata,
-    prim_specs,
-    usd_clip,
-)
+from posefield.encode.usd import character_prims, clip_arrays, usd_clip
 from posefield.encode.usd.clip_arrays import ClipArrays
-from posefield.encode.usd.prim_specs import ValueTypes
 from posefield.encode.usd.usd_clip import ClipLayerBuilder
+from posefield.encode.usd_layers import custom_data, layer_metadata, prim_specs
+from posefield.encode.usd_layers.prim_specs import ValueTypes
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 
 PERFORMANCE = Sdf.Path("/Performance")

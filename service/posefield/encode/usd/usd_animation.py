@@ -7,10 +7,10 @@ from typing import Any
 from pxr import Sdf
 
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.usd import character_prims, clip_arrays, prim_specs
-from posefield.encode.usd.layer_content import Array, LayerContent
-from posefield.encode.usd.layer_metadata import BaseLayerBuilder
-from posefield.encode.usd.template_cache import CRATE_CACHE
+from posefield.encode.usd import character_prims, clip_arrays
+from posefield.encode.usd_layers import crate_template, prim_specs
+from posefield.encode.usd_layers.layer_content import LayerContent
+from posefield.encode.usd_layers.layer_metadata import BaseLayerBuilder
 from posefield.question.results import SampledClip
 
 ANIMATION_NAME = "Anim"
@@ -22,11 +22,6 @@ class AnimationLayerBuilder(BaseLayerBuilder):
 
     paths: tuple[str, ...]
     curves: tuple[str, ...] = ()
-
-    @property
-    def values(self) -> tuple[Array, ...]:
-        """Return the arrays that every layer holds."""
-        return ()
 
     def head(self, content: LayerContent) -> Any:
         """Return the layer without its prims."""
@@ -48,7 +43,7 @@ class AnimationLayerBuilder(BaseLayerBuilder):
 def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return binary layers of the clips' animations, with the facts and without a character."""
     return [
-        CRATE_CACHE.write(
+        crate_template.usdc(
             AnimationLayerBuilder(take.rate, convention, take.rig.paths, take.curves), take.content
         )
         for take in clip_arrays.arrays_without_character(answers, convention)

@@ -14,10 +14,11 @@ from pxr import Sdf
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.files import zip_archive
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.usd import character_prims, clip_arrays, prim_specs
-from posefield.encode.usd.layer_content import Array, LayerContent
-from posefield.encode.usd.layer_metadata import BaseLayerBuilder
-from posefield.encode.usd.template_cache import CRATE_CACHE, TEXTS
+from posefield.encode.usd import character_prims, clip_arrays
+from posefield.encode.usd_layers import crate_template, prim_specs
+from posefield.encode.usd_layers.layer_content import LayerContent
+from posefield.encode.usd_layers.layer_metadata import BaseLayerBuilder
+from posefield.encode.usd_layers.text_cache import TEXTS
 from posefield.question.results import SampledClip
 
 ROOT = Sdf.Path("/Character")
@@ -30,11 +31,6 @@ class ClipLayerBuilder(BaseLayerBuilder):
 
     rig: CharacterRig
     curves: tuple[str, ...] = ()
-
-    @property
-    def values(self) -> tuple[Array, ...]:
-        """Return the arrays that every layer holds."""
-        return character_prims.fixed_vectors(self.rig, self.convention, self.curves)
 
     def head(self, content: LayerContent) -> Any:
         """Return the layer without its prims."""
@@ -76,7 +72,7 @@ def usda(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
 
 def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USD layers in binary form."""
-    return [CRATE_CACHE.write(*each) for each in builders_and_contents(answers, convention)]
+    return [crate_template.usdc(*each) for each in builders_and_contents(answers, convention)]
 
 
 def usdz(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:

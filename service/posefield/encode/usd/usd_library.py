@@ -23,7 +23,8 @@ from posefield.encode.character import character, joint_names
 from posefield.encode.character import extent as reach
 from posefield.encode.files import axis_conversion
 from posefield.encode.files.file_convention import Convention
-from posefield.encode.usd import character_prims, layer_metadata, prim_specs
+from posefield.encode.usd import character_prims
+from posefield.encode.usd_layers import layer_metadata, prim_specs
 from posefield.motion.skeleton import Skeleton
 from posefield.question.results import SampledClip
 

@@ -11,11 +11,10 @@ from posefield.common.units import Floats, Indices, Singles
 from posefield.encode.character import animation_samples
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.files.file_convention import METRES
-from posefield.encode.usd import custom_data
-from posefield.encode.usd.layer_content import WEIGHTS, LayerContent, Samples
-from posefield.encode.usd.template_cache import CRATE_CACHE, TemplateCache
 from posefield.encode.usd.usd_animation import AnimationLayerBuilder
 from posefield.encode.usd_crowd import crowd_extent
+from posefield.encode.usd_layers import crate_template
+from posefield.encode.usd_layers.layer_content import WEIGHTS, LayerContent, Samples
 from posefield.motion.crowd_clip import CrowdClip, Motions
 
 
@@ -62,14 +61,10 @@ def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
         raise ValueError(f"{made} motions, expected {motion_count(crowd)}")
 
 
-def motion_layer(
-    crowd: CrowdClip, rig: CharacterRig, samples: Samples, press: TemplateCache = CRATE_CACHE
-) -> bytes:
-    """Return the binary layer of one motion of a crowd, written by `press`."""
-    return press.write(
-        AnimationLayerBuilder(crowd.rate, METRES, rig.paths, crowd.curves),
-        LayerContent(samples, {}, custom_data.NO_FACTS),
-    )
+def motion_layer(crowd: CrowdClip, rig: CharacterRig, samples: Samples) -> bytes:
+    """Return the binary layer of one motion of a crowd."""
+    author = AnimationLayerBuilder(crowd.rate, METRES, rig.paths, crowd.curves)
+    return crate_template.usdc(author, LayerContent(samples, {}, {}))
 
 
 def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Iterator[MotionSamples]:

@@ -13,8 +13,9 @@ from posefield.common.errors import InvalidField
 from posefield.encode.character import character
 from posefield.encode.files import zip_archive
 from posefield.encode.files.zip_archive import ZipMember
-from posefield.encode.usd import character_prims, layer_metadata, prim_specs
+from posefield.encode.usd import character_prims
 from posefield.encode.usd_crowd import crowd_motions, crowd_scene, crowd_summary
+from posefield.encode.usd_layers import layer_metadata, prim_specs
 from posefield.motion.crowd_clip import CrowdClip
 from posefield.question.body_kind import BodyKind
 

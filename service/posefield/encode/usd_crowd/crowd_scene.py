@@ -18,8 +18,8 @@ from pxr import Sdf, Vt
 
 from posefield.common import cancellation
 from posefield.common.units import Indices
-from posefield.encode.usd import custom_data, layer_metadata, prim_specs
-from posefield.encode.usd.prim_specs import ValueTypes
+from posefield.encode.usd_layers import custom_data, layer_metadata, prim_specs
+from posefield.encode.usd_layers.prim_specs import ValueTypes
 from posefield.motion import quat
 from posefield.motion.crowd_clip import CrowdClip, Placement
 

@@ -10,10 +10,10 @@ import numpy as np
 from pxr import Sdf
 
 from posefield.common.units import Floats
-from posefield.encode.usd import prim_specs
-from posefield.encode.usd.prim_specs import ValueTypes
 from posefield.encode.usd_crowd import crowd_extent, crowd_scene
 from posefield.encode.usd_crowd.crowd_motions import MotionSummary
+from posefield.encode.usd_layers import prim_specs
+from posefield.encode.usd_layers.prim_specs import ValueTypes
 from posefield.motion.crowd_clip import CrowdClip
 
 LEVEL_ATTRIBUTE = "posefield:level"

@@ -11,7 +11,6 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.encode.character import character
 from posefield.encode.files import zip_archive
-from posefield.encode.usd import layer_metadata
 from posefield.encode.usd_crowd import (
     FILES,
     INSTANCING,
@@ -23,6 +22,7 @@ from posefield.encode.usd_crowd import (
     single_layer,
 )
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
+from posefield.encode.usd_layers import layer_metadata
 from posefield.motion.crowd_clip import CrowdClip
 from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 

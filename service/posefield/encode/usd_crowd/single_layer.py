@@ -11,9 +11,10 @@ from pxr import Sdf
 from posefield.common import cancellation
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig
-from posefield.encode.usd import character_prims, prim_specs
+from posefield.encode.usd import character_prims
 from posefield.encode.usd_crowd import crowd_motions, crowd_scene, crowd_summary
 from posefield.encode.usd_crowd.crowd_motions import MotionSamples
+from posefield.encode.usd_layers import prim_specs
 from posefield.motion.crowd_clip import CrowdClip
 from posefield.question.body_kind import BodyKind
 

@@ -154,7 +154,8 @@ class RigTarget:
 
 
 def _layer_bytes(extension: str, layer: Any) -> bytes:
-    from posefield.encode.usd import layer_metadata, usd_clip
+    from posefield.encode.usd import usd_clip
+    from posefield.encode.usd_layers import layer_metadata
 
     if extension == "usda":
         text: str = layer.ExportToString()

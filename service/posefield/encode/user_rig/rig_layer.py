@@ -18,8 +18,9 @@ from posefield.common.array_shapes import Bones, JointRotations
 from posefield.common.units import Floats, Singles
 from posefield.encode.character import joint_names
 from posefield.encode.files.file_convention import METRES, Convention
-from posefield.encode.usd import character_prims, custom_data, layer_metadata, prim_specs
-from posefield.encode.usd.prim_specs import ValueTypes
+from posefield.encode.usd import character_prims
+from posefield.encode.usd_layers import custom_data, layer_metadata, prim_specs
+from posefield.encode.usd_layers.prim_specs import ValueTypes
 from posefield.encode.user_rig import metre_joints
 from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion import quat

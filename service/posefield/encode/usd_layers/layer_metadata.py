@@ -2,18 +2,21 @@
 
 import errno
 import tempfile
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self, TypeVar
 
 from pxr import Sdf, Tf
 
 from posefield.common.errors import FileError
 from posefield.encode.files.file_convention import METRES, Convention
-from posefield.encode.usd import custom_data
-from posefield.encode.usd.layer_content import LayerContent
+from posefield.encode.usd_layers import custom_data
+from posefield.encode.usd_layers.layer_content import LayerContent
 
+FACTS = "posefield"
+"""Name of a layer's facts in its custom data."""
+Result = TypeVar("Result")
 MEMORY_FOLDER = Path("/dev/shm")
 
 # The first layer of a process makes usd-core load its file formats; two threads that do so at the
@@ -37,9 +40,9 @@ def set_layer_metadata(
 
 
 def set_custom_data(made: Any, said: Mapping[str, Any]) -> None:
-    """Set the custom layer data `posefield` to facts, unless there are none."""
+    """Set the custom layer data `FACTS` to facts, unless there are none."""
     if said:
-        made.customLayerData = {"posefield": dict(said)}
+        made.customLayerData = {FACTS: dict(said)}
 
 
 @dataclass(frozen=True)
@@ -49,15 +52,14 @@ class BaseLayerBuilder:
     rate: float
     convention: Convention
 
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Return the numbers that every layer holds."""
-        return (self.rate, self.convention.metres_per_unit)
+    def with_rate(self, rate: float) -> Self:
+        """Return layers of another rate."""
+        return replace(self, rate=rate)
 
     def set_metadata(self, made: Any, default: str, content: LayerContent) -> None:
         """Set the metadata of a layer, with this default prim, and the facts of its content."""
         set_layer_metadata(made, default, content.frames, self.rate, self.convention)
-        set_custom_data(made, custom_data.usd_dictionary(content.facts.join()))
+        set_custom_data(made, custom_data.usd_dictionary(content.facts))
 
 
 def crate_bytes(made: Any, memory: Path = MEMORY_FOLDER) -> bytes:
@@ -66,23 +68,45 @@ def crate_bytes(made: Any, memory: Path = MEMORY_FOLDER) -> bytes:
     memory: folder for that file; the default folder of temporary files if it cannot be used. Raises
     FileError if neither can be written.
     """
+
+    def exported(path: Path) -> bytes:
+        export_layer(made, path)
+        return path.read_bytes()
+
+    return _with_file(exported, memory)
+
+
+def crate_text(data: bytes, memory: Path = MEMORY_FOLDER) -> str:
+    """Return a binary layer as text, as usd-core reads it from a file in `memory`.
+
+    Raises FileError as `crate_bytes` does.
+    """
+
+    def read(path: Path) -> str:
+        path.write_bytes(data)
+        text: str = Sdf.Layer.OpenAsAnonymous(str(path)).ExportToString()
+        return text
+
+    return _with_file(read, memory)
+
+
+def _with_file(use: Callable[[Path], Result], memory: Path) -> Result:
+    """Return what a function returns for the path of a file that does not exist yet."""
     try:
-        return _exported_bytes(made, memory)
+        return _in_folder(use, memory)
     except OSError:
         # It may be missing, full or not writable: containers have 64 MB of it.
         pass
     try:
-        return _exported_bytes(made, None)
+        return _in_folder(use, None)
     except OSError as fault:
         message = f"a temporary file of usd-core cannot be written: {fault.strerror}"
         raise FileError(tempfile.gettempdir(), message) from fault
 
 
-def _exported_bytes(made: Any, place: Path | None) -> bytes:
+def _in_folder(use: Callable[[Path], Result], place: Path | None) -> Result:
     with tempfile.TemporaryDirectory(dir=place) as folder:
-        path = Path(folder, "layer.usdc")
-        export_layer(made, path)
-        return path.read_bytes()
+        return use(Path(folder, "layer.usdc"))
 
 
 def export_layer(made: Any, path: Path) -> None:

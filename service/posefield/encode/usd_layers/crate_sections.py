@@ -23,14 +23,10 @@ class CrateSection:
 
 @dataclass(frozen=True)
 class CrateParts:
-    """Head and values, with the table's offset set to zero, and the sections, tokens first."""
+    """Head and values, and the sections, tokens first."""
 
     values: bytes
     sections: tuple[CrateSection, ...]
-
-    def alike(self, other: "CrateParts") -> bool:
-        """Return whether both are equal except for the text of their tokens."""
-        return self.values == other.values and self.sections[1:] == other.sections[1:]
 
 
 def split_crate(data: bytes) -> CrateParts | None:
@@ -48,8 +44,8 @@ def split_crate(data: bytes) -> CrateParts | None:
         or listed[0][1] < TABLE_OFFSET_POSITION + TABLE_OFFSET.size
     ):
         return None
-    found = CrateParts(with_table_offset(bytearray(data[: listed[0][1]]), 0), sections)
-    return found if join_crate(found.values, found.sections) == data else None
+    found = CrateParts(data[: listed[0][1]], sections)
+    return found if join_crate(bytearray(found.values), sections) == data else None
 
 
 def _table_of_contents(data: bytes) -> list[tuple[bytes, int, int]]:
@@ -61,25 +57,12 @@ def _table_of_contents(data: bytes) -> list[tuple[bytes, int, int]]:
     ]
 
 
-def join_crate(values: bytes | bytearray, sections: tuple[CrateSection, ...]) -> bytes:
-    """Return the binary layer of head, values and sections."""
-    made = bytearray(values)
-    end = sections_and_table(made, sections)
-    return bytes(made) + end
-
-
-def sections_and_table(values: bytearray, sections: tuple[CrateSection, ...]) -> bytes:
-    """Return sections and table for the end of a layer; set the table's offset in its head."""
+def join_crate(values: bytearray, sections: tuple[CrateSection, ...]) -> bytes:
+    """Return the binary layer of head, values and sections; set the table's offset in the head."""
     start, entries = len(values), []
     for section in sections:
         entries.append(ENTRY.pack(section.name, start, len(section.content)))
         start += len(section.content)
     TABLE_OFFSET.pack_into(values, TABLE_OFFSET_POSITION, start)
     contents = (section.content for section in sections)
-    return b"".join((*contents, TABLE_OFFSET.pack(len(sections)), *entries))
-
-
-def with_table_offset(values: bytearray, table: int) -> bytes:
-    """Return head and values with the given offset of the table."""
-    TABLE_OFFSET.pack_into(values, TABLE_OFFSET_POSITION, table)
-    return bytes(values)
+    return b"".join((values, *contents, TABLE_OFFSET.pack(len(sections)), *entries))

@@ -7,9 +7,13 @@ import numpy as np
 import orjson
 
 from posefield.common.units import Floats, Singles
-from posefield.encode.usd import custom_data
-from posefield.encode.usd import layer_content as contents
-from posefield.encode.usd.layer_content import Array, LayerBuilder, LayerContent, LayerPattern
+from posefield.encode.usd_layers import layer_content as contents
+from posefield.encode.usd_layers.layer_content import (
+    Array,
+    LayerBuilder,
+    LayerContent,
+    LayerPattern,
+)
 
 INDENT = b"            "
 """Indentation of time samples in the layers of this package."""
@@ -38,11 +42,9 @@ class TextTemplate:
         return b"".join((_head(author, content), *parts))
 
 
-def pattern(author: LayerBuilder, content: LayerContent) -> LayerPattern:
+def pattern(content: LayerContent) -> LayerPattern:
     """Return the shapes of the arrays of a content, on which alone its template depends."""
-    samples = tuple((name, rows.shape, None) for name, rows in content.samples.items())
-    values = tuple((name, found.shape, found.dtype.char) for name, found in content.values.items())
-    return LayerPattern(samples, values, (), custom_data.NO_FACTS.shape)
+    return content.pattern._replace(facts=False)
 
 
 def ordinary(author: LayerBuilder, content: LayerContent) -> bytes:
@@ -58,7 +60,7 @@ def template(
 
     It is verified if it writes the same text as usd-core for the content.
     """
-    marks = contents.random_content(pattern, author.numbers, 0, seed=1)
+    marks = contents.random_content(pattern, {}, seed=1)
     body = ordinary(author, marks).removeprefix(_head(author, marks))
     holes = sorted(_array_spans(body, _array_texts(marks)))
     starts, ends = [0, *(end for _, end, _ in holes)], [*(at for at, _, _ in holes), len(body)]

@@ -7,7 +7,7 @@ import numpy as np
 from pxr import Sdf, Vt
 
 from posefield.common.units import Floats
-from posefield.encode.usd.layer_content import WEIGHTS, Samples
+from posefield.encode.usd_layers.layer_content import WEIGHTS, Samples
 
 ValueTypes = Sdf.ValueTypeNames
 

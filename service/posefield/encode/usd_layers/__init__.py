@@ -1,0 +1,1 @@
+"""USD layers: metadata, prims, facts, and templates that are filled in."""

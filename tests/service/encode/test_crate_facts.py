@@ -1,0 +1,84 @@
+"""Facts that this package writes into binary layers, as usd-core reads them and writes its own."""
+
+import math
+import struct
+from dataclasses import replace
+
+import pytest
+from test_crate import Plain, built, content
+from test_facts import GIVEN
+
+from posefield.encode.usd_layers import (
+    crate_facts,
+    crate_sections,
+    crate_template,
+    layer_metadata,
+)
+
+NUMBERS = [0.1, 0.25, -0.0, 1e300, 3.4028235677973366e38, 1e-45, math.inf, -math.inf, math.nan]
+INTEGERS = [0, -1, 2**31 - 1, 2**31, -(2**31), -(2**31) - 1, 2**63 - 1, -(2**63) + 1, 2**64]
+TEXTS = [
+    "",
+    "Anim",
+    "posefield",
+    "rotations",
+    "\u00fcn\u00efcode \u5de6\u8155",
+    'quo"ted\n',
+    "x" * 5000,
+]
+CASES = [
+    GIVEN,
+    {"numbers": NUMBERS, **{f"n{index}": number for index, number in enumerate(NUMBERS)}},
+    {f"i{index}": number for index, number in enumerate(INTEGERS)},
+    {"integers": INTEGERS[:-1], "more": INTEGERS, "truths": [True, False], "mixed": [1, "a"]},
+    {"texts": TEXTS, **{f"t{index}": text for index, text in enumerate(TEXTS)}},
+    {"a": {"b": {"c": {"d": 0.1, "e": [0.1, 0.2]}, "z": {}}, "none": None}, "last": {"x": 1.5}},
+    {f"fact {index}": index / 3 for index in range(1000)},
+    {"": "", "only": []},
+]
+
+
+@pytest.mark.parametrize("facts", CASES, ids=[next(iter(facts)) for facts in CASES])
+def test_facts_are_read_as_those_that_usd_writes(facts):
+    made = replace(content(1), facts=facts)
+    found = layer_metadata.crate_text(crate_template.usdc(Plain(), made))
+    assert found == built(Plain(), made)
+    other = replace(made, facts=facts | {"another": 0.1})
+    assert layer_metadata.crate_text(crate_template.usdc(Plain(), other)) != found
+
+
+def test_texts_of_any_length_are_read():
+    """Runs of 15 bytes, and of each 255 more, have a head that is a byte longer."""
+    for length in (*range(20), *range(250, 275), *range(505, 530)):
+        made = replace(content(1), facts={"a": "x" * length})
+        found = layer_metadata.crate_text(crate_template.usdc(Plain(), made))
+        assert f'string a = "{"x" * length}"\n' in found
+
+
+def test_values_that_are_read_where_they_lie_are_aligned():
+    for length in range(8):
+        made = replace(content(1), facts={"a": "x" * length, "b": [0.1] * 3, "c": 0.1 + length})
+        found = crate_template.usdc(Plain(), made)
+        assert found.index(struct.pack("<Qddd", 3, 0.1, 0.1, 0.1)) % 8 == 0
+
+
+def test_a_text_with_the_end_of_a_token_is_an_error():
+    made = replace(content(1), facts={"a": "x\0y"})
+    with pytest.raises(ValueError, match="a fact with the character NUL, expected text without"):
+        crate_template.usdc(Plain(), made)
+
+
+def test_a_layer_without_the_mark_has_no_place():
+    bare = replace(content(1), facts={})
+    parts = crate_sections.split_crate(crate_template.usdc(Plain(), bare))
+    assert crate_facts.find_place(parts) is None
+    marked = Plain().layer(bare)
+    marked.customLayerData = {"posefield": crate_facts.MARK}
+    parts = crate_sections.split_crate(layer_metadata.crate_bytes(marked))
+    assert crate_facts.find_place(parts) is not None
+    # Texts of several parts are those of gigabytes.
+    head, *rest = parts.sections
+    size = crate_facts.TOKENS_HEAD.size
+    several = replace(head, content=head.content[:size] + b"\2" + head.content[size + 1 :])
+    assert crate_facts.find_place(replace(parts, sections=(several, *rest))) is None
+    assert crate_facts.find_place(replace(parts, sections=(*rest, head))) is None
