@@ -3,7 +3,10 @@
 import math
 import struct
 from dataclasses import replace
+from enum import StrEnum
+from types import MappingProxyType
 
+import numpy as np
 import pytest
 from test_crate import Plain, built, content
 from test_facts import GIVEN
@@ -14,6 +17,11 @@ from posefield.encode.usd_layers import (
     crate_template,
     layer_metadata,
 )
+
+
+class Word(StrEnum):
+    LEFT = "left"
+
 
 NUMBERS = [0.1, 0.25, -0.0, 1e300, 3.4028235677973366e38, 1e-45, math.inf, -math.inf, math.nan]
 INTEGERS = [0, -1, 2**31 - 1, 2**31, -(2**31), -(2**31) - 1, 2**63 - 1, -(2**63) + 1, 2**64]
@@ -35,6 +43,7 @@ CASES = [
     {"a": {"b": {"c": {"d": 0.1, "e": [0.1, 0.2]}, "z": {}}, "none": None}, "last": {"x": 1.5}},
     {f"fact {index}": index / 3 for index in range(1000)},
     {"": "", "only": []},
+    MappingProxyType({"inner": MappingProxyType({"x": np.float32(0.1)}), "word": Word("left")}),
 ]
 
 
@@ -43,7 +52,7 @@ def test_facts_are_read_as_those_that_usd_writes(facts):
     made = replace(content(1), facts=facts)
     found = layer_metadata.crate_text(crate_template.usdc(Plain(), made))
     assert found == built(Plain(), made)
-    other = replace(made, facts=facts | {"another": 0.1})
+    other = replace(made, facts={**facts, "another": 0.1})
     assert layer_metadata.crate_text(crate_template.usdc(Plain(), other)) != found
 
 

@@ -32,13 +32,15 @@ from posefield.encode.usd_layers.custom_data import FactList
 MARK = 1.2345678901234567e-300
 """The number that usd-core writes in place of the facts; float32 does not hold it."""
 
-NAME = struct.Struct("<Iq")
-"""Index of a name, and an offset."""
+INLINE_FACT, FLOAT_FACT = struct.Struct("<IqQ"), struct.Struct("<IqdQ")
+"""Index of a name, an offset to a description, and this; in between a number."""
 TOKENS_HEAD = struct.Struct("<QQQ")
 """Number of tokens, bytes of their texts, and bytes of these when compressed."""
 MARKED = JUMP.pack(JUMP.size + DOUBLE.size) + DOUBLE.pack(MARK)
 """The mark in a layer: the offset of its description, from here, and its value."""
 TEXT, NUMBER = TYPES[str] | INLINED, TYPES[float] | INLINED
+PLAIN = frozenset((str, float, bool, dict))
+"""Types of facts that are written as they are."""
 ELEMENTS = {str: (TYPES[str], "I"), int: (LONG_INTEGER, "q"), float: (TYPES[float], "d")}
 """Type of a list's elements, and their form in `struct`."""
 
@@ -65,7 +67,7 @@ class FactPlace:
         Raises ValueError for a text with the character NUL, which ends a token.
         """
         writer = _FactWriter(values, {}, len(self.strings) // INDEX.size)
-        found = writer.describe(facts)
+        found = writer.dictionary(facts)
         JUMP.pack_into(values, self.jump, len(values) - self.jump)
         values += COUNT.pack(found)
         return self._tables(list(writer.texts))
@@ -112,32 +114,43 @@ class _FactWriter:
     texts: dict[str, int]
     before: int
 
-    def describe(self, fact: Any) -> int:
-        """Return the description of a fact, whose value is written if it does not hold it."""
-        kind = type(fact)
-        if kind is float:
-            return self._number(fact)
-        if kind is str:
-            return TEXT | self._string(fact)
-        if kind is dict:
-            return self._dictionary(fact)
-        if kind is bool:
-            return TYPES[bool] | INLINED | fact
-        if kind is int and abs(fact) <= custom_data.LARGEST_INTEGER:
-            return self._integer(fact)
-        if kind is FactList:
+    def dictionary(self, facts: Mapping[str, Any]) -> int:
+        """Return the description of facts, which are written.
+
+        For each there is its name, an offset, a value unless the description holds it, and this.
+        """
+        names = sorted([name for name, fact in facts.items() if fact is not None])
+        found = self._append(COUNT.pack(len(names)))
+        for name in names:
+            fact, index = facts[name], self._string(name)
+            if type(fact) not in PLAIN:
+                fact = custom_data.plain_fact(fact)
+            if type(fact) is str:
+                self.values += INLINE_FACT.pack(index, JUMP.size, TEXT | self._string(fact))
+            elif type(fact) is float:
+                self.values += _float_fact(index, fact, len(self.values))
+            else:
+                self._fact(index, fact)
+        return TYPES[dict] | found
+
+    def _fact(self, index: int, fact: Any) -> None:
+        """Write a fact of any length, by the index of its name."""
+        jump = self._append(INDEX.pack(index) + bytes(JUMP.size)) + INDEX.size
+        described = self._describe(fact)
+        JUMP.pack_into(self.values, jump, len(self.values) - jump)
+        self.values += COUNT.pack(described)
+
+    def _describe(self, fact: dict[str, Any] | FactList | bool | int) -> int:
+        if isinstance(fact, dict):
+            return self.dictionary(fact)
+        if isinstance(fact, FactList):
             return self._list(fact)
-        return self.describe(custom_data.plain_fact(fact))
+        return TYPES[bool] | INLINED | fact if isinstance(fact, bool) else self._integer(fact)
 
     def _integer(self, fact: int) -> int:
         if -(1 << 31) <= fact < 1 << 31:
             return TYPES[int] | INLINED | fact & 0xFFFFFFFF
         return LONG_INTEGER | self._append(JUMP.pack(fact))
-
-    def _number(self, fact: float) -> int:
-        if c_float(fact).value == fact:
-            return NUMBER | int.from_bytes(FLOAT.pack(fact), "little")
-        return TYPES[float] | self._append(DOUBLE.pack(fact))
 
     def _list(self, fact: FactList) -> int:
         kind, form = ELEMENTS[fact.kind]
@@ -148,19 +161,6 @@ class _FactWriter:
         found = self._append(COUNT.pack(len(items)) + struct.pack(f"<{len(items)}{form}", *items))
         return kind | ARRAY | found
 
-    def _dictionary(self, facts: Mapping[str, Any]) -> int:
-        """Write a dictionary: for each fact its name, an offset, its value and its description."""
-        values = self.values
-        names = sorted([name for name, fact in facts.items() if fact is not None])
-        found = self._append(COUNT.pack(len(names)))
-        for name in names:
-            values += NAME.pack(self._string(name), 0)
-            end = len(values)
-            described = self.describe(facts[name])
-            JUMP.pack_into(values, end - JUMP.size, len(values) - end + JUMP.size)
-            values += COUNT.pack(described)
-        return TYPES[dict] | found
-
     def _append(self, written: bytes) -> int:
         """Return the offset of bytes after they are written."""
         offset = len(self.values)
@@ -169,6 +169,15 @@ class _FactWriter:
 
     def _string(self, text: str) -> int:
         return self.texts.setdefault(text, self.before + len(self.texts))
+
+
+def _float_fact(index: int, fact: float, at: int) -> bytes:
+    """Return a number of a dictionary, by the index of its name, at an offset."""
+    if c_float(fact).value == fact:
+        bits = int.from_bytes(FLOAT.pack(fact), "little")
+        return INLINE_FACT.pack(index, JUMP.size, NUMBER | bits)
+    value = at + INDEX.size + JUMP.size
+    return FLOAT_FACT.pack(index, JUMP.size + DOUBLE.size, fact, TYPES[float] | value)
 
 
 # LZ4, by which tokens are compressed, alternates runs of literal bytes with copies of earlier ones

@@ -27,18 +27,24 @@ def usd_dictionary(facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def plain_fact(fact: Any) -> Any:
-    """Return a fact as what USD holds: a text, truth or number, a list of one kind, a mapping.
+    """Return a fact as what USD holds: a text, truth or number, a list of one kind, a dictionary.
 
-    A mixed list is a mapping by index, and an integer that readers do not support a text. Raises
+    A mixed list is a dictionary by index, and an integer that readers do not support a text. Raises
     TypeError for any other value.
     """
     match fact:
         case np.generic() | np.ndarray():
             return plain_fact(fact.tolist())
-        case Mapping() | str() | bool() | float():
+        case Mapping():
+            return dict(fact)
+        case str():
+            return str(fact)
+        case bool():
             return fact
+        case float():
+            return float(fact)
         case int():
-            return fact if _is_supported(fact) else str(fact)
+            return int(fact) if _is_supported(fact) else str(int(fact))
         case Sequence():
             return _plain_list(fact)
     raise TypeError(f"a fact of type {type(fact).__name__}, expected text, a number or several")
@@ -62,4 +68,4 @@ def _usd_value(fact: Any) -> Any:
     plain = plain_fact(fact)
     if isinstance(plain, FactList):
         return ARRAYS[plain.kind](list(plain.items))
-    return usd_dictionary(plain) if isinstance(plain, Mapping) else plain
+    return usd_dictionary(plain) if isinstance(plain, dict) else plain
