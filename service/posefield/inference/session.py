@@ -23,9 +23,9 @@ from posefield.model_file.answer_bounds import AnswerBounds
 from posefield.model_file.model_card import ModelCard
 from posefield.model_file.row_values import ROW_VALUES, shape_rows
 
-# Estimate of memory: a model of 114 kB with four levels in use takes 3.1 MB, for twelve sessions
-# with weights.
-BASE_MEMORY, COPIES = 2 << 20, 12
+# Estimate of memory, by the shipped models: each level has up to six sessions, one for each set of
+# values that is asked for, and a session takes four to five times the file.
+BASE_MEMORY, COPIES_PER_LEVEL = 1 << 20, 24
 
 
 @dataclass(frozen=True)
@@ -254,8 +254,8 @@ class Session:
 
     @property
     def memory(self) -> int:
-        """Estimated memory in bytes with all levels open."""
-        return BASE_MEMORY + COPIES * self.size
+        """Estimated memory in bytes with all levels and all sets of values in use."""
+        return BASE_MEMORY + COPIES_PER_LEVEL * len(self.card.levels) * self.size
 
     def run_trial(self) -> bytes:
         """Return the answer at the default controls; equals `golden` for a sound model.
