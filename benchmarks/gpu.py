@@ -17,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import crowd_scene
 import numpy as np
 import onnxruntime
 from rows import Row, record, table
@@ -29,11 +30,8 @@ from posefield.inference.providers import CPU, CUDA, TOLERANCE, Provider
 from posefield.inference.session import Session
 from posefield.model_file import subgraph
 from posefield.model_file.model_card import ModelCard
-from posefield.motion.crowd_clip import Placement
 from posefield.registry import shipped_models
-from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield.validation.crowd_question import CrowdQuestion
 
 RESULTS = Path(__file__).parents[1] / "docs/results/speed"
 COMMAND = "python benchmarks/gpu.py --record"
@@ -178,27 +176,15 @@ def _crowds(opened: Session, provider: Provider, most: int, rounds: int) -> dict
     ]
     found = {}
     for crowd in CROWDS:
-        asked = _crowd_question(opened.card, min(crowd, most))
+        count = min(crowd, most)
+        finest = np.zeros(count, np.int64)
         runs = {
-            str(each): partial(crowd_synthesis.synthesize_crowd, model, asked)
+            str(each): crowd_scene.around(model, count).poses(finest)
             for each, model in enumerate(models)
         }
         cpu, gpu = in_turn(runs, rounds, 1).values()
         found |= {f"crowd {crowd}": 1e3 * gpu, f"crowd {crowd} ratio": cpu / gpu}
     return found
-
-
-def _crowd_question(card: ModelCard, count: int) -> CrowdQuestion:
-    asked = questions(card, count)
-    # Durations between the clips may be shorter than the shortest of them.
-    times = 0.5 * asked["time"][:, 0].astype(float)
-    controls = zip(card.controls, asked["controls"].T.astype(float), strict=True)
-    indices = np.zeros(count, int)
-    placement = Placement(np.zeros((count, 3)), np.zeros(count))
-    columns = {control.name: values for control, values in controls}
-    return CrowdQuestion(
-        columns, times, placement, (None,), indices, indices, "travel", extrapolate="ok"
-    )
 
 
 def _rows(found: dict[str, float]) -> list[Row]:

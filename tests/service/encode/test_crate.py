@@ -10,7 +10,6 @@ from posefield.encode.usd_layers import (
     crate_samples,
     crate_sections,
     crate_template,
-    custom_data,
     layer_content,
     layer_metadata,
     prim_specs,
@@ -32,7 +31,7 @@ class Plain:
 
     def head(self, content):
         made = Sdf.Layer.CreateAnonymous("moves.usda")
-        layer_metadata.set_custom_data(made, custom_data.usd_dictionary(content.facts))
+        layer_metadata.set_custom_data(made, content.facts)
         made.timeCodesPerSecond = self.rate
         made.startTimeCode, made.endTimeCode = 0.0, content.frames - 1.0
         made.pseudoRoot.SetInfo("metersPerUnit", UNIT)

@@ -78,7 +78,7 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
         scope = prim_specs.prim(made, PERFORMANCE.name, "Scope")
         facts = answer.trust.facts()
         segments = facts.pop("segments")
-        scope.customData = {"posefield": custom_data.usd_dictionary(facts)}
+        scope.customData = {layer_metadata.FACTS: custom_data.usd_dictionary(facts)}
         group = prim_specs.prim(scope, SEGMENTS.name, "Scope")
         for index, own in enumerate(segments):
             _add_segment(group, index, own, arrays)
@@ -89,7 +89,7 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
 def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArrays) -> None:
     paths = arrays.rig.paths
     prim = character_prims.animation(group, segment_name(index), paths, arrays.curves)
-    prim.customData = {"posefield": custom_data.usd_dictionary(facts)}
+    prim.customData = {layer_metadata.FACTS: custom_data.usd_dictionary(facts)}
     frames = segment_frames(facts["begins"], facts["ends"], arrays.rate, arrays.content.frames)
     rows = slice(frames.start, frames.stop)
     samples = {name: whole[rows] for name, whole in arrays.content.samples.items()}

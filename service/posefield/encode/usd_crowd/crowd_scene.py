@@ -55,7 +55,7 @@ def new_layer(crowd: CrowdClip, form: str) -> Any:
     """
     made = Sdf.Layer.CreateAnonymous(f"crowd.{form}")
     layer_metadata.set_layer_metadata(made, ROOT.name, crowd.frames, crowd.rate)
-    made.customLayerData = {"posefield": custom_data.usd_dictionary(crowd.facts)}
+    made.customLayerData = {layer_metadata.FACTS: custom_data.usd_dictionary(crowd.facts)}
     prim_specs.prim(made, ROOT.name, "Xform", MODEL_SCHEMAS).kind = "assembly"
     return made
 

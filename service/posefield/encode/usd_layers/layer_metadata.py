@@ -39,10 +39,10 @@ def set_layer_metadata(
     made.pseudoRoot.SetInfo("upAxis", convention.up.upper())
 
 
-def set_custom_data(made: Any, said: Mapping[str, Any]) -> None:
+def set_custom_data(made: Any, facts: Mapping[str, Any]) -> None:
     """Set the custom layer data `FACTS` to facts, unless there are none."""
-    if said:
-        made.customLayerData = {FACTS: dict(said)}
+    if said := custom_data.usd_dictionary(facts):
+        made.customLayerData = {FACTS: said}
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class BaseLayerBuilder:
     def set_metadata(self, made: Any, default: str, content: LayerContent) -> None:
         """Set the metadata of a layer, with this default prim, and the facts of its content."""
         set_layer_metadata(made, default, content.frames, self.rate, self.convention)
-        set_custom_data(made, custom_data.usd_dictionary(content.facts))
+        set_custom_data(made, content.facts)
 
 
 def crate_bytes(made: Any, memory: Path = MEMORY_FOLDER) -> bytes:

@@ -17,10 +17,10 @@ ENTRY_BYTES = 1500
 
 @dataclass(frozen=True)
 class Entry:
-    """Entry of a pattern: its template, None if it could not be verified; occurred: how often."""
+    """Entry of a pattern: its template, None without. tried: whether making one was tried."""
 
     template: TextTemplate | None
-    occurred: int = 2
+    tried: bool
 
     @property
     def size(self) -> int:
@@ -28,7 +28,7 @@ class Entry:
         return ENTRY_BYTES + (0 if self.template is None else len(self.template))
 
 
-ONCE = Entry(None, occurred=1)
+ONCE = Entry(None, tried=False)
 """Entry of a pattern that has occurred once."""
 
 
@@ -52,7 +52,7 @@ class TextCache:
         key = (author, text_template.pattern(content))
         entry = self._find(key)
         if entry == ONCE:
-            entry = Entry(text_template.template(author, content, key[1]))
+            entry = Entry(text_template.template(author, content, key[1]), tried=True)
             self._store(key, entry)
         elif entry is None:
             self._store(key, ONCE)

@@ -19,7 +19,7 @@ from posefield.common.units import Floats, Singles
 from posefield.encode.character import joint_names
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.usd import character_prims
-from posefield.encode.usd_layers import custom_data, layer_metadata, prim_specs
+from posefield.encode.usd_layers import layer_metadata, prim_specs
 from posefield.encode.usd_layers.prim_specs import ValueTypes
 from posefield.encode.user_rig import metre_joints
 from posefield.encode.user_rig.rig_stage import RigStage
@@ -72,7 +72,7 @@ def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
 def _set_metadata(made: Any, answer: SampledClip, root: str, convention: Convention) -> None:
     clip = answer.clip
     layer_metadata.set_layer_metadata(made, root, len(clip), clip.rate, convention)
-    layer_metadata.set_custom_data(made, custom_data.usd_dictionary(answer.trust.facts()))
+    layer_metadata.set_custom_data(made, answer.trust.facts())
 
 
 def _set_extent(made: Any, answer: SampledClip, rest: RestJoints, stage: RigStage) -> None:
