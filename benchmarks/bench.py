@@ -57,8 +57,8 @@ def main() -> None:
             *export_formats.rows(made),
             *export.rows(model),
             *export_cluster.rows(model),
-            *export_usd.rows(),
         ],
+        "layers": export_usd.rows(),
         "requests": [
             *clips_http.rows(made),
             *serve.rows(model),

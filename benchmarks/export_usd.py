@@ -1,12 +1,13 @@
 """Clips to the bytes of USD files, against the UsdSkel schema API and against plain layers.
 
-OPENBLAS_NUM_THREADS=1 .venv/bin/python benchmarks/export_usd.py
+    OPENBLAS_NUM_THREADS=1 .venv/bin/python benchmarks/export_usd.py [--record]
 
 Every file has skeleton, animation, body, extent and facts. Where body and extent are given, all are
 timed from the same arrays; where they are made, so is all that a file holds, 32 clips at a time.
 """
 
 import itertools
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from pxr import Gf, Kind, Usd, UsdGeom, UsdSkel, Vt
-from rows import Row, table
+from rows import Row, record, table
 from timing import in_turn
 
 from posefield.encode.character import character, joint_names
@@ -32,6 +33,7 @@ from posefield.motion.skeleton import Skeleton
 from posefield.question.results import ClipAnswer, Trust
 
 CLIPS, FRAMES, JOINTS, ENTRIES = 32, 100, 30, 100_000
+RESULTS = Path(__file__).parents[1] / "docs/results/speed"
 SIZE = f"{JOINTS} joints × {FRAMES} frames"
 FOLDER = Path("/dev/shm") if Path("/dev/shm").is_dir() else None
 
@@ -281,4 +283,7 @@ def _mesh(stage: Any, rig: CharacterRig, content: LayerContent, extent: Any) -> 
 
 
 if __name__ == "__main__":
-    print(table(rows()))
+    found = rows()
+    print(table(found))
+    if "--record" in sys.argv:
+        record({"layers": found}, "python benchmarks/export_usd.py --record", RESULTS)

@@ -20,6 +20,7 @@ SPEED_FILES = (
     "crowds",
     "gpu",
     "files",
+    "layers",
     "exports",
 )
 SPEED = tuple(f"speed/{name}" for name in SPEED_FILES)
