@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 from msgspec import UNSET, Struct, UnsetType
 
-CONTRACT = "4.4.0"
+CONTRACT = "5.0.0"
 """Version of the contract that this client was made for."""
 
 

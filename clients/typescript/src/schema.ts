@@ -5042,7 +5042,7 @@ export interface operations {
     };
 }
 /** Version of the contract that this is made from. */
-export const CONTRACT = "4.4.0";
+export const CONTRACT = "5.0.0";
 
 /** Keys that every document has. */
 export const REQUIRED = {
