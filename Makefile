@@ -140,7 +140,7 @@ clean: ## remove what was built, environments too
 
 # Every family is held out take by take; finished folds are kept, so that a run that was stopped goes on.
 EVALUATED := cmu_walk hdm05_grab_high hdm05_deposit_floor hdm05_kick hdm05_hop bandai_raise_hand
-EVALUATIONS := docs/results/evaluation
+EVALUATIONS := build/evaluation/results
 
 .PHONY: evaluate
 evaluate: $(SAMPLE)/recipe.toml ## measure all families on held-out clips and write the results pages; DATA: folder of the motion
@@ -152,4 +152,5 @@ evaluate: $(SAMPLE)/recipe.toml ## measure all families on held-out clips and wr
 	done
 	$(BIN)/posefield evaluate $(SAMPLE)/recipe.toml --resume build/evaluation \
 		--json-file $(EVALUATIONS)/reaching.json >/dev/null
+	$(BIN)/python docs/evaluation_summary.py $(EVALUATIONS)
 	$(BIN)/python docs/generate.py

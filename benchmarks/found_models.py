@@ -5,7 +5,6 @@ for all clips of that performer as they were cut by hand.
 """
 
 import argparse
-import json
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from typing import Any
 import discovered_families
 import numpy as np
 from discovered_families import Discovery, JudgedFamily
-from rows import origin
+from rows import compact, origin
 
 from posefield_train.evaluate import compared_motion, methods, motion_errors
 from posefield_train.evaluate.methods import Queries
@@ -107,7 +106,7 @@ def main(arguments: Sequence[str]) -> None:
         models = compare(found, given.folder / "bvh")
         families = discovered_families.document(found)
     own = origin("python benchmarks/found_models.py HDM05_LONG --record")
-    text = json.dumps({**own, "families": families, "models": models}, indent=1)
+    text = compact({**own, "families": families, "models": models})
     print(text)
     if given.record:
         RESULTS.write_text(text + "\n", encoding="utf-8")

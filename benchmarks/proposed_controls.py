@@ -1,14 +1,13 @@
 """Controls that discovery proposes for the clips of shipped recipes, against those by hand."""
 
 import argparse
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-from rows import origin
+from rows import compact, origin
 
 from posefield_train.discover import control_proposals, take_prediction
 from posefield_train.discover.control_proposals import FamilyClips
@@ -75,7 +74,7 @@ def main(arguments: Sequence[str]) -> None:
     given = parser.parse_args(arguments)
     found = [asdict(propose(name, given.data)) for name in RECIPES]
     command = origin("python benchmarks/proposed_controls.py DATA --record")
-    text = json.dumps({**command, "recipes": found}, indent=1)
+    text = compact({**command, "recipes": found})
     print(text)
     if given.record:
         RESULTS.write_text(text + "\n", encoding="utf-8")

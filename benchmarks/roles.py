@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rows import origin
+from rows import compact, origin
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests/model_export"))
@@ -46,7 +46,7 @@ def main(arguments: Sequence[str]) -> None:
         **origin("python benchmarks/roles.py --record"),
         "tables": [measure(table, first.get(table)) for table in TABLES],
     }
-    text = json.dumps(found, indent=1, ensure_ascii=False)
+    text = compact(found)
     print(text)
     if given.record:
         (ROOT / "docs/results/roles.json").write_text(text + "\n", encoding="utf-8")

@@ -7,6 +7,9 @@ from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+WIDTH = 400
+"""Characters of a line of a file of results: a row of a table is one line."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -55,8 +58,22 @@ def record(tables: Mapping[str, list[Row]], command: str, folder: Path, device: 
     """
     for name, rows in tables.items():
         found = {**origin(command, device), "rows": _plain(rows)}
-        text = json.dumps(found, indent=1, ensure_ascii=False)
-        (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        (folder / f"{name}.json").write_text(compact(found) + "\n", encoding="utf-8")
+
+
+def compact(value: object, indent: int = 0) -> str:
+    """Return JSON in which an object or list that fits in WIDTH characters is one line."""
+    line = json.dumps(value, ensure_ascii=False)
+    if len(line) <= WIDTH or not isinstance(value, dict | list):
+        return line
+    parts = (
+        [f"{json.dumps(key)}: {compact(part, indent + 1)}" for key, part in value.items()]
+        if isinstance(value, dict)
+        else [compact(part, indent + 1) for part in value]
+    )
+    start, end = "{}" if isinstance(value, dict) else "[]"
+    lines = ",\n".join(" " * (indent + 1) + part for part in parts)
+    return f"{start}\n{lines}\n{' ' * indent}{end}"
 
 
 def origin(command: str, device: str = "") -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 .venv/bin/python benchmarks/worst_requests.py REACHING.onnx WALK.onnx
 Each request is sent alone to a service of one worker with its usual limits, started for it. Writes
-docs/results/worst-requests.md and docs/results/worst-requests.json.
+docs/results/worst-requests.md and build/worst-requests.json.
 """
 
 import contextlib
@@ -21,7 +21,9 @@ import worst_questions
 from serve_process import Server
 from worst_questions import Question
 
-RESULTS = Path(__file__).parents[1] / "docs/results/worst-requests"
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "docs/results/worst-requests.md"
+CANDIDATES = ROOT / "build/worst-requests.json"
 ENVIRONMENT = {"POSEFIELD_WORKERS": "1", "POSEFIELD_LOG": "off", "POSEFIELD_DEADLINE": "3600"}
 MB, LIMIT = 1e6, 700.0
 """Bytes, and the most megabytes that a process may take."""
@@ -192,15 +194,12 @@ def main(reaching: Path, walk: Path) -> None:
 
 
 def _write(costs: list[Cost]) -> None:
-    RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    CANDIDATES.parent.mkdir(parents=True, exist_ok=True)
     said = (__doc__ or "").partition("\n")[0]
-    head = (
-        f"# {said}\n\nWritten by `benchmarks/worst_requests.py`; all {len(costs)} candidates are in"
-    )
-    text = f"{head}\n`docs/results/worst-requests.json`.\n\n{table(worst(costs))}\n"
-    RESULTS.with_suffix(".md").write_text(text)
+    head = f"# {said}\n\nWorst of {len(costs)} candidates, by `benchmarks/worst_requests.py`."
+    RESULTS.write_text(f"{head}\n\n{table(worst(costs))}\n")
     listed = json.dumps([asdict(cost) for cost in costs], indent=1)
-    RESULTS.with_suffix(".json").write_text(listed + "\n")
+    CANDIDATES.write_text(listed + "\n")
 
 
 if __name__ == "__main__":

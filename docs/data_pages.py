@@ -9,7 +9,6 @@ from typing import Any
 
 import measured_tables
 import yaml
-from evaluation_tables import transcribed
 from page_parts import code, page, table
 from result_tables import ORIGINS, REMARKS, TABLES
 
@@ -172,15 +171,25 @@ def results(name: str) -> str:
     """Return a page of measured results."""
     found = json.loads((ROOT / f"docs/results/{name}.json").read_text(encoding="utf-8"))
     parts = [found["intro"], f"Measured: {found['measured']}. Machine: {found['machine']}."]
-    if any(each["from"] not in ORIGINS for each in found["tables"]) and (said := transcribed()):
-        parts.append(said)
-    for each in found["tables"]:
-        parts.append(f"## {each['title']}")
-        parts += [each["about"]] if each["about"] else []
-        if each["from"] in ORIGINS:
-            parts.append(measured_tables.origin(ORIGINS[each["from"]]))
-        parts.append(table(*TABLES[each["from"]]()))
-        made = [REMARKS[each["from"]]()] if each["from"] in REMARKS else []
-        if remarks := [*made, *each["remarks"]]:
-            parts.append("\n".join(f"- {remark}" for remark in remarks))
+    missing = [
+        part["title"] for part in found["tables"] if not measured_tables.exists(part["from"])
+    ]
+    if missing:
+        parts.append(f"Not measured with this version: {', '.join(missing)}.")
+    for part in found["tables"]:
+        if part["title"] not in missing:
+            parts += _result(part)
     return page(found["title"], f"docs/results/{name}.json", parts)
+
+
+def _result(described: dict[str, Any]) -> Iterator[str]:
+    name = described["from"]
+    yield f"## {described['title']}"
+    if described["about"]:
+        yield described["about"]
+    if name in ORIGINS:
+        yield measured_tables.origin(ORIGINS[name])
+    yield table(*TABLES[name]())
+    made = [REMARKS[name]()] if name in REMARKS else []
+    if remarks := [*made, *described["remarks"]]:
+        yield "\n".join(f"- {remark}" for remark in remarks)

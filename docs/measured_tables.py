@@ -1,9 +1,7 @@
 """Tables of figures that a command has measured and written to a file of docs/results.
 
 Files of `speed` hold rows as benchmarks/rows.py writes them; `models.json` is by
-docs/measure_models.py, `learning.json` by docs/measure_learning.py, and `joined.json` holds what
-`posefield evaluate --joined` prints. Each file names the command,
-the date and the machine of its figures.
+docs/measure_models.py. Each file names the command, the date and the machine of its figures.
 """
 
 import json
@@ -47,11 +45,15 @@ def read(name: str) -> Found:
     return found
 
 
+def exists(table: str) -> bool:
+    """Return whether a table of speed is measured; all others are."""
+    return not table.startswith("speed/") or (FOLDER / f"{table}.json").exists()
+
+
 def origin(name: str) -> str:
     """Return a sentence on the command, the date and the machine of a file's figures."""
     found = read(name)
-    said = f"Measured by `{found['command']}`, {found['date']}. Machine: {found['machine']}."
-    return " ".join(filter(None, [said, found.get("note", "")]))
+    return f"Measured by `{found['command']}`, {found['date']}. Machine: {found['machine']}."
 
 
 def speed(name: str) -> Rows:
@@ -92,44 +94,6 @@ def levels() -> Rows:
             f"{100 * level['pose']:.1f} cm",
             f"{far:.0f} m",
         ]
-
-
-def learning() -> tuple[list[str], Rows]:
-    """Return columns and rows of the error with suggested and with random samples, cm."""
-    found = read("learning")["learning"]
-    return ["samples", *map(str, found["samples"])], _learning(found)
-
-
-def learning_remark() -> str:
-    """Return a sentence on the number of suggested clips with the error of all random ones."""
-    found = read("learning")["learning"]
-    fewer = found["samples"][-1] / found["reached"]
-    verdict = "met" if fewer >= 2.0 else "**missed**"
-    return (
-        f"The goal of reaching the same error with half the clips is {verdict}: suggested clips "
-        f"reach the error of {found['samples'][-1]} random ones with {fewer:.1f} times fewer, at "
-        f"{found['reached']:.0f}. Means of {found['trials']} trials, ± their standard errors."
-    )
-
-
-def joined() -> Rows:
-    """Yield the support flag on two families joined, and the required and desired shares."""
-    own = read("joined")
-    low, high = own["heights_m"]
-    yield [
-        f"{own['families']} ({own['clips']}, {own['controls']})",
-        f"{100 * own['false_alarms']:.1f} %",
-        f"{100 * own['beyond']:.0f} %",
-        f"{100 * own['gap']:.0f} % (heights from {low:g} to {high:g} m)",
-    ]
-    yield ["required, desired", "15, 12 %", "95, 100 %", "all"]
-
-
-def _learning(found: Found) -> Rows:
-    for key, name in (("suggested", "suggested"), ("at_random", "at random")):
-        own = found[key]
-        pairs = zip(own["global_cm"], own["global_standard_error_cm"], strict=True)
-        yield [name, *(f"{error:.2f} ± {doubt:.2f}" for error, doubt in pairs)]
 
 
 def _value(row: Found) -> str:

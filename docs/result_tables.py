@@ -1,7 +1,6 @@
 """Tables of results by the name that a file of docs/results refers to them by."""
 
 from collections.abc import Callable
-from itertools import chain
 
 import equal_tables
 import evaluation_tables as tables
@@ -37,10 +36,6 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
         tables.headings("method", known_performer),
         tables.errors(known_performer),
     ),
-    "clips_open": lambda: (
-        tables.headings("method", known_performer),
-        tables.errors(known_performer, is_open=True),
-    ),
     "performers": lambda: (
         tables.headings("method", new_performer),
         tables.errors(new_performer),
@@ -66,12 +61,11 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
         tables.exact(),
     ),
     "support": lambda: (
-        ["family", "false alarms", tables.BEYOND, "in the gap"],
-        chain(tables.support(), measured_tables.joined()),
+        ["family", "false alarms", tables.BEYOND],
+        tables.support(),
     ),
     "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
     "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
-    "learning": measured_tables.learning,
     "performed": lambda: (performed_tables.COLUMNS, performed_tables.performed()),
     "joins": lambda: (performed_tables.COLUMNS, performed_tables.joins()),
     "discovered": lambda: (performed_tables.COLUMNS, performed_tables.discovered()),
@@ -90,7 +84,6 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
 REMARKS: dict[str, Callable[[], str]] = {
     "equal_known": lambda: equal_tables.counts("known"),
     "equal_open": lambda: equal_tables.counts("open"),
-    "learning": measured_tables.learning_remark,
     "found_families": found_tables.families_remark,
     "proposed_controls": found_tables.controls_remark,
     "roles": found_tables.roles_remark,
@@ -98,7 +91,7 @@ REMARKS: dict[str, Callable[[], str]] = {
 """A sentence made of the rows of a table, for some of them."""
 
 DISCOVERY = ("discovered", "found_families", "proposed_controls", "roles")
-OWN_FILES = (*SPEED, *DISCOVERY, "performed", "joins", "learning", "scaled")
+OWN_FILES = (*SPEED, *DISCOVERY, "performed", "joins", "scaled")
 ORIGINS: dict[str, str] = {name: name for name in OWN_FILES} | {
     "recipes": "models",
     "levels": "models",
