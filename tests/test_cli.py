@@ -60,6 +60,14 @@ def test_it_says_its_version(posefield):
     assert posefield("--version") == (0, f"posefield {__version__}\n", "")
 
 
+def test_an_application_that_calls_main_twice_registers_commands_once(posefield):
+    posefield("--version")
+    registered = len(cli.app.registered_commands)
+    first, second = posefield("train", "--help"), posefield("train", "--help")
+    assert first == second and first[0] == 0
+    assert len(cli.app.registered_commands) == registered
+
+
 @pytest.mark.system
 def test_it_is_a_command_of_its_own():
     command = str(Path(sys.executable).parent / "posefield")

@@ -7,9 +7,10 @@ that died; 128 and a signal's number where that ended an export.
 
 import sys
 from collections.abc import Callable
+from functools import cache
 from importlib.metadata import entry_points
 from importlib.util import find_spec
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -73,15 +74,8 @@ TRAINING = {
 
 def main() -> None:
     """Run the command line; MotionErrors and missing modules end as one line and an exit code."""
-    plugins = entry_points(group="posefield.commands")
-    # The container image contains only the service.
-    found = [plugin for plugin in plugins if find_spec(plugin.module.partition(".")[0])]
-    for plugin in found:
-        plugin.load()(app)
-    if not found:
-        _list_training()
     try:
-        app()
+        _program()()
     except ModuleNotFoundError as fault:
         typer.echo(f"posefield: {_missing(fault.name or '')}", err=True)
         sys.exit(2)
@@ -90,6 +84,22 @@ def main() -> None:
     except MotionError as fault:
         typer.echo(f"posefield: {fault}", err=True)
         sys.exit(_exit_code(fault))
+
+
+@cache
+def _program() -> Callable[[], Any]:
+    """Return the program of all commands, built once in a process.
+
+    Registering the training commands at each call would make every later call slower.
+    """
+    plugins = entry_points(group="posefield.commands")
+    # The container image contains only the service.
+    installed = [plugin for plugin in plugins if find_spec(plugin.module.partition(".")[0])]
+    for plugin in installed:
+        plugin.load()(app)
+    if not installed:
+        _list_training()
+    return typer.main.get_command(app)
 
 
 def _missing(module: str) -> str:
