@@ -82,7 +82,7 @@ addon: $(ENV) ## the Blender add-on as an archive to install, in build
 # Types are checked beside the tests: neither alone keeps two processors busy.
 .PHONY: test
 test: $(PAGE) $(DOCS) ## lint, types, layers, unit tests, the contract in process: some minutes
-	$(MAKE) --no-print-directory -j2 lint types unit
+	$(MAKE) --no-print-directory -j2 lint types typescript unit
 
 .PHONY: lint
 lint: $(ENV)
@@ -102,6 +102,10 @@ docs: $(ENV) ## build the documentation in build/site
 types: $(ENV)
 	$(BIN)/mypy
 
+.PHONY: typescript
+typescript: $(PAGE) ## check types, style and tests of the TypeScript client and the page
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run check --prefix clients --silent
+
 .PHONY: unit
 unit: $(PAGE) $(DOCS)
 	$(BIN)/python -m pytest -n auto -m "not system"
@@ -110,6 +114,10 @@ unit: $(PAGE) $(DOCS)
 test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, stores, clusters, browsers, Blender, the image
 	$(BIN)/python -m pytest -n auto -m system
 	$(BIN)/python tests/interop/run.py
+
+.PHONY: test-all
+test-all: test test-system ## both rings, the older Blender, and the engines MLServer and Triton
+	$(BIN)/python tests/interop/run.py --others
 
 # Everything installable: both distributions of the workspace as wheels and sdists.
 .PHONY: wheels

@@ -150,7 +150,7 @@ def test_what_is_wrong_with_the_audit_itself_fails():
 def checkout(tmp_path):
     """A folder with CI's own scripts, whose make and other Pythons only say that they ran."""
     shutil.copytree(ROOT / ".ci", tmp_path / ".ci")
-    program(tmp_path / "bin/make", 'echo "made $1"')
+    program(tmp_path / "bin/make", 'echo "made $*"')
     program(tmp_path / ".ci/pythons", "echo proven")
     return tmp_path
 
@@ -163,19 +163,24 @@ def ci(checkout, uv):
 def test_ci_passes_in_this_order(checkout, fake_uv):
     done = ci(checkout, fake_uv(CLEAN, 0))
     assert done.returncode == 0
-    assert done.stdout.splitlines() == [
-        "made test",
-        "made test-system",
-        "proven",
-        CLEAN,
-        "made demo",
+    lines = [line for line in done.stdout.splitlines() if not line.startswith("=== ")]
+    made = ["made page", "made --no-print-directory -j2 lint types typescript", "proven"]
+    assert lines[:6] == [*made, "made test-system", CLEAN, "made demo"]
+    # Each step with its time.
+    times = [re.fullmatch(r" +\d+ s  (.+)", line) for line in lines[6:]]
+    assert [time[1].split()[-1] for time in times] == [
+        "page",
+        "typescript",
+        ".ci/pythons",
+        "system",
+        "audit",
+        "demo",
     ]
 
 
 def test_ci_says_last_and_loudly_what_was_not_audited(checkout, fake_uv):
     done = ci(checkout, fake_uv(UNREACHABLE, 2))
     assert done.returncode == 0
-    assert done.stdout.splitlines()[-2] == "made demo"
     assert "NOT AUDITED" in done.stdout.splitlines()[-1]
 
 
@@ -195,10 +200,18 @@ def test_ci_fails_where_tests_were_skipped(said, checkout, fake_uv):
     assert done.returncode == 1 and "were skipped" in done.stderr
 
 
-@pytest.mark.parametrize("step", ["test", "test-system", "demo"])
+@pytest.mark.parametrize("step", ["page", "types", "test-system", "demo"])
 def test_ci_fails_with_any_of_its_steps(step, checkout, fake_uv):
-    program(checkout / "bin/make", f'[ "$1" != {step} ]')
+    program(checkout / "bin/make", f'[[ " $* " != *" {step} "* ]]')
     assert ci(checkout, fake_uv(CLEAN, 0)).returncode != 0
+
+
+def test_a_slow_run_says_so_and_passes(checkout, fake_uv):
+    text = (checkout / ".ci/run").read_text()
+    assert "LIMIT=1500\n" in text
+    (checkout / ".ci/run").write_text(text.replace("LIMIT=1500", "LIMIT=-1"))
+    done = ci(checkout, fake_uv(CLEAN, 0))
+    assert done.returncode == 0 and "SLOW" in done.stdout.splitlines()[-1]
 
 
 # --- Pythons --------------------------------------------------------------------------------------
@@ -284,5 +297,7 @@ def test_two_pythons_that_are_installed_have_to_be_usable(versions, unusable, co
 
 def test_the_scripts_are_sound_to_shellcheck():
     shellcheck = Path(sys.executable).with_name("shellcheck")
-    done = run(shellcheck, *sorted((ROOT / ".ci").iterdir()))
+    done = run(
+        shellcheck, *sorted(file for file in (ROOT / ".ci").iterdir() if file.suffix != ".py")
+    )
     assert (done.returncode, done.stdout) == (0, "")
