@@ -31,7 +31,7 @@ BASES = (
 ENDINGS = {"conf", "css", "html", "json", "md", "py", "sh", "toml", "ts", "yaml"}
 FOLDERS = {
     *(path.name for base in BASES for path in base.iterdir() if path.is_dir()),
-    # Folders before decision 0045.
+    # Folders of earlier versions.
     *("exact", "export", "walk", "web"),
 }
 MODULE = re.compile(r"(posefield(?:_train)?)((?:\.\w+)+(?::\w+)?)")
@@ -129,4 +129,10 @@ def test_the_index_of_decisions_lists_every_record():
     folder = ROOT / "docs/decisions"
     index = (folder / "README.md").read_text()
     listed = re.findall(r"\]\((\d{4}-[^)]*)\)", index)
-    assert sorted(listed) == sorted(path.name for path in folder.glob("[0-9]*.md"))
+    records = sorted(folder.glob("[0-9]*.md"))
+    assert sorted(listed) == [path.name for path in records]
+    assert [path.name for path in records if len(path.read_text().splitlines()) > 40] == []
+    hidden = [
+        path for path in records if path.read_text().startswith("---\nsearch:\n  exclude: true\n")
+    ]
+    assert hidden == records

@@ -61,7 +61,7 @@ def imported(file, known):
 
 
 def faults(code):
-    """A line for each breach of the rules of docs/decisions/0045-folders-by-stage.md."""
+    """A line for each breach of the rules of folders."""
     yield from crowded_folders(code)
     yield from repeated_names(code)
     yield from circles(code)

@@ -6,7 +6,7 @@ import pytest
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.model_file import subgraph
 
-# As few as decision 0074 left. Identities are removed when a session loads.
+# Identities are removed when a session loads.
 NODES = {"model_path": 77, "labelled_path": 85, "walk_path": 113}
 
 

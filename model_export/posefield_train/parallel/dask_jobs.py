@@ -1,7 +1,7 @@
 """Jobs on a Dask cluster, by the public interface of `distributed`.
 
 The shared arguments are the result of a task, not scattered: scattered data are lost with the last
-worker that holds them, a task runs again (docs/decisions/0040-cluster-jobs.md).
+worker that holds them, a task runs again.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping

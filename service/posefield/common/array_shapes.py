@@ -3,7 +3,7 @@
 `Annotated[Floats, "frames joints 3"]` names the axes of an array. A name has one size within a
 call, and within the fields of a dataclass. `*poses` stands for any number of axes, `*#poses` for
 axes that broadcast against each other, `...` for any axes. Nothing reads the shapes at run time:
-the tests check them (tests/shape_checks.py, decision 0048).
+the tests check them (tests/shape_checks.py).
 
 Axes of several modules, with the letters of the docstrings. Motions: frames (F; canonical ones T;
 asked ones S), joints (J), poses (P), clips, characters or motions (N, M), strides, levels of detail

@@ -62,7 +62,7 @@ NO_CONSTRAINTS = ConstraintSet((), ())
 def solver_cost(card: ModelCard, asked: MotionQuestion) -> int:
     """Return the cost of solving the constraints of a question, in units of a plain target.
 
-    Open controls cost several units (decision 0028).
+    Open controls cost several units.
     """
     each = OPEN_COST if len(asked.controls) < len(card.controls) else 1
     return each * len(asked.targets)

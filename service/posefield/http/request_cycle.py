@@ -3,7 +3,7 @@
 The steps, in their order: find the operation, authorise the client, negotiate the format,
 revalidate the client's cached response, decode the question, validate it, synthesise the answer,
 encode it, and send the response. Authorisation comes before decoding, so that the body of a client
-without a key is not read, and revalidation before it, so that a 304 costs no work (decision 0046).
+without a key is not read, and revalidation before it, so that a 304 costs no work.
 """
 
 import logging

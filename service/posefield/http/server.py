@@ -267,8 +267,8 @@ def _exit_on_signal(number: int, frame: FrameType | None) -> NoReturn:
 def limit_threads() -> None:
     """Limit BLAS to one thread, unless the environment sets its number of threads.
 
-    Idle BLAS threads spin: with two threads a grid of sigma takes 1.5 to 8 times the CPU time
-    (decision 0027). The last bits of results depend on the number of threads, and worker processes
+    Idle BLAS threads spin: with two threads a grid of sigma takes 1.5 to 8 times the CPU time.
+    The last bits of results depend on the number of threads, and worker processes
     and exports have one.
     """
     if not SINGLE_THREAD_ENV.keys() & os.environ.keys():

@@ -1,7 +1,4 @@
-"""Execution providers of onnxruntime: what computes the graph, in calls of which sizes.
-
-docs/decisions/0008-large-calls-on-a-gpu.md has the figures.
-"""
+"""Execution providers of onnxruntime: what computes the graph, in calls of which sizes."""
 
 import os
 from collections.abc import Mapping

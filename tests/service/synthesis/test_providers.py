@@ -136,13 +136,6 @@ def test_large_calls_alone_are_computed_by_the_provider():
 
 
 def test_the_documents_tell_the_sizes_and_the_tolerance():
-    page, record = (
-        (DOCS / name).read_text()
-        for name in ("operate/providers.md", "decisions/0008-large-calls-on-a-gpu.md")
-    )
-    for text in (page, record):
-        assert f"{CUDA.smallest:,} rows" in text and f"{CUDA.calls.most:,}" in text
-        assert f"within {providers.TOLERANCE:.0e}".replace("e-0", "e-") in text
-    for each in (CPU, CUDA):
-        assert f"{each.calls.walking:,} rows | {each.calls.timed:,} rows |" in record
-    assert f"{CPU.calls.fewest} to {CPU.calls.most:,} rows, about {CPU.calls.count} calls" in record
+    text = (DOCS / "operate/providers.md").read_text()
+    assert f"{CUDA.smallest:,} rows" in text and f"{CUDA.calls.most:,}" in text
+    assert f"within {providers.TOLERANCE:.0e}".replace("e-0", "e-") in text

@@ -20,7 +20,7 @@ LARGEST_DENSE = 299
 INDUCING = 160
 """Inducing clips of a larger family, at most."""
 LARGEST_TUNED = 500
-"""Clips on which parameters are tuned, at most (decision 0036)."""
+"""Clips on which parameters are tuned, at most (decision 0025)."""
 FEW_VALUES = 10
 """Values of a control up to which each of them has an inducing clip."""
 # The means of the priors of scale and correlation, and of the offset.

@@ -18,7 +18,7 @@ from posefield.common.errors import FileError
 log = logging.getLogger(__name__)
 
 # PyJWKClient's own cache fetches in the thread that looks a key up, here the event loop's, and is
-# empty once it has expired while the issuer is down: docs/decisions/0011.
+# empty once it has expired while the issuer is down.
 REFRESH_COOLDOWN = 10.0
 """Minimum time between two reads of the source, s: unknown key ids cannot cause more reads."""
 

@@ -22,7 +22,7 @@ from posefield.question.performance_report import Reference
 MOST_DISTANCE = 0.25
 """Distance of the poses at a cut from which on a join is hard, m."""
 MOST_PEAK = 3.0
-"""Peak acceleration of a join over the usual one from which on it is hard (decision 0093)."""
+"""Peak acceleration of a join over the usual one from which on it is hard (decision 0086)."""
 MOST_DROP = 0.12
 """Difference of the roots' heights at a cut from which on a join is hard, m."""
 # The peak is looked for from this time before a join to this one after it, s.
