@@ -3,16 +3,21 @@
 python docs/generate.py writes them; with --check it prints the pages that differ, and exits 1.
 """
 
+import ast
+import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import code_pages
 import data_pages
-import module_tables
+from page_parts import code, table
 
 DOCS = Path(__file__).parent
+OVERVIEW = "architecture/00-overview.md"
+DISTRIBUTIONS = ("service/posefield", "model_export/posefield_train")
 PAGES: dict[str, Callable[[], str]] = {
+    OVERVIEW: lambda: overview(),
     "operate/settings.md": code_pages.settings,
     "reference/cli.md": code_pages.commands,
     "reference/problems.md": code_pages.problems,
@@ -33,7 +38,7 @@ PAGES: dict[str, Callable[[], str]] = {
 
 def main() -> None:
     """Write all pages, or check that they are up to date."""
-    texts = {name: text() for name, text in PAGES.items()} | dict(architecture())
+    texts = {name: text() for name, text in PAGES.items()}
     stale = [name for name, text in texts.items() if content(DOCS / name) != text]
     if "--check" in sys.argv[1:]:
         for name in stale:
@@ -44,11 +49,27 @@ def main() -> None:
         print(f"docs/{name} written")
 
 
-def architecture() -> Iterator[tuple[str, str]]:
-    """Yield name and text of each architecture page, its tables of modules made anew."""
-    for file in sorted((DOCS / "architecture").glob("*.md")):
-        text = module_tables.updated(file.read_text(encoding="utf-8"))
-        yield f"architecture/{file.name}", text
+def overview() -> str:
+    """Return the overview of the architecture with its table of packages made anew."""
+    text = (DOCS / OVERVIEW).read_text(encoding="utf-8")
+    rows = table(("package", "purpose"), packages())
+    return re.sub(
+        r"(<!-- packages -->\n).*(<!-- end of packages -->)",
+        lambda block: f"{block[1]}\n{rows}\n\n{block[2]}",
+        text,
+        flags=re.DOTALL,
+    )
+
+
+def packages() -> Iterator[tuple[str, str]]:
+    """Yield path and purpose of each package of both distributions."""
+    for root in DISTRIBUTIONS:
+        for file in sorted((DOCS.parent / root).glob("*/__init__.py")):
+            said = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8")))
+            if not said:
+                raise SystemExit(f"{file} has no docstring")
+            path = file.parent.relative_to((DOCS.parent / root).parent)
+            yield code(path), " ".join(said.split("\n\n")[0].split())
 
 
 def content(file: Path) -> str | None:

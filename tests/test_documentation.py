@@ -30,7 +30,7 @@ from posefield_train.source.recipe import Recipe
 
 README = ROOT / "README.md"
 GENERATE = [sys.executable, str(DOCS / "generate.py")]
-MOST_LINES, MOST_WORDS, MOST_PAGE_LINES = 150, 900, 165
+MOST_LINES, MOST_WORDS = 150, 900
 VARIABLE = re.compile(r"\bPOSEFIELD_[A-Z_]+[A-Z]\b")
 
 
@@ -58,22 +58,10 @@ def test_the_readme_is_short():
     assert len(re.findall(r"^!\[", text, re.MULTILINE)) == 1
 
 
-def test_architecture_is_twelve_short_pages():
+def test_architecture_is_short():
     pages = sorted((DOCS / "architecture").glob("*.md"))
-    assert [path.name[:2] for path in pages] == [f"{number:02d}" for number in range(12)]
-    assert [
-        path.name for path in pages if len(path.read_text().splitlines()) > MOST_PAGE_LINES
-    ] == []
-
-
-def test_every_package_is_on_an_architecture_page():
-    text = "\n".join(path.read_text() for path in (DOCS / "architecture").glob("*.md"))
-    for root in (ROOT / "service/posefield", ROOT / "model_export/posefield_train"):
-        packages = [path.parent for path in root.rglob("__init__.py") if path.parent != root]
-        with_modules = [path for path in packages if len(list(path.glob("*.py"))) > 1]
-        assert len(with_modules) > 10
-        names = [str(path.relative_to(root.parent)) for path in with_modules]
-        assert [name for name in names if f"**`{name}`**" not in text] == []
+    assert len(pages) == 6
+    assert [path.name for path in pages if len(path.read_text().splitlines()) > 120] == []
 
 
 def test_every_page_is_in_the_navigation():
