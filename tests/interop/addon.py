@@ -1,4 +1,4 @@
-"""Test of the Blender add-on in both Blenders against the kinematics of this project.
+"""Test of the Blender add-on in Blender against the kinematics of this project.
 
     .venv/bin/python tests/interop/addon.py
 
@@ -58,8 +58,8 @@ class Row:
         return (self.metres <= FURTHEST and self.turn <= TURNED) == self.meant
 
 
-def faults() -> list[str]:
-    """Return the add-on's faults in both Blenders."""
+def faults(version: str = environment.NEWEST) -> list[str]:
+    """Return the add-on's faults in a version of Blender."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         models = _models()
@@ -67,11 +67,8 @@ def faults() -> list[str]:
         for known, (_, content) in models.items():
             (folder / "models" / f"{known}.onnx").write_bytes(content)
         archive = _built(folder)
-        return [
-            f"{version}: {fault}"
-            for version, python in environment.blenders().items()
-            for fault in _of(version, _driven(python, archive, folder, models), models)
-        ]
+        driven = _driven(environment.blender(version), archive, folder, models)
+        return [f"{version}: {fault}" for fault in _of(version, driven, models)]
 
 
 def _models() -> Models:

@@ -52,7 +52,8 @@ def motion(armature):
 def frames(armature):
     if not armature.animation_data or not armature.animation_data.action:
         return range(0)
-    curves = armature.animation_data.action.fcurves
+    data = armature.animation_data
+    curves = data.action.layers[0].strips[0].channelbag(data.action_slot).fcurves
     return sorted({key.co.x for key in next(iter(curves)).keyframe_points})
 
 

@@ -12,11 +12,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-BLENDER = ROOT / ".venv-blender"
-BLENDER_5 = ROOT / ".venv-blender-5"
 THREE = ROOT / "build" / "three"
-PACKAGES = ("bpy==4.5.15", "numpy<2")
-PACKAGES_5 = ("bpy==5.0.1", "numpy<2")
+NEWEST, OLDER = "5.0.1", "4.5.15"
+"""Versions of Blender: CI takes the newest, `make test-all` the older one too."""
 NODE_PACKAGES = ("three@0.187.0", "gltf-validator@2.0.0-dev.3.10", "@redocly/cli@2.77.0")
 
 # What ldd names for bpy's own library beyond libc and libstdc++.
@@ -28,15 +26,20 @@ LIBRARIES = (
 
 def prepare() -> tuple[Path, Path]:
     """The Python that has Blender and the node beside three.js, installed when they are not."""
-    python = _blender(BLENDER, PACKAGES)
     found = node()
     modules(THREE, NODE_PACKAGES, *found)
-    return python, found[0]
+    return blender(NEWEST), found[0]
 
 
-def blenders() -> dict[str, Path]:
-    """The Pythons that have the Blenders which the add-on is for, by version."""
-    return {"4.5": _blender(BLENDER, PACKAGES), "5.0": _blender(BLENDER_5, PACKAGES_5)}
+def blender(version: str) -> Path:
+    """The Python that has Blender as a module, with the libraries that Blender needs."""
+    venv = ROOT / (".venv-blender" if version == NEWEST else ".venv-blender-older")
+    python = packages(venv, (f"bpy=={version}", "numpy<2"))
+    if not _imports(python):
+        _libraries()
+        if not _imports(python):
+            sys.exit(f"Blender does not start; install {' '.join(LIBRARIES)} (Debian's names)")
+    return python
 
 
 def packages(venv: Path, wanted: Sequence[str]) -> Path:
@@ -63,15 +66,6 @@ def node() -> tuple[Path, Path]:
     """node and npm, which the lock file of the development environment names."""
     folder = Path(sys.executable).parent
     return folder / "node", folder / "npm"
-
-
-def _blender(venv: Path, wanted: Sequence[str]) -> Path:
-    python = packages(venv, wanted)
-    if not _imports(python):
-        _libraries()
-        if not _imports(python):
-            sys.exit(f"Blender does not start; install {' '.join(LIBRARIES)} (Debian's names)")
-    return python
 
 
 def _libraries() -> None:
