@@ -52,12 +52,9 @@ AUDITS = {
     "known": ("uvicorn 0.1 has 1 known vulnerability: PYSEC-1", 1, 1, True),
     "unreachable": (UNREACHABLE, 2, 75, False),
     "broken database": ("error: HTTP status server error (503 Service Unavailable)", 2, 75, False),
-    "another answer": ("error: error decoding response body", 2, 2, False),
     "wrong arguments": ("error: unexpected argument '--x' found", 2, 2, False),
     "crash": ("panicked at crates/uv", 101, 2, False),
-    "silence": ("", 0, 2, False),
     "nothing to audit": (CLEAN.replace("201", "0"), 0, 2, False),
-    "other words": ("warning: the audit was skipped", 0, 2, False),
 }
 
 
@@ -125,22 +122,8 @@ def test_a_known_vulnerability_fails_the_audit(database):
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("database", [[]], indirect=True)
-def test_nothing_known_passes_it(database):
-    done = audit("--service-url", database[0])
-    assert done.returncode == 0 and re.search(
-        r"no known vulnerabilities .* in \d{3} p", done.stdout
-    )
-
-
-@pytest.mark.system
 def test_a_database_that_cannot_be_reached_has_a_code_of_its_own():
     assert audit("--service-url", "http://127.0.0.1:9/").returncode == 75
-
-
-@pytest.mark.system
-def test_what_is_wrong_with_the_audit_itself_fails():
-    assert audit("--no-such-option").returncode == 2
 
 
 # --- the whole ------------------------------------------------------------------------------------
@@ -279,10 +262,7 @@ exit 2"""
     ("versions", "unusable", "code"),
     [
         (("3.11", "3.12", "3.13"), "", 0),
-        (("3.11", "3.13"), "", 0),
-        (("3.12",), "", 0),
         (("3.11", "3.12"), "3.12", 1),
-        (("3.12",), "3.12", 1),
         ((), "", 1),
     ],
 )

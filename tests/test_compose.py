@@ -130,10 +130,3 @@ def test_commands_of_the_quickstarts_exist(tmp_path):
     (code,) = (words[words.index("-c") + 1] for words in lines if "-c" in words)
     exec(code.replace("/models", str(tmp_path)))
     assert (tmp_path / "cmu_walk.onnx").stat().st_size > 100_000
-
-
-def test_files_of_the_quickstarts_exist():
-    table = QUICKSTARTS.read_text().partition("\n\n")[2].partition("\n\n")[0]
-    names = re.findall(r"`([\w.-]+)`", table)
-    assert len(names) == 6
-    assert [name for name in names if not any((at / name).exists() for at in (ROOT, DEPLOY))] == []

@@ -120,15 +120,6 @@ def test_it_serves_the_models_folder(stages):
     assert values(final, "EXPOSE") == [environment(final)["POSEFIELD_PORT"]]
 
 
-def test_labels_say_what_it_is(stages):
-    given = dict(pair.split("=", 1) for pair in shlex.split(values(stages[1], "LABEL")[0]))
-    said = {name.removeprefix("org.opencontainers.image."): text for name, text in given.items()}
-    project = tomllib.loads((ROOT / "service/pyproject.toml").read_text())["project"]
-    assert (said["title"], said["version"]) == (project["name"], __version__)
-    assert said["licenses"] == project["license"]
-    assert (said["source"], said["revision"]) == ("${SOURCE}", "${REVISION}")
-
-
 def test_it_is_healthy_when_it_is_ready(stages):
     (check,) = values(stages[1], "HEALTHCHECK")
     command = json.loads(check[check.index("[") :])

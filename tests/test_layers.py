@@ -71,59 +71,14 @@ def copy(tmp_path):
     return tmp_path
 
 
-def test_every_import_stays_within_its_layer():
-    done = lint(ROOT)
-    assert done.returncode == 0, done.stdout
-    assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout)
-
-
 @pytest.mark.system
 @pytest.mark.parametrize(
     ("module", "line", "broken"),
     [
         ("service/posefield/motion/clip.py", "import orjson", "the floor needs numpy only"),
         ("service/posefield/motion/clip.py", "import posefield.encode", LAYERS),
-        (
-            "service/posefield/encode/usd/usd_clip.py",
-            "import posefield.synthesis",
-            LAYERS,
-        ),
-        (
-            "service/posefield/check/skeleton_bindings.py",
-            "import posefield.encode",
-            LAYERS,
-        ),
-        (
-            "service/posefield/encode/usd/usd_clip.py",
-            "import starlette",
-            "only the web speaks HTTP",
-        ),
-        (
-            "service/posefield/http/app.py",
-            "import posefield_train.train",
-            "what ships never imports",
-        ),
         ("service/posefield/inference/session.py", "import onnx", "what ships never imports"),
-        (
-            "service/posefield/motion/quat.py",
-            "import jaxtyping",
-            "only tests check array shapes",
-        ),
-        (
-            "service/posefield/check/skeleton_bindings.py",
-            "import matplotlib.figure",
-            "what ships never imports",
-        ),
-        (
-            "model_export/posefield_train/train.py",
-            "import posefield.synthesis.clips",
-            "the training job uses",
-        ),
-        (
-            "model_export/posefield_train/graph/onnx_export.py",
-            "import posefield.encode",
-            "the training job uses",
-        ),
+        ("model_export/posefield_train/train.py", "import posefield.synthesis", "the training job"),
     ],
 )
 def test_a_planted_breach_is_caught_and_named(copy, module, line, broken):
@@ -146,20 +101,6 @@ def test_what_is_hidden_cannot_be_imported(module):
     done = python(f"{HIDDEN}import {module}")
     assert done.returncode == 1
     assert "ModuleNotFoundError: hidden" in done.stderr
-
-
-DRAWS = "import sys, {module}\nprint('matplotlib' in sys.modules)"
-
-
-@pytest.mark.system
-def test_who_wants_no_pictures_waits_for_none():
-    done = python(DRAWS.format(module="posefield_train.evaluate.protocol"))
-    assert done.stdout == "False\n", done.stderr
-    # Negative control: the page needs it.
-    assert (
-        python(DRAWS.format(module="posefield_train.evaluate.pages.evaluation_page")).stdout
-        == "True\n"
-    )
 
 
 @pytest.mark.parametrize(

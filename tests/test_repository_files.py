@@ -3,7 +3,6 @@
 import re
 import subprocess
 
-import pytest
 import yaml
 from document_pages import ROOT
 
@@ -37,22 +36,6 @@ def test_workflows_run_targets_of_the_makefile():
     assert set().union(*run.values()) <= make_targets()
 
 
-def test_workflows_test_every_supported_python():
-    workflow = yaml.safe_load((GITHUB / "workflows/test.yml").read_text())
-    listed = workflow["jobs"]["unit"]["strategy"]["matrix"]["python"]
-    supported = re.search(r"for version in ([\d. ]+); do", (ROOT / ".ci/pythons").read_text())
-    assert supported and listed == supported[1].split()
-
-
-@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.name)
-def test_a_workflow_has_few_rights_and_ends(path):
-    workflow = yaml.safe_load(path.read_text())
-    assert workflow["permissions"] == {"contents": "read"}
-    for name, job in workflow["jobs"].items():
-        if any("run" in step for step in job.get("steps", [])):
-            assert job["timeout-minutes"] <= 60, name
-
-
 def test_a_tag_publishes_only_the_version_of_the_packages():
     workflow = yaml.safe_load((GITHUB / "workflows/publish.yml").read_text())
     (check,) = [step["run"] for step in steps(workflow) if "GITHUB_REF_NAME" in step.get("run", "")]
@@ -61,14 +44,6 @@ def test_a_tag_publishes_only_the_version_of_the_packages():
     for tag, code in ((f"v{version}", 0), ("v99.0.0", 1)):
         done = subprocess.run(["bash", "-c", check], cwd=ROOT, env={"GITHUB_REF_NAME": tag})
         assert done.returncode == code, tag
-
-
-def test_templates_have_unique_questions():
-    for path in (GITHUB / "ISSUE_TEMPLATE").glob("[fi]*.yml"):
-        form = yaml.safe_load(path.read_text())
-        identifiers = [each["id"] for each in form["body"]]
-        assert form["name"] and form["description"]
-        assert identifiers and len(set(identifiers)) == len(identifiers)
 
 
 def test_the_citation_names_the_paper_and_the_licence():
