@@ -12,10 +12,10 @@ from rows import Row
 from timing import in_turn
 
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.inference.providers import CPU
+from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 
-BATCH = CPU.calls.most
+BATCH = crowd_synthesis.MOST_ROWS
 
 Profile = dict[str, Part]
 

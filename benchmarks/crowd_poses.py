@@ -10,10 +10,10 @@ from rows import Row
 from timing import in_turn
 
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.inference.providers import CPU
+from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 
-BATCH = CPU.calls.most
+BATCH = crowd_synthesis.MOST_ROWS
 
 MANY = 10_000
 SIZES = (1, 10, 100, 1_000, MANY, 100_000)

@@ -23,10 +23,10 @@ from timing import in_turn
 
 from posefield.common.units import Indices, Singles
 from posefield.inference.graph_ports import OUTPUTS
-from posefield.inference.providers import CPU
+from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 
-BATCH = CPU.calls.most
+BATCH = crowd_synthesis.MOST_ROWS
 
 MANY, FEW, CHECKED = 10_000, 1_000, 200
 TOGETHER = 128

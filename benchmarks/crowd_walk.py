@@ -17,14 +17,14 @@ from posefield.common.units import Floats, Indices, Singles
 from posefield.inference import level_selection
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.inference.level_selection import Camera
-from posefield.inference.providers import CPU
 from posefield.locomotion import floor_plane, stride, walking_crowd
 from posefield.locomotion.gait import Gait
 from posefield.locomotion.locomotion_plan import LocomotionPlan
 from posefield.motion import skeleton
+from posefield.synthesis import crowd_synthesis
 from posefield.synthesis.synthesizer import Synthesizer
 
-BATCH = CPU.calls.most
+BATCH = crowd_synthesis.MOST_ROWS
 
 COUNT, SECONDS, RATE = 500, 10.0, 30.0
 EXTENTS = (100.0, 200.0, 400.0)

@@ -17,7 +17,6 @@ SPEED_FILES = (
     "before",
     "viewer",
     "crowds",
-    "gpu",
     "files",
     "layers",
     "exports",

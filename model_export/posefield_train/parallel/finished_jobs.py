@@ -10,6 +10,7 @@ import pickle
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ import joblib
 import posefield
 import posefield_train
 from posefield.common import atomic_files
-from posefield.common.package_versions import package_version
 from posefield_train.parallel.jobs import Arguments, Jobs
 
 LIBRARIES = ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn")
@@ -92,5 +92,5 @@ def code_key() -> str:
             found.update(file.relative_to(place).as_posix().encode())
             found.update(hashlib.sha256(file.read_bytes()).digest())
     for name in LIBRARIES:
-        found.update(f"{name} {package_version(name)}".encode())
+        found.update(f"{name} {version(name)}".encode())
     return found.hexdigest()

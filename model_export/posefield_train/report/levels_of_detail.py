@@ -17,7 +17,6 @@ from matplotlib.ticker import LogLocator
 
 from posefield.inference import cost_model, session
 from posefield.inference.level_selection import Camera
-from posefield.inference.providers import CPU
 from posefield.inference.session import Session
 from posefield.model_file import model_card
 from posefield.model_file.level_of_detail import Level
@@ -41,9 +40,9 @@ _EXPLANATION = (
     "performers and times; they include the effect of clips that a level leaves out. A pixel is "
     f"one of an image of {CAMERA.height:.0f} lines with a vertical field of view of "
     f"{math.degrees(CAMERA.fov):.0f} degrees. Times are for one pose in batches of "
-    f"{CPU.calls.timed}, measured on one thread of the machine that trained, with the service's "
-    "own code. A coarser level is never listed as slower than a finer one. Times are not stored in "
-    "the model file."
+    f"{cost_model.ROWS_PER_CALL}, measured on one thread of the machine that trained, with the "
+    "service's own code. A coarser level is never listed as slower than a finer one. Times are not "
+    "stored in the model file."
 )
 
 
@@ -94,7 +93,7 @@ class LevelCosts:
         chosen = zip(self.chosen.facts(), self.distances, strict=True)
         others = zip(self.others.facts(), self.times, strict=True)
         return {
-            "poses_a_call": CPU.calls.timed,
+            "poses_a_call": cost_model.ROWS_PER_CALL,
             "image_lines": CAMERA.height,
             "field_of_view_rad": significant_digits.round_number(CAMERA.fov),
             "levels": [

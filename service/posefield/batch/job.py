@@ -3,13 +3,13 @@
 import hashlib
 from dataclasses import asdict, dataclass, field
 from functools import cached_property, lru_cache
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import orjson
 
 from posefield import __version__
 from posefield.common.errors import InvalidField
-from posefield.common.package_versions import package_version
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.inference import session
 from posefield.motion.joint_roles import NamingConvention
@@ -52,7 +52,7 @@ class ExportJob:
         """Return the fields as plain values, with the versions of the packages used."""
         versions = {
             "posefield": __version__,
-            **{maker: package_version(maker) for maker in VERSIONED_PACKAGES},
+            **{maker: version(maker) for maker in VERSIONED_PACKAGES},
         }
         plain = {**asdict(self), "character": list(self.character)}
         return {**plain, "versions": versions}

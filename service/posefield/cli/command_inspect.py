@@ -25,11 +25,11 @@ def inspect(model: ModelPath, json: Json = False) -> None:
         **cards.plain_values(opened.card),
         "seconds_per_pose": seconds,
     }
-    typer.echo(as_json(plain) if json else _summary(plain, opened.provider.calls.timed))
+    typer.echo(as_json(plain) if json else _summary(plain))
 
 
-def _summary(plain: dict[str, Any], rows: int) -> str:
-    """Return a summary of a model card, within one screen; rows: of the calls that were timed."""
+def _summary(plain: dict[str, Any]) -> str:
+    """Return a summary of a model card, within one screen."""
     diagnostics = plain["diagnostics"]
     levels = zip(plain["levels"], plain["seconds_per_pose"], strict=True)
     lines = [
@@ -40,7 +40,7 @@ def _summary(plain: dict[str, Any], rows: int) -> str:
         f"ranks {plain['levels'][0]['ranks']} of {diagnostics['tensor']}: truncation costs "
         f"{100 * diagnostics['truncation_rms_m']:.2f} cm, a clip left out lies "
         f"{100 * diagnostics['leave_one_out_rms_m']:.2f} cm away (root mean square over joints)",
-        f"levels of detail, times in batches of {rows}:",
+        f"levels of detail, times in batches of {cost_model.ROWS_PER_CALL}:",
         *(_level(number, *level) for number, level in enumerate(levels)),
         "controls:",
         *(_control(control, plain["skeleton"]["names"]) for control in plain["controls"]),

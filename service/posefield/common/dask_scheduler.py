@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import PackageNotFoundError
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -18,7 +18,6 @@ from distributed.comm.addressing import parse_address
 from distributed.comm.registry import get_backend
 
 from posefield.common.errors import ClusterError
-from posefield.common.package_versions import package_version
 
 CONNECT_TIMEOUT = 10.0
 """Seconds to wait for the scheduler, and for a first worker."""
@@ -90,7 +89,7 @@ def _source_digest(package: str) -> str:
 
 def _installed_version(distribution: str) -> str:
     try:
-        return package_version(distribution)
+        return version(distribution)
     except PackageNotFoundError:
         return "none"
 

@@ -32,7 +32,6 @@ from posefield.http.lifespan import StartAnnouncement, lifespan
 from posefield.http.middleware.coalescing import CoalescingProtocol
 from posefield.http.telemetry import log, metrics, tracing
 from posefield.http.telemetry.telemetry import Telemetry
-from posefield.inference.providers import CPU, find_provider
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.registry.model_registry import VersionLimits
 from posefield.registry.model_reload import ReloadingRegistry
@@ -50,7 +49,7 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
     """Serve the models of files, folders and URLs until SIGTERM or SIGINT.
 
     Raises ModelError, before listening, for a file that cannot be served, InvalidField for an
-    unavailable address or provider and WorkerDied if worker processes cannot start.
+    unavailable address and WorkerDied if worker processes cannot start.
     """
     # Also needed after uvicorn has returned: it raises the signal that ended it again.
     signal.signal(signal.SIGTERM, _exit_on_signal)
@@ -63,8 +62,7 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
     with ExitStack() as stack, suppress(KeyboardInterrupt):
         sockets = _listening_sockets(stack, settings.host, settings.port)
         first = multiprocessing.get_context("spawn").Semaphore(1) if count > 1 else Semaphore(1)
-        line = start_line(names, settings.provider, _url(sockets[0]))
-        announcement = StartAnnouncement(line, first)
+        announcement = StartAnnouncement(f"posefield: {names} at {_url(sockets[0])}", first)
         if count > 1:
             stack.enter_context(metrics.shared_folder())
             _set_threads()
@@ -77,12 +75,6 @@ def serve(places: Sequence[str | Path], settings: Settings) -> None:
             limit_threads()
             app = partial(_application, shelf, settings, announcement)
             uvicorn.Server(_config(app, settings, 1)).run(sockets)
-
-
-def start_line(names: str, provider: str, url: str) -> str:
-    """Return the line that tells the models, the provider of large calls and the URL."""
-    told = "" if provider == CPU.name else f", large calls on {provider},"
-    return f"posefield: {names}{told} at {url}"
 
 
 def worker_application(
@@ -105,7 +97,7 @@ def open_models(
 ) -> ReloadingRegistry:
     """Open the models of files, folders and URLs; `ReloadingRegistry.check` raises their errors."""
     bounds = VersionLimits(settings.versions, settings.versions_memory)
-    return ReloadingRegistry(places, bounds, limits, find_provider(settings.provider))
+    return ReloadingRegistry(places, bounds, limits)
 
 
 def _application(

@@ -11,7 +11,6 @@ from typing import Any, Protocol
 
 from posefield.common.units import Singles
 from posefield.inference import onnx_runtime
-from posefield.inference.providers import CPU, Provider
 from posefield.model_file import subgraph
 
 Feed = Mapping[str, Singles]
@@ -40,19 +39,17 @@ class _Part:
 class GraphParts:
     """Sessions on parts of one file's graph.
 
-    Two threads that need a part at the same time each open a session; one of them is kept. A call
-    has one row for each row of controls.
+    Two threads that need a part at the same time each open a session; one of them is kept.
     """
 
-    def __init__(self, content: bytes, source: str, provider: Provider = CPU) -> None:
-        """Take a checked file; source: its name in errors. provider: computes large calls."""
-        self._content, self._source, self._provider = content, source, provider
-        self._parts: dict[tuple[tuple[str, ...], int, bool], _Part] = {}
+    def __init__(self, content: bytes, source: str) -> None:
+        """Take a checked file; source: its name in errors."""
+        self._content, self._source = content, source
+        self._parts: dict[tuple[tuple[str, ...], int], _Part] = {}
 
     def run(self, values: Sequence[str], feed: Feed, level: int) -> list[Any]:
         """Return values as `Graph.run` does."""
-        smallest = self._provider.smallest
-        key = tuple(values), level, smallest is not None and len(feed["controls"]) >= smallest
+        key = tuple(values), level
         part = self._parts.get(key)
         if part is None:
             part = self._parts[key] = self._open(*key)
@@ -60,9 +57,9 @@ class GraphParts:
         found: list[Any] = part.session.run(key[0], own)
         return found
 
-    def _open(self, values: tuple[str, ...], level: int, large: bool) -> _Part:
+    def _open(self, values: tuple[str, ...], level: int) -> _Part:
         content = subgraph.select_outputs(subgraph.fix_level(self._content, level), *values)
-        session = onnx_runtime.open_session(content, self._source, self._provider if large else CPU)
+        session = onnx_runtime.open_session(content, self._source)
         # Inputs with a default are not among the others.
         ports = [*session.get_inputs(), *session.get_overridable_initializers()]
         return _Part(session, tuple(port.name for port in ports))

@@ -9,7 +9,6 @@ import numpy as np
 from posefield.common.array_shapes import Vector
 from posefield.inference import cost_model
 from posefield.inference.level_selection import LevelTable
-from posefield.inference.providers import CPU
 from posefield.inference.session import Session
 from posefield.motion import joint_roles
 from posefield.motion.joint_roles import NamingConvention
@@ -33,12 +32,9 @@ class NamedModel:
         """Digest of the model file and of this machine's rounding.
 
         It differs between machines on which the model's answers or the correction differ in the
-        last digits, and between providers, which round differently.
+        last digits.
         """
-        provider = self.session.provider
         parts = self.identity.encode() + self.session.golden + rounding_fingerprint()
-        if provider is not CPU:
-            parts += provider.name.encode()
         return blake2b(parts, digest_size=16).digest()
 
     @cached_property

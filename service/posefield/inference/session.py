@@ -11,10 +11,9 @@ import numpy as np
 
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Indices, Singles
-from posefield.inference import graph_ports, onnx_runtime, providers
+from posefield.inference import graph_ports, onnx_runtime
 from posefield.inference.graph_parts import Graph, GraphParts
 from posefield.inference.graph_ports import CONTACTS, LABELS
-from posefield.inference.providers import CPU, Provider
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights
@@ -51,8 +50,7 @@ class Session:
     """An open model.
 
     card: its metadata. digest: identifies the file's bytes. graph: in onnxruntime. size: of the
-    file, bytes. content: the file. golden: the answer at the default controls. provider: computes
-    large calls.
+    file, bytes. content: the file. golden: the answer at the default controls.
     """
 
     card: ModelCard
@@ -61,7 +59,6 @@ class Session:
     size: int
     content: bytes = field_of(default=b"", repr=False)
     golden: bytes = b""
-    provider: Provider = CPU
 
     def run(
         self,
@@ -258,17 +255,10 @@ class Session:
         return BASE_MEMORY + COPIES_PER_LEVEL * len(self.card.levels) * self.size
 
     def run_trial(self) -> bytes:
-        """Return the answer at the default controls; equals `golden` for a sound model.
-
-        Where a provider computes large calls, one of them is part of the answer.
-        """
+        """Return the answer at the default controls; equals `golden` for a sound model."""
         names, controls = graph_ports.outputs(self.card), graph_ports.default_controls(self.card)
         answers = self.run(controls, np.zeros((1, 1)), *names)
         answers.append(self.durations(controls))
-        if self.provider.smallest is not None:
-            many = self.provider.smallest
-            large = self.run(controls.repeat(many, axis=0), np.zeros((many, 1)), *names)
-            answers += [answer[:1] for answer in large]
         return b"".join(answer.tobytes() for answer in answers)
 
 
@@ -284,38 +274,24 @@ def load(path: Path) -> Session:
     return load_bytes(checked_file.read(path), str(path))
 
 
-def load_bytes(
-    content: bytes,
-    source: str,
-    limits: TrialLimits = DEFAULT_LIMITS,
-    provider: Provider | None = None,
-) -> Session:
-    """Return a session on untrusted bytes, which a child process opens first, on the CPU.
+def load_bytes(content: bytes, source: str, limits: TrialLimits = DEFAULT_LIMITS) -> Session:
+    """Return a session on untrusted bytes, which a child process opens first.
 
-    source: path or URL for messages. provider: of large calls; None for that of the environment.
-    Raises ModelError for a file that cannot be served and InvalidField for a provider that cannot
-    compute.
+    source: path or URL for messages. Raises ModelError for a file that cannot be served.
     """
-    own = provider or providers.chosen_provider()
-    onnx_runtime.require_provider(own)
     limits.check(content, source)
-    return open_checked(content, checked_file.load_card(content, source), source, own)
+    return open_checked(content, checked_file.load_card(content, source), source)
 
 
 def open_bytes(content: bytes, source: str) -> Session:
-    """Return a session on bytes that this program wrote, checked without a child process.
-
-    The CPU computes all calls, so that trainings and exports have the same bytes everywhere.
-    """
+    """Return a session on bytes that this program wrote, checked without a child process."""
     card = checked_file.load_card(content, source)
     graph_ports.check(onnx_runtime.open_session(content, source), card, source)
     return open_checked(content, card, source)
 
 
-def open_checked(content: bytes, card: ModelCard, source: str, provider: Provider = CPU) -> Session:
+def open_checked(content: bytes, card: ModelCard, source: str) -> Session:
     """Return a session on a checked file, after a trial of its finest level."""
-    graph = GraphParts(content, source, provider)
-    session = Session(
-        card, checked_file.digest(content), graph, len(content), content, provider=provider
-    )
+    graph = GraphParts(content, source)
+    session = Session(card, checked_file.digest(content), graph, len(content), content)
     return replace(session, golden=session.run_trial())

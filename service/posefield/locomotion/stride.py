@@ -22,6 +22,8 @@ from posefield.model_file.model_card import ModelCard
 
 # A time after the end of every clip, s; the graph limits times to the end.
 AFTER_END = 1e9
+ROWS_PER_CALL = 1000
+"""Most rows of a call of the graph."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +186,7 @@ def contact_probabilities(
     durations: of the cycles (K,), s, as of `strides`; computed if they are not known.
     """
     found = np.empty((len(controls), len(session.card.contacts)))
-    for rows in batches(len(controls), session.provider.calls.walking):
+    for rows in batches(len(controls)):
         cancellation.check()
         own, names = controls[rows], labels[rows]
         if durations is None:
@@ -280,7 +282,7 @@ def _run_batches(
 ) -> list[Annotated[Floats, "points ..."]]:
     """Return the graph's outputs for any number of rows, computed in batches."""
     found: list[Floats] = []
-    for rows in batches(len(controls), session.provider.calls.walking):
+    for rows in batches(len(controls)):
         cancellation.check()
         own = controls[rows], times[rows]
         parts = session.run(*own, *outputs, labels=labels[rows], level=level)
@@ -293,11 +295,11 @@ def _run_batches(
     return found
 
 
-def batches(rows: int, most: int) -> Iterator[slice]:
-    """Yield the rows of each call of the graph, at most so many."""
+def batches(rows: int) -> Iterator[slice]:
+    """Yield the rows of each call of the graph, at most ROWS_PER_CALL of them."""
     first = 0
     while first < rows:
         # A matrix product with one row sums in another order, so no batch of several has one row.
-        count = most - 1 if rows - first == most + 1 else most
+        count = ROWS_PER_CALL - 1 if rows - first == ROWS_PER_CALL + 1 else ROWS_PER_CALL
         yield slice(first, first + count)
         first += count

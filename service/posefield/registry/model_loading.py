@@ -9,9 +9,8 @@ from pathlib import Path
 from weakref import WeakValueDictionary
 
 from posefield.common.errors import ModelError
-from posefield.inference import onnx_runtime, providers, session
+from posefield.inference import session
 from posefield.inference.onnx_runtime import first_line
-from posefield.inference.providers import Provider
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.model_file import checked_file
 from posefield.registry import model_sources
@@ -38,17 +37,14 @@ def open_model(
     place: str | Path,
     content: bytes,
     limits: TrialLimits = DEFAULT_LIMITS,
-    provider: Provider | None = None,
 ) -> Synthesizer:
     """Return the model of a file that has been read.
 
-    provider: of large calls; None for that of the environment. Raises ModelError for a file that
-    cannot be served and a name that cannot stand in a URL, and InvalidField for a provider that
-    cannot compute.
+    Raises ModelError for a file that cannot be served and a name that cannot stand in a URL.
     """
     if not NAME.fullmatch(name):
         raise ModelError(place, f"name {name!r}, expected {NAME.pattern}")
-    return Synthesizer(name, session.load_bytes(content, str(place), limits, provider))
+    return Synthesizer(name, session.load_bytes(content, str(place), limits))
 
 
 class ModelLoader:
@@ -67,17 +63,12 @@ class ModelLoader:
         places: Iterable[str | Path],
         most: int,
         limits: TrialLimits = DEFAULT_LIMITS,
-        provider: Provider | None = None,
     ) -> None:
         """Prepare to look at files, folders and URLs.
 
         most: largest number of versions of a name that are open, the newest. limits: of each file's
-        trial. provider: of large calls; None for that of the environment. Raises InvalidField for
-        a provider that cannot compute.
+        trial.
         """
-        self._provider = provider or providers.chosen_provider()
-        # Here, since an error while a file is opened is taken for a fault of the file.
-        onnx_runtime.require_provider(self._provider)
         self._limits = limits
         self._sources = {str(place): model_sources.open_source(place) for place in places}
         self._most = most
@@ -194,7 +185,7 @@ class ModelLoader:
         identity = f"{found.name}@{checked_file.digest(content)}"
         model = self._alive.get(identity)
         if model is None:
-            model = open_model(found.name, found.location, content, self._limits, self._provider)
+            model = open_model(found.name, found.location, content, self._limits)
             self._alive[identity] = model
             self.opened += 1
         return model

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from posefield.common.errors import UnknownModel
 from posefield.common.name_suggestion import did_you_mean
-from posefield.inference.providers import Provider
 from posefield.registry.model_loading import ModelLoader
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -70,15 +69,14 @@ class VersionLimits:
     memory: int = 64 << 20
 
 
-def load(places: Iterable[str | Path], provider: Provider | None = None) -> ModelRegistry:
+def load(places: Iterable[str | Path]) -> ModelRegistry:
     """Return the library of .onnx files, folders of them and URLs of object stores.
 
     It has the newest version of each name; the name is the file's stem or the folder of the
-    versions. provider: of large calls; None for that of the environment. Raises ModelError for a
-    place without a model, a file that cannot be served, a name that cannot stand in a URL, and two
-    places with one name, and InvalidField for a provider that cannot compute.
+    versions. Raises ModelError for a place without a model, a file that cannot be served, a name
+    that cannot stand in a URL, and two places with one name.
     """
-    intake = ModelLoader(places, most=1, provider=provider)
+    intake = ModelLoader(places, most=1)
     intake.scan()
     intake.check()
     return ModelRegistry({name: versions[0] for name, versions in intake.versions().items()})

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from posefield.inference.providers import Provider
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.registry import model_registry
 from posefield.registry.model_loading import LoadFailure, ModelLoader
@@ -76,17 +75,12 @@ class ReloadingRegistry:
         places: Iterable[str | Path],
         bounds: VersionLimits,
         limits: TrialLimits = DEFAULT_LIMITS,
-        provider: Provider | None = None,
     ) -> None:
-        """Open everything that can be opened within the limits; `check` raises the first fault.
-
-        provider: of large calls; None for that of the environment. Raises InvalidField for one
-        that cannot compute.
-        """
+        """Open everything that can be opened within the limits; `check` raises the first fault."""
         self.registry = ModelRegistry({})
         self.reloads = ReloadStatistics()
         self._bounds = bounds
-        self._loader = ModelLoader(places, 1 + bounds.older, limits, provider)
+        self._loader = ModelLoader(places, 1 + bounds.older, limits)
         self._logged: set[str] = set()
         self._refresh()
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from posefield.inference.providers import CPU
 from posefield.registry import model_registry
 from posefield.registry.model_registry import ModelRegistry
 
@@ -19,10 +18,7 @@ def or_shipped(places: Sequence[str]) -> list[str]:
 
 
 def with_shipped(places: Sequence[Path]) -> ModelRegistry:
-    """Return the shipped models and those of files and folders, which win where names are equal.
-
-    The CPU computes all their calls: files of performances have the same bytes with any provider.
-    """
-    shipped = model_registry.load([FOLDER], CPU)
-    given = model_registry.load(places, CPU).models if places else {}
+    """Return the shipped models and those of files and folders, which win where names are equal."""
+    shipped = model_registry.load([FOLDER])
+    given = model_registry.load(places).models if places else {}
     return ModelRegistry({**shipped.models, **given})

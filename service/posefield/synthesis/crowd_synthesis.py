@@ -14,7 +14,6 @@ from posefield.common import cancellation
 from posefield.common.units import Booleans, Floats, Indices, Singles
 from posefield.inference import graph_ports, level_selection
 from posefield.inference.level_selection import LevelCriteria, LevelTable
-from posefield.inference.providers import CallSizes
 from posefield.model_file.model_card import ModelCard
 from posefield.motion import blend, curves
 from posefield.motion.crowd_clip import CrowdPoses, Placement
@@ -28,6 +27,11 @@ SLACK = 1e-5
 # Durations differ between levels, and a client does not know the level that its time is checked
 # against where a view chooses levels or two levels are blended.
 COARSE_SLACK = 0.1
+
+# Smaller calls are dominated by their overhead and that of threads; larger ones exceed a core's
+# cache between operators, and a pose of a walk costs up to eight times as much. The number of calls
+# is fixed, not the number of cores: rounding depends on it.
+FEWEST_ROWS, MOST_ROWS, CALLS = 512, 1536, 8
 
 # Threads suffice: onnxruntime and NumPy release the interpreter lock while they compute.
 _WORKERS = ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="crowd")
@@ -182,7 +186,7 @@ def _run_graph(model: Synthesizer, asked: _GraphInputs, levels: Indices) -> _Gra
         _pose_takes(model, asked, block, level, np.arange(len(asked))[rows])
 
     # A list first: workers do not wait for parts. Reading the results raises the workers' errors.
-    calls = list(_calls(levels, model.session.provider.calls))
+    calls = list(_calls(levels))
     run = _WORKERS.map if len(calls) > 1 else map
     list(run(cancellation.bind_context(fill), calls))
     return block
@@ -234,9 +238,9 @@ def _blend(
 _PER_TIME = ("rotations", "root_position", "travel", graph_ports.CURVES)
 
 
-def _calls(levels: Indices, sizes: CallSizes) -> Iterator[tuple[int, Indices | slice]]:
+def _calls(levels: Indices) -> Iterator[tuple[int, Indices | slice]]:
     """Yield the level and rows of each call; contiguous rows as a slice."""
-    most = sizes.rows_per_call(len(levels))
+    most = min(max(len(levels) // CALLS, FEWEST_ROWS), MOST_ROWS)
     for level in np.unique(levels).tolist():
         rows = np.flatnonzero(levels == level)
         for part in np.array_split(rows, -(-len(rows) // most)):

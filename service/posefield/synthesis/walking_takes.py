@@ -151,7 +151,7 @@ def _relative_poses(
     bench = model.solver.corrector(level)
     rows = np.searchsorted(found.chosen, pair[0])
     posed = [np.empty((len(phases), *shape)) for shape in _shapes(model.session.card)]
-    for part in stride.batches(len(phases), model.session.provider.calls.walking):
+    for part in stride.batches(len(phases)):
         cancellation.check()
         times = (phases[part] * own.durations[part])[:, None]
         given = plan.controls[pair][part], times, labels[part]

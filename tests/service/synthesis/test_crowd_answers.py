@@ -9,9 +9,8 @@ import recorded
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import UP
-from posefield.inference import session
 from posefield.inference.level_selection import Camera, LevelCriteria
-from posefield.inference.providers import CPU, CUDA
+from posefield.locomotion import stride
 from posefield.motion import quat, skeleton
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import PoseQuestion
@@ -104,31 +103,26 @@ def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
     assert np.array_equal(changed, question.detail > 0)
 
 
-def test_a_crowd_in_large_calls_is_answered_like_one_in_small_ones(labelled_path, model):
-    """The calls of CUDA, computed by the CPU: one of each level, none, or fewer than the others."""
-    provider = replace(CUDA, execution=CPU.execution, device="cpu", options=())
-    opened = session.load_bytes(labelled_path.read_bytes(), "labelled", provider=provider)
-    runtimes, calls = zip(
-        *(recorded.session(each) for each in (opened, model.session)), strict=True
-    )
-    count = 3 * CUDA.smallest
-    levels = np.repeat([0, 1, 2], [2 * CUDA.smallest, CUDA.smallest - 100, 100])
-    question = asked(model, count, detail=levels)
-    large, small = (
-        crowd_synthesis.synthesize_crowd(Synthesizer("labelled", runtime), question)
-        for runtime in runtimes
-    )
-    sizes = [sorted(len(feed["time"]) for feed in each if "time" in feed) for each in calls]
-    assert sizes[0] == sorted(np.bincount(levels).tolist())
-    assert len(sizes[1]) > 8 and max(sizes[1]) <= CPU.calls.most
-    assert np.abs(of(model, large) - of(model, small)).max() < FLOAT32
-    assert np.abs(large.duration - small.duration).max() < FLOAT32
+def test_a_large_crowd_is_computed_in_calls_of_a_bounded_size(model):
+    opened, calls = recorded.session(model.session)
+    question = asked(model, 10_000, detail=np.zeros(10_000, dtype=int))
+    crowd_synthesis.synthesize_crowd(Synthesizer("labelled", opened), question)
+    sizes = [len(feed["time"]) for feed in calls if "time" in feed]
+    assert sum(sizes) == 10_000 and max(sizes) == 10_000 // crowd_synthesis.CALLS
+
+
+@pytest.mark.parametrize("rows", [1, 1000, 1001, 2001, 2002])
+def test_the_rows_of_walking_characters_are_split_without_single_ones(rows):
+    sizes = [part.stop - part.start for part in stride.batches(rows)]
+    last = rows - sum(sizes[:-1])
+    assert max(sizes) <= stride.ROWS_PER_CALL and 0 < last and (rows == 1 or last > 1)
 
 
 def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
-    question = asked(model, 3 * CPU.calls.most + 7)
+    most = crowd_synthesis.MOST_ROWS
+    question = asked(model, 3 * most + 7)
     whole = crowd_synthesis.synthesize_crowd(model, question)
-    rows = np.array([0, 1, CPU.calls.most, 2 * CPU.calls.most + 5, len(question) - 1])
+    rows = np.array([0, 1, most, 2 * most + 5, len(question) - 1])
     part = crowd_synthesis.synthesize_crowd(
         model,
         replace(

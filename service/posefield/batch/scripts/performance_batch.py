@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,6 @@ from posefield.batch.target import (
 from posefield.characters import delivery
 from posefield.characters.user_character import UserCharacter
 from posefield.common.errors import FileError, QueryError
-from posefield.common.package_versions import package_version
 from posefield.encode import performance_files
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.performance_files import PerformanceEncoder
@@ -177,7 +177,7 @@ def _digest(batch: PerformanceBatch, script: Script, registry: ModelRegistry) ->
         batch.form,
         batch.layout,
         __version__,
-        *(package_version(name) for name in VERSIONED_PACKAGES),
+        *(version(name) for name in VERSIONED_PACKAGES),
         *script.identities,
         "" if chosen is None else registry.find(chosen.model).identity,
         *([] if whom is None else whom.facts),

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 from posefield.common.errors import InvalidField
-from posefield.inference.providers import CPU, find_provider
 
 PREFIX = "POSEFIELD_"
 
@@ -23,7 +22,7 @@ class Settings:
     begins; 503 after it. drain: time after SIGTERM in which the service still listens and reports
     not ready. grace: time for open requests to finish after the drain. unresponsive: time without
     an iteration of the event loop until a process logs its stacks and ends, to be replaced; 0 for
-    never. provider: cpu, or cuda to compute large calls of crowds on a GPU.
+    never.
 
     body_limit: size of a request body. crowd_body_limit: size of the body of a crowd request.
     clips_body_limit: size of the body of a request for many clips or performances. bodies_memory:
@@ -111,7 +110,6 @@ class Settings:
     hosts: str = ""
     # Long work runs in threads, so half a minute is a fault of the event loop, not load.
     unresponsive: int = 30
-    provider: str = CPU.name
     origins: str = ""
     keys: str = ""
     keys_file: str = ""
@@ -157,7 +155,6 @@ class Settings:
         _check_range("idle_time", self.idle_time, 1, 3600)
         _check_range("bodies_memory", self.bodies_memory, 1024 * 1024, 1 << 40)
         _check_range("unresponsive", self.unresponsive, 0, 3600)
-        find_provider(self.provider)
         _check_range("jwt_leeway", self.jwt_leeway, 0, 600)
         _check_range("jwt_refresh", self.jwt_refresh, 10, 86_400)
 

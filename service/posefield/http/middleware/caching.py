@@ -6,10 +6,10 @@ this machine. Their digest is its strong entity tag; computing it takes two micr
 
 import platform
 from hashlib import blake2b
+from importlib.metadata import version
 from pathlib import Path
 
 import posefield
-from posefield.common.package_versions import package_version
 
 NO_STORE = b"no-store"
 IMMUTABLE = b"max-age=31536000, immutable"
@@ -35,7 +35,7 @@ def code_digest() -> bytes:
         digest.update(source.relative_to(root).as_posix().encode() + b"\0")
         digest.update(source.read_bytes())
     for name in LIBRARIES:
-        digest.update(f"{name} {package_version(name)}\0".encode())
+        digest.update(f"{name} {version(name)}\0".encode())
     digest.update(platform.machine().encode())
     return digest.digest()
 
