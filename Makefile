@@ -29,7 +29,7 @@ install: $(ENV) ## install into .venv what the lock file names
 
 # Node comes with the environment; packages are those of the lock file.
 NODE := clients/node_modules/.installed
-$(NODE): clients/package.json clients/package-lock.json clients/docs/package.json clients/typescript/package.json clients/viewer/package.json | $(ENV)
+$(NODE): clients/package.json clients/package-lock.json clients/typescript/package.json clients/viewer/package.json | $(ENV)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm ci --prefix clients --silent --no-audit --no-fund
 	@touch $@
 
@@ -42,10 +42,14 @@ PAGE := service/posefield/http/pages/viewer/index.html
 $(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.webgpu.config.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
 
-# The service's answer to `/docs`: one file with Swagger UI in it, which reads the contract from the service.
+# The service's answer to `/docs`: Swagger UI as its package holds it, within one file of HTML.
 DOCS := service/posefield/http/pages/docs/index.html
-$(DOCS): $(NODE) $(shell find clients/docs/src -type f) clients/docs/index.html clients/docs/vite.config.ts clients/tsconfig.base.json clients/docs/tsconfig.json
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/docs --silent
+SWAGGER := clients/node_modules/swagger-ui-dist
+$(DOCS): $(NODE) clients/docs/index.html
+	mkdir -p $(@D)
+	cat $(addprefix $(SWAGGER)/,LICENSE NOTICE swagger-ui-bundle.js.LICENSE.txt) > $(@D)/LICENSES.txt
+	sed -e '/^.. swagger-ui.css/{r $(SWAGGER)/swagger-ui.css' -e 'd}' \
+		-e '/^.. swagger-ui-bundle.js/{r $(SWAGGER)/swagger-ui-bundle.js' -e 'd}' clients/docs/index.html > $@
 
 .PHONY: page
 page: $(PAGE) $(DOCS) ## build the pages that the service shows at / and /docs

@@ -1,8 +1,8 @@
 """Pages generated from the code: settings, commands, problems and table columns."""
 
 import ast
+import html
 import inspect
-import json
 import re
 from collections.abc import Iterator
 from dataclasses import fields
@@ -15,7 +15,7 @@ from page_parts import choices, code, page, table
 from posefield import cli
 from posefield.batch.rows.columns import OPTION_KINDS
 from posefield.http.api.settings import PREFIX, Settings
-from posefield.http.pages.problems_page import PROBLEM_TEXTS, problem_example
+from posefield.http.pages import static_page
 from posefield.question import text_decoding
 from posefield.question.motion_question import NamedClipQuestion
 from posefield_train.cli import commands as add_training_commands
@@ -174,20 +174,17 @@ def _default(parameter: Any) -> str:
 
 def problems() -> str:
     """Return the page of all kinds of problems, by status."""
-    parts = [PROBLEMS_INTRO]
-    kinds = sorted(PROBLEM_TEXTS, key=lambda kind: kind.status)
-    parts.append(
-        table(
-            ("status", "name", "title"),
-            [(kind.status, f"[`{kind.name}`](#{kind.name})", kind.title) for kind in kinds],
-        )
+    entries = re.findall(
+        r'<dt id="(.+?)">(\d+) .*?<dd>(.+?)</dd>',
+        static_page.PROBLEMS.read_text("utf-8"),
+        re.DOTALL,
     )
-    for kind in kinds:
-        text = PROBLEM_TEXTS[kind]
-        example = json.dumps(problem_example(kind), indent=2)
-        parts += [f"## {kind.name}", f"Status {kind.status}: {kind.title}.", text.comes]
-        parts += [text.remedy, f"```json\n{example}\n```"]
-    return page("Problems", "service/posefield/http/pages/problems_page.py", parts)
+    rows = [
+        (status, code(name), re.sub("</?code>", "`", html.unescape(text)))
+        for name, status, text in entries
+    ]
+    parts = [PROBLEMS_INTRO, table(("status", "name", "title and remedy"), rows)]
+    return page("Problems", "service/posefield/http/pages/problems.html", parts)
 
 
 def columns() -> str:

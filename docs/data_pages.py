@@ -25,7 +25,7 @@ The contract is `api/openapi.yaml` (OpenAPI 3.1), version {version}. A running s
 
 | address | content |
 |---|---|
-| `/docs` | the contract as a page, searchable; each operation can be tried |
+| `/docs` | the contract as a page; each operation can be tried |
 | `/openapi.yaml`, `/openapi.json` | the contract |
 | `/problems` | every error, with cause and remedy; also [here](problems.md) |
 

@@ -164,7 +164,6 @@ def test_options_in_the_documents_exist():
 def test_every_problem_is_described():
     text = page("reference/problems.md")
     assert undescribed([kind.name for kind in PROBLEM_KINDS], text) == []
-    assert [kind.name for kind in PROBLEM_KINDS if f"\n## {kind.name}\n" not in text] == []
 
 
 def test_every_recipe_key_is_described():

@@ -13,7 +13,7 @@ from posefield import __version__
 
 ROOT = Path(__file__).parents[1]
 PROJECTS = ("service", "model_export", "clients/python")
-PACKAGES = ("docs", "typescript", "viewer")
+PACKAGES = ("typescript", "viewer")
 PLACES = {
     "CITATION.cff": r"^version: (\S+)$",
     "Dockerfile": r'image\.version="(.+?)"',

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import asdict
+from html import escape
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -95,10 +96,8 @@ def page_content(before: bytes, data: str, identity: str) -> bytes:
 
     Not in its head: browsers look for the encoding in the first kilobyte.
     """
-    # Imported here, since other commands need no Jinja.
-    from posefield.http.pages import templates
-
-    mark = templates.render("model.html", content=data, identity=identity)
+    kind = f'type="application/octet-stream" id="posefield-copy" data-identity="{escape(identity)}"'
+    mark = f"<script {kind}>{data}</script>"
     start, end, rest = before.rpartition(_BODY_END)
     return start + mark.encode() + end + rest
 

@@ -12,7 +12,7 @@ from posefield.characters import character_folder
 from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.common.errors import UnknownFormat
 from posefield.common.name_suggestion import did_you_mean
-from posefield.http import pages, request_cycle
+from posefield.http import request_cycle
 from posefield.http.access import access_policy
 from posefield.http.api import contract, problems
 from posefield.http.api.contract import Contract, Operation
@@ -22,6 +22,7 @@ from posefield.http.concurrency.readiness import Readiness
 from posefield.http.middleware import cors, request_head
 from posefield.http.middleware.request_head import HeadLimits
 from posefield.http.operations import OPERATIONS
+from posefield.http.pages import static_page
 from posefield.http.request_cycle import ServerState
 from posefield.http.routing import Route, RouteTree
 from posefield.http.service import Service
@@ -75,7 +76,7 @@ def build_app(
         readiness,
         settings,
         agreed.version,
-        pages.static_pages(agreed),
+        static_page.static_pages(agreed),
         rules,
         origins,
         telling,

@@ -20,7 +20,6 @@ from posefield.common.errors import UnknownModel
 from posefield.http.access import api_keys
 from posefield.http.api import problems
 from posefield.http.api.problems import PROBLEM_KINDS
-from posefield.http.pages import problems_page as page
 
 LIST = b'{"models": []}'
 
@@ -53,8 +52,13 @@ def raised_later(address, ask=lambda client: client.models(), **given):
     return caught.value
 
 
+def problem_example(kind):
+    errors = [{"parameter": "fps", "detail": "expected a number"}]
+    return problems.problem_document(kind, "fps: expected a number", "3f9c0b7a5d21", errors)
+
+
 def refusal(kind):
-    content = json.dumps(page.problem_example(kind)).encode()
+    content = json.dumps(problem_example(kind)).encode()
     return answer(content, problems.MEDIA_TYPE, kind.status)
 
 
@@ -63,7 +67,7 @@ def test_every_kind_of_problem_is_a_class_of_its_own(kind):
     version = answer(json.dumps({"contract": CONTRACT}).encode())
     with scripted.serving(refusal(kind), version) as server:
         fault = raised(server.address)
-    said = page.problem_example(kind)
+    said = problem_example(kind)
     assert type(fault) is Problem.kinds[kind.name]
     assert type(fault).__name__.lower() == kind.name.replace("-", "")
     assert (fault.kind, fault.status) == (kind.name, kind.status)
@@ -78,7 +82,7 @@ def test_there_are_no_classes_of_kinds_that_are_not():
 
 
 def test_a_kind_that_is_newer_than_the_client_is_a_problem():
-    said = page.problem_example(PROBLEM_KINDS[0]) | {
+    said = problem_example(PROBLEM_KINDS[0]) | {
         "type": "urn:posefield:problem:moon-too-full",
         "phase": 0.5,
     }
@@ -259,7 +263,7 @@ def test_an_answer_of_another_version_says_of_which(said):
     [
         (b'{"title": "Busy"}', errors.Unreachable),
         (
-            json.dumps(page.problem_example(PROBLEM_KINDS[0]) | {"type": "about:blank"}).encode(),
+            json.dumps(problem_example(PROBLEM_KINDS[0]) | {"type": "about:blank"}).encode(),
             errors.Busy,
         ),
     ],

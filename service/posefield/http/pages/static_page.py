@@ -1,13 +1,17 @@
-"""Static documents, created at their first request."""
+"""Static documents: the contract and the HTML pages, created at their first request."""
 
+import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from hashlib import blake2b, sha256
-from html.parser import HTMLParser
 from pathlib import Path
 
+import orjson
+
+from posefield.http.api import contract
+from posefield.http.api.contract import Contract
 from posefield.http.middleware import security_headers
 
 
@@ -42,18 +46,39 @@ _PAGES = Path(__file__).parent
 VIEWER = _PAGES / "viewer/index.html"
 VIEWER_SCRIPT = _PAGES / "viewer/crowd-webgpu.js"
 DOCS = _PAGES / "docs/index.html"
+PROBLEMS = _PAGES / "problems.html"
 NO_SOURCE = "'none'"
 """Sources of a Content-Security-Policy that allow nothing."""
 
 
+def static_pages(agreed: Contract) -> dict[str, StaticPage]:
+    """Return the pages by operationId."""
+    return {
+        "getContract": StaticPage(contract.MEDIA_TYPE, lambda: agreed.source),
+        "getContractJson": StaticPage("application/json", lambda: orjson.dumps(agreed.document)),
+        "getDocs": StaticPage("text/html", partial(built_page, DOCS), headers),
+        "getProblems": StaticPage("text/html", PROBLEMS.read_bytes, headers),
+        "getViewerCrowd": StaticPage("text/javascript", partial(viewer_script, VIEWER_SCRIPT)),
+        "getViewer": StaticPage(
+            "text/html", partial(built_page, VIEWER), partial(headers, loads_scripts=True)
+        ),
+    }
+
+
 def built_page(path: Path) -> bytes:
-    """Return the page that `make page` has built; a page of instructions if it is missing."""
+    """Return the page that `make page` has built; one that says so if it is missing."""
     try:
         return path.read_bytes()
     except FileNotFoundError:
-        from posefield.http.pages import templates
+        return _NOT_BUILT
 
-        return templates.render("missing.html", title="posefield").encode()
+
+_NOT_BUILT = b"""\
+<!doctype html>
+<html lang="en"><title>posefield</title><link rel="icon" href="data:,">
+<p>This service was installed from its sources, and this page was not built: <code>make page</code>.
+The contract is at <a href="/openapi.yaml">/openapi.yaml</a>.
+"""
 
 
 def viewer_script(path: Path) -> bytes:
@@ -69,36 +94,14 @@ def headers(content: bytes, loads_scripts: bool = False) -> dict[str, str]:
 
     loads_scripts: whether a page with scripts may load others of its own origin.
     """
-    found = _InlineTextParser()
-    found.feed(content.decode())
-    found.close()
-    script = found.sources("script")
+    hashes: dict[str, list[str]] = {"script": [], "style": []}
+    for tag, text in _INLINE.findall(content):
+        digest = b64encode(sha256(text).digest()).decode()
+        hashes[tag.decode()].append(f"'sha256-{digest}'")
+    script, style = (" ".join(hashes[tag]) or NO_SOURCE for tag in hashes)
     if loads_scripts and script != NO_SOURCE:
         script = f"'self' {script}"
-    return security_headers.page_headers(script, found.sources("style"))
+    return security_headers.page_headers(script, style)
 
 
-class _InlineTextParser(HTMLParser):
-    """Parser that collects the texts of a page's inline scripts and styles."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._texts: dict[str, list[str]] = {"script": [], "style": []}
-        self._within: list[str] | None = None
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._within = self._texts.get(tag)
-        if self._within is not None:
-            self._within.append("")
-
-    def handle_endtag(self, tag: str) -> None:
-        self._within = None
-
-    def handle_data(self, data: str) -> None:
-        if self._within is not None:
-            self._within[-1] += data
-
-    def sources(self, tag: str) -> str:
-        """Return the hashes of a tag's texts as sources of a Content-Security-Policy."""
-        digests = (b64encode(sha256(text.encode()).digest()).decode() for text in self._texts[tag])
-        return " ".join(f"'sha256-{digest}'" for digest in digests) or NO_SOURCE
+_INLINE = re.compile(rb"<(script|style)\b[^>]*>(.*?)</\1>", re.DOTALL)
