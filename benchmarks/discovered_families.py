@@ -17,6 +17,7 @@ from typing import Any
 import hand_cuts
 import numpy as np
 from hand_cuts import HandCut
+from rows import Row
 
 from posefield_train.discover import take_reading
 from posefield_train.discover.joined_features import Span
@@ -104,6 +105,37 @@ def document(found: Discovery) -> Found:
         "all": counts(found.families, found.cuts),
         "ends": ends(found.families),
     }
+
+
+def rows(document: Found) -> list[Row]:
+    """Return shares of wrong clips and missed cuts, distances of ends and processor time."""
+    counts, minutes = document["all"], document["minutes"]
+    ends = {name: round(seconds, 3) for name, seconds in document["ends"].items()}
+    wrong = 100.0 * (1.0 - counts["right"] / counts["clips"])
+    found = [
+        ("clips of families: wrong", wrong, "%", f"of {counts['clips']}", 10.0),
+        _missed("all actions", counts, 20.0),
+        *(_missed(action["action"], action, None) for action in document["actions"]),
+        ("ends from those of the cuts", ends["median"], "s", "median", None),
+        ("the same but for the median of a family", ends["convention_median"], "s", "median", 0.1),
+        ("its worst tenth", ends["convention_p90"], "s", "90th percentile", 0.3),
+        (
+            "processor time",
+            document["seconds"],
+            "s",
+            f"{minutes:.1f} minutes of takes",
+            5 * minutes,
+        ),
+    ]
+    return [Row(name, value, unit, remark, None, goal) for name, value, unit, remark, goal in found]
+
+
+def _missed(
+    action: str, counts: dict[str, int], goal: float | None
+) -> tuple[str, float, str, str, float | None]:
+    missed = 100.0 * (1.0 - counts["found"] / counts["cuts"])
+    remark = f"of {counts['cuts']}; {counts['families']} families of {counts['clips']} clips"
+    return f"{action}: cuts missed", missed, "%", remark, goal
 
 
 def _counts_of(found: Discovery, action: str) -> dict[str, int]:

@@ -14,7 +14,7 @@ from typing import Any
 import discovered_families
 import numpy as np
 from discovered_families import Discovery, JudgedFamily
-from rows import compact, origin
+from rows import Row, record, table
 
 from posefield_train.evaluate import compared_motion, methods, motion_errors
 from posefield_train.evaluate.methods import Queries
@@ -25,8 +25,10 @@ from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.train import train
 
-RESULTS = Path(__file__).resolve().parents[1] / "docs/results/found_families.json"
+RESULTS = Path(__file__).resolve().parents[1] / "docs/results"
 ACTIONS = ("grabHighR", "depositFloorR", "kickLFront1Reps")
+MOST_WORSE = 5.0
+"""Percent that a model of found clips may be worse."""
 
 
 def compare(found: Discovery, data: Path) -> list[dict[str, Any]]:
@@ -95,6 +97,18 @@ def _errors(
     return found
 
 
+def rows(models: Sequence[dict[str, Any]]) -> list[Row]:
+    """Return how much farther models of found clips are than those of clips cut by hand."""
+    found = []
+    for model in models:
+        clips, errors = model["clips"], model["relative_cm"]
+        more = 100.0 * (errors["found"] / errors["by_hand"] - 1.0)
+        remark = "{found} clips, {by_hand} by hand; ".format(**clips)
+        remark += "{found:.2f} cm, {by_hand:.2f} cm by hand".format(**errors)
+        found.append(Row(f"{model['action']}: error", more, "% more", remark, None, MOST_WORSE))
+    return found
+
+
 def main(arguments: Sequence[str]) -> None:
     """Print the figures; write them where the documentation reads them if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -103,13 +117,12 @@ def main(arguments: Sequence[str]) -> None:
     given = parser.parse_args(arguments)
     with tempfile.TemporaryDirectory() as made:
         found = discovered_families.discover(given.folder, Path(made))
-        models = compare(found, given.folder / "bvh")
-        families = discovered_families.document(found)
-    own = origin("python benchmarks/found_models.py HDM05_LONG --record")
-    text = compact({**own, "families": families, "models": models})
-    print(text)
+        families = discovered_families.rows(discovered_families.document(found))
+        models = rows(compare(found, given.folder / "bvh"))
+    print(table([*families, *models]))
     if given.record:
-        RESULTS.write_text(text + "\n", encoding="utf-8")
+        command = "python benchmarks/found_models.py HDM05_LONG --record"
+        record({"found_families": families, "found_models": models}, command, RESULTS)
 
 
 if __name__ == "__main__":

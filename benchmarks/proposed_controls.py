@@ -3,18 +3,18 @@
 import argparse
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rows import compact, origin
+from rows import Row, record, table
 
 from posefield_train.discover import control_proposals, take_prediction
 from posefield_train.discover.control_proposals import FamilyClips
 from posefield_train.discover.take_prediction import TakePrediction
 from posefield_train.source import ingest, measured_controls, recipe, shipped_recipes
 
-RESULTS = Path(__file__).resolve().parents[1] / "docs/results/proposed_controls.json"
+RESULTS = Path(__file__).resolve().parents[1] / "docs/results"
 RECIPES = (
     "hdm05_grab_high",
     "hdm05_deposit_floor",
@@ -66,18 +66,25 @@ def propose(name: str, data: Path) -> Proposed:
     return Proposed(name, tuple(wanted), lacking, found.remaining[-1], prediction.remaining(given))
 
 
+def row(proposed: Proposed) -> Row:
+    """Return the variance that remains; at most that with the controls by hand is wanted."""
+    lacking = ", ".join(proposed.lacking) or "none"
+    remark = f"by hand: {', '.join(proposed.by_hand)}; not proposed: {lacking}"
+    remaining, by_hand = 100.0 * proposed.remaining, 100.0 * proposed.remaining_by_hand
+    return Row(f"{proposed.recipe}: variance that remains", remaining, "%", remark, None, by_hand)
+
+
 def main(arguments: Sequence[str]) -> None:
     """Print the figures; write them where the documentation reads them if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("data", type=Path, help="folder of the data sets")
     parser.add_argument("--record", action="store_true")
     given = parser.parse_args(arguments)
-    found = [asdict(propose(name, given.data)) for name in RECIPES]
-    command = origin("python benchmarks/proposed_controls.py DATA --record")
-    text = compact({**command, "recipes": found})
-    print(text)
+    found = [row(propose(name, given.data)) for name in RECIPES]
+    print(table(found))
     if given.record:
-        RESULTS.write_text(text + "\n", encoding="utf-8")
+        command = "python benchmarks/proposed_controls.py DATA --record"
+        record({"proposed_controls": found}, command, RESULTS)
 
 
 if __name__ == "__main__":

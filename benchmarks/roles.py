@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rows import compact, origin
+from rows import Row, record, table
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "tests/model_export"))
@@ -36,20 +36,40 @@ def measure(table: str, first: dict[str, int] | None) -> dict[str, Any]:
     return {"table": table, "conventions": list(skeletons), "now": counts, "first": first}
 
 
+def rows(measured: dict[str, Any]) -> list[Row]:
+    """Return the shares of roles that are asked and wrong. Goals are those of held-out tables."""
+    now, first = measured["now"], measured["first"]
+    name = f"{measured['table'].replace('_', ' ')}, {len(measured['conventions'])} conventions"
+    count = sum(now.values())
+    asked = f"of {count} roles" + (f"; {first['asked']} in the first run" if first else "")
+    wrong = f"{first['wrong']} in the first run" if first else ""
+    share = 100.0 * now["asked"] / count
+    return [
+        Row(f"{name}: asked", share, "%", asked, None, None),
+        Row(f"{name}: wrong", now["wrong"], "roles", wrong, None, 0.0 if first else None),
+    ]
+
+
+def held_out(counts: Sequence[dict[str, int]]) -> Row:
+    """Return the share of roles of all held-out tables that are asked or wrong."""
+    total = sum(sum(table.values()) for table in counts)
+    right = sum(table["right"] for table in counts)
+    share = 100.0 * (1.0 - right / total)
+    return Row("all held out: asked or wrong", share, "%", f"of {total} roles", None, 5.0)
+
+
 def main(arguments: Sequence[str]) -> None:
     """Print the figures; write them where the documentation reads them if asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--record", action="store_true")
     given = parser.parse_args(arguments)
     first = json.loads(FIRST_RUNS.read_text(encoding="utf-8"))
-    found = {
-        **origin("python benchmarks/roles.py --record"),
-        "tables": [measure(table, first.get(table)) for table in TABLES],
-    }
-    text = compact(found)
-    print(text)
+    measured = [measure(name, first.get(name)) for name in TABLES]
+    found = [row for counts in measured for row in rows(counts)]
+    found.append(held_out([counts["now"] for counts in measured if counts["first"]]))
+    print(table(found))
     if given.record:
-        (ROOT / "docs/results/roles.json").write_text(text + "\n", encoding="utf-8")
+        record({"roles": found}, "python benchmarks/roles.py --record", ROOT / "docs/results")
 
 
 if __name__ == "__main__":

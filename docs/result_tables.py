@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import equal_tables
 import evaluation_tables as tables
-import found_tables
 import measured_tables
 import performed_tables
 import take_tables
@@ -15,13 +14,22 @@ SPEED_FILES = (
     "graph",
     "requests",
     "before",
-    "viewer",
     "crowds",
     "files",
     "layers",
     "exports",
 )
 SPEED = tuple(f"speed/{name}" for name in SPEED_FILES)
+JUDGED = (
+    "performed",
+    "joins",
+    "discovered",
+    "found_families",
+    "found_models",
+    "proposed_controls",
+    "roles",
+    "scaled",
+)
 TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "equal_known": lambda: (equal_tables.BEST_COLUMNS, equal_tables.best("known")),
     "equal_open": lambda: (equal_tables.BEST_COLUMNS, equal_tables.best("open")),
@@ -65,14 +73,10 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     ),
     "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
     "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
-    "performed": lambda: (performed_tables.COLUMNS, performed_tables.performed()),
-    "joins": lambda: (performed_tables.COLUMNS, performed_tables.joins()),
-    "discovered": lambda: (performed_tables.COLUMNS, performed_tables.discovered()),
-    "scaled": lambda: (performed_tables.COLUMNS, performed_tables.scaled()),
-    "found_families": lambda: (found_tables.FAMILY_COLUMNS, found_tables.families()),
-    "found_models": lambda: (found_tables.MODEL_COLUMNS, found_tables.models()),
-    "proposed_controls": lambda: (found_tables.CONTROL_COLUMNS, found_tables.controls()),
-    "roles": lambda: (found_tables.ROLE_COLUMNS, found_tables.roles()),
+    **{
+        name: lambda name=name: (performed_tables.COLUMNS, performed_tables.rows(name))
+        for name in JUDGED
+    },
     **{
         name: lambda name=name: (measured_tables.SPEED_COLUMNS, measured_tables.speed(name))
         for name in SPEED
@@ -83,17 +87,11 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
 REMARKS: dict[str, Callable[[], str]] = {
     "equal_known": lambda: equal_tables.counts("known"),
     "equal_open": lambda: equal_tables.counts("open"),
-    "found_families": found_tables.families_remark,
-    "proposed_controls": found_tables.controls_remark,
-    "roles": found_tables.roles_remark,
 }
 """A sentence made of the rows of a table, for some of them."""
 
-DISCOVERY = ("discovered", "found_families", "proposed_controls", "roles")
-OWN_FILES = (*SPEED, *DISCOVERY, "performed", "joins", "scaled")
-ORIGINS: dict[str, str] = {name: name for name in OWN_FILES} | {
+ORIGINS: dict[str, str] = {name: name for name in (*SPEED, *JUDGED)} | {
     "recipes": "models",
     "levels": "models",
-    "found_models": "found_families",
 }
 """File of docs/results that names the command and the date of a table's figures."""

@@ -13,9 +13,9 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent / "benchmarks")]
 import equal_tables  # noqa: E402
 import evaluation_summary  # noqa: E402
 import evaluation_tables  # noqa: E402
-import found_tables  # noqa: E402
 import measure_models  # noqa: E402
 import measured_tables  # noqa: E402
+import performed_tables  # noqa: E402
 import result_tables  # noqa: E402
 import take_tables  # noqa: E402
 from rows import Row, compact, record  # noqa: E402
@@ -246,63 +246,17 @@ def test_takes_stand_beside_their_negative_controls(folder):
     assert rows["acceleration with detail over captured (without)"] == ""
 
 
-def test_roles_stand_beside_those_of_the_first_run(tmp_path, monkeypatch):
-    def table(name, right, asked, first):
-        now = {"right": right, "asked": asked, "wrong": 0}
-        return {"table": name, "conventions": ["one", "two"], "now": now, "first": first}
-
-    before = {"right": 90, "asked": 8, "wrong": 2}
-    tables = [table("development", 50, 0, None), table("held_out", 96, 4, before)]
-    (tmp_path / "roles.json").write_text(json.dumps({"tables": tables}))
+def test_judged_rows_have_a_verdict_for_goal_and_wish(tmp_path, monkeypatch):
+    made = [
+        Row("strides: missed", 1.0, "%", "of 92", None, 2.0),
+        Row("example: found", 3.0, "s", "", None, None),
+    ]
+    record({"discovered": made}, "python benchmarks/discovery.py", tmp_path)
     monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
-    first, second, every = found_tables.roles()
-    assert first == ["2 of development", "50", "50 (100.0 %)", "0", "0", "", ""]
-    assert second[1:-1] == ["100", "96 (96.0 %)", "4", "0", "90 (90.0 %; 2 wrong)"]
-    verdict = "95 % and none wrong: now met, in the first run **missed**"
-    assert every[1:] == [*second[1:-1], verdict]
-    assert found_tables.roles_remark() == "Held out were, in three sets: one, two."
-
-
-def test_families_and_their_models_have_verdicts(tmp_path, monkeypatch):
-    counts = {"families": 1, "clips": 10, "right": 9, "cuts": 20, "found": 9}
-    ends = {"median": 0.2, "p90": 0.5, "convention_median": 0.1, "convention_p90": 0.4}
-    found = {
-        "minutes": 12.0,
-        "seconds": 70.0,
-        "actions": [counts | {"action": "grab"}],
-        "all": counts,
-        "ends": ends,
-    }
-    errors = {"found": 8.8, "by_hand": 8.0}
-    model = {"action": "grab", "clips": {"found": 9, "by_hand": 20}, "relative_cm": errors}
-    content = {"families": found, "models": [model | {"absolute_rms_cm": errors}]}
-    (tmp_path / "found_families.json").write_text(json.dumps(content))
-    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
-    one, every = found_tables.families()
-    assert one == ["`grab`", "1", "10", "9 (90.0 %)", "20", "9 (45.0 %)"]
-    assert every == ["all", *one[1:]]
-    said = found_tables.families_remark()
-    assert "Precision 0.900 (must 0.9, met; wish 0.95, **missed**)." in said
-    assert "Recall 0.450 (must 0.8, **missed**" in said
-    assert "0.10 s (must 0.1 s, met) and 0.40 s (must 0.3 s, **missed**)" in said
-    assert "takes 70 s of processor time for 12.0 minutes of takes (must 60 s, **missed**)" in said
-    (row,) = found_tables.models()
-    assert row[2:6] == ["8.80", "8.00", "+10.0 %", "+5 %, **missed**"]
-
-
-def test_controls_that_are_not_proposed_are_named_and_counted(tmp_path, monkeypatch):
-    kept = {"recipe": "kick", "by_hand": ["a", "b"], "lacking": []}
-    lost = {"recipe": "hop", "by_hand": ["c"], "lacking": ["c"]}
-    rest = {"remaining": 0.4, "remaining_by_hand": 0.5}
-    content = {"recipes": [kept | rest, lost | rest]}
-    (tmp_path / "proposed_controls.json").write_text(json.dumps(content))
-    monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
-    rows = [["`kick`", "a, b", "none", "40 %", "50 %"], ["`hop`", "c", "c", "40 %", "50 %"]]
-    assert list(found_tables.controls()) == rows
-    assert found_tables.controls_remark() == (
-        "All controls by hand are proposed for 1 of 2 recipes (must 4, **missed**; wish 6, "
-        "**missed**); the proposed ones explain as much for 2."
-    )
+    assert list(performed_tables.rows("discovered")) == [
+        ["strides: missed", "1 %", "2 %, met", "0 %, **missed**", "of 92"],
+        ["example: found", "3 s", "", "", ""],
+    ]
 
 
 def test_a_summary_shows_what_the_result_shows(folder):
