@@ -5,4 +5,4 @@ import os
 # onnxruntime's Linux wheels report to their vendor unless told otherwise before they are imported.
 os.environ["ORT_DISABLE_TELEMETRY"] = "1"
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
