@@ -1,16 +1,21 @@
 """Tests of the import rules between the shipped packages and the training packages."""
 
+import ast
 import os
 import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
 
+from posefield.http.middleware import caching
+
 ROOT = Path(__file__).parents[1]
 LAYERS = "packages import only those below them"
+PACKAGE = ROOT / "service/posefield"
 PACKAGES = ("service/posefield", "model_export/posefield_train")
 
 # In a process of its own: nothing of the training job can be imported, as in the image.
@@ -129,3 +134,20 @@ def test_the_start_imports_nothing_that_only_some_requests_need(module):
 def test_an_import_at_the_start_would_be_noticed():
     said = python("import sys, posefield.encode.usd.usd_clip; print('pxr' in sys.modules)")
     assert said.stdout == "True\n", said.stderr
+
+
+ANSWERING = ("encode", "feet", "inference", "motion", "question", "synthesis")
+
+
+def test_an_entity_tag_depends_on_every_library_that_makes_answers():
+    files = (path for name in ANSWERING for path in (PACKAGE / name).rglob("*.py"))
+    nodes = [node for path in files for node in ast.walk(ast.parse(path.read_text()))]
+    imported = {
+        alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names
+    }
+    imported |= {node.module for node in nodes if isinstance(node, ast.ImportFrom) and node.module}
+    distributions = packages_distributions()
+    roots = {name.partition(".")[0] for name in imported} & distributions.keys()
+    libraries = {name for root in roots for name in distributions[root]}
+    assert "usd-core" in libraries
+    assert libraries - {"posefield"} <= set(caching.LIBRARIES)
