@@ -4,29 +4,25 @@ and would retry; the second has a URL.
 
     .venv/bin/python benchmarks/client.py [MODEL]
 
-Both ask the real service, and a server that answers the same bytes at once, in turn in one run.
+Both ask the real service in turn in one run.
 """
 
 import statistics
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import httpx
 import serve_process
-from posefield_client import NOTHING, Client
-from posefield_client.numbers import pose
+from posefield_client import Client, Pose, numbers
 from posefield_client.wire import Reply
 from rows import Row, table
 
-HERE = Path(__file__).parent
-MODEL = HERE.parent / "build/models/reaching.onnx"
+MODEL = Path(__file__).parents[1] / "build/models/reaching.onnx"
 GOAL = 1.5
 ROUNDS, WARM = 3000, 200
-MEDIA_TYPE = "application/vnd.msgpack"
+READ = numbers.decoder(Pose)
 
 
 def main() -> None:
@@ -35,30 +31,27 @@ def main() -> None:
 
 
 def rows(model: Path) -> list[Row]:
-    """Return the time of a pose relative to httpx alone, with the real service and with none."""
-    with serve_process.posefield(model) as real, Client(real.url) as client:
+    """Return the time of a pose relative to httpx alone."""
+    with (
+        serve_process.posefield(model) as service,
+        httpx.Client() as bare,
+        Client(service.url, cache_bytes=0) as uncached,
+        Client(service.url) as client,
+    ):
         asked = client.model(model.stem)
         controls = {name: control.default for name, control in asked.controls.items()}
-        found = httpx.get(url(real.url, model.stem, controls)(0.5)).content
-        rows = [_row("of the service", real.url, model.stem, controls)]
-    with _same(found) as address:
-        return [*rows, _row("of a server that answers at once", address, model.stem, controls)]
-
-
-def _row(whose: str, address: str, model: str, controls: dict[str, float]) -> Row:
-    with httpx.Client() as bare, Client(address, cache=NOTHING) as lone, Client(address) as usual:
-        where = url(address, model, controls)
-        alone, kept = lone.model(model), usual.model(model)
+        where = url(service.url, model.stem, controls)
+        alone = uncached.model(model.stem)
         ways = {
             "bare": lambda at: _bare(bare, where(at)),
             "none kept": lambda at: alone.pose(at, **controls),
-            "client": lambda at: kept.pose(at, **controls),
+            "client": lambda at: asked.pose(at, **controls),
         }
         took = _in_turn(ways)
     times = ", ".join(f"{name} {seconds * 1e6:.0f} us" for name, seconds in took.items())
     baseline = f"httpx alone, read alike ({times})"
     ratio = took["client"] / took["bare"]
-    return Row(f"a pose {whose} by posefield_client", ratio, "times", baseline, None, GOAL)
+    return [Row("a pose of the service by posefield_client", ratio, "times", baseline, None, GOAL)]
 
 
 def url(address: str, model: str, controls: dict[str, float]) -> Callable[[float], str]:
@@ -70,7 +63,7 @@ def url(address: str, model: str, controls: dict[str, float]) -> Callable[[float
 
 def _bare(http: httpx.Client, where: str) -> None:
     answer = http.get(where)
-    pose(Reply(answer.status_code, answer.headers, answer.content))
+    READ(Reply(answer.status_code, answer.headers, answer.content))
 
 
 def _in_turn(ways: dict[str, Callable[[float], object]]) -> dict[str, float]:
@@ -83,17 +76,6 @@ def _in_turn(ways: dict[str, Callable[[float], object]]) -> dict[str, float]:
             way(at)
             took[name].append(time.perf_counter() - began)
     return {name: statistics.median(each[WARM:]) for name, each in took.items()}
-
-
-@contextmanager
-def _same(content: bytes) -> Iterator[str]:
-    with tempfile.NamedTemporaryFile() as file:
-        file.write(content)
-        file.flush()
-        port = serve_process.free_port()
-        command = [sys.executable, HERE / "client_same.py", file.name, MEDIA_TYPE, str(port)]
-        with serve_process.started("client_same", command, port) as server:
-            yield server.url
 
 
 if __name__ == "__main__":

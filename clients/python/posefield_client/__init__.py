@@ -10,17 +10,8 @@ lists the exceptions.
 """
 
 from posefield_client import errors
-from posefield_client.aio import (
-    AsyncClient,
-    AsyncClip,
-    AsyncCrowd,
-    AsyncModel,
-    AsyncPerformance,
-    AsyncSaving,
-)
-from posefield_client.cache import NOTHING, Cache, Memory
-from posefield_client.client import Client, Clip, Crowd, Model, Performance, Saving
-from posefield_client.disk import Disk
+from posefield_client.aio import AsyncClient, AsyncModel, AsyncMotion, AsyncSaving
+from posefield_client.client import Client, Model, Motion, Saving
 from posefield_client.errors import PosefieldError
 from posefield_client.generated import (
     CONTRACT,
@@ -41,39 +32,31 @@ from posefield_client.generated import (
     Trust,
 )
 from posefield_client.numbers import ClipNumbers, CrowdPoses, PerformanceNumbers, Pose, SigmaGrid
-from posefield_client.retry import NEVER, Retry
 from posefield_client.saving import Missed, Progress, Saved
 from posefield_client.scripts import Script
+from posefield_client.wire import NEVER, Retry
 
 __all__ = [
     "CONTRACT",
     "NEVER",
-    "NOTHING",
     "AsyncClient",
-    "AsyncClip",
-    "AsyncCrowd",
     "AsyncModel",
-    "AsyncPerformance",
+    "AsyncMotion",
     "AsyncSaving",
-    "Cache",
     "Camera",
     "Client",
-    "Clip",
     "ClipNumbers",
     "Control",
-    "Crowd",
     "CrowdPoses",
-    "Disk",
     "Floor",
     "ManifestEntry",
-    "Memory",
     "Met",
     "Missed",
     "Model",
     "ModelCard",
+    "Motion",
     "NamedClipQuestion",
     "NamedScript",
-    "Performance",
     "PerformanceEntry",
     "PerformanceNumbers",
     "PerformanceQuestion",

@@ -1,31 +1,14 @@
-"""Exceptions of the client, as one tree.
+"""Exceptions of the client, as one tree under PosefieldError.
 
-PosefieldError
-├── WrongQuestion              invalid argument: a name, format or number; nothing was sent
-├── Problem                    problem document of the service; itself for an unknown type
-│   ├── WrongRequest           the request violates the contract
-│   │   ├── BadParameter, BadBody, UnsupportedMediaType, NotAcceptable,
-│   │   ├── NoSuchPath, MethodNotAllowed,
-│   │   └── BodyTooLarge, UrlTooLong, HeadTooLarge, UnknownHost
-│   ├── NotAllowed             the key was refused
-│   │   └── Unauthenticated, Forbidden
-│   ├── Unanswerable           a valid request without a result
-│   │   └── UnknownModel, UnknownFormat, InvalidField, OutsideSamples,
-│   │       OutOfReach
-│   ├── Busy                   temporary; retried
-│   │   └── Overloaded, Late, NotReady
-│   └── InternalError          the service failed
-├── Unreachable                no service responds; retried
-├── TimedOut                   the timeout was exceeded; retried
-├── Broken                     the response was interrupted; retried
-│   └── IncompleteAnswer       the response ended, but is incomplete
-└── Unexpected                 the response does not follow the contract of this client
+Problem has a class for each kind of problem of the contract, below WrongRequest (the request
+violates the contract), NotAllowed, Unanswerable (a valid request without a result), Busy and
+InternalError. Classes with `again` are retried.
 """
 
 import time
 from collections.abc import Mapping
 from email.utils import parsedate_to_datetime
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import msgspec
 
@@ -64,20 +47,19 @@ class Problem(PosefieldError):
         if kind:
             cls.kinds[kind] = cls
 
-    def __init__(self, said: generated.Problem, retry_after: float | None = None) -> None:
-        super().__init__(f"{said.title}: {said.detail}" if said.detail else said.title)
-        self.said = said
-        self.status = said.status
-        self.kind = said.type.removeprefix(TYPE_PREFIX)
-        self.title = said.title
-        self.detail = said.detail
-        self.instance = said.instance
-        self.errors = said.errors
+    def __init__(self, document: generated.Problem, retry_after: float | None = None) -> None:
+        # Pickling between processes repeats the constructor with these arguments.
+        super().__init__(document, retry_after)
+        self.status = document.status
+        self.kind = document.type.removeprefix(TYPE_PREFIX)
+        self.title = document.title
+        self.detail = document.detail
+        self.instance = document.instance
+        self.errors = document.errors
         self.retry_after = retry_after
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        # Pickling between processes needs the arguments of the constructor.
-        return type(self), (self.said, self.retry_after), vars(self)
+    def __str__(self) -> str:
+        return f"{self.title}: {self.detail}" if self.detail else self.title
 
 
 class WrongRequest(Problem):
@@ -207,58 +189,46 @@ class IncompleteAnswer(Broken):
 class Unexpected(PosefieldError):
     """The response does not follow the contract of this client.
 
-    found: description of the response. service: the service's contract version; None if unknown.
-    client: the contract version of this client.
+    service: the service's contract version; None if unknown. client: that of this client.
     """
 
-    client = CONTRACT
+    client: ClassVar[str] = CONTRACT
+    service: str | None = None
 
-    def __init__(self, found: str, service: str | None = None) -> None:
-        speaks = (
-            f"speaks contract {service}" if service else "does not say which contract it speaks"
-        )
-        super().__init__(f"{found}; the service {speaks}, this client was made for {CONTRACT}")
-        self.found = found
-        self.service = service
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.found, self.service), vars(self)
+    def __str__(self) -> str:
+        version = f"contract {self.service}" if self.service else "an unknown contract"
+        return f"{super().__str__()}; the service has {version}, this client {CONTRACT}"
 
 
 _PROBLEM = msgspec.json.Decoder(generated.Problem)
 
 
-def of_answer(
-    status: int, headers: Mapping[str, str], content: bytes, asked: str
+def from_response(
+    status: int, headers: Mapping[str, str], content: bytes, request: str
 ) -> PosefieldError:
-    """Return the exception for an unsuccessful response. asked: the request, in words."""
-    fault = _of_anything(status, headers, content, asked)
-    fault.retry_after = _seconds(headers)
-    return fault
+    """Return the exception for an unsuccessful response. request: method and path."""
+    error = _classified(status, headers, content, request)
+    error.retry_after = _seconds(headers)
+    return error
 
 
-def _of_anything(
-    status: int, headers: Mapping[str, str], content: bytes, asked: str
+def _classified(
+    status: int, headers: Mapping[str, str], content: bytes, request: str
 ) -> PosefieldError:
-    problem = media_type(headers) == MEDIA_TYPE
+    kind = media_type(headers)
     try:
-        if problem:
-            return _of_problem(status, _PROBLEM.decode(content))
-    except msgspec.DecodeError as fault:
-        if status not in GATEWAYS:
-            told = f"{asked} was answered with {status} and no problem document: {fault}"
-            return Unexpected(told)
+        if kind == MEDIA_TYPE:
+            document = _PROBLEM.decode(content)
+            # For an unknown type, the status still tells whether the problem is temporary.
+            unknown = Busy if status in GATEWAYS else Problem
+            return Problem.kinds.get(document.type.removeprefix(TYPE_PREFIX), unknown)(document)
+    except msgspec.DecodeError as error:
+        kind = f"no problem document: {error}"
     if status in GATEWAYS:
-        return Unreachable(f"{asked} was answered with {status}, and not by the service")
+        return Unreachable(f"{request} was answered with {status}, and not by the service")
     if "location" in headers:
-        return Unexpected(f"{asked} was sent on to {headers['location']} ({status})")
-    return Unexpected(f"{asked} was answered with {status} and {media_type(headers)}")
-
-
-def _of_problem(status: int, said: generated.Problem) -> Problem:
-    # For an unknown type, the status still tells whether the problem is temporary.
-    unknown = Busy if status in GATEWAYS else Problem
-    return Problem.kinds.get(said.type.removeprefix(TYPE_PREFIX), unknown)(said)
+        return Unexpected(f"{request} was redirected to {headers['location']} ({status})")
+    return Unexpected(f"{request} was answered with {status} and {kind}")
 
 
 def media_type(headers: Mapping[str, str]) -> str:
@@ -267,18 +237,18 @@ def media_type(headers: Mapping[str, str]) -> str:
 
 
 def _seconds(headers: Mapping[str, str]) -> float | None:
-    """Return the seconds of a Retry-After header; None without one.
+    """Return the seconds of a Retry-After header; None without a valid one.
 
     A date is compared with the response's own Date header, because clocks differ.
     """
     text = headers.get("retry-after", "")
     if text.isascii() and text.isdigit():
         return float(text)
-    said, now = _moment(text), _moment(headers.get("date", ""))
-    return max(0.0, said - (time.time() if now is None else now)) if said is not None else None
+    date, now = _timestamp(text), _timestamp(headers.get("date", ""))
+    return max(0.0, date - (time.time() if now is None else now)) if date is not None else None
 
 
-def _moment(text: str) -> float | None:
+def _timestamp(text: str) -> float | None:
     try:
         return parsedate_to_datetime(text).timestamp()
     except (ValueError, OverflowError):

@@ -1,186 +1,195 @@
-"""Requests to a service and to a model, shared by both clients.
+"""Questions as HTTP requests: GET, which can be cached, or POST for long ones."""
 
-Controls are keywords, or a mapping `controls` for names that Python reserves. Arguments that are
-left out take the defaults of the service's contract.
-"""
-
-from collections.abc import Mapping, Sequence
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
 from typing import Any, Literal, TypeVar
+from urllib.parse import quote_plus
 
 import msgspec
+import numpy as np
 import numpy.typing as npt
 
-from posefield_client import asking, holding, numbers
-from posefield_client.generated import (
-    OPERATIONS,
-    CharacterList,
-    Liveness,
-    ModelCard,
-    ModelList,
-    ModelSummary,
-    PoseQuestion,
-    Readiness,
-    Reasons,
-    SigmaQuestion,
-    Suggestions,
-    WhyQuestion,
-)
-from posefield_client.holding import Exact, Targets
-from posefield_client.numbers import Pose, SigmaGrid
-from posefield_client.wire import Call, Reply, Request
+from posefield_client.errors import WrongQuestion
+from posefield_client.generated import OPERATIONS, Floor, ManifestEntry, PerformanceEntry, Target
+from posefield_client.wire import Call, Reply
 
 T = TypeVar("T")
-
-Extrapolate = Literal["ok", "warn", "refuse"]
 Controls = Mapping[str, float]
 Labels = Mapping[str, str | Mapping[str, float]]
 """Name, or weights of names, by label set: {"style": {"angry": 0.7, "happy": 0.3}}."""
+Exact = Literal["auto", "none"] | str | Sequence[str]
+"""The service's default, none, or the names of measured controls."""
+FloorValue = float | Floor | Mapping[str, float]
+"""Height of a level floor, m, or a plane."""
 Times = float | Sequence[float] | npt.NDArray[Any]
+Targets = Iterable[Target | Mapping[str, Any]]
+Entry = ManifestEntry | PerformanceEntry
+"""Line of a manifest: of an archive of clips, or of one of performances."""
+
+MODEL_NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,63}(@[0-9a-f]{16})?", re.ASCII)
+LONGEST = 4000
+"""Longest path and query of a GET request; services accept 8,192 characters by default."""
 
 
-def models() -> Call[tuple[ModelSummary, ...]]:
-    """Return the models of the service."""
-    return Call(Request(OPERATIONS["listModels"], "/v1/models"), _models)
+def question(arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a question from the arguments of a method: its own names, `controls` and `named`.
+
+    Arguments that are None are left out: they take the defaults of the contract.
+    """
+    given = {key: value for key, value in arguments.items() if value is not None}
+    for name in ("self", "model"):
+        given.pop(name, None)
+    if "named" in given:
+        given = {"controls": {**given.pop("controls", {}), **given.pop("named")}, **given}
+    if isinstance(exact := given.get("exact"), str) and exact not in ("auto", "none"):
+        given["exact"] = [exact]
+    if "times" in given and not isinstance(given["times"], list | tuple):
+        given["times"] = np.atleast_1d(given["times"])
+    return {key: plain(key, value) for key, value in given.items()}
 
 
-def characters() -> Call[CharacterList]:
-    """Return the characters of users, to which motions are delivered."""
-    return Call(Request(OPERATIONS["listCharacters"], "/v1/characters"), _CHARACTERS)
+def plain(name: str, value: Any) -> Any:
+    """Return a value as JSON types, recursively; WrongQuestion if that is impossible."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {key: plain(key, part) for key, part in value.items()}
+    if value is None or isinstance(value, bool | str):
+        return value
+    if isinstance(value, int | float):
+        # JSON would encode a non-finite number as null, which has another meaning.
+        if isinstance(value, float) and not math.isfinite(value):
+            raise WrongQuestion(f"{name} is {value!r}, expected a finite number")
+        return value
+    if isinstance(value, Iterable) and not isinstance(value, bytes):
+        return [plain(name, part) for part in value]
+    raise WrongQuestion(f"{name} is {value!r}, expected numbers, texts, lists or mappings")
 
 
-def live() -> Call[Liveness]:
-    """Return the liveness of the process, with its contract version."""
-    return Call(Request(OPERATIONS["getLiveness"], "/livez"), _LIVENESS)
+def get(
+    operation: str, model: str, words: Mapping[str, Any], read: Callable[[Reply], T], form: str = ""
+) -> Call[T]:
+    """Return a GET request. form: the format at the end of its path; empty without one."""
+    kind = OPERATIONS[operation].in_format(form)
+    query = "&".join(f"{quote_plus(key)}={_text(value)}" for key, value in _parameters(words))
+    path = kind.path.replace("{model}", model)
+    return Call(kind, f"{path}?{query}" if query else path, read)
 
 
-def ready() -> Call[Readiness]:
-    """Return the loaded models; NotReady if the service is not ready."""
-    return Call(Request(OPERATIONS["getReadiness"], "/readyz"), _READINESS)
-
-
-def card(model: str, /) -> Call[ModelCard]:
-    """Return the model card."""
-    return Call(asking.plain("getModel", model), _CARD)
-
-
-def character(model: str, /) -> Call[bytes]:
-    """Return the character at rest as binary glTF: joints and the body skinned to them."""
-    return Call(asking.plain("getCharacter", model), _content)
-
-
-def kernel(model: str, /) -> Call[bytes]:
-    """Return the model's numbers for a graphics card, a safetensors file."""
-    return Call(asking.plain("getKernel", model), _content)
-
-
-def pose(
+def post(
+    operation: str,
     model: str,
-    /,
-    times: Times,
-    *,
-    performer: str | None = None,
-    labels: Labels | None = None,
-    level: int | None = None,
-    joint_sigma: bool | None = None,
-    extrapolate: Extrapolate | None = None,
-    exact: Exact | None = None,
-    targets: Targets | None = None,
-    take: int | None = None,
-    variety: float | None = None,
-    detail: bool | None = None,
-    controls: Controls | None = None,
-    **named: float,
-) -> Call[Pose]:
-    """Return poses at one or more times, s, with constraints if given."""
-    question = PoseQuestion(
-        controls=asking.controls(controls, named),
-        times=asking.numbers("times", times),
-        **asking.said(extrapolate=extrapolate, performer=performer, level=level),
-        **asking.said(joint_sigma=joint_sigma, labels=labels),
-        **asking.said(take=take, variety=variety, detail=detail),
-        **holding.said(exact, targets),
-    )
-    return Call(asking.either("PoseInFormat", model, question, "msgpack"), numbers.pose)
+    body: Mapping[str, Any],
+    read: Callable[[Reply], T],
+    form: str = "",
+    query: str = "",
+) -> Call[T]:
+    """Return a POST request. form: the format at the end of its path; empty without one."""
+    kind = OPERATIONS[operation].in_format(form)
+    path = kind.path.replace("{model}", model)
+    return Call(kind, path + query, read, msgspec.json.encode(body))
 
 
-def why(
-    model: str,
-    /,
-    *,
-    nearest: int | None = None,
-    performer: str | None = None,
-    labels: Labels | None = None,
-    extrapolate: Extrapolate | None = None,
-    controls: Controls | None = None,
-    **named: float,
-) -> Call[Reasons]:
-    """Return the captured clips nearest to these controls, and their weights."""
-    question = WhyQuestion(
-        controls=asking.controls(controls, named),
-        **asking.said(nearest=nearest, extrapolate=extrapolate),
-        **asking.said(performer=performer, labels=labels),
-    )
-    return Call(asking.either("Why", model, question), _REASONS)
+def ask(
+    noun: str, model: str, words: Mapping[str, Any], read: Callable[[Reply], T], form: str = ""
+) -> Call[T]:
+    """Return a get<noun> request, or query<noun> if its path and query exceed LONGEST."""
+    call = get(f"get{noun}", model, words, read, form)
+    return call if len(call.target) <= LONGEST else post(f"query{noun}", model, words, read, form)
 
 
-def suggest(
-    model: str,
-    /,
-    *,
-    count: int | None = None,
-    performer: str | None = None,
-    labels: Labels | None = None,
-) -> Call[Suggestions]:
-    """Return the clips to capture next. performer, labels: whose clips count as captured."""
-    words = asking.said(count=count, performer=performer) | asking.label_words(labels or {})
-    return Call(asking.plain("getSuggestions", model, words), _SUGGESTIONS)
+def _parameters(words: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
+    """Return a question as query parameters, with one parameter per control."""
+    for key, value in words.items():
+        if key == "controls":
+            yield from value.items()
+        elif key == "times":
+            yield from (("time", time) for time in value)
+        elif key == "targets":
+            yield from (("target", _target(target)) for target in value)
+        elif key == "labels":
+            yield from (("label", f"{name}={_label(label)}") for name, label in value.items())
+        elif key == "floor" and isinstance(value, Mapping):
+            yield key, _joined(value.get(part) for part in ("height", "slope_x", "slope_z"))
+        elif isinstance(value, list):
+            yield key, _joined(value)
+        else:
+            yield key, value
 
 
-def sigma(
-    model: str,
-    /,
-    across: str,
-    along: str,
-    *,
-    columns: int | None = None,
-    rows: int | None = None,
-    margin: float | None = None,
-    performer: str | None = None,
-    labels: Labels | None = None,
-    controls: Controls | None = None,
-    **named: float,
-) -> Call[SigmaGrid]:
-    """Return sigma over the ranges of two controls, extended by a share `margin`."""
-    question = SigmaQuestion(
-        across=across,
-        along=along,
-        controls=asking.controls(controls, named),
-        **asking.said(columns=columns, rows=rows, margin=margin),
-        **asking.said(performer=performer, labels=labels),
-    )
-    return Call(asking.either("SigmaInFormat", model, question, "msgpack"), numbers.grid)
+def _label(value: str | Mapping[str, float]) -> str:
+    """Return a label's NAME, or NAME:WEIGHT,NAME:WEIGHT."""
+    if isinstance(value, str):
+        return value
+    return ",".join(f"{name}:{digits(weight)}" for name, weight in value.items())
 
 
-class _Json:
-    """Decoder of a schema of the contract from JSON."""
-
-    def __init__(self, kind: type[T]) -> None:
-        self._decoder = msgspec.json.Decoder(kind)
-
-    def __call__(self, reply: Reply) -> Any:
-        return self._decoder.decode(reply.content)
+def _target(target: Mapping[str, Any]) -> str:
+    """Return a target as JOINT@MOMENT:X,Y,Z."""
+    if ("time" in target) == ("at" in target):
+        raise WrongQuestion(f"target {dict(target)}: expected one of time and at")
+    moment = target["at"] if "at" in target else digits(target["time"])
+    return f"{target.get('joint')}@{moment}:{_joined(target.get('position', ()))}"
 
 
-_LIVENESS, _READINESS = _Json(Liveness), _Json(Readiness)
-_CHARACTERS = _Json(CharacterList)
-_CARD, _REASONS, _LIST = _Json(ModelCard), _Json(Reasons), _Json(ModelList)
-_SUGGESTIONS = _Json(Suggestions)
+def _joined(values: Iterable[Any]) -> str:
+    return ",".join(map(digits, values))
 
 
-def _models(reply: Reply) -> tuple[ModelSummary, ...]:
-    found: ModelList = _LIST(reply)
-    return found.models
+def _text(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return quote_plus(digits(value))
 
 
-def _content(reply: Reply) -> bytes:
-    return reply.content
+def digits(value: Any) -> str:
+    """Return a number without an exponent, because a query decodes "+" as a space."""
+    text = str(value)
+    is_exponential = isinstance(value, float) and "e" in text
+    return format(Decimal(text), "f") if is_exponential else text
+
+
+def model_name(name: str) -> str:
+    """Return the name; raise WrongQuestion if it is not a valid model name."""
+    if MODEL_NAME.fullmatch(name) is None:
+        raise WrongQuestion(f"model {name!r}, expected a name or name@hash")
+    return name
+
+
+@dataclass(frozen=True)
+class Files:
+    """Request with a file as result.
+
+    call: makes it from a decoder and a format. operation: that has the formats. count: number of
+    clips of an archive, else None. about: the question, for people. entry: form of the lines of an
+    archive's manifest.
+    """
+
+    call: Callable[[Callable[[Reply], Any], str], Call[Any]]
+    operation: str
+    about: str
+    count: int | None = None
+    entry: type[Entry] = ManifestEntry
+
+    def request(self, form: str, read: Callable[[Reply], T]) -> Call[T]:
+        """Return the request for a format; WrongQuestion for an unknown one."""
+        formats = OPERATIONS[self.operation].formats
+        if form not in formats:
+            raise WrongQuestion(f"format {form!r}, expected one of {', '.join(formats)}")
+        return self.call(read, form)
+
+
+def about(model: str, words: Mapping[str, Any]) -> str:
+    """Return a model and a question as the arguments of a call, for people; long lists are cut."""
+    given = {**words.get("controls", {}), **words}
+    given.pop("controls", None)
+    texts = (f"{key}={_short(value)}" for key, value in given.items())
+    return ", ".join([repr(model), *texts])
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else f"<{len(value)} items>"

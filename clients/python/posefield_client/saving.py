@@ -1,36 +1,33 @@
-"""Atomic writes of files with progress."""
+"""Atomic writes of files with progress, and archives that are complete."""
 
-import io
 import secrets
+import tarfile
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from errno import EISDIR
 from pathlib import Path
 from stat import S_IMODE
-from types import TracebackType
 from typing import BinaryIO, TypeVar
 
 import msgspec
 
-from posefield_client import archives
-from posefield_client.archives import Counter, Entry
-from posefield_client.exchange import Core
-from posefield_client.files import Files
-from posefield_client.wire import Call, Reply, Steps
+from posefield_client.errors import IncompleteAnswer
+from posefield_client.questions import Entry, Files
+from posefield_client.wire import Reply
+
+Line = TypeVar("Line")
+MANIFEST = "manifest.jsonl"
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Progress of a download: bytes received of total, and files of count for an archive."""
+    """Progress of a download: bytes received of total, which is None if unknown."""
 
     received: int
     total: int | None = None
-    files: int | None = None
-    count: int | None = None
 
-
-Line = TypeVar("Line")
 
 Watch = Callable[[Progress], object]
 """Callback for progress. An exception from it ends the download without a file."""
@@ -67,143 +64,116 @@ class Saved:
 
 
 class Part:
-    """Temporary file beside the target; `keep` renames it, otherwise it is deleted at the end."""
+    """Sink with a temporary file beside the target, deleted unless `keep` renames it."""
 
-    def __init__(self, path: Path) -> None:
-        self._asked = path
+    def __init__(self, path: Path, watch: Watch | None) -> None:
+        self.path = path
         # Write the target of a symbolic link, and keep the link.
-        self.path = path.resolve()
-        self._beside = self.path.with_name(f".{secrets.token_hex(6)}.part")
+        self._target = path.resolve()
+        self._temporary = self._target.with_name(f".{secrets.token_hex(6)}.part")
+        self._watch = watch
+        self._received = 0
+        self._total: int | None = None
         self.file: BinaryIO
 
     def __enter__(self) -> "Part":
-        if self.path.is_dir():
-            raise IsADirectoryError(EISDIR, "a folder, expected a file", str(self.path))
-        with self._named_faults():
-            self.file = self._beside.open("xb+")
+        if self._target.is_dir():
+            raise IsADirectoryError(EISDIR, "a folder, expected a file", str(self._target))
+        with self._named_errors():
+            self.file = self._temporary.open("xb+")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        fault: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.file.close()
         with suppress(FileNotFoundError):
-            self._beside.unlink()
+            self._temporary.unlink()
+
+    def begin(self, total: int | None) -> None:
+        """Discard the content of an earlier attempt."""
+        self.file.seek(0)
+        self.file.truncate()
+        self._received, self._total = 0, total
+
+    def write(self, chunk: bytes) -> None:
+        """Write the next bytes."""
+        self.file.write(chunk)
+        self._received += len(chunk)
+        if self._watch is not None:
+            self._watch(Progress(self._received, self._total))
 
     def keep(self) -> None:
         """Rename the complete file to its target."""
         self.file.close()
         # Keep the permissions of an existing file.
         with suppress(FileNotFoundError):
-            self._beside.chmod(S_IMODE(self.path.stat().st_mode))
-        with self._named_faults():
-            self._beside.replace(self.path)
+            self._temporary.chmod(S_IMODE(self._target.stat().st_mode))
+        with self._named_errors():
+            self._temporary.replace(self._target)
+
+    def saved(self, form: str, files: Files, reply: Reply) -> Saved:
+        """Return the metadata from a response's headers; ValueError if they are invalid."""
+        headers = reply.headers
+        supported = headers.get("posefield-supported")
+        return Saved(
+            self.path,
+            self._received,
+            headers.get("posefield-model"),
+            _number(headers.get("posefield-sigma")),
+            _number(headers.get("posefield-duration")),
+            _lines(headers.get("posefield-warning", ""), str),
+            entries(self.file, form, files),
+            None if supported is None else supported == "true",
+            msgspec.json.decode(headers.get("posefield-inferred", "{}"), type=dict[str, float]),
+            _lines(headers.get("posefield-missed", ""), Missed),
+        )
 
     @contextmanager
-    def _named_faults(self) -> Iterator[None]:
+    def _named_errors(self) -> Iterator[None]:
         """Raise errors of the file system with the wanted path, not with the temporary one."""
         try:
             yield
-        except OSError as fault:
-            raise type(fault)(fault.errno, fault.strerror, str(self._asked)) from None
+        except OSError as error:
+            raise type(error)(error.errno, error.strerror, str(self.path)) from None
 
 
-class Into:
-    """Sink that writes to a file and reports progress."""
+def entries(file: BinaryIO, form: str, files: Files) -> tuple[Entry, ...]:
+    """Return the manifest of an archive; empty for other files.
 
-    def __init__(self, file: BinaryIO, ending: str, count: int | None, watch: Watch | None) -> None:
-        self._file = file
-        self._ending = ending
-        self._count = count
-        self._watch = watch
-        self.begin(None)
-
-    def begin(self, total: int | None) -> None:
-        """Discard earlier content."""
-        self._file.seek(0)
-        self._file.truncate()
-        self.received, self._total = 0, total
-        self._counter = Counter(self._ending) if self._watch and self._count else None
-
-    def write(self, chunk: bytes) -> None:
-        """Write the next bytes."""
-        self._file.write(chunk)
-        self.received += len(chunk)
-        if self._watch is not None:
-            self._watch(self._progress(chunk))
-
-    def _progress(self, chunk: bytes) -> Progress:
-        if self._counter is None or self._count is None:
-            return Progress(self.received, self._total)
-        self._counter.feed(chunk)
-        # The counter includes the manifest.
-        whole = min(self._counter.files, self._count)
-        return Progress(self.received, self._total, whole, self._count)
-
-
-def save(core: Core, files: Files, path: Path, watch: Watch | None) -> Steps[Saved]:
-    """Write a response to a file; its suffix selects the format.
-
-    Raises PosefieldError and OSError.
+    Raises IncompleteAnswer if the archive does not match its manifest.
     """
-    ending = files.ending(path)
-    request = files.request(ending)
-    with Part(path) as part:
-
-        def look(reply: Reply) -> Saved:
-            return _saved(path, reply, _entries(part.file, ending, files))
-
-        sink = Into(part.file, ending, files.count, watch)
-        saved = yield from core.answer(Call(request, look), sink)
-        part.keep()
-        return replace(saved, bytes=sink.received)
-
-
-def content(core: Core, files: Files, ending: str) -> Steps[bytes]:
-    """Return a response in a format, as bytes."""
-
-    def look(reply: Reply) -> bytes:
-        _entries(io.BytesIO(reply.content), ending, files)
-        return reply.content
-
-    return (yield from core.answer(Call(files.request(ending), look)))
-
-
-def _entries(file: BinaryIO, ending: str, files: Files) -> tuple[Entry, ...]:
-    """Return the manifest of a complete archive; empty for other files."""
     if files.count is None:
         return ()
     file.seek(0)
-    return archives.check(file, ending, files.count, files.entry)
+    try:
+        sizes, manifest = _zip(file) if form == "zip" else _tar(file)
+        decoder = msgspec.json.Decoder(files.entry)
+        lines = tuple(map(decoder.decode, manifest.splitlines()))
+    except (zipfile.BadZipFile, tarfile.TarError, KeyError, msgspec.DecodeError, EOFError) as error:
+        raise IncompleteAnswer(f"the archive broke off: {error}") from None
+    clips = {name: size for name, size in sizes.items() if name != MANIFEST}
+    complete = len(lines) == files.count and clips == {line.file: line.bytes for line in lines}
+    if list(sizes)[-1:] != [MANIFEST] or not complete:
+        raise IncompleteAnswer(f"the archive holds {len(sizes)} files, expected {files.count + 1}")
+    return lines
 
 
-def _saved(path: Path, reply: Reply, entries: tuple[Entry, ...]) -> Saved:
-    """Return the metadata from a response's headers; ValueError if they are invalid."""
-    headers = reply.headers
-    return Saved(
-        path,
-        0,
-        headers.get("posefield-model"),
-        _number(headers.get("posefield-sigma")),
-        _number(headers.get("posefield-duration")),
-        _lines(headers.get("posefield-warning", ""), str),
-        entries,
-        _truth(headers.get("posefield-supported")),
-        msgspec.json.decode(headers.get("posefield-inferred", "{}"), type=dict[str, float]),
-        _lines(headers.get("posefield-missed", ""), Missed),
-    )
+def _zip(file: BinaryIO) -> tuple[dict[str, int], bytes]:
+    with zipfile.ZipFile(file) as archive:
+        sizes = {info.filename: info.file_size for info in archive.infolist()}
+        return sizes, archive.read(MANIFEST)
 
 
-def _lines(joined: str, each: type[Line]) -> tuple[Line, ...]:
+def _tar(file: BinaryIO) -> tuple[dict[str, int], bytes]:
+    with tarfile.open(fileobj=file, mode="r:") as archive:
+        sizes = {member.name: member.size for member in archive.getmembers()}
+        manifest = archive.extractfile(MANIFEST)
+        assert manifest is not None
+        return sizes, manifest.read()
+
+
+def _lines(joined: str, kind: type[Line]) -> tuple[Line, ...]:
     """Return the JSON values of a header with several comma-joined lines."""
-    return msgspec.json.decode(f"[{joined}]", type=tuple[each, ...])  # type: ignore[valid-type]
-
-
-def _truth(text: str | None) -> bool | None:
-    return None if text is None else text == "true"
+    return msgspec.json.decode(f"[{joined}]", type=tuple[kind, ...])  # type: ignore[valid-type]
 
 
 def _number(text: str | None) -> float | None:

@@ -2,25 +2,61 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypedDict
 
-import msgspec
 import numpy.typing as npt
-from msgspec import UNSET
+from msgspec import Struct
 
-from posefield_client import asking
+from posefield_client import questions
 from posefield_client.errors import WrongQuestion
-from posefield_client.generated import Act, Hold, Join, PlacedTarget, Walk
-from posefield_client.holding import Exact
+from posefield_client.generated import (
+    Body,
+    CharacterChoice,
+    Extrapolate,
+    FeetMode,
+    GaitEnd,
+    Join,
+    NamedScript,
+    Names,
+    Obstacle,
+    PerformanceQuestion,
+    PerformanceReport,
+    PerformanceStart,
+    PlacedTarget,
+    Unit,
+    Up,
+)
+from posefield_client.questions import Exact, Labels
 
-Segment = Walk | Act | Hold
-S = TypeVar("S", Walk, Act, Hold)
 Numbers = Sequence[float] | npt.NDArray[Any]
 Points = Sequence[Numbers] | npt.NDArray[Any]
 Curve = float | Points
 """A number, or pairs of a distance or time in the segment and a value."""
-GaitEnd = Literal["rolling", "standing"]
-Labels = Mapping[str, str | Mapping[str, float]]
+
+
+class Planned(Struct, frozen=True):
+    """Response to a request for the plan of a performance."""
+
+    trust: PerformanceReport
+
+
+class ScriptOptions(TypedDict, total=False):
+    """Options of a script besides its segments; names, unit, up and body are those of its file."""
+
+    character: CharacterChoice | Mapping[str, Any] | None
+    start: PerformanceStart | Mapping[str, Any] | None
+    obstacles: Iterable[Obstacle | Mapping[str, Any]] | None
+    fps: float | None
+    take: int | None
+    variety: float | None
+    detail: bool | None
+    level: int | None
+    feet: FeetMode
+    extrapolate: Extrapolate | None
+    names: Names | None
+    unit: Unit
+    up: Up
+    body: Body
 
 
 @dataclass(frozen=True)
@@ -32,10 +68,7 @@ class Script:
     Metres, seconds, radians; points of the floor are x to the left and z forward.
     """
 
-    segments: tuple[Segment, ...] = ()
-
-    def __repr__(self) -> str:
-        return f"Script({', '.join(map(_words, self.segments))})"
+    segments: tuple[Mapping[str, Any], ...] = ()
 
     def walk(
         self,
@@ -61,19 +94,18 @@ class Script:
         With none of them it goes where the act after it begins. model: by default that of the walk
         before. speed: m/s. turn: rad/s to the left. start, stop: at full speed or at rest.
         """
-        given = {
-            **asking.said(along=along, to=to, seconds=seconds, speed=speed, speed_over=speed_over),
-            **asking.said(turn=turn, performer=performer, labels=labels, start=start, stop=stop),
-            **asking.said(join=join),
-        }
-        return self._with(Walk, self._walker(model), given, asking.together(controls, named))
+        segment = questions.question(locals())
+        walks = [segment["model"] for segment in self.segments if segment["kind"] == "walk"]
+        if model is None and not walks:
+            raise WrongQuestion("a walk without a model, expected one in the first walk")
+        return self._with("walk", model or walks[-1], segment)
 
     def act(
         self,
         model: str,
         /,
         *,
-        targets: Iterable[PlacedTarget | Mapping[str, Any]] = (),
+        targets: Iterable[PlacedTarget | Mapping[str, Any]] | None = None,
         exact: Exact | None = None,
         at: Numbers | None = None,
         facing: float | None = None,
@@ -88,12 +120,7 @@ class Script:
         targets: where joints must be, in the world. at, facing: place and heading, rad, of its
         first pose; by default where the segment before it ends, or where its target is met.
         """
-        given = {
-            **asking.said(exact=(exact,) if _is_name(exact) else exact, at=at, facing=facing),
-            **asking.said(performer=performer, labels=labels, join=join),
-            **asking.said(targets=tuple(targets) or None),
-        }
-        return self._with(Act, model, given, asking.together(controls, named))
+        return self._with("act", model, questions.question(locals()))
 
     def hold(
         self, seconds: float, *, joint: str | None = None, look_at: Numbers | None = None
@@ -102,51 +129,27 @@ class Script:
 
         joint: that stays where it is. look_at: point that the head turns to, m.
         """
-        given = asking.said(seconds=seconds, joint=joint, look_at=look_at)
-        return self._with(Hold, None, given, {})
+        return self._with("hold", None, questions.question(locals()))
 
     def document(self) -> dict[str, Any]:
         """Return the script as JSON values, as files of scripts contain it."""
-        return {"segments": asking.sayable("segments", self.segments)}
+        return {"segments": list(self.segments)}
 
-    def _with(
-        self, kind: type[S], model: str | None, given: dict[str, Any], controls: Mapping[str, float]
-    ) -> "Script":
-        place = f"segment {len(self.segments)}"
-        plain = asking.sayable(place, {**given, "kind": kind.__struct_config__.tag})
-        if model is not None:
-            plain["model"] = asking.model_name(model)
-        if controls:
-            plain["controls"] = asking.controls(None, controls)
-        return replace(self, segments=(*self.segments, read_segment(place, plain, kind)))
-
-    def _walker(self, model: str | None) -> str:
-        """Return the model, by default that of the last walk."""
-        walked = [each.model for each in self.segments if isinstance(each, Walk)]
-        if model is None and not walked:
-            raise WrongQuestion("a walk without a model, expected one in the first walk")
-        return walked[-1] if model is None else model
+    def _with(self, kind: str, model: str | None, given: Mapping[str, Any]) -> "Script":
+        named = {} if model is None else {"model": questions.model_name(model)}
+        options = {key: value for key, value in given.items() if key != "controls" or value}
+        return replace(self, segments=(*self.segments, {"kind": kind, **named, **options}))
 
 
-def read_segment(place: str, given: Any, kind: Any = Segment) -> Any:
-    """Return a segment; WrongQuestion if it is invalid."""
-    try:
-        found = msgspec.convert(given, kind)
-    except msgspec.ValidationError as fault:
-        raise WrongQuestion(f"{place}: {fault}") from None
-    targets = getattr(found, "targets", UNSET)
-    for number, target in enumerate(() if targets is UNSET else targets):
-        if (target.time is UNSET) == (target.at is UNSET):
-            raise WrongQuestion(f"{place}, target {number}: expected one of time and at")
-    return found
+AnyScript = Script | PerformanceQuestion | NamedScript | Mapping[str, Any]
+"""A script, or a document of one as the contract has it."""
 
 
-def _is_name(exact: Exact | None) -> bool:
-    return isinstance(exact, str) and exact not in ("auto", "none")
-
-
-def _words(segment: Segment) -> str:
-    """Return a segment in two words: its kind, and its model or its duration."""
-    if isinstance(segment, Hold):
-        return f"hold {segment.seconds:g} s"
-    return f"{'walk' if isinstance(segment, Walk) else 'act'} {segment.model}"
+def document(script: AnyScript, options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the question of a script with options."""
+    if isinstance(script, Script):
+        script = script.document()
+    if not isinstance(script, Mapping):
+        kind = type(script).__name__
+        raise WrongQuestion(f"script is a {kind}, expected a Script or a mapping with segments")
+    return {**questions.plain("script", script), **questions.question(options)}

@@ -1,13 +1,10 @@
 """Tests of the client's errors: one class per kind of problem, and one for network errors."""
 
 import asyncio
-import gzip
 import json
 import pickle
-import re
 
 import httpx
-import msgspec
 import pytest
 import scripted
 import serving
@@ -16,7 +13,6 @@ from posefield_client.errors import Problem, Unexpected
 from posefield_client.generated import CONTRACT
 from scripted import Pause, answer, chunked
 
-from posefield.common.errors import UnknownModel
 from posefield.http.access import api_keys
 from posefield.http.api import problems
 from posefield.http.api.problems import PROBLEM_KINDS
@@ -62,19 +58,23 @@ def refusal(kind):
     return answer(content, problems.MEDIA_TYPE, kind.status)
 
 
-@pytest.mark.parametrize("kind", PROBLEM_KINDS, ids=lambda kind: kind.name)
-def test_every_kind_of_problem_is_a_class_of_its_own(kind):
+def test_a_problem_has_the_fields_of_its_document():
+    kind = problems.NO_SUCH_PATH
     version = answer(json.dumps({"contract": CONTRACT}).encode())
     with scripted.serving(refusal(kind), version) as server:
         fault = raised(server.address)
-    said = problem_example(kind)
-    assert type(fault) is Problem.kinds[kind.name]
-    assert type(fault).__name__.lower() == kind.name.replace("-", "")
+    document = problem_example(kind)
+    assert type(fault) is Problem.kinds[kind.name] is errors.NoSuchPath
     assert (fault.kind, fault.status) == (kind.name, kind.status)
-    assert (fault.title, fault.detail) == (said["title"], said["detail"])
-    assert fault.instance == said["instance"]
-    assert [e.detail for e in fault.errors] == [e["detail"] for e in said["errors"]]
-    assert said["title"] in str(fault)
+    assert (fault.title, fault.detail) == (document["title"], document["detail"])
+    assert fault.instance == document["instance"]
+    assert [e.detail for e in fault.errors] == [e["detail"] for e in document["errors"]]
+    assert document["title"] in str(fault)
+
+
+def test_every_kind_of_problem_is_a_class_of_its_own():
+    for name, kind in Problem.kinds.items():
+        assert kind.__name__.lower() == name.replace("-", "")
 
 
 def test_there_are_no_classes_of_kinds_that_are_not():
@@ -92,11 +92,6 @@ def test_a_kind_that_is_newer_than_the_client_is_a_problem():
     assert fault.kind == "moon-too-full"
 
 
-def test_the_tree_is_drawn_in_the_head_of_the_module():
-    drawn = set(re.findall(r"\b[A-Z][A-Za-z]+\b", errors.__doc__.partition("\n\n")[2]))
-    assert {each.__name__ for each in subclasses(PosefieldError)} | {"PosefieldError"} == drawn
-
-
 def test_what_can_help_to_ask_again_is_asked_again():
     again = {each.__name__ for each in subclasses(PosefieldError) if each.again}
     busy = {kind.name.replace("-", "") for kind in problems.LOAD_PROBLEMS} | {"busy"}
@@ -110,10 +105,7 @@ FAR = {"joint": "RightHand", "position": (0, 1, 5), "at": "end"}
 @pytest.mark.parametrize(
     ("ask", "kind"),
     [
-        (lambda m, c: m("reich").card, errors.UnknownModel),
         (lambda m, c: m("reach@0000000000000000").card, errors.UnknownModel),
-        (lambda m, c: m("reach").pose(0, spin=1), errors.InvalidField),
-        (lambda m, c: m("reach").pose(100, **c), errors.InvalidField),
         (lambda m, c: m("reach").pose(0, performer="nobody", **c), errors.InvalidField),
         (
             lambda m, c: m("reach").pose(0, extrapolate="refuse", **c | {"turn": 1000}),
@@ -124,7 +116,6 @@ FAR = {"joint": "RightHand", "position": (0, 1, 5), "at": "end"}
             errors.OutOfReach,
         ),
         (lambda m, c: m("reach").clip(fps="x", **c).content("usdc"), errors.BadParameter),
-        (lambda m, c: m("reach").clip(loop=True, **c).content("usdc"), errors.InvalidField),
         (lambda m, c: m("reach").crowd([0, 1], turn=[1, 2, 3]).numbers, errors.InvalidField),
     ],
 )
@@ -220,11 +211,6 @@ def test_an_answer_of_which_nobody_knows_the_end():
         assert type(raised(server.address)) is errors.IncompleteAnswer
 
 
-def test_bytes_that_are_not_in_the_coding_that_is_said():
-    with scripted.serving(answer(LIST, Content_Encoding="gzip")) as server:
-        assert type(raised(server.address)) is errors.Broken
-
-
 @pytest.mark.parametrize("status", errors.GATEWAYS)
 def test_something_before_the_service_says_that_it_is_not_there(status):
     with scripted.serving(answer(b"<html>", "text/html", status)) as server:
@@ -253,11 +239,11 @@ def test_an_answer_of_another_version_says_of_which(said):
     assert type(fault) is type(later) is Unexpected
     assert (fault.service, fault.client) == ("9.1.0", CONTRACT)
     assert str(fault) == str(later)
-    assert f"speaks contract 9.1.0, this client was made for {CONTRACT}" in str(fault)
+    assert f"the service has contract 9.1.0, this client {CONTRACT}" in str(fault)
     assert [line for line in server.lines if line != "GET /v1/models"] == ["GET /livez"] * 2
 
 
-@pytest.mark.parametrize("status", errors.GATEWAYS)
+@pytest.mark.parametrize("status", [429, 504])
 @pytest.mark.parametrize(
     ("said", "kind"),
     [
@@ -277,29 +263,6 @@ def test_a_gateways_own_problem_is_asked_again(said, kind, status):
         assert fault.retry_after == 7
 
 
-def test_what_cannot_be_read_says_why():
-    with scripted.serving(answer(b"[1,"), answer(b'{"contract": "9.1.0"}')) as server:
-        fault = raised(server.address)
-    assert isinstance(fault.__cause__, msgspec.DecodeError)
-
-
-@pytest.mark.parametrize("ask", [raised, raised_later])
-def test_a_coded_answer_that_was_cut_is_not_whole(ask):
-    whole = gzip.compress(LIST)
-    with scripted.serving(answer(whole[:-4], Content_Encoding="gzip")) as server:
-        assert type(ask(server.address)) is errors.IncompleteAnswer
-    with scripted.serving(answer(whole, Content_Encoding="gzip")) as server:
-        with Client(server.address) as client:
-            assert client.models() == ()
-
-
-def test_a_coding_that_was_not_asked_for():
-    with scripted.serving(
-        answer(LIST, Content_Encoding="br"), answer(b"{}"), answer(b"{}")
-    ) as server:
-        assert "in br, expected gzip" in str(raised(server.address))
-
-
 def test_a_client_that_was_closed():
     def close(client):
         client.close()
@@ -314,31 +277,16 @@ def test_a_client_that_was_closed():
         assert "closed" in str(fault)
 
 
-def test_notes_travel_between_processes():
-    version = answer(b'{"contract": "1.0.0"}')
-    with scripted.serving(refusal(problems.NO_SUCH_PATH), version) as server:
-        fault = raised(server.address)
-    assert pickle.loads(pickle.dumps(fault)).__notes__ == fault.__notes__
-
-
-def test_an_older_service_is_asked_for_its_document():
-    document = answer(b'{"info": {"version": "2.0.0"}}')
-    said = [answer(b"{}"), answer(b'{"status": "live"}'), document]
-    with scripted.serving(*said) as server:
-        assert raised(server.address).service == "2.0.0"
-    assert server.lines[1:] == ["GET /livez", "GET /openapi.json"]
-
-
 def test_what_is_no_service_says_no_version():
     page = answer(b"<html>", "text/html")
-    with scripted.serving(page, page, page) as server:
+    with scripted.serving(page, page) as server:
         fault = raised(server.address)
     assert fault.service is None
-    assert "does not say which contract" in str(fault)
+    assert "the service has an unknown contract" in str(fault)
 
 
 def test_a_path_that_an_older_service_does_not_have_is_noted():
-    version = answer(b'{"contract": "1.0.0"}')
+    version = answer(b'{"status": "live", "contract": "1.0.0"}')
     with scripted.serving(refusal(problems.NO_SUCH_PATH), version) as server:
         fault = raised(server.address)
     assert type(fault) is errors.NoSuchPath
@@ -352,13 +300,6 @@ def test_errors_travel_between_processes():
             again = pickle.loads(pickle.dumps(fault))
             assert type(again) is type(fault)
             assert (str(again), vars(again)) == (str(fault), vars(fault))
-
-
-def test_a_model_that_disappears(address, controls):
-    gone = refusal(problems.QUERY_ERROR_PROBLEMS[UnknownModel])
-    with scripted.serving(gone) as server:
-        fault = raised(server.address, lambda client: client.model("reach").pose(0, **controls))
-    assert type(fault) is errors.UnknownModel
 
 
 def test_the_real_service_speaks_the_contract(address):

@@ -1,6 +1,8 @@
-"""Tests of the client with the contract's examples, synchronous and asynchronous."""
+"""Tests of the client with the contract's examples.
 
-import asyncio
+The asynchronous client is the same code, see test_pyclient_generated.
+"""
+
 import json
 import re
 from urllib.parse import parse_qsl, urlsplit
@@ -11,13 +13,20 @@ import numpy as np
 import pytest
 from asking import contains, listening
 from contract_examples import CASES
-from posefield_client import NOTHING, AsyncClient, Client
-from posefield_client.files import CLIP, CLIPS, CROWD, WALK
-from posefield_client.performances import ARCHIVES, PERFORMANCE
+from posefield_client import Client
+from posefield_client.generated import OPERATIONS
 
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.registry import model_registry
+
+CLIP, CLIPS, CROWD, WALK = (
+    OPERATIONS[f"{name}InFormat"].formats
+    for name in ("getClip", "queryClips", "queryCrowd", "getCrowd")
+)
+PERFORMANCE, ARCHIVES = (
+    OPERATIONS[f"query{name}InFormat"].formats for name in ("Performance", "Performances")
+)
 
 # What the client does not ask for, and why.
 ANY_FORMAT = "negotiates the formats that end other paths"
@@ -38,10 +47,19 @@ NOT_ASKED = {
     },
     **{
         (name, None): "for people to read"
-        for name in ("getViewer", "getViewerCrowd", "getDocs", "getProblems", "getContract")
+        for name in (
+            "getViewer",
+            "getViewerCrowd",
+            "getDocs",
+            "getProblems",
+            "getContract",
+            "getContractJson",
+        )
     },
+    ("getContract", None): "is in `generated`",
+    ("getContractJson", None): "is in `generated`",
+    ("getKernel", None): "for graphics cards",
     ("getMetrics", None): "for Prometheus",
-    ("getContractJson", None): "asked by itself where an answer is none of the contract",
 }
 
 
@@ -126,7 +144,6 @@ CALLS = {
     ("getReadiness", None): lambda client, r: client.ready(),
     ("getModel", None): lambda client, r: model(client, r).card,
     ("getCharacter", None): lambda client, r: model(client, r).character(),
-    ("getKernel", None): lambda client, r: model(client, r).kernel(),
     ("getPoseInFormat", "msgpack"): pose,
     ("queryPoseInFormat", "msgpack"): pose,
     ("getWhy", None): why,
@@ -147,7 +164,6 @@ CALLS = {
     ),
     ("getClipInFormat", "msgpack"): lambda client, r: model(client, r).clip(**words(r)).numbers,
     ("queryCrowdInFormat", "msgpack"): lambda client, r: model(client, r).crowd(**words(r)).numbers,
-    ("queryCrowdInFormat", "arrow"): lambda client, r: model(client, r).crowd(**words(r)).table(),
 }
 EACH_CALL = pytest.mark.parametrize(
     ("name", "form"), CALLS, ids=["-".join(filter(None, case)) for case in CALLS]
@@ -212,17 +228,9 @@ def place(recorder):
         yield address
 
 
-def by_waiting(place, call, request):
-    with Client(place, cache=NOTHING) as client:
+def asked(place, call, request):
+    with Client(place, cache_bytes=0) as client:
         return call(client, request)
-
-
-def by_awaiting(place, call, request):
-    async def ask():
-        async with AsyncClient(place, cache=NOTHING) as client:
-            return await call(client, request)
-
-    return asyncio.run(ask())
 
 
 def test_every_operation_is_asked_for_or_there_is_a_reason():
@@ -230,12 +238,11 @@ def test_every_operation_is_asked_for_or_there_is_a_reason():
     assert not set(CALLS) & set(NOT_ASKED)
 
 
-@pytest.mark.parametrize("ask", [by_waiting, by_awaiting])
 @EACH_CALL
-def test_it_is_asked_as_in_the_example_and_answered(name, form, ask, place, recorder):
+def test_it_is_asked_as_in_the_example_and_answered(name, form, place, recorder):
     request = contract_examples.request(name, form)
     recorder.asked.clear()
-    found = ask(place, CALLS[name, form], padded(name, request))
+    found = asked(place, CALLS[name, form], padded(name, request))
     (sent,) = recorder.asked
     assert alike(*sent) == alike(
         request["method"], request["path"], json.dumps(request.get("body", "")).encode()
@@ -249,8 +256,8 @@ def as_promised(name, form, request, found, place):
     if isinstance(found, bytes):
         sent = httpx.request(request["method"], place + request["path"], json=request.get("body"))
         assert found == sent.content
-    elif (name, form) in SHOWN_BY_TABLES:
-        assert table_of(found) == SHOWN_BY_TABLES[name, form]
+    elif (name, form) == ("getClipInFormat", "msgpack"):
+        assert (found.rate, len(found.times)) == (25.0, 13)
     else:
         # Of arrays the example of the same question in JSON says what is in them.
         expected = contract_examples.response(name, form and "json")["body"]
@@ -260,17 +267,6 @@ def as_promised(name, form, request, found, place):
 
 WRAPPERS = {"listModels": "models", "queryPerformance": "trust"}
 """Keys of documents of which the client returns the only value."""
-SHOWN_BY_TABLES = {
-    ("getClipInFormat", "msgpack"): (25.0, 13),
-    ("queryCrowdInFormat", "arrow"): ["levels", 2],
-}
-
-
-def table_of(found):
-    """Return a clip's rate and length, or a table's columns and length."""
-    if hasattr(found, "rate"):
-        return found.rate, len(found.times)
-    return ["levels" if "levels" in found.column_names else found.column_names, found.num_rows]
 
 
 def test_another_answer_would_be_seen():
@@ -288,14 +284,6 @@ def alike(method, target, body):
     said = sorted((name, value(text)) for name, text in parse_qsl(query))
     content = json.loads(body) if body.strip(b'"') else None
     return method, path, said, content
-
-
-@EACH_CALL
-def test_both_clients_are_told_the_same(name, form, place):
-    request = contract_examples.request(name, form)
-    waited = by_waiting(place, CALLS[name, form], request)
-    awaited = by_awaiting(place, CALLS[name, form], request)
-    assert plain(waited) == plain(awaited)
 
 
 def plain(found):
