@@ -196,7 +196,7 @@ class Client:
     def _ask_once(self, call: Call[T], sink: Sink | None) -> T:
         is_cached = call.body is None and sink is None
         kept = self._cache.find(call.target) if is_cached else None
-        if kept is not None and time.time() < kept.until:
+        if kept is not None and kept.is_fresh():
             return call.decode(kept)
         reply = self._send(call, kept, sink)
         if kept is not None and reply.status == 304:

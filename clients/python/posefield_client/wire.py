@@ -39,6 +39,10 @@ class Reply:
     content: bytes
     until: float = 0.0
 
+    def is_fresh(self) -> bool:
+        """Return True for a cached response that needs no revalidation."""
+        return time.time() < self.until
+
 
 @dataclass(frozen=True, slots=True)
 class Call(Generic[T]):
