@@ -159,10 +159,9 @@ evaluate: $(SAMPLE)/recipe.toml ## measure all families on held-out clips and wr
 	test -d "$(DATA)" || { echo "make evaluate needs DATA=folder of the motion data"; exit 2; }
 	mkdir -p $(EVALUATIONS)
 	for family in $(EVALUATED); do \
-		$(BIN)/posefield evaluate $$family --data "$(DATA)" --resume build/evaluation \
-			--json-file $(EVALUATIONS)/$$family.json >/dev/null || exit 1; \
+		$(BIN)/python benchmarks/evaluate.py $$family --data "$(DATA)" \
+			--json $(EVALUATIONS)/$$family.json >/dev/null || exit 1; \
 	done
-	$(BIN)/posefield evaluate $(SAMPLE)/recipe.toml --resume build/evaluation \
-		--json-file $(EVALUATIONS)/reaching.json >/dev/null
+	$(BIN)/python benchmarks/evaluate.py $(SAMPLE)/recipe.toml --json $(EVALUATIONS)/reaching.json >/dev/null
 	$(BIN)/python docs/evaluation_summary.py $(EVALUATIONS)
 	$(BIN)/python docs/generate.py

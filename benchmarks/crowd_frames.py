@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from family import Family
-from paper import poses
+from paper import naive_kriging, poses
 from scipy import linalg
 
 from posefield.common.units import Indices, Singles
-from posefield_train.kriging import naive_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.universal_kriging import UniversalKriging
 

@@ -16,8 +16,8 @@ import numpy as np
 from discovered_families import Discovery, JudgedFamily
 from rows import Row, record, table
 
-from posefield_train.evaluate import compared_motion, methods, motion_errors
-from posefield_train.evaluate.methods import Queries
+from posefield_train.evaluate import compared_motion, motion_errors, predictions
+from posefield_train.evaluate.predictions import Queries
 from posefield_train.families import family_recipe, family_table
 from posefield_train.families.family_table import FamilyRow
 from posefield_train.source import ingest, recipe
@@ -88,7 +88,7 @@ def _errors(
     """Return the relative mean and the absolute root mean square of each held-out clip, m."""
     trained = train(told, rest, lambda _: None)
     asked = Queries(np.stack([one.controls for one in held]), [{}] * len(held))
-    made = methods.predict_posefield(told, trained, asked)
+    made = predictions.predict_posefield(told, trained, asked)
     found = []
     for one, answer in zip(held, made, strict=True):
         captured = compared_motion.motion_of_clip(one.captured or one.clip, None)

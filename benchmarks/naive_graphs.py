@@ -10,15 +10,16 @@ from functools import partial
 
 import numpy as np
 from family import Family
+from paper import naive_kriging
+from paper.naive_kriging import NaiveKriging
 
 from posefield.common.units import Floats
 from posefield.model_file import subgraph
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.align import time_alignment
-from posefield_train.kriging import kriging_graph, naive_kriging, variogram
+from posefield_train.kriging import kriging_graph, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.naive_kriging import NaiveKriging
 from posefield_train.onnx_graph.graph_builder import GraphBuilder
 from posefield_train.onnx_graph.level_tables import LevelTables
 from posefield_train.tensor import quaternion_graph

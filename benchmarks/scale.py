@@ -19,12 +19,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from evaluation import ground_truth
 from rows import Row, record, table
 
 from posefield.common.units import Floats
-from posefield_train.evaluate import compared_motion, ground_truth, methods, motion_errors
+from posefield_train.evaluate import compared_motion, motion_errors, predictions
 from posefield_train.evaluate.compared_motion import ComparedMotion
-from posefield_train.evaluate.methods import Queries
+from posefield_train.evaluate.predictions import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging.kriging_bank import VARIANCE
@@ -127,7 +128,7 @@ def compare(own: recipe.Recipe, trained: TrainedModel) -> dict[str, float]:
 
 
 def _answers(own: recipe.Recipe, trained: TrainedModel, points: Floats) -> list[ComparedMotion]:
-    return methods.predict_posefield(own, trained, Queries(points, [{}] * len(points)))
+    return predictions.predict_posefield(own, trained, Queries(points, [{}] * len(points)))
 
 
 def _distance(found: Sequence[ComparedMotion], points: Floats) -> float:

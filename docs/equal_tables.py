@@ -1,4 +1,4 @@
-"""Tables of comparisons with equal information, made of the files of `posefield evaluate`."""
+"""Tables of comparisons with equal information, made of the files of `make evaluate`."""
 
 import math
 from collections.abc import Iterator

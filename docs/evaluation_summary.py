@@ -1,4 +1,4 @@
-"""Write docs/results/evaluation: the figures of `posefield evaluate --json-file` that pages show.
+"""Write docs/results/evaluation: the figures of benchmarks/evaluate.py that pages show.
 
 python docs/evaluation_summary.py build/evaluation/results
 

@@ -1,4 +1,4 @@
-"""Tables of results, made of the files that `posefield evaluate --json` has written."""
+"""Tables of results, made of the files that `make evaluate` writes."""
 
 import json
 from collections.abc import Callable, Iterator

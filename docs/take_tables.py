@@ -1,4 +1,4 @@
-"""Table of the takes of held-out clips, made of the files of `posefield evaluate --json`."""
+"""Table of the takes of held-out clips, made of the files of `make evaluate`."""
 
 from collections.abc import Callable, Sequence
 

@@ -13,13 +13,13 @@ import numpy as np
 from family import Family
 
 from paper import precomputation
+from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
 from posefield.motion import skeleton
 from posefield_train.graph import ranks
 from posefield_train.graph.ranks import ParetoFront, RankTriple
 from posefield_train.graph.truncation_cost import RankCost
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.naive_kriging import NaiveKriging
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor.decoder import Decoder
 from posefield_train.tensor.hosvd import TuckerTensor

@@ -15,10 +15,10 @@ from timing import in_turn
 
 from paper import errors, poses, precomputation
 from paper.errors import Errors
+from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
 from posefield_train.graph import truncation_cost
 from posefield_train.graph.ranks import RankTriple
-from posefield_train.kriging.naive_kriging import NaiveKriging
 
 # The paper states no unit for its thresholds: summed distances in m, under two assumptions.
 THRESHOLDS = {"500 cm": 5.0, "750 cm": 7.5, "1000 cm": 10.0, "500 mm": 0.5}

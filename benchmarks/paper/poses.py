@@ -14,9 +14,9 @@ from family import Family
 from scipy import linalg
 
 from paper import kernels
+from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.naive_kriging import NaiveKriging
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.tensor.hosvd import TuckerTensor
 

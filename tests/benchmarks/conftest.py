@@ -1,11 +1,12 @@
-"""Fixtures of the tests of Table 1; adds benchmarks/ to the module path."""
+"""Fixtures of the tests of benchmarks; adds benchmarks/ to the module path."""
 
 import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+TESTS = Path(__file__).parents[1]
+sys.path[:0] = [str(TESTS.parent / "benchmarks"), str(TESTS / "model_export")]
 
 
 @pytest.fixture(scope="session")

@@ -17,8 +17,8 @@ from posefield_train.adapt import (
     tensor_extension,
 )
 from posefield_train.align import phase_alignment
-from posefield_train.evaluate import compared_motion, methods, motion_errors
-from posefield_train.evaluate.methods import Queries
+from posefield_train.evaluate import compared_motion, motion_errors, predictions
+from posefield_train.evaluate.predictions import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import ConstantModel
@@ -70,7 +70,7 @@ def misses(recipe, trained, model, name, whose="cy"):
     """Mean distance of a model's answers from a performer's own clips that it was not shown, m."""
     asked = examples(trained, whose, ASKED)
     said = Queries(np.stack([e.controls for e in asked]), [{"performer": name}] * len(asked))
-    made = methods.predict_posefield(recipe, replace(trained, model=model), said)
+    made = predictions.predict_posefield(recipe, replace(trained, model=model), said)
     pairs = zip(made, asked, strict=True)
     return np.mean(
         [

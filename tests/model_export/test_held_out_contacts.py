@@ -8,8 +8,7 @@ from joblib import parallel_config
 
 from posefield_train.contacts import contact_labels, held_out_contacts
 from posefield_train.contacts.held_out_contacts import FRAMES, SHARES, HeldOutClips
-from posefield_train.evaluate import protocol
-from posefield_train.evaluate.summary import evaluation_summary
+from posefield_train.evaluate import protocol, summary
 from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.sample import sample_walk
 from posefield_train.source.recipe import Recipe
@@ -62,8 +61,8 @@ def test_an_evaluation_tells_the_contacts_of_clips_held_out(strides):
     with parallel_config(backend="sequential"):
         result = protocol.run_protocol(own, strides[:8], "clip", ProcessJobs(1), lambda *_: None)
     assert len(result.contacts) == 8
-    found = json.loads(json.dumps(evaluation_summary.facts(result)))["contacts"]
+    found = json.loads(json.dumps(summary.facts(result)))["contacts"]
     assert found == held_out_contacts.mean_facts(result.contacts)
     assert found["agreement"] > 0.95 and FRAMES == 100
-    said = evaluation_summary.trust_text(result)[-1]
+    said = summary.trust_text(result)[-1]
     assert said.startswith(f"contacts: {found['agreement']:.1%} of frames agree")

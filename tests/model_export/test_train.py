@@ -10,8 +10,8 @@ from posefield.common.units import UP
 from posefield.motion import skeleton
 from posefield.motion.clip import assemble
 from posefield_train import train
-from posefield_train.evaluate import compared_motion, methods, motion_errors
-from posefield_train.evaluate.methods import Queries
+from posefield_train.evaluate import compared_motion, motion_errors, predictions
+from posefield_train.evaluate.predictions import Queries
 from posefield_train.sample import noise_free
 from posefield_train.sample import sample_controls as ranges
 from posefield_train.source.canonical import placement
@@ -220,9 +220,7 @@ def test_clips_aligned_to_what_others_predict_make_the_better_model(
     ]
 
     def error(made):
-        found = methods.predict_all(small_recipe, made, Queries(points, [{}] * 40)).motions[
-            "posefield"
-        ]
+        found = predictions.predict_posefield(small_recipe, made, Queries(points, [{}] * 40))
         pairs = zip(found, captured, strict=True)
         return motion_errors.mean(
             [motion_errors.compare_motions(a, b, ()) for a, b in pairs]

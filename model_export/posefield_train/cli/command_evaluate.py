@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,15 +16,13 @@ from posefield.console.arguments import Json
 from posefield.console.output import as_json
 from posefield.console.question_options import with_option_groups
 from posefield.console.registration import MAKE, PlainCommand, register
-from posefield_train.cli import executors, output_files
+from posefield_train.cli import executors
 from posefield_train.cli.executors import Scheduler
 from posefield_train.source import shipped_recipes
 
 if TYPE_CHECKING:
     from posefield.console.progress import ProgressBar
-    from posefield_train.evaluate.learning_curves import Learning
     from posefield_train.evaluate.protocol import EvaluationResult, ProgressCallback
-    from posefield_train.evaluate.support_flags import SupportFlags
     from posefield_train.parallel.jobs import Jobs
     from posefield_train.source.ingest import Example
     from posefield_train.source.recipe import Recipe
@@ -35,7 +33,6 @@ class Protocol(StrEnum):
 
     CLIP = "clip"
     PERFORMER = "performer"
-    TRUTH = "truth"
 
 
 @dataclass(frozen=True)
@@ -45,33 +42,15 @@ class EvaluateOptions:
     protocol: Annotated[
         list[Protocol] | None,
         typer.Option(
-            help="hold out clips or performers, or compare with the noise-free truth; may be "
-            "repeated; default: all",
+            help="hold out clips or performers; may be repeated; default: all",
             metavar="|".join(Protocol),
         ),
     ] = None
-    report: Annotated[Path | None, typer.Option(help="output .html report")] = None
     json: Json = False
     json_file: Annotated[
         Path | None,
         typer.Option("--json-file", help="output .json file; --json FILE is the same"),
     ] = None
-    joined: Annotated[
-        Path | None,
-        typer.Option(
-            help="another recipe: measure the share of the gap between both families that the "
-            "support flag detects",
-            metavar="RECIPE",
-        ),
-    ] = None
-    learning: Annotated[
-        bool,
-        typer.Option(
-            "--learning",
-            help="compare the errors after suggested and after random captures, for the "
-            "procedural family",
-        ),
-    ] = False
     scheduler: Scheduler = None
     jobs: Annotated[int | None, typer.Option(help="number of processes; default: one per core")] = (
         None
@@ -97,11 +76,6 @@ class EvaluateOptions:
         with executors.jobs(self.scheduler, self.jobs) as own:
             yield FinishedJobs(own, self.resume) if self.resume else own
 
-    @property
-    def protocols(self) -> list[str]:
-        """Names of the wanted protocols; empty for all that the recipe allows."""
-        return [one.value for one in self.protocol or []]
-
     def print(self, text: str) -> None:
         """Print a result for people: on standard error if standard output has the JSON."""
         typer.echo(text, err=self.json)
@@ -121,10 +95,9 @@ def evaluate(
 ) -> None:
     """Measure the errors of a recipe's models on held-out motions.
 
-    Other methods are measured on the same motions. Each fold fits the whole model again without the
-    held-out clips.
+    A Gaussian process and the mean motion are measured on the same motions. Each fold fits the
+    whole model again without the held-out clips.
     """
-    output_files.expect_html(wanted.report)
     recipe_file = shipped_recipes.file_of(recipe, data)
     _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
@@ -154,7 +127,7 @@ def json_file_words(words: Sequence[str]) -> list[str]:
 
 
 EXAMPLES = [
-    "evaluate kick/recipe.toml --report kick.html",
+    "evaluate kick/recipe.toml --json-file kick.json",
     "evaluate cmu_walk --data motion --protocol performer --json",
 ]
 
@@ -164,144 +137,50 @@ def add(app: typer.Typer) -> None:
     register(app, evaluate, MAKE, EXAMPLES, "evaluate", EvaluateCommand)
 
 
-@dataclass(frozen=True)
-class _Family:
-    """A recipe and its examples."""
-
-    recipe: "Recipe"
-    examples: "list[Example]"
-
-
 def _evaluate(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> None:
-    from posefield_train.evaluate.summary import evaluation_summary
+    from posefield_train.evaluate import protocol, summary
+    from posefield_train.source import ingest, recipe
 
     # Errors in the arguments are reported before minutes of work.
-    own = _family(recipe_file, data, wanted)
-    other = _joined(own, data, wanted)
-    results = _protocols(own, wanted)
-    wanted.print(evaluation_summary.legend(results))
-    curve = _learning(wanted)
-    more = _extra_results(own, other, results, curve, wanted)
-    first, *others = map(evaluation_summary.facts, results)
-    found = as_json({**first, **more, "others": others})
+    family = recipe.read_accepted(recipe_file)
+    examples, _ = ingest.ingest(family, data)
+    allowed = protocol.protocols(examples)
+    names = [one.value for one in wanted.protocol or []]
+    for name in names:
+        if name not in allowed:
+            can = ", ".join(allowed)
+            raise InvalidField("protocol", f"{name!r}, but {family.name} can only: {can}")
+    results = _results(family, examples, names or allowed, wanted)
+    wanted.print(summary.legend(results))
+    first, *others = map(summary.facts, results)
+    figures = as_json({**first, "others": others})
     if wanted.json:
-        typer.echo(found)
+        typer.echo(figures)
     if wanted.json_file:
-        atomic_files.write(found.encode(), wanted.json_file)
-    if wanted.report:
-        from posefield_train.evaluate.pages import evaluation_page
-
-        atomic_files.write(
-            evaluation_page.html(own.recipe.description, results, curve), wanted.report
-        )
+        atomic_files.write(figures.encode(), wanted.json_file)
 
 
-def _family(recipe_file: Path, data: Path, wanted: EvaluateOptions) -> _Family:
-    """Read a recipe's family. Raises InvalidField for options that it does not allow."""
-    from posefield_train.evaluate import protocol
-    from posefield_train.source import ingest, recipe
-
-    own = recipe.read_accepted(recipe_file)
-    if wanted.learning and not own.truth:
-        raise InvalidField("learning", f"{own.name} has no truth, expected the procedural family")
-    examples, _ = ingest.ingest(own, data)
-    can = protocol.protocols(own, examples)
-    for name in wanted.protocols:
-        if name not in can:
-            raise InvalidField("protocol", f"{name!r}, but {own.name} can only: {', '.join(can)}")
-    return _Family(own, examples)
-
-
-@dataclass(frozen=True)
-class _JoinedFamily:
-    """Name of a joined family, and the support flags of both families together."""
-
-    name: str
-    flags: "SupportFlags"
-
-
-def _joined(own: _Family, data: Path, wanted: EvaluateOptions) -> _JoinedFamily | None:
-    """Return None if no other family is named."""
-    from posefield_train.evaluate import support_flags
-    from posefield_train.source import ingest, recipe
-
-    if not wanted.joined:
-        return None
-    other = recipe.read_accepted(wanted.joined)
-    examples, _ = ingest.ingest(other, data)
-    return _JoinedFamily(
-        other.name, support_flags.measure_joined(own.recipe, own.examples, other, examples)
-    )
-
-
-def _protocols(own: _Family, wanted: EvaluateOptions) -> "list[EvaluationResult]":
+def _results(
+    family: "Recipe", examples: "list[Example]", names: list[str], wanted: EvaluateOptions
+) -> "list[EvaluationResult]":
     """Run the protocols and print each result when it is complete."""
     from posefield.console.progress import ProgressBar
-    from posefield_train.evaluate import corrections, protocol
-    from posefield_train.evaluate.footing import feet_summary
-    from posefield_train.evaluate.summary import evaluation_summary, performer_summary
-    from posefield_train.evaluate.variation import take_summary
+    from posefield_train.evaluate import protocol, summary
 
-    names = wanted.protocols or protocol.protocols(own.recipe, own.examples)
-    counts = [protocol.count_jobs(own.examples, name) for name in names]
+    counts = [len(protocol.folds_of(examples, name)) for name in names]
     results = []
     with wanted.executor() as jobs:
-        for place, name in enumerate(names):
-            before, total = sum(counts[:place]), sum(counts)
+        for index, name in enumerate(names):
+            before, total = sum(counts[:index]), sum(counts)
             # One bar for all protocols, so that the estimate is that of the command.
-            with ProgressBar(f"{own.recipe.name}, {name}", total, before) as bar:
-                results.append(
-                    protocol.run_protocol(
-                        own.recipe, own.examples, name, jobs, _after(bar, before, total)
-                    )
-                )
-            trust = "\n".join(evaluation_summary.trust_text(results[-1]))
-            wanted.print(f"{evaluation_summary.table(results[-1])}\n\n{trust}\n")
-            if results[-1].corrections:
-                wanted.print(f"{corrections.table(results[-1])}\n")
-            if results[-1].feet:
-                wanted.print(f"{feet_summary.table(results[-1].feet)}\n")
-            if told := take_summary.table(results[-1].variation):
-                wanted.print(f"{told}\n")
-    for text in performer_summary.performer_text(results):
-        wanted.print(text)
+            with ProgressBar(f"{family.name}, {name}", total, before) as bar:
+                report = _after(bar, before, total)
+                results.append(protocol.run_protocol(family, examples, name, jobs, report))
+            trust = "\n".join(summary.trust_text(results[-1]))
+            wanted.print(f"{summary.table(results[-1])}\n\n{trust}\n")
     return results
 
 
 def _after(bar: "ProgressBar", before: int, total: int) -> "ProgressCallback":
     """Return a callback that shows folds after `before` others, of `total`."""
     return lambda done, _: bar.update(before + done, total)
-
-
-def _extra_results(
-    own: _Family,
-    other: _JoinedFamily | None,
-    results: "list[EvaluationResult]",
-    curve: "Learning | None",
-    wanted: EvaluateOptions,
-) -> dict[str, Any]:
-    """Print and return the results for a joined family, for performers and for suggested clips."""
-    from posefield_train.evaluate import learning_curves
-    from posefield_train.evaluate.summary import performer_summary
-
-    more: dict[str, Any] = {}
-    if other:
-        wanted.print(f"\n{own.recipe.name} and {other.name} joined, {other.flags.text()}")
-        more["joined"] = {"family": other.name, "support": other.flags.facts()}
-    if named := performer_summary.performer_facts(results):
-        more["performers"] = named
-    if curve:
-        more["learning"] = learning_curves.facts(curve)
-        wanted.print(f"\n{learning_curves.table(curve)}")
-    return more
-
-
-def _learning(wanted: EvaluateOptions) -> "Learning | None":
-    """Measure the learning curves; None if they are not wanted."""
-    from posefield.console.progress import ProgressBar
-    from posefield_train.evaluate import learning_curves
-
-    if not wanted.learning:
-        return None
-    with wanted.executor() as jobs, ProgressBar("learning") as bar:
-        return learning_curves.measure_curves(jobs, bar.update)

@@ -1,4 +1,4 @@
-"""Evaluation protocols: clips held out, performers held out, and the noise-free truth."""
+"""Evaluation protocols: clips held out, and performers held out."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,47 +8,28 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
-from posefield.motion.clip import Clip
 from posefield_train.contacts import held_out_contacts
 from posefield_train.contacts.contact_model import ContactAccuracy
 from posefield_train.contacts.held_out_contacts import HeldOutClips
 from posefield_train.evaluate import (
     compared_motion,
-    corrected_answers,
-    event_bodies,
     folds,
-    ground_truth,
-    methods,
     motion_errors,
-    new_performers,
+    predictions,
     support_flags,
 )
-from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
-from posefield_train.evaluate.corrected_answers import Correction
-from posefield_train.evaluate.event_bodies import CAPTURED, EventBodies
+from posefield_train.evaluate.compared_motion import ComparedMotion
 from posefield_train.evaluate.folds import Fold
-from posefield_train.evaluate.footing import standing_answers
-from posefield_train.evaluate.footing.standing_answers import FeetAnswer
-from posefield_train.evaluate.methods import EXACT, OURS, Queries
 from posefield_train.evaluate.motion_errors import MotionErrors
+from posefield_train.evaluate.predictions import Predictions, Queries
 from posefield_train.evaluate.support_flags import SupportFlags
-from posefield_train.evaluate.variation import take_answers, take_summary
-from posefield_train.evaluate.variation.take_answers import TakeResults
-from posefield_train.evaluate.variation.take_summary import Takes
-from posefield_train.graph import onnx_export
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.parallel import single_thread
 from posefield_train.parallel.jobs import Jobs
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import truncation_error
 from posefield_train.train import train
-
-# Noise-free motions evaluated together: progress is shown, and memory is bounded.
-BATCH = 50
-# Methods whose bodies are kept for the charts.
-CHARTED_METHODS = (OURS, EXACT, *new_performers.ADAPTATION_COUNTS)
 
 ProgressCallback = Callable[[int, int], None]
 """Callback with the number of parts that are done, and of all parts."""
@@ -60,128 +41,86 @@ class EvaluationResult:
 
     clips: names. errors: of each method by clip; None for clips that a method did not predict.
     sigma: standard deviation (C,) that posefield predicts, m. joint_sigma: of each joint (C, J), m.
-    joints: their names. takes: number (C,) of the take of each clip. corrections: of the
-    predictions to the captured event (C,); empty without an event. flags: accuracy of the support
-    flag; None against the truth, which has no held-out clips. bodies: at the event, of captured
-    clips and of posefield's predictions. parents: of the joints. contacts: accuracy of posefield's
-    (C,); empty without contacts, and against the truth. feet: of the service's answers (C,); empty
-    without feet, in place, and against the truth. variation: takes of the clips.
-    curves: names. has_positions: False for clips of curves without a skeleton, of which measures of
-    positions say nothing.
+    joints: their names. takes: number (C,) of the take of each clip. flags: accuracy of the support
+    flag; None if no clips are held out. contacts: accuracy of posefield's (C,); empty without
+    contacts. curves: names. has_positions: False for clips of curves without a skeleton, of which
+    measures of positions say nothing. definitions: of the methods by name. references: row of
+    posefield that a method is compared with, where it is another than OURS.
     """
 
     family: str
     protocol: str
     clips: tuple[str, ...]
-    errors: dict[str, tuple[MotionErrors | None, ...]]
+    errors: Mapping[str, Sequence[MotionErrors | None]]
     sigma: Floats
     joint_sigma: Floats
     joints: tuple[str, ...]
     takes: tuple[int, ...]
-    corrections: tuple[Correction, ...]
     flags: SupportFlags | None = None
-    bodies: EventBodies = field(default_factory=dict)
-    parents: tuple[int, ...] = ()
     contacts: tuple[ContactAccuracy, ...] = ()
-    feet: tuple[FeetAnswer, ...] = ()
-    variation: Takes = field(default_factory=Takes)
     curves: tuple[str, ...] = ()
     has_positions: bool = True
+    definitions: Mapping[str, str] = field(default_factory=lambda: predictions.DEFINITIONS)
+    references: Mapping[str, str] = field(default_factory=dict)
 
-    def asked(self, name: str) -> list[int]:
+    def predicted(self, name: str) -> list[int]:
         """Return the indices of the clips that a method predicted."""
-        return [place for place, error in enumerate(self.errors[name]) if error is not None]
+        return [clip for clip, error in enumerate(self.errors[name]) if error is not None]
 
-    def of(self, name: str, places: Sequence[int]) -> list[MotionErrors]:
-        """Return the errors of a method at some of the clips that it predicted."""
-        return [error for place in places if (error := self.errors[name][place]) is not None]
+    def of(self, name: str, clips: Sequence[int] | None = None) -> list[MotionErrors]:
+        """Return the errors of a method at some of the clips that it predicted; None for all."""
+        chosen = range(len(self.clips)) if clips is None else clips
+        return [error for clip in chosen if (error := self.errors[name][clip]) is not None]
 
 
 @dataclass(frozen=True)
 class PartialResult:
-    """Result for some of the clips. places: their indices."""
+    """Result for some of the clips, whose indices are `clips`; the rest as in EvaluationResult."""
 
-    places: tuple[int, ...]
-    errors: dict[str, list[MotionErrors | None]]
+    clips: tuple[int, ...]
+    errors: Mapping[str, Sequence[MotionErrors | None]]
     sigma: Floats
     joint_sigma: Floats
-    corrections: list[Correction]
-    bodies: EventBodies
-    parents: tuple[int, ...]
     contacts: Sequence[ContactAccuracy] = ()
-    feet: Sequence[FeetAnswer] = ()
-    takes: TakeResults | None = None
-
-    def of(self, name: str) -> Sequence[MotionErrors | None]:
-        """Return the errors of a method, None for each clip if it predicted none."""
-        return self.errors.get(name, [None] * len(self.places))
 
 
 @dataclass(frozen=True)
-class _EvaluatedModel:
-    """A recipe, its trained model, and the model file."""
+class TrainedFold:
+    """A model that was trained without the clips of a fold, and what it is asked.
+
+    rest, held: clips that it was trained on, and those held out. captured: motions of the latter.
+    """
 
     recipe: Recipe
     trained: TrainedModel
-    file: bytes
+    fold: Fold
+    rest: Sequence[Example]
+    held: Sequence[Example]
+    queries: Queries
+    captured: Sequence[ComparedMotion]
 
 
-def protocols(recipe: Recipe, examples: Sequence[Example]) -> list[str]:
-    """Return the protocols that a recipe allows, the most important first."""
+def protocols(examples: Sequence[Example]) -> list[str]:
+    """Return the protocols that a family allows, the most important first."""
     several = len({example.row.performer for example in examples}) > 1
-    known = ["truth"] if recipe.truth else []
-    return known + ["clip"] + (["performer"] if several else [])
+    return ["clip", "performer"] if several else ["clip"]
 
 
-def count_jobs(examples: Sequence[Example], protocol: str) -> int:
-    """Return the number of jobs that a protocol is run in."""
-    if protocol == "truth":
-        return -(-ground_truth.POINTS // BATCH)
-    return len(_folds(examples, protocol))
-
-
-def _folds(examples: Sequence[Example], protocol: str) -> list[Fold]:
+def folds_of(examples: Sequence[Example], protocol: str) -> list[Fold]:
+    """Return the folds of a protocol."""
     return folds.clip_folds(examples) if protocol == "clip" else folds.performer_folds(examples)
 
 
 def run_protocol(
     recipe: Recipe, examples: Sequence[Example], protocol: str, jobs: Jobs, report: ProgressCallback
 ) -> EvaluationResult:
-    """Run a protocol: "clip" or "performer", held out one by one, or "truth".
+    """Run a protocol: "clip" or "performer", held out one by one.
 
     Raises TrainingError if the examples that remain are too few to train from.
     """
-    if protocol == "truth":
-        return run_against_truth(recipe, examples, ground_truth.truth_points(), jobs, report)
-    own = _folds(examples, protocol)
-    each = [(fold, protocol) for fold in own]
-    names = [f"{e.row.place.name} (line {e.row.line})" for e in examples]
-    controls = np.stack([example.controls for example in examples])
-    found = support_flags.measure_flags(
-        controls, [control.name for control in recipe.controls], own
-    )
-    joints, takes = examples[0].clip.skeleton.names, sample_points.take_numbers(examples)
-    asked = _ResultNames(f"leave_one_{protocol}_out", names, joints, takes.tolist())
-    parts = with_progress(jobs.run(run_fold, each, (recipe, examples)), len(each), report)
-    curves = tuple(examples[0].clip.curves.names) if examples[0].clip.curves else ()
-    return replace(_merge_parts(recipe, asked, parts), flags=found, curves=curves)
-
-
-def run_against_truth(
-    recipe: Recipe,
-    examples: Sequence[Example],
-    points: Floats,
-    jobs: Jobs,
-    report: ProgressCallback,
-) -> EvaluationResult:
-    """Return the result at control points (C, d) of the procedural family."""
-    made = _evaluated_model(recipe, examples)
-    each = [(points[at : at + BATCH], at) for at in range(0, len(points), BATCH)]
-    names = [", ".join(f"{value:.4g}" for value in point) for point in points]
-    asked = _ResultNames("truth", names, made.trained.skeleton.names, range(len(points)))
-    return _merge_parts(
-        recipe, asked, with_progress(jobs.run(_run_truth_batch, each, (made,)), len(each), report)
-    )
+    listed = folds_of(examples, protocol)
+    parts = jobs.run(run_fold, [(fold,) for fold in listed], (recipe, examples))
+    return held_out_result(recipe, examples, protocol, with_progress(parts, len(listed), report))
 
 
 def with_progress(results: Iterator[Any], count: int, report: ProgressCallback) -> Iterator[Any]:
@@ -192,165 +131,112 @@ def with_progress(results: Iterator[Any], count: int, report: ProgressCallback) 
 
 
 @single_thread.single_threaded()
-def run_fold(
-    recipe: Recipe, examples: Sequence[Example], fold: Fold, protocol: str
-) -> PartialResult:
+def run_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> PartialResult:
     """Return the result for the clips of one fold. Raises TrainingError as `run_protocol` does."""
+    trained = train_fold(recipe, examples, fold)
+    return compare_fold(trained, predictions.predict(recipe, trained.trained, trained.queries))
+
+
+def train_fold(recipe: Recipe, examples: Sequence[Example], fold: Fold) -> TrainedFold:
+    """Return the model of the clips that a fold does not hold out."""
     rest, held = fold.split(examples)
     try:
-        made = _evaluated_model(recipe, rest)
+        trained = train(recipe, rest, lambda _: None)
     except TrainingError as error:
         named = ", ".join(sorted({example.row.place.name for example in held}))
         raise TrainingError(f"with {named} held out: {error}") from error
-    asked = Queries(np.stack([e.controls for e in held]), [e.row.labels for e in held])
-    events = [methods.captured_event(recipe, made.trained, e.landmarks) for e in held]
-    pairs = zip(held, events, strict=True)
+    queries = Queries(np.stack([e.controls for e in held]), [e.row.labels for e in held])
     # As captured: closing a cycle moves joints, which would favour what closes the same way.
     captured = [
-        compared_motion.motion_of_clip(example.captured or example.clip, event)
-        for example, event in pairs
+        compared_motion.motion_of_clip(
+            example.captured or example.clip,
+            predictions.captured_event(recipe, trained, example.landmarks),
+        )
+        for example in held
     ]
-    if protocol == "clip":
-        more: ExtraPredictions = new_performers.predict_unnamed(recipe, made.trained, rest, asked)
-    else:
-        more = new_performers.predict_adapted(recipe, made.trained, held)
-    found = _compare_methods(made, fold.held, asked, _ReferenceMotions(captured, events, more))
-    contacts = _contact_accuracies(made, HeldOutClips(rest, held), asked)
-    by_clip = held if protocol == "clip" else []
-    feet = standing_answers.feet_answers(recipe.name, made.file, by_clip, _relative_distance)
-    takes = None
-    if protocol == "clip":
-        takes = take_answers.take_results(recipe.name, made.file, held, fold.held)
-    return replace(found, contacts=contacts, feet=feet, takes=takes)
+    return TrainedFold(recipe, trained, fold, rest, held, queries, captured)
 
 
-def _relative_distance(made: Clip, captured: Clip) -> float:
-    """Return the mean distance of a clip from a captured one after time warping, m."""
-    one, other = (compared_motion.motion_of_clip(own, None) for own in (made, captured))
-    return float(motion_errors.compare_motions(one, other, ()).relative.mean)
+def compare_fold(fold: TrainedFold, predicted: Predictions) -> PartialResult:
+    """Return the errors of predictions for the clips that are held out."""
+    feet = tuple(map(fold.trained.skeleton.names.index, fold.recipe.motion.feet))
+    errors = motion_errors.compare_methods(predicted.motions, fold.captured, feet)
+    contacts = _contact_accuracies(fold)
+    return PartialResult(fold.fold.held, errors, predicted.sigma, predicted.joint_sigma, contacts)
 
 
-def _contact_accuracies(
-    made: _EvaluatedModel, clips: HeldOutClips, asked: Queries
-) -> list[ContactAccuracy]:
-    own, model = made.trained.contacts, made.trained.model
-    if own is None:
+def _contact_accuracies(fold: TrainedFold) -> list[ContactAccuracy]:
+    fitted, model = fold.trained.contacts, fold.trained.model
+    if fitted is None:
         return []
-    labels = sample_points.label_weights(asked.labels, model.bank.labels)
-    durations = model.durations(asked.controls, labels)
+    controls = fold.queries.controls
+    labels = sample_points.label_weights(fold.queries.labels, model.bank.labels)
+    durations = model.durations(controls, labels)
 
     def predict(shares: Floats) -> Floats:
-        found = model.evaluate(asked.controls, shares * durations[:, None], labels).contacts
-        return np.zeros((len(durations), len(shares), 0)) if found is None else found
+        contacts = model.evaluate(controls, shares * durations[:, None], labels).contacts
+        return np.zeros((len(durations), len(shares), 0)) if contacts is None else contacts
 
-    joints = [one.joint for one in own.statistics]
-    return held_out_contacts.held_out_accuracies(made.recipe, clips, joints, predict)
-
-
-ExtraPredictions = Mapping[str, Sequence[ComparedMotion | None]]
-"""Answers of methods that only one protocol has; None for clips that they did not predict."""
+    joints = [statistics.joint for statistics in fitted.statistics]
+    clips = HeldOutClips(fold.rest, fold.held)
+    return held_out_contacts.held_out_accuracies(fold.recipe, clips, joints, predict)
 
 
-@dataclass(frozen=True)
-class _ReferenceMotions:
-    """Captured motions, their events, and predictions of additional methods."""
-
-    captured: Sequence[ComparedMotion]
-    events: Sequence[MotionEvent | None]
-    more: ExtraPredictions
-
-
-@single_thread.single_threaded()
-def _run_truth_batch(made: _EvaluatedModel, points: Floats, start: int) -> PartialResult:
-    event = methods.captured_event(made.recipe, made.trained, ())
-    captured = ground_truth.truth_motions(points, event)
-    places = tuple(range(start, start + len(points)))
-    asked = Queries(points, [{}] * len(points))
-    return _compare_methods(
-        made, places, asked, _ReferenceMotions(captured, [event] * len(points), {})
-    )
-
-
-def _evaluated_model(recipe: Recipe, examples: Sequence[Example]) -> _EvaluatedModel:
-    methods.check_lines(examples, tuple(control.name for control in recipe.controls))
-    trained = train(recipe, examples, lambda _: None)
-    return _EvaluatedModel(recipe, trained, onnx_export.export_finest(recipe, trained))
-
-
-def _compare_methods(
-    made: _EvaluatedModel,
-    places: tuple[int, ...],
-    asked: Queries,
-    held: _ReferenceMotions,
-) -> PartialResult:
-    recipe, trained = made.recipe, made.trained
-    feet = tuple(map(trained.skeleton.names.index, recipe.motion.feet))
-    found = methods.predict_all(recipe, trained, asked)
-    rest = {name: own for name, own in found.motions.items() if name != OURS}
-    ours, corrections = {OURS: found.motions[OURS]}, list[Correction]()
-    pairs = zip(held.captured, held.events, strict=True)
-    wanted = [corrected_answers.event_target(own, event) for own, event in pairs if event]
-    if wanted:
-        corrected = corrected_answers.correct_motions(recipe, trained, made.file, asked, wanted)
-        ours[EXACT], corrections = corrected.motions, corrected.corrections
-    motions = {**ours, **held.more, **rest}
-    compared = motion_errors.compare_methods(motions, held.captured, feet)
-    named = {
-        CAPTURED: held.captured,
-        **{name: motions[name] for name in motions if name in CHARTED_METHODS},
-    }
-    moment = truncation_error.event_frame(recipe, trained.examples)
-    looks = {
-        name: [event_bodies.event_body(own, moment.joint) if moment else None for own in made_of]
-        for name, made_of in named.items()
-    }
-    parents = trained.skeleton.parents
-    trust = found.sigma, found.joint_sigma
-    return PartialResult(places, compared, *trust, corrections, looks, parents)
-
-
-@dataclass(frozen=True)
-class _ResultNames:
-    """Names of the protocol, of the clips and of the joints; takes: number of each clip's."""
-
-    protocol: str
-    clips: Sequence[str]
-    joints: tuple[str, ...]
-    takes: Sequence[int]
-
-
-def _merge_parts(
-    recipe: Recipe, asked: _ResultNames, parts: Iterator[PartialResult]
+def held_out_result(
+    recipe: Recipe, examples: Sequence[Example], protocol: str, results: Iterator[PartialResult]
 ) -> EvaluationResult:
-    """Merge parts into one result, in the order of the clips."""
-    listed = sorted(parts, key=lambda part: part.places)
-    order = np.argsort([place for part in listed for place in part.places])
-    corrections = [correction for part in listed for correction in part.corrections]
-    contacts = [accuracy for part in listed for accuracy in part.contacts]
-    feet = [answer for part in listed for answer in part.feet]
+    """Return the result of a protocol from those of its folds."""
+    clip = examples[0].clip
+    controls = np.stack([example.controls for example in examples])
+    flags = support_flags.measure_flags(
+        controls, [control.name for control in recipe.controls], folds_of(examples, protocol)
+    )
+    merged = merge(
+        recipe,
+        f"leave_one_{protocol}_out",
+        [f"{example.row.place.name} (line {example.row.line})" for example in examples],
+        clip.skeleton.names,
+        sample_points.take_numbers(examples).tolist(),
+        results,
+    )
+    curves = tuple(clip.curves.names) if clip.curves else ()
+    return replace(merged, flags=flags, curves=curves)
+
+
+def merge(
+    recipe: Recipe,
+    protocol: str,
+    clips: Sequence[str],
+    joints: tuple[str, ...],
+    takes: Sequence[int],
+    results: Iterator[PartialResult],
+) -> EvaluationResult:
+    """Merge results for some of the clips, in any order, into one."""
+    parts = sorted(results, key=lambda part: part.clips)
     # A fold that leaves one performer lacks the methods that distinguish performers.
-    methods_asked = dict.fromkeys(name for part in listed for name in part.errors)
-    gathered = {name: [e for part in listed for e in part.of(name)] for name in methods_asked}
-    looks = {
-        name: [s for part in listed for s in part.bodies.get(name, [None] * len(part.places))]
-        for name in (CAPTURED, *CHARTED_METHODS)
-        if any(name in part.bodies for part in listed)
-    }
+    names = dict.fromkeys(name for part in parts for name in part.errors)
     return EvaluationResult(
         recipe.name,
-        asked.protocol,
-        tuple(asked.clips),
-        {name: tuple(own[i] for i in order) for name, own in gathered.items()},
-        np.concatenate([part.sigma for part in listed])[order],
-        np.concatenate([part.joint_sigma for part in listed])[order],
-        asked.joints,
-        tuple(asked.takes),
-        tuple(corrections[i] for i in order if corrections),
-        bodies={name: [own[i] for i in order] for name, own in looks.items()},
-        parents=listed[0].parents,
-        # A fold without a clip in contact has no contacts.
-        contacts=tuple(contacts[i] for i in order) if len(contacts) == len(order) else (),
-        feet=tuple(feet[i] for i in order) if len(feet) == len(order) else (),
-        variation=take_summary.merge([part.takes for part in listed], order.tolist()),
+        protocol,
+        tuple(clips),
+        {
+            name: in_order(parts, lambda p, n=name: p.errors.get(n, [None] * len(p.clips)))
+            for name in names
+        },
+        np.array(in_order(parts, lambda part: part.sigma)),
+        np.array(in_order(parts, lambda part: part.joint_sigma)),
+        joints,
+        tuple(takes),
+        contacts=tuple(in_order(parts, lambda part: part.contacts)),
         has_positions=recipe.curves is None or not recipe.curves.alone,
     )
+
+
+def in_order(parts: Sequence[Any], values: Callable[[Any], Sequence[Any]]) -> list[Any]:
+    """Return a value of each clip in the order of the clips; empty where some have none.
+
+    parts: each with `clips`, indices of which `values` are.
+    """
+    order = np.argsort([clip for part in parts for clip in part.clips])
+    listed = [value for part in parts for value in values(part)]
+    return [listed[i] for i in order] if len(listed) == len(order) else []

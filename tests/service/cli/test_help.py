@@ -89,7 +89,7 @@ def test_json_is_a_flag_of_every_command_with_a_result(name):
         (["--json", "a.toml"], ["--json", "a.toml"]),
         (["--json", "cmu_walk"], ["--json", "cmu_walk"]),
         (["a.toml", "--json"], ["a.toml", "--json"]),
-        (["a.toml", "--json", "--learning"], ["a.toml", "--json", "--learning"]),
+        (["a.toml", "--json", "--protocol", "clip"], ["a.toml", "--json", "--protocol", "clip"]),
     ],
 )
 def test_evaluate_takes_json_as_a_flag_and_with_a_file_as_before(words, parsed):

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from evaluation.peers import Interpolator
 from posefield.common.units import Booleans, Floats
 from posefield.kriging import kriging_model
-from posefield_train.evaluate.peers.interpolation_peers import Interpolator
 from posefield_train.kriging.sample_points import SamplePoints
 
 MOST_PARTS = 12

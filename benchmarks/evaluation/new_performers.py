@@ -1,25 +1,27 @@
-"""Predictions without a performer, and of a model adapted to a new performer with a few clips."""
+"""Error reduction by the name of a performer, and by a few clips of a new performer."""
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from evaluation.methods import ADAPTATION_COUNTS, ASKED_OPEN, NO_PERFORMER
 from posefield.common.units import Floats, Indices
 from posefield.kriging.kriging_model import half_ranges
 from posefield_train.adapt import adaptation, canonical_clips
-from posefield_train.evaluate import methods
+from posefield_train.evaluate import predictions, summary
 from posefield_train.evaluate.compared_motion import ComparedMotion
-from posefield_train.evaluate.methods import ASKED_OPEN, NO_PERFORMER, Queries
+from posefield_train.evaluate.predictions import OURS, Queries
+from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
+from posefield_train.report.drawing.significant_digits import round_number
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections.data_sections import PERFORMER
 from posefield_train.train import train
 
-ADAPTATION_COUNTS = {"posefield_adapt_1": 1, "posefield_adapt_3": 3, "posefield_adapt_5": 5}
-"""Number of clips that each method adapts with."""
 MIN_OTHER_TAKES = 3
 """Fewest other takes of the performer for which a clip is predicted."""
 
@@ -43,8 +45,8 @@ def predict_unnamed(
     plain = recipe.model_copy(update={"kriging": kriging})
     untold = train(plain, shown, lambda _: None)
     return {
-        NO_PERFORMER: methods.predict_posefield(plain, untold, unnamed),
-        ASKED_OPEN: methods.predict_posefield(recipe, trained, unnamed),
+        NO_PERFORMER: predictions.predict_posefield(plain, untold, unnamed),
+        ASKED_OPEN: predictions.predict_posefield(recipe, trained, unnamed),
     }
 
 
@@ -81,7 +83,7 @@ def _motions(
             own = adaptation.adapt(known, [held[i] for i in shown], example.row.performer)
             models[shown] = replace(trained, model=own.model)
         asked = Queries(example.controls[None], [example.row.labels])
-        found += methods.predict_posefield(recipe, models[shown], asked)
+        found += predictions.predict_posefield(recipe, models[shown], asked)
     return found
 
 
@@ -115,3 +117,33 @@ def _points(held: Sequence[Example]) -> Floats:
     controls = np.stack([example.controls for example in held])
     low, high = controls.min(axis=0), controls.max(axis=0)
     return half_ranges(controls, low, np.where(high > low, high, low + 1.0))
+
+
+def facts(results: Sequence[EvaluationResult]) -> dict[str, Any]:
+    """Return the error reduction by performer names and by clips of new performers.
+
+    Empty unless both protocols were run on a model that distinguishes performers.
+    """
+    by_name = {result.protocol: result for result in results}
+    clips, others = (by_name.get(f"leave_one_{held}_out") for held in ("clip", "performer"))
+    if not clips or not others or ASKED_OPEN not in clips.errors:
+        return {}
+    everyone = clips.predicted(ASKED_OPEN)
+    named, unnamed = (_mean_distance(clips, name, everyone) for name in (OURS, ASKED_OPEN))
+    figures: dict[str, Any] = {"named_nearer": round_number(1.0 - named / unnamed)}
+    for name in ADAPTATION_COUNTS:
+        if shown := others.predicted(name):
+            adapted, none = (_mean_distance(others, row, shown) for row in (name, OURS))
+            whole = _mean_distance(clips, OURS, shown)
+            figures[name] = {
+                "clips": len(shown),
+                "relative_cm": summary.centimetres(adapted),
+                "shown_none_cm": summary.centimetres(none),
+                "shown_all_cm": summary.centimetres(whole),
+                "farther_than_all": round_number(adapted / whole - 1.0),
+            }
+    return figures
+
+
+def _mean_distance(result: EvaluationResult, name: str, clips: Sequence[int]) -> float:
+    return float(summary.clip_distances(result, result.of(name, clips)).mean())

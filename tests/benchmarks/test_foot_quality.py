@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from evaluation import foot_quality
 
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.evaluate.footing import foot_quality
 
 RATE, FRAMES = 60.0, 61
 FOOT, KNEE = 2, 1

@@ -2,7 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
+import numpy as np
+
+from evaluation import foot_quality
+from evaluation.foot_quality import FootQuality
 from posefield.feet import limb_choice
 from posefield.inference import session
 from posefield.model_file.model_card import ModelCard
@@ -10,14 +15,22 @@ from posefield.motion.clip import Clip
 from posefield.question.motion_question import ClipQuestion, FeetMode, LabelValue
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.evaluate.footing import foot_quality
-from posefield_train.evaluate.footing.foot_quality import FootQuality
+from posefield_train.evaluate import compared_motion, motion_errors
+from posefield_train.report.drawing.significant_digits import round_number
 from posefield_train.source.ingest import Example
 
 NO_LIMIT = 1e6
 """Duration of a swing, s, that none exceeds."""
-Distance = Callable[[Clip, Clip], float]
-"""Distance of a made clip from a captured one, m."""
+NAMES = ("predicted", "standing", "locked")
+"""Answers that are compared with captured clips."""
+RATIOS: dict[str, Callable[[FootQuality], float]] = {
+    "skate": lambda quality: quality.skate,
+    "weighted_skate": lambda quality: quality.weighted_skate,
+    "acceleration": lambda quality: quality.acceleration,
+    "knee_peak": lambda quality: quality.knee_peak,
+    "knee_mean": lambda quality: quality.knee_mean,
+}
+"""Measures that are given as a ratio of means over clips."""
 
 
 @dataclass(frozen=True)
@@ -39,9 +52,7 @@ class FeetAnswer:
     lowered: float
 
 
-def feet_answers(
-    name: str, file: bytes, held: Sequence[Example], distance: Distance
-) -> list[FeetAnswer]:
+def feet_answers(name: str, file: bytes, held: Sequence[Example]) -> list[FeetAnswer]:
     """Return the answers of a model file for held-out clips, with their labels known.
 
     Empty for a model whose feet do not stand: in place, without feet, or without legs.
@@ -50,8 +61,8 @@ def feet_answers(
     joints = measured_joints(model.session.card)
     if joints is None:
         return []
-    models = _Models(model, _without_swing_rules(model))
-    return [_feet_answer(models, example, joints, distance) for example in held]
+    locked = _without_swing_rules(model)
+    return [_feet_answer(model, locked, example, joints) for example in held]
 
 
 @dataclass(frozen=True)
@@ -78,37 +89,30 @@ def measured_joints(card: ModelCard) -> MeasuredJoints | None:
     return MeasuredJoints(tuple(leg.tip for leg in legs), tuple(leg.middle for leg in legs))
 
 
-@dataclass(frozen=True)
-class _Models:
-    """A model, and the same without the rules of swings."""
-
-    own: Synthesizer
-    locked: Synthesizer
-
-
 def _feet_answer(
-    models: _Models,
-    example: Example,
-    joints: MeasuredJoints,
-    distance: Distance,
+    model: Synthesizer, locked: Synthesizer, example: Example, joints: MeasuredJoints
 ) -> FeetAnswer:
-    """Return the measures of one clip."""
     clip = example.captured or example.clip
     rate = min(foot_quality.HIGHEST_RATE, clip.rate)
-    standing_question = question(models.own, example, rate, "stand")
-    predicted = clips.synthesize_clip(models.own, question(models.own, example, rate))
-    standing = clips.synthesize_clip(models.own, standing_question)
-    locked = clips.synthesize_clip(models.locked, standing_question)
+    standing_question = question(model, example, rate, "stand")
+    predicted = clips.synthesize_clip(model, question(model, example, rate))
+    standing = clips.synthesize_clip(model, standing_question)
     report = standing.trust.feet
     return FeetAnswer(
         joints.measure(clip, rate),
         joints.measure(predicted.clip, rate),
         joints.measure(standing.clip, rate),
-        joints.measure(locked.clip, rate),
-        distance(predicted.clip, clip),
-        distance(standing.clip, clip),
+        joints.measure(clips.synthesize_clip(locked, standing_question).clip, rate),
+        _relative_distance(predicted.clip, clip),
+        _relative_distance(standing.clip, clip),
         report.lowered if report else 0.0,
     )
+
+
+def _relative_distance(clip: Clip, captured: Clip) -> float:
+    """Return the mean distance of a clip from a captured one after time warping, m."""
+    one, other = (compared_motion.motion_of_clip(moved, None) for moved in (clip, captured))
+    return motion_errors.compare_motions(one, other, ()).relative.mean
 
 
 def _without_swing_rules(model: Synthesizer) -> Synthesizer:
@@ -134,3 +138,31 @@ def question(
     return ClipQuestion(
         controls=controls, labels=labels, extrapolate="ok", exact="none", fps=rate, feet=feet
     )
+
+
+def facts(answers: Sequence[FeetAnswer]) -> dict[str, Any]:
+    """Return the figures by name: centimetres, centimetres a second, ratios; empty without feet."""
+    if not answers:
+        return {}
+    figures: dict[str, Any] = {
+        "clips": len(answers),
+        "captured_skate_cm_per_s": _centimetres([one.captured.skate for one in answers]),
+        "predicted_error_cm": _centimetres([one.predicted_error for one in answers]),
+        "standing_error_cm": _centimetres([one.standing_error for one in answers]),
+        "lowered_worst_cm": round_number(100.0 * max(one.lowered for one in answers)),
+        "lowest_cm": {
+            name: round_number(100.0 * min(getattr(one, name).lowest for one in answers))
+            for name in ("captured", *NAMES)
+        },
+    }
+    for key, value in RATIOS.items():
+        captured = max(float(np.mean([value(one.captured) for one in answers])), 1e-9)
+        figures[key] = {
+            name: round_number(np.mean([value(getattr(one, name)) for one in answers]) / captured)
+            for name in NAMES
+        }
+    return figures
+
+
+def _centimetres(metres: Sequence[float]) -> float:
+    return round_number(100.0 * float(np.mean(metres)))

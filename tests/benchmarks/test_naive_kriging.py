@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from paper import naive_kriging
 from running import outputs
 from scipy.interpolate import RBFInterpolator
 
-from posefield_train.kriging import naive_kriging, universal_kriging, variogram
+from posefield_train.kriging import universal_kriging, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
 
 SAMPLES, FRAMES, JOINTS = 25, 6, 4

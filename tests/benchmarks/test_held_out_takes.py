@@ -1,16 +1,15 @@
-"""Tests of the takes of an evaluation: random fields, held-out clips, and their summary."""
+"""Tests of the takes and standing feet of held-out clips, and of their figures."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from evaluation import field_statistics, standing_feet, takes
 
 from posefield.inference import session
 from posefield.kriging.kriging_model import KrigingWeights
 from posefield.question.motion_question import ClipQuestion
 from posefield_train.evaluate.folds import Fold
-from posefield_train.evaluate.variation import field_statistics, take_answers, take_summary
-from posefield_train.evaluate.variation.take_summary import Takes
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_walk
 from posefield_train.train import train
@@ -29,7 +28,7 @@ def file(strides):
 @pytest.fixture(scope="module")
 def found(strides, file):
     _, held = Fold(HELD).split(strides)
-    return take_answers.take_results("stroll", file, held, HELD)
+    return takes.take_results("stroll", file, held, HELD)
 
 
 @pytest.fixture(scope="module")
@@ -55,20 +54,18 @@ def test_other_folds_have_other_seeds(weights):
 def test_a_covariance_without_fields_has_no_takes(weights):
     spherical = replace(weights.hyper, covariance="spherical")
     assert field_statistics.measure(KrigingWeights(spherical, weights.samples), 1) is None
-    assert take_summary.facts(Takes()) == {} and take_summary.table(Takes()) == ""
+    assert takes.facts((), ()) == {}
 
 
 def test_few_samples_have_takes_without_statistics_of_fields(weights, found):
     few = KrigingWeights(weights.hyper, weights.samples[:5])
     assert field_statistics.measure(few, 1) is None
     assert field_statistics.measure(KrigingWeights(weights.hyper, weights.samples[:6]), 1)
-    alone = Takes(found.clips)
-    assert "variance" not in take_summary.facts(alone)
-    assert len(take_summary.rows(alone)) == 3
+    assert "variance" not in takes.facts(found.clips, ())
 
 
 def test_takes_of_held_out_clips_are_measured_at_the_default_rate(found):
-    assert ClipQuestion(controls={}).fps == take_answers.RATE
+    assert ClipQuestion(controls={}).fps == takes.RATE
     assert len(found.clips) == len(HELD)
     for own in found.clips:
         assert own.take != own.predicted and own.sliding != own.predicted
@@ -78,31 +75,51 @@ def test_takes_of_held_out_clips_are_measured_at_the_default_rate(found):
 
 
 def test_a_take_of_a_motion_without_cycle_varies_few_time_functions(labelled_path, examples):
-    made = take_answers.take_results("reach", labelled_path.read_bytes(), examples[:2], (0, 1))
+    made = takes.take_results("reach", labelled_path.read_bytes(), examples[:2], (0, 1))
     # Without feet no motion is measured.
     assert made.clips == () and made.fields is not None
-    told = take_summary.facts(take_summary.merge([made], []))
+    told = takes.facts((), [made.fields])
     assert "acceleration" not in told and told["variance"] == pytest.approx(1.0, abs=0.2)
 
 
-def test_facts_are_ratios_of_means_in_the_order_of_the_clips(found):
-    told = take_summary.facts(take_summary.merge([found, None], [2, 0, 1]))
-    captured = sum(own.captured.acceleration for own in found.clips)
-    taken = sum(own.take.acceleration for own in found.clips)
-    assert told["acceleration"]["take"] == pytest.approx(taken / captured, rel=1e-5)
-    assert told["clips"] == 3 and told["frames_per_second"] == take_answers.RATE
-    merged = take_summary.merge([found], [2, 0, 1])
-    assert merged.clips[0] is found.clips[2]
-    assert take_summary.merge([found], [0, 1]).clips == (), "a fold without takes"
-
-
-def test_the_table_has_values_beside_negative_controls(found):
-    merged = take_summary.merge([found], [0, 1, 2])
-    listed = take_summary.rows(merged)
-    assert len(listed) == 6 and all(len(row) == len(take_summary.HEADER) for row in listed)
-    # With detail there is a row of it.
+def test_facts_of_takes_are_ratios_of_means(found):
+    facts = takes.facts(found.clips, [found.fields])
+    captured = sum(one.captured.acceleration for one in found.clips)
+    taken = sum(one.take.acceleration for one in found.clips)
+    assert facts["acceleration"]["take"] == pytest.approx(taken / captured, rel=1e-5)
+    assert facts["clips"] == 3 and facts["frames_per_second"] == takes.RATE
+    # A fold whose model has no detail counts with its prediction and its take.
     one = replace(found.clips[0], detailed=found.clips[0].take, detailed_take=found.clips[0].take)
-    detailed = replace(merged, clips=[one, *found.clips[1:]])
-    rows = [row for row in take_summary.rows(detailed) if "detail" in row[0]]
-    assert len(rows) == 1 and "without detail" in rows[0][2]
-    assert "variance over kriging variance" in take_summary.table(merged)
+    detailed = takes.facts([one, *found.clips[1:]], ())["acceleration"]
+    assert detailed["detailed_take"] == facts["acceleration"]["take"]
+
+
+@pytest.fixture(scope="module")
+def answers(strides, file):
+    _, held = Fold(HELD).split(strides)
+    return standing_feet.feet_answers("stroll", file, held)
+
+
+def test_standing_feet_slide_less_and_cost_little(answers):
+    assert len(answers) == 3
+    for one in answers:
+        assert one.standing.weighted_skate < one.predicted.weighted_skate + 1e-3
+        assert one.standing_error < one.predicted_error + 0.01
+        assert one.standing.lowest > -0.01
+        assert 0.0 <= one.lowered <= 0.08
+    # Negative control: rules of swings, and not the contacts alone, make feet stand.
+    locked, standing = (
+        np.mean([getattr(one, name).weighted_skate for one in answers])
+        for name in ("locked", "standing")
+    )
+    assert locked > standing
+
+
+def test_facts_of_feet_are_ratios_of_means_and_centimetres(answers):
+    facts = standing_feet.facts(answers)
+    captured = sum(one.captured.acceleration for one in answers)
+    standing = sum(one.standing.acceleration for one in answers)
+    assert facts["acceleration"]["standing"] == pytest.approx(standing / captured, rel=1e-5)
+    errors = [one.standing_error for one in answers]
+    assert facts["standing_error_cm"] == pytest.approx(100.0 * sum(errors) / 3.0, rel=1e-5)
+    assert standing_feet.facts([]) == {}

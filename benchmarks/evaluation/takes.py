@@ -1,11 +1,16 @@
 """Takes of the service for held-out clips, compared with the captured motion."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from msgspec import structs
 
+from evaluation import field_statistics, standing_feet
+from evaluation.field_statistics import FieldStatistics
+from evaluation.foot_quality import FootQuality
+from evaluation.standing_feet import MeasuredJoints
 from posefield.constraints.take_variation import TakeVariation
 from posefield.inference import session
 from posefield.inference.takes import TakeSettings
@@ -14,11 +19,7 @@ from posefield.motion.clip import Clip, assemble
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
-from posefield_train.evaluate.footing import standing_answers
-from posefield_train.evaluate.footing.foot_quality import FootQuality
-from posefield_train.evaluate.footing.standing_answers import MeasuredJoints
-from posefield_train.evaluate.variation import field_statistics
-from posefield_train.evaluate.variation.field_statistics import FieldStatistics
+from posefield_train.report.drawing.significant_digits import round_number
 from posefield_train.source.ingest import Example
 
 RATE = 30.0
@@ -68,7 +69,7 @@ def take_results(
     card = model.session.card
     seeds = [FIRST_SEED + place for place in places]
     fields = field_statistics.measure(model.session.kriging_weights, seeds[0])
-    joints = standing_answers.measured_joints(card)
+    joints = standing_feet.measured_joints(card)
     if joints is None or not random_field.has_features(card.kriging):
         return TakeResults((), fields)
     found = [
@@ -89,7 +90,7 @@ class _Asked:
     @property
     def plain(self) -> ClipQuestion:
         """Return the question for the prediction, with feet as predicted."""
-        return standing_answers.question(self.model, self.example, RATE)
+        return standing_feet.question(self.model, self.example, RATE)
 
     @property
     def taken(self) -> ClipQuestion:
@@ -134,3 +135,56 @@ def _unlimited(model: Synthesizer, asked: ClipQuestion) -> Clip:
     return assemble(
         card.skeleton, found.rotations, found.root_position, found.bone_offsets, asked.fps
     )
+
+
+MEASURES: dict[str, Callable[[FootQuality], float]] = {
+    "acceleration": lambda quality: quality.acceleration,
+    "skate": lambda quality: quality.skate,
+    "weighted_skate": lambda quality: quality.weighted_skate,
+}
+"""Measures that are given as a ratio of means over clips."""
+ANSWERS = ("predicted", "take", "sliding", "unlimited", "detailed", "detailed_take")
+"""Answers that are compared with the captured clips, as `TakeAnswer` names them."""
+PLAIN = {"detailed": "predicted", "detailed_take": "take"}
+"""Answers in place of those with detail, of a fold whose model has none."""
+
+
+def facts(clips: Sequence[TakeAnswer], fields: Sequence[FieldStatistics]) -> dict[str, Any]:
+    """Return the figures by name, ratios all of them; empty without takes.
+
+    clips: of all folds; empty without feet that can stand. fields: of each fold's model; empty for
+    models of few samples. Ranges are the least and the greatest of the bins of distance, each the
+    mean over folds. In `controls` are the negative controls of the fields.
+    """
+    return (_field_facts(fields) if fields else {}) | (_clip_facts(clips) if clips else {})
+
+
+def _field_facts(fields: Sequence[FieldStatistics]) -> dict[str, Any]:
+    def mean(name: str) -> float:
+        return round_number(np.mean([getattr(one, name) for one in fields]))
+
+    def least_and_most(name: str) -> list[float]:
+        bins = np.mean([getattr(one, name) for one in fields], axis=0)
+        return [round_number(bins.min()), round_number(bins.max())]
+
+    return {
+        "variogram": least_and_most("variogram"),
+        "variance": mean("variance"),
+        "mean_in_standard_errors": mean("mean_error"),
+        "controls": {
+            "variogram_of_half_scales": least_and_most("wrong_variogram"),
+            "variance_without_conditioning": mean("unconditioned"),
+            "mean_in_standard_errors_of_equal_errors": mean("shared_errors"),
+        },
+    }
+
+
+def _clip_facts(clips: Sequence[TakeAnswer]) -> dict[str, Any]:
+    def ratio(name: str, value: Callable[[FootQuality], float]) -> float:
+        captured = float(np.mean([value(one.captured) for one in clips]))
+        answers = [getattr(one, name) or getattr(one, PLAIN.get(name, name)) for one in clips]
+        return round_number(np.mean([value(one) for one in answers]) / max(captured, 1e-9))
+
+    names = [name for name in ANSWERS if any(getattr(one, name) is not None for one in clips)]
+    ratios = {key: {name: ratio(name, value) for name in names} for key, value in MEASURES.items()}
+    return {"clips": len(clips), "frames_per_second": RATE, **ratios}

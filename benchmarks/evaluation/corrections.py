@@ -1,4 +1,4 @@
-"""Answers corrected to the captured position of the event's joint by the service's solver.
+"""Predictions corrected to the captured position of the event's joint by the service's solver.
 
 Each correction is measured, also for targets that are farther away than the captured position.
 """
@@ -6,9 +6,11 @@ Each correction is measured, also for targets that are farther away than the cap
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from evaluation.methods import EXACT
 from posefield.common.units import Floats
 from posefield.constraints import constrained_motion
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
@@ -20,9 +22,12 @@ from posefield.motion import skeleton
 from posefield.motion.measures import Measure
 from posefield_train.evaluate import compared_motion, motion_errors
 from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
-from posefield_train.evaluate.methods import Queries
+from posefield_train.evaluate.motion_errors import MotionErrors
+from posefield_train.evaluate.predictions import OURS, Queries
+from posefield_train.evaluate.protocol import EvaluationResult
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
+from posefield_train.report.drawing.significant_digits import round_number
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
@@ -79,14 +84,6 @@ class Far:
 
 
 @dataclass(frozen=True)
-class CorrectedMotions:
-    """Corrected motions and their corrections."""
-
-    motions: list[ComparedMotion]
-    corrections: list[Correction]
-
-
-@dataclass(frozen=True)
 class _MotionCorrector:
     """An opened model, its constraint solver, and the event."""
 
@@ -132,8 +129,8 @@ def correct_motions(
     file: bytes,
     asked: Queries,
     wanted: Sequence[EventTarget],
-) -> CorrectedMotions:
-    """Return the answers of a model file, each corrected to its target."""
+) -> tuple[list[ComparedMotion], list[Correction]]:
+    """Return the predictions of a model file, each corrected to its target, and the corrections."""
     event = truncation_error.event_frame(recipe, trained.examples)
     assert event is not None
     opened = session.open_bytes(file, recipe.name)
@@ -142,7 +139,7 @@ def correct_motions(
     labels = sample_points.label_weights(asked.labels, known)
     clips = zip(asked.controls[:, None], labels[:, None], wanted, strict=True)
     motions, corrections = zip(*(_correct(desk, *clip) for clip in clips), strict=True)
-    return CorrectedMotions(list(motions), list(corrections))
+    return list(motions), list(corrections)
 
 
 def _correct(
@@ -207,3 +204,45 @@ def _acceleration_ratio(after: ComparedMotion, before: ComparedMotion) -> float:
 
 def _is_reachable(held: ConstrainedMotion) -> bool:
     return all(met.reached for met in held.results)
+
+
+def facts(result: EvaluationResult, corrections: Sequence[Correction]) -> dict[str, float]:
+    """Return the figures by name: centimetres, milliseconds, shares; with the worst clip's."""
+
+    def of(value: Callable[[Correction], float]) -> Floats:
+        return np.array([float(value(correction)) for correction in corrections])
+
+    before, after = result.of(OURS), result.of(EXACT)
+    spread = {
+        "effector_cm": 100.0 * np.array([error.effector for error in after]),
+        "steps": of(lambda c: c.steps),
+        "acceleration": of(lambda c: c.acceleration),
+        "distance": of(lambda c: c.distance),
+    }
+    # Medians, because single clips are delayed by other work of the machine.
+    plain = {
+        "relative_change": _change(before, after, "relative"),
+        "global_change": _change(before, after, "absolute"),
+        "ms": 1e3 * np.median(of(lambda c: c.seconds)),
+        "plain_ms": 1e3 * np.median(of(lambda c: c.plain_seconds)),
+        "out_of_reach": np.mean(of(lambda c: not c.reached)),
+    }
+    for index, metres in enumerate(BEYOND_DISTANCES[: len(corrections[0].beyond)]):
+        missed = [not correction.beyond[index] for correction in corrections]
+        plain[f"out_of_reach_{round(100 * metres)}cm"] = np.mean(missed)
+    if far := [correction.far for correction in corrections if correction.far]:
+        plain["far_out_of_reach"] = np.mean([not one.reached for one in far])
+        spread["far_acceleration"] = np.array([one.acceleration for one in far])
+        spread["far_root_cm"] = 100.0 * np.array([one.root for one in far])
+        spread["far_steps"] = np.array([float(one.steps) for one in far])
+    means = {name: round_number(values.mean()) for name, values in spread.items()}
+    worst = {f"{name}_worst": round_number(values.max()) for name, values in spread.items()}
+    return means | worst | {name: round_number(value) for name, value in plain.items()}
+
+
+def _change(before: Sequence[MotionErrors], after: Sequence[MotionErrors], distance: str) -> Any:
+    """Return the change of a mean distance, as a share of that without correction."""
+    means = [
+        np.mean([getattr(error, distance).mean for error in errors]) for errors in (after, before)
+    ]
+    return means[0] / means[1] - 1.0

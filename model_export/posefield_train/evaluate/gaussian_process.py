@@ -19,7 +19,7 @@ from posefield_train.kriging.sample_points import SamplePoints
 JITTER = 1e-10
 
 
-def gp_with_performers(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
+def predict(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
     """Return predictions of a Gaussian process with a length scale for each control and performer.
 
     Length scales, amplitude and noise maximise the marginal likelihood.
@@ -35,14 +35,8 @@ def gp_with_performers(samples: SamplePoints, values: Floats, queries: Floats) -
     with warnings.catch_warnings():
         # A length scale at its bound is a valid result: the control has no influence, or all.
         warnings.simplefilter("ignore", ConvergenceWarning)
-        found = model.fit(samples.points, scaled).predict(queries)
-    return centre + size * found.reshape(len(queries), -1)
-
-
-def gp_without_performers(samples: SamplePoints, values: Floats, queries: Floats) -> Floats:
-    """Return the predictions of `gp_with_performers` from the controls alone."""
-    known, asked = samples.half_ranges, queries[:, : samples.controls]
-    return gp_with_performers(SamplePoints(known, samples.controls, samples.groups), values, asked)
+        predicted = model.fit(samples.points, scaled).predict(queries)
+    return centre + size * predicted.reshape(len(queries), -1)
 
 
 @dataclass(frozen=True)
@@ -73,7 +67,7 @@ class MarginalLikelihood:
         count, columns = self.values.shape
         alpha = cho_solve((factor, True), self.values, check_finite=False)
         inverse = cho_solve((factor, True), np.eye(count), check_finite=False)
-        own = (
+        likelihood = (
             -0.5 * float(np.sum(self.values * alpha))
             - columns * float(np.log(np.diag(factor)).sum())
             - 0.5 * columns * count * np.log(2.0 * np.pi)
@@ -82,12 +76,12 @@ class MarginalLikelihood:
         weighted = inner * signal
         lengths = np.tensordot(weighted, self.squares, axes=2) * rates
         slope = 0.5 * np.array([weighted.sum(), *lengths, noise * np.trace(inner)])
-        return -own, -slope
+        return -likelihood, -slope
 
     def optimize(
         self, unused: Callable[..., Any], start: Floats, bounds: Floats
     ) -> tuple[Floats, float]:
         """Return the best theta and its value; an optimizer of scikit-learn's regressor."""
         limits = [(float(low), float(high)) for low, high in bounds]
-        found = minimize(self.negative, start, method="L-BFGS-B", jac=True, bounds=limits)
-        return found.x, float(found.fun)
+        best = minimize(self.negative, start, method="L-BFGS-B", jac=True, bounds=limits)
+        return best.x, float(best.fun)

@@ -2,29 +2,25 @@
 
 import numpy as np
 import pytest
+from evaluation import linear_smoothers, methods, peers
 from scipy.interpolate import RBFInterpolator
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from posefield_train.evaluate.peers import (
-    gaussian_process,
-    interpolation_peers,
-    linear_smoothers,
-    predicted_values,
-)
 from posefield_train.kriging.sample_points import SamplePoints
 
 EXACT = 1e-8
-PEERS = (*interpolation_peers.LINEAR_PEERS, predicted_values.GP)
+PEERS = (*peers.LINEAR_PEERS, "gp")
 
 
 def predicted(name, samples, values, queries):
-    """Return the prediction of a peer, by its name."""
-    return predicted_values.predict(samples, {"pose": values}, queries).values[name]["pose"]
+    """Return the prediction of a peer of libraries that has no labels, by its name."""
+    settings, _ = peers.LINEAR_PEERS[name]
+    choices = [linear_smoothers.smoother(peer, samples, queries) for peer in settings]
+    return linear_smoothers.predict(choices, values)
 
 
 def laid(points, labels=None):
-    labels = np.zeros((len(points), 0)) if labels is None else labels
+    if labels is None:
+        return SamplePoints(points, points.shape[1], np.arange(len(points)))
     both = np.hstack([points, labels])
     return SamplePoints(both, points.shape[1], np.arange(len(points)), (labels.shape[1],))
 
@@ -56,11 +52,14 @@ REPRODUCE_LINES = (
 )
 
 
-@pytest.mark.parametrize("name", PEERS)
-def test_a_constant_is_predicted_as_such(name, points, queries):
-    found = predicted(name, laid(points), np.full((24, 2), 7.0), queries)
-    assert found.shape == (7, 2)
-    assert np.abs(found - 7.0).max() < 1e-6
+def test_a_constant_is_predicted_as_such(points, queries):
+    predicted_values, _ = methods.peer_values(
+        laid(points), {"pose": np.full((24, 2), 7.0)}, queries
+    )
+    assert set(predicted_values) == set(PEERS), "without labels none is there twice"
+    for values in predicted_values.values():
+        assert values["pose"].shape == (7, 2)
+        assert np.abs(values["pose"] - 7.0).max() < 1e-6
 
 
 @pytest.mark.parametrize("name", REPRODUCE_LINES)
@@ -79,7 +78,7 @@ def test_interpolators_meet_their_samples(name, points):
     assert np.abs(found - curved(points)).max() < EXACT
 
 
-@pytest.mark.parametrize("name", ["thin_plate_smoothed", "gp", "mean", "linear_regression"])
+@pytest.mark.parametrize("name", ["thin_plate_smoothed", "mean", "linear_regression"])
 def test_what_smooths_does_not_meet_noise(name, points, rng):
     noise = rng.standard_normal((24, 2))
     found = predicted(name, laid(points), noise, points + 1e-3)
@@ -120,54 +119,24 @@ def test_the_nearest_of_the_same_performer_is_taken(points):
     values = np.arange(24.0)[:, None]
     asked = np.hstack([points[:1], [[0.0, 1.0]]])
     own = 12 + int(np.argmin(np.linalg.norm(points[12:] - points[0], axis=1)))
-    assert interpolation_peers.nearest_of_performer(laid(points, labels), values, asked) == own
+    assert peers.nearest_of_performer(laid(points, labels), values, asked) == own
     nobody = np.hstack([points[:1], [[0.0, 0.0]]])
-    assert interpolation_peers.nearest_of_performer(laid(points, labels), values, nobody) == 0
-
-
-def test_the_process_tells_performers_apart_where_it_is_told(points, queries):
-    labels = np.tile(np.eye(2), (12, 1))
-    values = linear(points) + 5.0 * labels[:, :1]
-    asked = np.hstack([queries, np.tile([0.0, 1.0], (7, 1))])
-    truth = linear(queries)
-    told = np.abs(
-        gaussian_process.gp_with_performers(laid(points, labels), values, asked) - truth
-    ).mean()
-    untold = np.abs(
-        gaussian_process.gp_without_performers(laid(points, labels), values, asked) - truth
-    ).mean()
-    assert told < 0.3 * untold
+    assert peers.nearest_of_performer(laid(points, labels), values, nobody) == 0
 
 
 def test_outside_the_hull_the_nearest_is_taken(points):
     values = curved(points)
     far = np.array([[9.0, 9.0, 9.0]])
     nearest = np.argmin(np.linalg.norm(points - far, axis=1))
-    found = interpolation_peers.linear_coefficients(laid(points), values, far)
+    found = peers.linear_coefficients(laid(points), values, far)
     assert np.array_equal(found[0], values[nearest])
 
 
 def test_one_control_is_interpolated_on_its_line():
     points = np.array([[0.5], [-1.0], [1.0]])
     values = np.array([[2.0], [0.0], [3.0]])
-    found = interpolation_peers.linear_coefficients(
-        laid(points), values, np.array([[0.75], [-0.25]])
-    )
+    found = peers.linear_coefficients(laid(points), values, np.array([[0.75], [-0.25]]))
     assert found.ravel() == pytest.approx([2.5, 1.0])
-
-
-def test_the_likelihood_is_scikit_learns(points, rng):
-    kernel = ConstantKernel(1.0) * RBF(np.ones(3)) + WhiteKernel(0.1)
-    values = curved(points) + 0.1 * rng.standard_normal((24, 2))
-    theta = kernel.theta + 0.3 * rng.standard_normal(5)
-    model = GaussianProcessRegressor(kernel, optimizer=None).fit(points, values)
-    expected, slope = model.log_marginal_likelihood(theta, eval_gradient=True)
-    own = gaussian_process.MarginalLikelihood(np.square(points[:, None] - points), values)
-    found, found_slope = own.negative(theta)
-    assert found == pytest.approx(-expected, rel=1e-10)
-    assert found_slope == pytest.approx(-slope, rel=1e-8)
-    # Negative control: elsewhere it is another number.
-    assert own.negative(theta + 0.1)[0] != pytest.approx(-expected, rel=1e-4)
 
 
 @pytest.fixture
@@ -177,23 +146,20 @@ def two(points):
     return laid(points, labels), linear(points) + 5.0 * labels[:, :1]
 
 
-def known_and_open(name, two, queries):
-    """Errors of a peer that is told the second performer, and of one that is not."""
+def test_every_peer_has_a_use_for_the_performer(two, queries):
     asked = np.hstack([queries, np.tile([0.0, 1.0], (len(queries), 1))])
-    found = predicted_values.predict(two[0], {"pose": two[1]}, asked).values
-    truth = linear(queries)
-    ends = ("", predicted_values.OPEN)
-    return [float(np.abs(found[name + end]["pose"] - truth).mean()) for end in ends]
-
-
-@pytest.mark.parametrize("name", PEERS)
-def test_every_peer_has_a_use_for_the_performer(name, two, queries):
-    told, untold = known_and_open(name, two, queries)
-    assert told < 0.75 * untold
+    predicted_values, _ = methods.peer_values(two[0], {"pose": two[1]}, asked)
+    expected = linear(queries)
+    for name in PEERS:
+        named, unnamed = (
+            float(np.abs(predicted_values[name + end]["pose"] - expected).mean())
+            for end in ("", methods.OPEN)
+        )
+        assert named < 0.75 * unnamed, name
 
 
 def test_offsets_are_those_of_the_performers(two):
-    own = linear_smoothers.smoother(interpolation_peers.thin_plate(1.0), two[0], two[0].points)
+    own = linear_smoothers.smoother(peers.thin_plate(1.0), two[0], two[0].points)
     found = linear_smoothers.performer_offsets(own, *two)
     assert found[0] - found[1] == pytest.approx(np.full(2, 5.0), rel=0.1)
 
@@ -201,14 +167,14 @@ def test_offsets_are_those_of_the_performers(two):
 def test_performers_who_do_not_differ_have_no_offsets(points, queries, rng):
     noise = rng.standard_normal((24, 3))
     samples = laid(points, np.tile(np.eye(2), (12, 1)))
-    own = linear_smoothers.smoother(interpolation_peers.thin_plate(1.0), samples, samples.points)
+    own = linear_smoothers.smoother(peers.thin_plate(1.0), samples, samples.points)
     same = linear_smoothers.performer_offsets(own, samples, linear(points)[:, :1] + 0 * noise)
     assert np.abs(same).max() < EXACT
 
 
 def test_an_unknown_performer_has_no_offset(two, queries):
     nobody = np.hstack([queries, np.zeros((len(queries), 2))])
-    choices = [linear_smoothers.smoother(interpolation_peers.thin_plate(1.0), two[0], nobody)]
+    choices = [linear_smoothers.smoother(peers.thin_plate(1.0), two[0], nobody)]
     found = linear_smoothers.predict_with_performers(choices, *two, nobody)
     own = linear_smoothers.performer_offsets(choices[0], *two)
     rest = two[1] - two[0].points[:, 3:] @ own
@@ -217,7 +183,7 @@ def test_an_unknown_performer_has_no_offset(two, queries):
 
 def test_left_out_weights_are_those_of_a_peer_without_the_part(two):
     samples, values = two
-    own = linear_smoothers.smoother(interpolation_peers.thin_plate(0.0), samples, samples.points)
+    own = linear_smoothers.smoother(peers.thin_plate(0.0), samples, samples.points)
     parts = linear_smoothers.left_out_parts(samples)
     assert len(parts) == linear_smoothers.MOST_PARTS
     assert np.sum(parts, axis=0).tolist() == [1] * 24

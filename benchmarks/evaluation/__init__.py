@@ -1,0 +1,1 @@
+"""Evaluation of the families of the results pages: peers, targets, feet, takes, performers."""

@@ -1,1 +1,0 @@
-"""Measures of standing feet, and the service's answers that are measured on folds."""

@@ -1,1 +1,0 @@
-"""Charts and HTML page of an evaluation."""

@@ -1,1 +1,0 @@
-"""Other interpolation methods that are compared with posefield, of SciPy and scikit-learn."""

@@ -1,0 +1,181 @@
+"""Predictions of posefield and two other methods for the same queries, from the same training."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from posefield.common.units import Floats
+from posefield.motion import skeleton
+from posefield_train.evaluate import compared_motion, gaussian_process
+from posefield_train.evaluate.compared_motion import ComparedMotion, MotionEvent
+from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.kriging import sample_points
+from posefield_train.kriging.kriging_bank import VARIANCE
+from posefield_train.source.recipe import Recipe
+from posefield_train.tensor import truncation_error, uniform_motion
+from posefield_train.tensor.truncation_error import EventFrame
+from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
+
+OURS, GP, MEAN = "posefield", "gp", "mean"
+DEFINITIONS = {
+    OURS: "the model as exported: truncated, with its own bone lengths and timing",
+    GP: "scikit-learn GaussianProcessRegressor, ARD RBF + white noise, label as columns",
+    MEAN: "the mean motion",
+}
+"""Definition of each method."""
+
+Values = Mapping[str, Floats]
+"""Values (n, m) of each kriged quantity by name; "pose" may be pose vectors (n, T, D)."""
+
+
+@dataclass(frozen=True)
+class Queries:
+    """Queries. controls: (Q, d). labels: names of each query by label set; empty for none."""
+
+    controls: Floats
+    labels: Sequence[Mapping[str, str]]
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """Predictions of all methods.
+
+    motions: by method; None for queries that a method does not predict. sigma: standard deviation
+    (Q,) that posefield predicts, m. joint_sigma: of each joint (Q, J), m.
+    """
+
+    motions: Mapping[str, Sequence[ComparedMotion | None]]
+    sigma: Floats
+    joint_sigma: Floats
+
+
+def predict(recipe: Recipe, trained: TrainedModel, queries: Queries) -> Predictions:
+    """Return the predictions of every method, posefield's first."""
+    points, values = query_points(trained, queries), trained.values
+    process = {
+        name: gaussian_process.predict(trained.samples, known, points)
+        for name, known in values.items()
+    }
+    mean = {name: np.tile(known.mean(axis=0), (len(points), 1)) for name, known in values.items()}
+    peers = {GP: with_pose_vectors(trained, process), MEAN: with_pose_vectors(trained, mean)}
+    return with_sigma(recipe, trained, queries, peers)
+
+
+def with_sigma(
+    recipe: Recipe, trained: TrainedModel, queries: Queries, peers: Mapping[str, Values]
+) -> Predictions:
+    """Return the predictions of posefield and of peers by name, and posefield's sigma.
+
+    peers: predicted values, with pose vectors.
+    """
+    bank = trained.model.bank
+    motions = {OURS: predict_posefield(recipe, trained, queries)}
+    motions |= motions_of_values(recipe, trained, peers)
+    sigma = bank.sigma(bank.numpy(query_points(trained, queries))[VARIANCE])
+    return Predictions(motions, sigma, sigma[:, None] * trained.joints)
+
+
+def query_points(trained: TrainedModel, queries: Queries) -> Floats:
+    """Return the points (Q, d + p) of queries: controls in half-ranges, and labels."""
+    return trained.model.bank.points(queries.controls, _labels(trained, queries))
+
+
+def _labels(trained: TrainedModel, queries: Queries) -> Floats:
+    return sample_points.label_weights(queries.labels, trained.model.bank.labels)
+
+
+def captured_event(
+    recipe: Recipe, trained: TrainedModel, landmarks: Sequence[float]
+) -> MotionEvent | None:
+    """Return the event of a captured clip from its landmarks; None if the recipe names none."""
+    frame = truncation_error.event_frame(recipe, trained.examples)
+    if frame is None or recipe.event is None:
+        return None
+    if recipe.event.at in ("start", "end"):
+        return MotionEvent(frame.joint, float(recipe.event.at == "end"))
+    return MotionEvent(frame.joint, landmarks[recipe.landmark_names.index(recipe.event.at)])
+
+
+def predict_posefield(
+    recipe: Recipe, trained: TrainedModel, queries: Queries
+) -> list[ComparedMotion]:
+    """Return the predictions of the exported model."""
+    event = truncation_error.event_frame(recipe, trained.examples)
+    labels, model = _labels(trained, queries), trained.model
+    fields = model.bank.numpy(model.bank.points(queries.controls, labels))
+    times = np.exp(fields["duration"]) * UNIFORM_SHARES
+    answer = model.evaluate(queries.controls, times, labels)
+    motions = _motions(
+        trained,
+        answer.rotations,
+        answer.root_position,
+        answer.bone_offsets,
+        answer.duration,
+        fields["warp"],
+        event,
+    )
+    if answer.curves is None:
+        return motions
+    return compared_motion.with_curves(motions, model.decoder.curves, answer.curves)
+
+
+def with_pose_vectors(trained: TrainedModel, values: Values) -> Values:
+    """Return predicted values with pose vectors (Q, T, D) for reduced motions (Q, N)."""
+    return {**values, "pose": pose_vectors(trained, values["pose"])}
+
+
+def pose_vectors(trained: TrainedModel, coefficients: Floats) -> Floats:
+    """Return pose vectors (Q, T, D) of motions (Q, N) in coordinates of the sample mode."""
+    return trained.tensor.numbers(trained.full.slices(coefficients))
+
+
+def motions_of_values(
+    recipe: Recipe, trained: TrainedModel, peers: Mapping[str, Values]
+) -> dict[str, list[ComparedMotion]]:
+    """Return motions of the values that peers predict, with pose vectors.
+
+    They have the model's timing, travel, chart and bones.
+    """
+    event, model = truncation_error.event_frame(recipe, trained.examples), trained.model
+    names = next(iter(peers.values()))
+    values = {name: np.concatenate([known[name] for known in peers.values()]) for name in names}
+    poses = uniform_motion.predicted_poses(
+        model.timing, trained.tensor, values["pose"], values["warp"], values.get("travel")
+    )
+    offsets = model.proportions.numpy(values["offsets"])
+    durations = np.exp(values["duration"][:, 0])
+    motions = _motions(
+        trained, poses.rotations, poses.path, offsets, durations, values["warp"], event
+    )
+    motions = compared_motion.with_curves(motions, trained.tensor.curves, poses.curves)
+    count = len(motions) // len(peers)
+    return {name: motions[i * count : (i + 1) * count] for i, name in enumerate(peers)}
+
+
+def _motions(
+    trained: TrainedModel,
+    rotations: Floats,
+    path: Floats,
+    offsets: Floats,
+    durations: Floats,
+    logs: Floats,
+    event: EventFrame | None,
+) -> list[ComparedMotion]:
+    """Return motions of rotations (Q, S, J, 4), root paths (Q, S, 3), bone offsets (Q, J, 3)."""
+    translations = skeleton.translations(offsets, path)
+    events = [_predicted_event(trained, log, event) for log in logs]
+    return compared_motion.motions_of_poses(
+        trained.skeleton.parents, rotations, translations, list(map(float, durations)), events
+    )
+
+
+def _predicted_event(
+    trained: TrainedModel, logs: Floats, event: EventFrame | None
+) -> MotionEvent | None:
+    """Return the event at the share of the duration that the predicted timing gives it."""
+    if event is None:
+        return None
+    timing = trained.model.timing
+    share = np.array([event.frame / (timing.frames - 1)])
+    return MotionEvent(event.joint, float(timing.basis.invert(logs, share)[0]))

@@ -1,1 +1,0 @@
-"""Summaries of an evaluation: of each method, and of performers."""

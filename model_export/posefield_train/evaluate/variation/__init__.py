@@ -1,1 +1,0 @@
-"""Measures of takes and of sampled detail, for held-out clips."""
