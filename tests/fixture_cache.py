@@ -33,6 +33,7 @@ SOURCES = (
     "service/posefield/question",
     "service/posefield/rigs",
     "service/posefield/roles",
+    "tests/families",
     "tests/fixture_cache.py",
     "tests/fixture_models.py",
 )

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import fixture_cache
 import numpy as np
+from families import face_files, sample_walk
 
 from posefield.common.units import Floats
 from posefield_train import train
 from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.sample import sample_files, sample_walk
-from posefield_train.sample.face import face_files
+from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe

@@ -184,35 +184,12 @@ def test_sample_writes_the_family(posefield, tmp_path, reaching_folder):
         assert again.read_bytes() == path.read_bytes()
 
 
-def test_sample_writes_the_face(posefield, tmp_path, models_trained):
-    code, out, _ = posefield("sample", "face", "-o", tmp_path / "face", "--json")
-    assert code == 0
-    assert json.loads(out) == {"recipe": str(tmp_path / "face" / "recipe.toml")}
-    for path in sorted(models_trained.face().rglob("*.*")):
-        again = tmp_path / "face" / path.relative_to(models_trained.face())
-        assert again.read_bytes() == path.read_bytes()
-
-
-def test_sample_of_the_face_has_no_truth_to_write(refused, tmp_path):
-    said = refused(2, "sample", "face", "--truth", "-o", tmp_path / "truth.bvh")
-    assert said == "truth: found for 'face', expected for reaching only"
-
-
 def test_sample_says_what_to_do_next(posefield, reaching_folder):
     code, out, _ = posefield("sample", "reaching", "-o", reaching_folder)
     assert (code, out) == (
         0,
         f"{reaching_folder / 'recipe.toml'}: train it with posefield train\n",
     )
-
-
-@pytest.mark.parametrize("family", ["quadruped", "hand"])
-def test_sample_writes_other_figures(posefield, refused, tmp_path, family):
-    code, out, _ = posefield("sample", family, "-o", tmp_path / family, "--json")
-    assert (code, json.loads(out)) == (0, {"recipe": str(tmp_path / family / "recipe.toml")})
-    assert len(list((tmp_path / family / "bvh").iterdir())) == 24
-    said = refused(2, "sample", family, "--truth", "-o", tmp_path / "truth.bvh")
-    assert said == f"truth: found for '{family}', expected for reaching only"
 
 
 def test_sample_writes_any_number_of_clips(posefield, tmp_path, reaching_folder):
@@ -232,19 +209,16 @@ def test_sample_writes_any_number_of_clips(posefield, tmp_path, reaching_folder)
 
 
 @pytest.mark.parametrize("option", ["clips", "seed"])
-def test_sample_has_numbers_for_families_of_reaching_alone(refused, tmp_path, option):
-    words = (f"--{option}", 5, "-o", tmp_path / "x")
-    assert refused(2, "sample", "hand", *words) == (
-        f"{option}: found for 'hand', expected for reaching only"
-    )
-    assert refused(2, "sample", "reaching", "--truth", *words) == (
+def test_the_noise_free_motion_has_no_number_of_clips(refused, tmp_path, option):
+    words = ("reaching", "--truth", f"--{option}", 5, "-o", tmp_path / "x")
+    assert refused(2, "sample", *words) == (
         f"{option}: found with --truth, expected for a family of clips"
     )
 
 
 def test_sample_of_another_family_is_refused(refused, tmp_path):
     said = refused(2, "sample", "dancing", "-o", tmp_path / "x")
-    assert said == "family: 'dancing', expected one of reaching, quadruped, hand, face"
+    assert said == "family: 'dancing', expected reaching"
 
 
 def test_sample_into_a_folder_of_something_else_is_refused(refused, tmp_path):

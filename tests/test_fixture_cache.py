@@ -14,9 +14,9 @@ TRAIN = """
 import sys
 from pathlib import Path
 import fixture_models
+from families import sample_walk
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.sample import sample_walk
 from posefield_train.source import ingest
 
 own = sample_walk.recipe()

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from evaluation import field_statistics, standing_feet, takes
+from families import sample_walk
 
 from posefield.inference import session
 from posefield.kriging.kriging_model import KrigingWeights
 from posefield.question.motion_question import ClipQuestion
 from posefield_train.evaluate.folds import Fold
 from posefield_train.graph import onnx_export
-from posefield_train.sample import sample_walk
 from posefield_train.train import train
 
 HELD = (0, 1, 2)

@@ -1,6 +1,7 @@
 """Clips of trained models: the procedural family and the real recipes."""
 
 import os
+import sys
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -12,10 +13,13 @@ from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.sample import sample_files, sample_walk
-from posefield_train.sample.figures import hand_grip, quadruped_walk
+from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
 from posefield_train.source.recipe import Recipe
+
+sys.path.append(str(Path(__file__).parents[1]))
+
+from families import hand_grip, quadruped_walk, sample_walk
 
 ROOT = Path(__file__).parents[2]
 RECIPES = sorted((ROOT / "model_export/posefield_train/recipes").glob("*.toml"))

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+from families import face_files, face_motion
 
 from posefield.common.units import Floats
 from posefield.motion import bvh_writer
-from posefield_train.sample.face import face_files, face_motion
 from posefield_train.source.recipe import Recipe
 
 RATE = 60.0

@@ -5,6 +5,7 @@ from dataclasses import replace
 import newcomers
 import numpy as np
 import pytest
+from families import sample_walk
 
 from posefield.common.errors import TrainingError
 from posefield.motion import quat
@@ -22,7 +23,6 @@ from posefield_train.evaluate.predictions import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import ConstantModel
-from posefield_train.sample import sample_walk
 from posefield_train.source import ingest
 from posefield_train.source.canonical import placement
 from posefield_train.tensor import hosvd

@@ -7,6 +7,7 @@ from dataclasses import replace
 import expressions
 import numpy as np
 import pytest
+from families import face_motion
 
 from posefield.common.errors import RecipeError, TrainingError
 from posefield.inference import session
@@ -23,7 +24,6 @@ from posefield_train.adapt import (
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export, parity_check
 from posefield_train.kriging import sample_points
-from posefield_train.sample.face import face_motion
 from posefield_train.source import ingest
 from posefield_train.source.rigs import dummy_roots
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from families import sample_walk
+from families.sample_walk import STYLES
 
 from posefield.inference import session
 from posefield.motion import bvh_writer
-from posefield_train.sample import sample_walk
-from posefield_train.sample.sample_walk import STYLES
 
 SWAY = 0.06
 SAID = ("--performer", "cy", "--unit", "1", "--up", "y", "--licence", "CC0-1.0")

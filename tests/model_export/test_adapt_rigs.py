@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from families import quadruped_walk
 
 from posefield.common.units import UP
 from posefield.motion import bvh_writer, quat
@@ -13,7 +14,6 @@ from posefield_train import train
 from posefield_train.adapt import model_reconstruction, new_clips
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_files
-from posefield_train.sample.figures import quadruped_walk
 from posefield_train.source import ingest, motion_readers, recipe
 
 WOLF = {"performer": "wolf"}

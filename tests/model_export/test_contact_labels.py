@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from families import quadruped_walk, sample_walk
 
 from posefield.common.errors import RecipeError
 from posefield.inference import session
@@ -19,8 +20,7 @@ from posefield_train.adapt.model_reconstruction import reconstruct
 from posefield_train.align import phase_alignment
 from posefield_train.contacts import contact_labels, contact_statistics
 from posefield_train.graph import onnx_export
-from posefield_train.sample import sample_files, sample_walk
-from posefield_train.sample.figures import quadruped_walk
+from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
 from posefield_train.source.recipe import Recipe
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import onnx
 import pytest
+from families import sample_walk
 
 from posefield.common.errors import ExportRefused, ModelError
 from posefield.inference import graph_ports, session
@@ -14,7 +15,6 @@ from posefield_train.contacts import contact_labels, contact_model, contact_tabl
 from posefield_train.graph import parity_check
 from posefield_train.kriging import universal_kriging
 from posefield_train.report.provenance import Provenance
-from posefield_train.sample import sample_walk
 
 # The graph computes in float32; a label rises within one canonical frame.
 SINGLE = 1e-4

@@ -4,13 +4,13 @@ import re
 
 import numpy as np
 import pytest
+from families import face_files
 from minimal import plain_recipe, recipe_with, small_clip, write_clips
 from pydantic import ValidationError
 
 from posefield.common.errors import RecipeError, TrainingError
 from posefield_train import train
 from posefield_train.align import phase_alignment
-from posefield_train.sample.face import face_files
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from families import face_motion
 
 from posefield.common.errors import ModelError
 from posefield.constraints import constrained_motion
@@ -15,7 +16,6 @@ from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
-from posefield_train.sample.face import face_motion
 from posefield_train.source.recipe import Recipe
 
 LAUGH, CALM = {"smile": 0.7, "openness": 0.5}, {"smile": 0.2, "openness": 0.5}

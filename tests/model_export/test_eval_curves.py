@@ -5,6 +5,7 @@ from dataclasses import replace
 import expressions
 import numpy as np
 import pytest
+from families import face_motion
 from joblib import parallel_config
 
 from posefield.motion.curves import distances
@@ -18,7 +19,6 @@ from posefield_train.evaluate import (
 from posefield_train.evaluate.predictions import OURS, Queries
 from posefield_train.evaluate.summary import NOT_APPLICABLE
 from posefield_train.parallel.jobs import ProcessJobs
-from posefield_train.sample.face import face_motion
 from posefield_train.source import curve_files, ingest
 from posefield_train.train import train
 

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from families import sample_walk
 from joblib import parallel_config
 
 from posefield_train.contacts import contact_labels, held_out_contacts
 from posefield_train.contacts.held_out_contacts import FRAMES, SHARES, HeldOutClips
 from posefield_train.evaluate import protocol, summary
 from posefield_train.parallel.jobs import ProcessJobs
-from posefield_train.sample import sample_walk
 from posefield_train.source.recipe import Recipe
 
 

@@ -5,6 +5,7 @@ from itertools import permutations
 
 import numpy as np
 import pytest
+from families import sample_walk
 from running import bank_values, outputs
 from scipy.optimize import check_grad
 
@@ -22,7 +23,6 @@ from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import LeaveOneOutLoss, TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.sample import sample_walk
 from posefield_train.source import ingest
 
 SETS = {"performer": ("ann", "bob", "cy"), "style": ("calm", "tired")}

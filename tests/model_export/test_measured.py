@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from families import sample_walk
 from minimal import SKELETON, plain_recipe, recipe_with, small_clip, write_clips
 from test_phase import cycle
 
@@ -15,7 +16,6 @@ from posefield.motion.measures import Measure, MeasuredMotion
 from posefield_train import train
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export
-from posefield_train.sample import sample_walk
 from posefield_train.source import ingest, measured_controls
 from posefield_train.source.recipe import Recipe
 

@@ -2,11 +2,11 @@
 
 import pytest
 import skeleton_tables
+from families import quadruped_walk
 
 from posefield.motion.joint_roles import ROLES
 from posefield.roles import body_shape, joint_recognition
 from posefield_train.sample import noise_free
-from posefield_train.sample.figures import quadruped_walk
 
 DEVELOPMENT = skeleton_tables.read("development")
 HELD_OUT = {

@@ -215,14 +215,15 @@ def merge(
     parts = sorted(results, key=lambda part: part.clips)
     # A fold that leaves one performer lacks the methods that distinguish performers.
     names = dict.fromkeys(name for part in parts for name in part.errors)
+
+    def errors_of(name: str) -> Callable[[PartialResult], Sequence[MotionErrors | None]]:
+        return lambda part: part.errors.get(name, [None] * len(part.clips))
+
     return EvaluationResult(
         recipe.name,
         protocol,
         tuple(clips),
-        {
-            name: in_order(parts, lambda p, n=name: p.errors.get(n, [None] * len(p.clips)))
-            for name in names
-        },
+        {name: in_order(parts, errors_of(name)) for name in names},
         np.array(in_order(parts, lambda part: part.sigma)),
         np.array(in_order(parts, lambda part: part.joint_sigma)),
         joints,

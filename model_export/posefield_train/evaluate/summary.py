@@ -12,7 +12,6 @@ from posefield_train.evaluate import motion_errors
 from posefield_train.evaluate.motion_errors import MotionErrors
 from posefield_train.evaluate.predictions import OURS
 from posefield_train.evaluate.protocol import EvaluationResult
-from posefield_train.report.drawing import markdown_table
 from posefield_train.report.drawing.significant_digits import round_number
 
 DISTANCES = ("relative", "absolute", "plain_relative", "plain_absolute", "shell")
@@ -212,7 +211,19 @@ def table(result: EvaluationResult) -> str:
     )
     head = [title for title, _ in columns(result)]
     rows = [_cells(result, summary) for summary in summarize(result)]
-    return f"{title}\n\n{markdown_table.markdown_table(head, rows)}"
+    return f"{title}\n\n{_markdown_table(head, rows)}"
+
+
+def _markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table with cells padded to the width of their column."""
+    listed = [head, *rows]
+    widths = [max(len(row[i]) for row in listed) for i in range(len(head))]
+    lines = [
+        "| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |"
+        for row in listed
+    ]
+    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
+    return "\n".join([lines[0], rule, *lines[1:]])
 
 
 def columns(result: EvaluationResult) -> tuple[tuple[str, str], ...]:

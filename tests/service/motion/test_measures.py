@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from families import sample_walk
 
 from posefield.common.units import UP
 from posefield.motion import measures, quat
 from posefield.motion.measures import Measure, MeasuredMotion
-from posefield_train.sample import sample_walk
 from posefield_train.source.measured_controls import travel
 
 # Sums and roots of numbers near one, in double precision.

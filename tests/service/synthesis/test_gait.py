@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from families import sample_walk
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.locomotion import gait, gait_region, stride
-from posefield_train.sample import sample_walk
 
 NOBODY = -1
 

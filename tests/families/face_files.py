@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from families import face_motion
+from families.face_motion import FaceTrial
 from posefield.common.units import Floats
 from posefield.motion import bvh_writer
 from posefield_train.sample import sample_files
-from posefield_train.sample.face import face_motion
-from posefield_train.sample.face.face_motion import FaceTrial
 
 RECIPE = """\
 schema = 1

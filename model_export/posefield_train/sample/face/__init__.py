@@ -1,1 +1,0 @@
-"""Procedural family of a face: a head with a jaw, and curves for blend shapes."""

@@ -1,1 +1,0 @@
-"""Procedural families of other figures than people: a quadruped that walks, a hand that grips."""
