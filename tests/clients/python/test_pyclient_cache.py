@@ -1,5 +1,7 @@
 """Tests of the client's cache: freshness, revalidation and limits."""
 
+import time
+
 import pytest
 import scripted
 import serving
@@ -46,7 +48,7 @@ def test_a_second_question_is_answered_as_the_headers_say(answers, counts, tags)
 
 def test_a_fresh_answer_is_asked_for_again_when_its_time_is_over(monkeypatch):
     now = [1000.0]
-    monkeypatch.setattr("time.time", lambda: now[0])
+    monkeypatch.setattr(time, "time", lambda: now[0])
     answers = [reasons(5, "max-age=60"), unchanged("max-age=60")]
     with scripted.serving(*answers) as server, Client(server.address) as client:
         for now[0], count in ((1000.0, 1), (1059.0, 1), (1061.0, 2), (1120.0, 2)):

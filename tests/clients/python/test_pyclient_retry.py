@@ -1,6 +1,7 @@
 """Tests of the client's retries: conditions, waiting times and limits."""
 
 import asyncio
+import random
 import time
 from email.utils import formatdate
 
@@ -19,7 +20,7 @@ SURE = Retry(attempts=4, first=1.0, longest=3.0, patience=20.0)
 @pytest.fixture(autouse=True)
 def _longest(monkeypatch):
     """Waits are as long as chance allows."""
-    monkeypatch.setattr("random.random", lambda: 1.0)
+    monkeypatch.setattr(random, "random", lambda: 1.0)
 
 
 def busy(retry_after=None):
@@ -52,7 +53,7 @@ def test_a_wait_is_the_longest_however_often_it_was_asked():
 
 
 def test_jitter_is_full(monkeypatch):
-    monkeypatch.setattr("random.random", lambda: 0.5)
+    monkeypatch.setattr(random, "random", lambda: 0.5)
     assert SURE.wait(1, busy(2.0), 0.0) == 2.5
 
 
@@ -69,7 +70,7 @@ def waited(monkeypatch):
         seconds.append(given)
 
     monkeypatch.setattr(anyio, "sleep", sleep)
-    monkeypatch.setattr("time.sleep", seconds.append)
+    monkeypatch.setattr(time, "sleep", seconds.append)
 
     def ask(*answers):
         with scripted.serving(*answers) as server:
