@@ -33,6 +33,28 @@ LEVEL_COLUMNS = [
 PIXELS, FIELD = 1080, math.pi / 3.0
 """Height of the image, pixels, and vertical field of view, rad, for the distance of a level."""
 LEVELS_OF = "cmu_walk"
+JUDGED_COLUMNS = ["figure", "value", "must", "wish", "remark"]
+WISHES = {
+    "joins": {
+        "slide of standing feet": 0.2,
+        "pelvis lowered": 2.0,
+        "hdm05_grab_high, 25 joins: peak over the real one": 1.3,
+        "cmu_walk, 69 joins: peak over the real one": 1.0,
+    },
+    "discovered": {
+        "strides: missed": 0.0,
+        "one example: missed by the best R": 5.0,
+        "processor time of reading and features": 10.0,
+    },
+    "found_families": {"clips of families: wrong": 5.0, "all actions: cuts missed": 5.0},
+    "scaled": {
+        "92 clips: processor time": 8.0,
+        "2,000 clips: distance to the truth": 0.4,
+        "2,000 clips: error of new clips over sigma": 1.2,
+        **{f"{clips} clips: file": 200.0 for clips in ("300", "1,000", "2,000")},
+    },
+}
+"""Wishes for figures by table, and by their name or the part of it after the subject."""
 VERDICTS = {True: "met", False: "**missed**", None: "not measured yet"}
 """Words for a goal that is met, missed, or whose row has no value."""
 Rows = Iterator[list[str]]
@@ -123,3 +145,21 @@ def _goal(row: Found) -> str:
 def number(value: float) -> str:
     """Return a number with three significant digits, and groups of thousands."""
     return f"{float(f'{value:.3g}'):,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+
+
+def judged(table: str) -> Rows:
+    """Yield figures with a value that they must have and one that is wished for."""
+    wishes = WISHES.get(table, {})
+    for row in read(table)["rows"]:
+        wish = row.get("wish", wishes.get(row["name"], wishes.get(row["name"].partition(": ")[2])))
+        value = f"{number(row['value'])} {row['unit']}"
+        limits = [_limit(row, most) for most in (row["goal"], wish)]
+        yield [row["name"], value, *limits, row["baseline"]]
+
+
+def _limit(row: Found, most: float | None) -> str:
+    """Return the most that a figure may be, and whether it is no more; empty without one."""
+    if most is None:
+        return ""
+    verdict = "met" if row["value"] <= most else "**missed**"
+    return f"{number(most)} {row['unit']}, {verdict}"

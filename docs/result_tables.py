@@ -5,8 +5,6 @@ from collections.abc import Callable
 import equal_tables
 import evaluation_tables as tables
 import measured_tables
-import performed_tables
-import take_tables
 from evaluation_tables import Rows, known_performer, new_performer
 
 SPEED_FILES = (
@@ -58,10 +56,10 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "takes": lambda: (
         [
             "measure",
-            *(tables.ALL_FAMILIES[own] for own in take_tables.take_families()),
+            *(tables.ALL_FAMILIES[own] for own in tables.take_families()),
             tables.GOALS,
         ],
-        take_tables.takes(),
+        tables.takes(),
     ),
     "exact": lambda: (
         [*tables.headings("target at the event", known_performer), tables.GOALS],
@@ -74,7 +72,7 @@ TABLES: dict[str, Callable[[], tuple[list[str], Rows]]] = {
     "recipes": lambda: (measured_tables.RECIPE_COLUMNS, measured_tables.recipes()),
     "levels": lambda: (measured_tables.LEVEL_COLUMNS, measured_tables.levels()),
     **{
-        name: lambda name=name: (performed_tables.COLUMNS, performed_tables.rows(name))
+        name: lambda name=name: (measured_tables.JUDGED_COLUMNS, measured_tables.judged(name))
         for name in JUDGED
     },
     **{

@@ -15,9 +15,7 @@ import evaluation_summary  # noqa: E402
 import evaluation_tables  # noqa: E402
 import measure_models  # noqa: E402
 import measured_tables  # noqa: E402
-import performed_tables  # noqa: E402
 import result_tables  # noqa: E402
-import take_tables  # noqa: E402
 from rows import Row, compact, record  # noqa: E402
 
 
@@ -221,7 +219,7 @@ def test_the_table_of_feet_is_that_of_the_files(folder):
 
 
 def test_takes_stand_beside_their_negative_controls(folder):
-    assert take_tables.take_families() == [] and len(list(take_tables.takes())) == 9
+    assert evaluation_tables.take_families() == [] and len(list(evaluation_tables.takes())) == 9
     fields = {
         "variogram": [0.98, 1.02],
         "variance": 1.01,
@@ -238,8 +236,8 @@ def test_takes_stand_beside_their_negative_controls(folder):
         (folder / f"{name}.json").write_text(json.dumps(family(2.0) | {"takes": takes}))
     evaluation_tables.protocols.cache_clear()
     # Of the other family only the fields were measured: its clips have no feet.
-    assert take_tables.take_families() == ["two"]
-    rows = {cells[0]: cells[1] for cells in take_tables.takes()}
+    assert evaluation_tables.take_families() == ["two"]
+    rows = {cells[0]: cells[1] for cells in evaluation_tables.takes()}
     assert rows["variance over kriging variance (without conditioning)"] == "1.01 (6.0)"
     taken = "acceleration of a take over captured (all time functions varied)"
     assert rows[taken] == "1.00 (2.00)"
@@ -253,7 +251,7 @@ def test_judged_rows_have_a_verdict_for_goal_and_wish(tmp_path, monkeypatch):
     ]
     record({"discovered": made}, "python benchmarks/discovery.py", tmp_path)
     monkeypatch.setattr(measured_tables, "FOLDER", tmp_path)
-    assert list(performed_tables.rows("discovered")) == [
+    assert list(measured_tables.judged("discovered")) == [
         ["strides: missed", "1 %", "2 %, met", "0 %, **missed**", "of 92"],
         ["example: found", "3 s", "", "", ""],
     ]
