@@ -232,7 +232,6 @@ def test_scripts_of_performances_in_the_guide_are_valid():
         json_decoding.decode_question(PerformanceQuestion, text.encode())
         for text in scripts_of_performances()[0]
     ]
-    # The fifth script for the shipped models is a Python example.
     assert len(found) == 5
     kinds = [type(each).__name__ for each in found[-1].segments]
     assert kinds == ["Walk", "Act", "Hold", "Act", "Walk"]
