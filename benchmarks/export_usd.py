@@ -9,7 +9,7 @@ timed from the same arrays; where they are made, so is all that a file holds, 32
 import itertools
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,9 +23,8 @@ from posefield.encode.character import character, joint_names
 from posefield.encode.character.character import CharacterRig
 from posefield.encode.formats import METRES
 from posefield.encode.usd import usd_animation, usd_clip, usd_library
-from posefield.encode.usd_layers import crate_template, layer_metadata, text_template
+from posefield.encode.usd_layers import crate_template, layer_metadata
 from posefield.encode.usd_layers.layer_content import LayerBuilder, LayerContent
-from posefield.encode.usd_layers.text_cache import TEXTS
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.clip import Clip
@@ -38,68 +37,39 @@ SIZE = f"{JOINTS} joints × {FRAMES} frames"
 FOLDER = Path("/dev/shm") if Path("/dev/shm").is_dir() else None
 
 
-@dataclass(frozen=True)
-class Form:
-    """A form of USD: how clips and layers are written in it, how usd-core does, and as a text."""
-
-    name: str
-    write: Callable[..., list[bytes]]
-    fill: Callable[[LayerBuilder, LayerContent], bytes]
-    ordinary: Callable[[LayerBuilder, LayerContent], bytes]
-    text: Callable[[bytes], str]
-    goals: tuple[float | None, float | None]
-
-
-def _crate(author: LayerBuilder, content: LayerContent) -> bytes:
-    return layer_metadata.crate_bytes(author.layer(content))
-
-
-FORMS = (
-    Form(
-        "usdc",
-        usd_clip.usdc,
-        crate_template.usdc,
-        _crate,
-        layer_metadata.crate_text,
-        (200.0, 20.0),
-    ),
-    Form("usda", usd_clip.usda, TEXTS.write, text_template.ordinary, bytes.decode, (None, None)),
-)
-
-
 def rows() -> list[Row]:
-    """Milliseconds a clip as usdc, usda and usdz, and the ratios to the rivals'."""
+    """Milliseconds a clip as usdc and usdz, and the ratios to the rivals'."""
     answers = _answers(CLIPS)
-    found = [row for form in FORMS for row in _form(answers, form)]
-    return [*found, *_package(answers), *_others(answers)]
+    return [*_layers(answers), *_package(answers), *_others(answers)]
 
 
-def _form(answers: list[ClipAnswer], form: Form) -> list[Row]:
+def _layers(answers: list[ClipAnswer]) -> list[Row]:
     one, made = answers[0], list(usd_clip.builders_and_contents(answers, METRES))
-    expected = [form.text(form.ordinary(*each)) for each in made]
-    if any(list(map(form.text, form.write(answers, METRES))) != expected for _ in range(2)):
-        raise AssertionError(f"{form.name} differs from what usd-core writes")
+    expected = [author.layer(content).ExportToString() for author, content in made]
+    for _ in range(2):
+        if list(map(layer_metadata.crate_text, usd_clip.usdc(answers, METRES))) != expected:
+            raise AssertionError("usdc differs from what usd-core writes")
     with TemporaryDirectory(dir=FOLDER) as folder:
-        path, (author, content) = Path(folder, f"clip.{form.name}"), made[0]
+        path, (author, content) = Path(folder, "clip.usdc"), made[0]
         taken = in_turn(
             {
-                "filled": lambda: [form.fill(*each) for each in made],
-                "ours": lambda: form.write(answers, METRES),
-                "alone": lambda: form.write([one], METRES),
-                "sdf": lambda: form.ordinary(*_first([one])),
-                "layer": lambda: form.ordinary(author, content),
+                "filled": lambda: [crate_template.usdc(*each) for each in made],
+                "ours": lambda: usd_clip.usdc(answers, METRES),
+                "alone": lambda: usd_clip.usdc([one], METRES),
+                "sdf": lambda: _crate(*_first([one])),
+                "layer": lambda: _crate(author, content),
                 "arrays": lambda: _schemas(one.clip, content, _arrays, path),
                 "lists": lambda: _schemas(one.clip, content, _lists, path),
             },
             rounds=15,
             repeats=2,
         )
-    filled, ours, (first, second) = taken["filled"] / CLIPS, taken["ours"] / CLIPS, form.goals
-    given, whole = f"{form.name}, body and extent given", f"{form.name}, body and extent made"
+    filled, ours = taken["filled"] / CLIPS, taken["ours"] / CLIPS
+    given, whole = "usdc, body and extent given", "usdc, body and extent made"
     return [
-        _row(given, filled, f"UsdSkel schema API, {LISTS}", taken["lists"], first),
+        _row(given, filled, f"UsdSkel schema API, {LISTS}", taken["lists"], 200.0),
         _row(given, filled, f"UsdSkel schema API, {ARRAYS}", taken["arrays"], None),
-        _row(given, filled, "Sdf layer, the same", taken["layer"], second),
+        _row(given, filled, "Sdf layer, the same", taken["layer"], 20.0),
         _row(
             whole, ours, f"UsdSkel schema API, {LISTS}, body and extent given", taken["lists"], None
         ),
@@ -178,6 +148,10 @@ def _new(answers: list[ClipAnswer]) -> None:
 
 def _stage(answer: ClipAnswer, entries: list[usd_library.LibraryEntry]) -> bytes:
     return usd_library.library_stage(answer.clip.skeleton, METRES, 30.0, entries)
+
+
+def _crate(author: LayerBuilder, content: LayerContent) -> bytes:
+    return layer_metadata.crate_bytes(author.layer(content))
 
 
 def _first(answers: list[ClipAnswer]) -> tuple[usd_clip.ClipLayerBuilder, LayerContent]:

@@ -9,8 +9,8 @@ from pathlib import Path
 import cases
 import numpy as np
 import trained
+from usd_checks import defects
 
-from posefield.check import check
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
@@ -31,7 +31,7 @@ def write(folder: Path) -> dict[str, dict[str, Path]]:
 def faults(folder: Path) -> list[str]:
     """Return the faults of the thousand files, a line each."""
     files = sorted((folder / "export").rglob("clips/**/*.usd*"))
-    found = [f"{path}: {finding}" for path in files for finding in check(path)]
+    found = [f"{path}: {finding}" for path in files for finding in defects(path)]
     return found if len(files) == CLIPS else [f"{len(files)} files, expected {CLIPS}", *found]
 
 

@@ -16,7 +16,6 @@ import typer
 
 from posefield import __version__
 from posefield.cli import (
-    command_check,
     command_clip,
     command_crowd,
     command_demo,
@@ -182,7 +181,6 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
             "export walk.onnx --sample 10000 --layout tar -o s3://bucket/walks",
         ],
     ),
-    "check": (command_check.check, ASK, ["check walk.usda", "check walk.usda --json"]),
     "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
     "mcp": (command_mcp.mcp, SERVE, ["mcp my_models -o clips", "mcp --schema"]),
     "key": (command_serve.key, SERVE, ["key anna --model walk >> keys.txt"]),

@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.encode import glb_buffer, glb_character
-from posefield.encode.body import coarse_mesh
 from posefield.encode.body.skinned_mesh import SkinnedMesh
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig
@@ -53,5 +52,5 @@ def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[st
 
 def _coarse_corners(store: GlbBuffer, mesh: SkinnedMesh) -> int:
     kind = glb_buffer.smallest_index_type(len(mesh.points))
-    corners = coarse_mesh.coarse_faces(mesh).reshape(-1).astype(kind)
+    corners = mesh.coarse.reshape(-1).astype(kind)
     return store.add(corners, "SCALAR", target=CORNERS)

@@ -146,7 +146,7 @@ def _lazy_usd_writer(name: str) -> Callable[[Sequence[SampledClip], Convention],
 
 
 CLIP_ENCODERS = by_extension(
-    # A template takes 30 ms to make, and each number of frames needs another one.
+    # usd-core takes milliseconds, and tens of them for the first template of a binary layer.
     ClipEncoder(
         "usda", "model/vnd.usda", _lazy_usd_writer("usda"), 120, inline_limit=0, has_body=True
     ),

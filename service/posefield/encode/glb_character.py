@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from posefield.common.units import Floats
 from posefield.encode import glb_buffer
-from posefield.encode.body import body_colours, skinned_mesh
+from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import SkinnedMesh
 from posefield.encode.character.character import CharacterRig, RestPose
 from posefield.encode.glb_buffer import CORNERS, VERTICES, GlbBuffer
@@ -64,8 +64,8 @@ def _body(store: GlbBuffer, resting: RestPose) -> dict[str, Any]:
 
 def _material(plain: bool) -> dict[str, Any]:
     """Return the material; plain: whether it has a colour of its own, instead of the points'."""
-    own = {"baseColorFactor": [*body_colours.SKIN, 1.0]} if plain else {}
-    surface = {**own, "metallicFactor": 0.0, "roughnessFactor": body_colours.ROUGHNESS}
+    own = {"baseColorFactor": [*skinned_mesh.SKIN, 1.0]} if plain else {}
+    surface = {**own, "metallicFactor": 0.0, "roughnessFactor": skinned_mesh.ROUGHNESS}
     return {"name": "Body", "pbrMetallicRoughness": surface}
 
 
@@ -107,7 +107,7 @@ def _mesh_arrays(rig: CharacterRig) -> MeshArrays:
     missing = ((0, 0), (0, 4 - mesh.joints.shape[1]))
     joints = np.pad(mesh.joints, missing).astype(glb_buffer.smallest_index_type(len(rig.skeleton)))
     cut = skinned_mesh.triangles(mesh.counts, mesh.corners).reshape(-1)
-    colors, shown = None, body_colours.colours(mesh)
+    colors, shown = None, skinned_mesh.colours(mesh)
     if len(shown) > 1:
         colors = np.full((len(mesh.tints), 4), 255, np.uint8)
         colors[:, :3] = np.round(255 * shown[mesh.tints])

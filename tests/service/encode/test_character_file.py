@@ -6,10 +6,8 @@ import struct
 import conftest
 import numpy as np
 import pytest
-import test_mannequin as bodies
 
 from posefield.encode import character_file
-from posefield.encode.body import coarse_mesh, mannequin
 from posefield.encode.character import character
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.motion.skeleton import Skeleton
@@ -82,37 +80,9 @@ def test_the_coarse_mesh_has_the_same_points(content):
     fine, coarse = (document(content)[0]["meshes"][mesh]["primitives"][0] for mesh in (0, 1))
     assert fine["attributes"] == coarse["attributes"]
     corners = part(content, "corners", mesh=1)
-    assert len(corners) == 3 * coarse_mesh.FACES
+    assert len(corners) == 3 * 300
     assert len(part(content, "corners")) > 4 * len(corners)
     assert set(corners.flat) < set(part(content, "corners").flat)
-
-
-class Faces:
-    """A mesh with coarse faces, for the checks of other meshes."""
-
-    def __init__(self, mesh, faces):
-        self.points, self.joints, self.weights = mesh.points, mesh.joints, mesh.weights
-        self.counts = np.full(len(faces), 3, np.int32)
-        self.corners = faces.reshape(-1)
-
-
-@pytest.mark.parametrize("name", bodies.BODIES)
-def test_coarse_faces_are_closed_and_as_large(name):
-    mesh = mannequin.mannequin(bodies.BODIES[name])
-    coarse = Faces(mesh, coarse_mesh.coarse_faces(mesh))
-    assert bodies.closed(coarse)
-    assert 0.82 < bodies.volume(coarse) / bodies.volume(mesh) < 1.1
-
-
-def test_coarse_limbs_bend_where_the_fine_ones_do(person):
-    """Each joint that moves a ring of the fine skin most also moves some of the coarse one most."""
-    mesh = mannequin.mannequin(person)
-    fine = np.bincount(mesh.joints[:, 0], minlength=len(person))
-    kept = sorted(set(coarse_mesh.coarse_faces(mesh).flat))
-    coarse = np.bincount(mesh.joints[kept, 0], minlength=len(person))
-    assert np.sum(fine >= 12) >= 15
-    assert np.all(coarse[fine >= 12] >= 3)
-    assert np.any(coarse[fine < 12] < 3)
 
 
 def test_equal_skeletons_have_equal_files(person, content):
@@ -123,8 +93,5 @@ def test_equal_skeletons_have_equal_files(person, content):
         person.tip_joints,
         person.tip_offsets.copy(),
     )
-    mesh = mannequin.mannequin(again)
-    found = coarse_mesh.coarse_faces(mesh).reshape(-1, 1)
-    assert np.array_equal(found, part(content, "corners", mesh=1))
     assert character_file.character_glb(again, "reach@0123456789abcdef") == content
     assert character_file.character_glb(again, "other@0123456789abcdef") != content

@@ -17,7 +17,6 @@ from posefield.encode.usd_layers import (
     crate_template,
     layer_content,
     layer_metadata,
-    text_template,
 )
 from posefield.motion.curves import Curve, CurveValues
 from posefield.question.results import ClipAnswer
@@ -96,7 +95,7 @@ def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
             values = np.round(2.0 * values) / 2.0
         made = with_curves(walk, CurveValues(own.curves, values))
         ((author, content),) = usd_clip.builders_and_contents([made], METRES)
-        expected = text_template.ordinary(author, content)
+        expected = author.layer(content).ExportToString().encode()
         assert usd_clip.usda([made], METRES) == [expected]
         (binary,) = usd_clip.usdc([made], METRES)
         assert layer_metadata.crate_text(binary).encode() == expected
@@ -105,8 +104,6 @@ def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
 def test_weights_are_filled_in_a_template(walk):
     made = with_curves(walk, curves(52, len(walk.clip)))
     ((author, content),) = usd_clip.builders_and_contents([made], METRES)
-    found = text_template.template(author, content, text_template.pattern(content))
-    assert found.write(author, content) == text_template.ordinary(author, content)
     pattern = layer_content.first_frame(content).pattern
     assert crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
     # Other weights have other files.

@@ -1,4 +1,4 @@
-"""Comparison of clips encoded in batches with usd-core's layers: of text, byte for byte."""
+"""Comparison of clips encoded in batches with usd-core's layers."""
 
 import math
 from dataclasses import replace
@@ -7,7 +7,7 @@ import conftest
 import numpy as np
 import pytest
 
-from posefield.encode.body.bone_boxes import TINTS
+from posefield.encode.body.skinned_mesh import TINTS
 from posefield.encode.files.file_convention import CENTIMETRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS, METRES
 from posefield.encode.usd import clip_arrays, usd_clip
@@ -15,9 +15,7 @@ from posefield.encode.usd_layers import (
     crate_template,
     layer_content,
     layer_metadata,
-    text_template,
 )
-from posefield.encode.usd_layers.text_cache import TextCache
 from posefield.motion import clip as clips
 from posefield.motion import quat
 from posefield.motion.skeleton import Skeleton
@@ -48,9 +46,9 @@ def _answer(rng, frames, person, said):
 def ordinary(given, convention=METRES):
     """Texts of the layers of usd-core."""
     return [
-        text_template.ordinary(*each)
+        author.layer(content).ExportToString()
         for one in given
-        for each in usd_clip.builders_and_contents([one], convention)
+        for author, content in usd_clip.builders_and_contents([one], convention)
     ]
 
 
@@ -67,8 +65,11 @@ def both(given, convention=METRES):
     pattern = layer_content.first_frame(content).pattern
     assert crate_template.template(author.with_rate(crate_template.MARKED_RATE), pattern)
     texts = ordinary(given, convention)
-    read = [layer_metadata.crate_text(each).encode() for each in written(given, convention)]
-    return read == texts and written(given, convention, usd_clip.usda) == texts
+    read = [layer_metadata.crate_text(each) for each in written(given, convention)]
+    return (
+        read == texts
+        and [each.decode() for each in written(given, convention, usd_clip.usda)] == texts
+    )
 
 
 def moved(answer, translations=None, rotations=None):
@@ -246,34 +247,3 @@ def test_awkward_numbers_are_written_as_usd_does():
         one.clip.translations[:, 1:] *= scale
     assert both(given)
     assert both(given, INCHES)
-
-
-def test_templates_of_text_are_used():
-    """Else all that is above would hold without them."""
-    cache, given = TextCache(8_000_000), [*usd_clip.builders_and_contents(answers(4, 37), METRES)]
-    sizes = [0]
-    for author, content in given:
-        cache.write(author, replace(content, facts={"number": len(sizes)}))
-        sizes.append(cache.used_bytes)
-    # The first occurrence is noted, the second makes a template.
-    assert 0 < sizes[1] < 5000 < sizes[2] == sizes[3] == sizes[4]
-    ((author, content),) = usd_clip.builders_and_contents(answers(1, 38), METRES)
-    cache.write(author, content)
-    assert cache.used_bytes == sizes[4] + sizes[1]
-
-
-def test_templates_of_text_are_kept_within_a_limit():
-    size = TextCache(8_000_000)
-    given = [*usd_clip.builders_and_contents(answers(2, 37), METRES)]
-    for each in given:
-        size.write(*each)
-    cache = TextCache(int(2.5 * size.used_bytes))
-    for frames in (30, 31, 32, 33, 30):
-        for author, content in usd_clip.builders_and_contents(answers(3, frames), METRES):
-            found = cache.write(author, content)
-            assert found == text_template.ordinary(author, content)
-            assert cache.used_bytes <= cache.limit
-    assert cache.used_bytes > size.used_bytes
-    nothing = TextCache(0)
-    assert nothing.write(*given[0]) == text_template.ordinary(*given[0])
-    assert nothing.used_bytes == 0

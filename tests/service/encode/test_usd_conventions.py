@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdSkel
+from usd_checks import defects
 
-from posefield.check import check
 from posefield.encode.body import skinned_mesh
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CENTIMETRES, CLIP_ENCODERS, METRES
@@ -102,7 +102,7 @@ def test_normals_look_outwards(path, convention):
     counts, corners = mesh.GetFaceVertexCountsAttr().Get(), mesh.GetFaceVertexIndicesAttr().Get()
     faces = skinned_mesh.triangles(np.array(counts), np.array(corners))
     again = skinned_mesh.vertex_normals(places.astype(float), faces)
-    assert np.all(np.sum(again * normals, axis=-1) > 0.99)
+    assert np.all(np.sum(again * normals, axis=-1) > 0.98)
     a, b, c = (places[faces[:, corner]].astype(float) for corner in range(3))
     volume = np.sum(a * np.cross(b, c)) / 6 * convention.metres_per_unit**3
     assert 0.03 < volume < 0.12
@@ -127,4 +127,4 @@ def test_files_say_what_they_measure_in(path, convention):
 
 
 def test_our_own_check_has_nothing_to_say(path):
-    assert check(path) == []
+    assert defects(path) == []

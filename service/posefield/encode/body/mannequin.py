@@ -1,97 +1,324 @@
-"""Mannequin of a skeleton: a person where it is built like one, else tubes along its bones."""
+"""Mannequin of a human rig: a stored skin, fitted to its bones by the roles of its joints.
+
+`mannequin.npz` was made once, for a rig of 1.75 m, by the generator of version 0.3.0 (rings of
+points along the bones, welded, with smoothed weights). Its parts are the trunk and the bones of the
+limbs. Each point lies where its parts carry it: a bone's part is turned, stretched along the bone
+and scaled across it, and the trunk is stretched between hips, shoulders and head.
+
+points (P, 3): m, to the left, up and ahead of the middle of the hips. counts, corners: of the
+faces; coarse (T, 3): fewer triangles on the same points. parts, weights (P, 3): the parts that move
+each point, and their weights out of 255. bone, share (P,): the part with which a point moves where
+bones have other lengths, and its share of the way along it; its height, m, on the trunk. ends
+(19, 2, 3): near and far end of each part, m.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from importlib.resources import files
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
-from posefield.common.units import Floats
-from posefield.encode.body import (
-    body_plan,
-    hip_weights,
-    limb_shape,
-    skinned_mesh,
-    trunk_shape,
-    tube_body,
-)
-from posefield.encode.body.body_plan import PersonPlan
-from posefield.encode.body.bone_chain import BoneChain
-from posefield.encode.body.mesh_builder import MeshBuilder
+from posefield.common.units import Floats, Indices
+from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, Bytes, Integers, SkinnedMesh
+from posefield.motion import blend
 from posefield.motion.skeleton import Skeleton
+from posefield.roles import joint_recognition
 
+LIMB = (
+    "Shoulder", "UpperArm", "LowerArm", "Hand", "Fingers", "UpperLeg", "LowerLeg", "Foot", "Toes"
+)  # fmt: skip
+SIDES = ("left", "right")
+PARTS = ("trunk", *(side + part for side in SIDES for part in LIMB))
+NEEDED = ("UpperArm", "LowerArm", "Hand", "UpperLeg", "LowerLeg", "Foot")
+"""Roles that a human rig has on both sides, beside hips and head."""
 INFLUENCES = 4
-ROUNDS, PULL = 5, 0.5
-"""Rounds of smoothing of the skin weights, and share of the neighbours' mean in each round."""
-TAIL = 0.03
-"""Radius, m, at the start of bones that no person has."""
+# Heights beside a person of the stored size, m: of the head joint above the shoulders, at least, of
+# the skin that the joint of the arms moves above them, of the sole below the toe joint and its tip,
+# and below the ankle of a foot without toes.
+CHIN, NECK, SOLE, TIP, ANKLE = 0.157, 0.055, 0.024, 0.002, 0.075
+HAND, FINGERTIP = 0.185, 0.02
+"""Length of a hand at least, and of the skin beyond its last bone, m."""
+BELOW, HEAD = 0.12, 0.18
+"""Lengths of the skin below the hips and above the head joint, m."""
+SOFTNESS, SHORTEST = 1.0, 0.03
+"""Half of the height over which two joints of the trunk both move the skin: as a share of the
+shorter bone, and at least, m."""
 
 
-def mannequin(skeleton: Skeleton) -> SkinnedMesh:
-    """Return the mannequin of a skeleton; equal skeletons have equal ones."""
-    tree = body_plan.point_tree(skeleton)
-    mesh, plan = MeshBuilder(), body_plan.person(tree)
-    if plan is None:
-        tube_body.build(mesh, tree)
-        mesh.drop_unused()
-        return finish(mesh, along_chains(mesh, len(skeleton)))
-    trunk = build_person(mesh, plan)
-    mesh.drop_unused()
-    weights = along_chains(mesh, len(skeleton))
-    hip_weights.set_weights(weights, mesh, plan, trunk)
-    return finish(mesh, weights)
+@cache
+def stored_mesh() -> Mapping[str, npt.NDArray[Any]]:
+    """Return the arrays of the stored skin."""
+    with files("posefield.encode.body").joinpath("mannequin.npz").open("rb") as file:
+        return dict(np.load(file))
 
 
-def build_person(mesh: MeshBuilder, plan: PersonPlan) -> BoneChain:
-    """Add a person, and tubes along bones that no person has; return the chain of the trunk."""
-    trunk = trunk_shape.build(mesh, plan)
-    for leg, left in zip(plan.legs, (True, False), strict=True):
-        limb_shape.build_leg(mesh, plan, leg, trunk_shape.leg_loop(trunk, left))
-    for arm, left in zip(plan.arms, (True, False), strict=True):
-        limb_shape.build_arm(mesh, plan, arm, trunk_shape.arm_loop(trunk, left))
-    for chain in plan.others:
-        shares = chain.marks / chain.marks[-1]
-        tube_body.add_tube(mesh, chain, plan.scale * TAIL * (1.0 - 0.7 * shares))
-    return trunk.chain
+class _Fit(NamedTuple):
+    """Joints and ends of the parts of a rig.
+
+    joints (19,): the joint that moves each part; the hips for the trunk. anchors (19, 2): ends of
+    each part, as joints or, after all joints, tips. ends (19, 2, 3): m, to the left, up and ahead
+    of the middle of the hips. scale: size beside the stored rig, by the length of the legs. spine:
+    joints from the hips to the head. arms:
+    index in the spine of the joint that holds the arms. tip: height of the end of the head, m.
+    """
+
+    joints: Indices
+    anchors: Indices
+    ends: Floats
+    scale: float
+    spine: list[int]
+    arms: int
+    tip: float
 
 
-def finish(mesh: MeshBuilder, given: Floats) -> SkinnedMesh:
-    """Return the mesh that was built, with normals; given (P, J): weights, not yet smooth."""
-    points: Floats = np.array(mesh.points)
-    counts = np.array([len(face) for face in mesh.faces], np.int32)
-    corners = np.array([point for face in mesh.faces for point in face], np.int32)
-    cut = skinned_mesh.triangles(counts, corners)
-    shares = np.array([place.share for place in mesh.places])
-    chosen, weights = _weights(mesh, given)
+def mannequin(skeleton: Skeleton) -> SkinnedMesh | None:
+    """Return the mannequin of a skeleton; None if it has not the roles or the form of a person."""
+    roles = joint_recognition.roles_of(skeleton.names, skeleton.parents)
+    if not {"hips", "head", *(side + n for side in SIDES for n in NEEDED)} <= set(roles):
+        return None
+    index = {name: joint for joint, name in enumerate(skeleton.names)}
+    places = skeleton.at_rest(skeleton.offsets)
+    places = np.concatenate([places, places[list(skeleton.tip_joints)] + skeleton.tip_offsets])
+    joints = {role: index[name] for role, name in roles.items()}
+    hips = places[[joints["leftUpperLeg"], joints["rightUpperLeg"]]]
+    side = (hips[0] - hips[1]) * (1.0, 0.0, 1.0)
+    if not side.any():
+        return None
+    side /= np.linalg.norm(side)
+    axes = np.stack([side, [0.0, 1.0, 0.0], np.cross(side, [0.0, 1.0, 0.0])])
+    middle = hips.mean(axis=0)
+    fit = _fit(skeleton, joints, (places - middle) @ axes.T)
+    if not _upright(fit.ends):
+        return None
+    stored = stored_mesh()
+    fitted = _fitted_points(stored, fit)
+    points = fitted @ axes + middle
+    marks = np.array([(places[joint] - middle) @ axes[1] for joint in fit.spine])
+    chosen, weights = _weights(stored, fit, len(skeleton), fitted[:, 1], marks)
+    counts, corners = stored["counts"].astype(np.int32), stored["corners"].astype(np.int32)
     return SkinnedMesh(
         points.astype(np.float32),
-        skinned_mesh.vertex_normals(points, cut),
-        *skinned_mesh.distinct_places(_anchors(mesh), shares),
+        skinned_mesh.vertex_normals(points, skinned_mesh.triangles(counts, corners)),
+        *skinned_mesh.distinct_places(*_places(stored, fit, marks)),
         chosen,
         weights,
         counts,
         corners,
         np.zeros(len(points), np.int32),
+        stored["coarse"].astype(np.int32),
     )
 
 
-def _anchors(mesh: MeshBuilder) -> Integers:
-    pairs = [
-        chain.anchors[place.segment : place.segment + 2]
-        for chain, place in zip(mesh.chains, mesh.places, strict=True)
-    ]
-    return np.array(pairs, np.int32)
+def _fit(skeleton: Skeleton, roles: Mapping[str, int], places: Floats) -> _Fit:
+    """Return the parts of a rig with joints and tips at places (J + E, 3)."""
+    above = (*skeleton.parents, *skeleton.tip_joints)
+
+    def furthest(joint: int) -> list[int]:
+        """Return the path from a joint to the joint or tip below it that is furthest from it."""
+        below = [[joint]]
+        for path in below:
+            below += [[*path, point] for point, parent in enumerate(above) if parent == path[-1]]
+        return max(below, key=lambda path: float(np.linalg.norm(places[path[-1]] - places[joint])))
+
+    spine = [roles["head"]]
+    while spine[0] != roles["hips"] and spine[0] >= 0:
+        spine.insert(0, above[spine[0]])
+    parts = {"trunk": (roles["hips"], roles["hips"], furthest(roles["head"])[-1])}
+    for side in SIDES:
+        upper, lower, hand = (roles[side + name] for name in NEEDED[:3])
+        thigh, shin, foot = (roles[side + name] for name in NEEDED[3:])
+        fingers, tip = furthest(hand), furthest(foot)[-1]
+        toes = roles.get(f"{side}Toes", tip)
+        bent = [
+            joint
+            for joint in fingers[1:]
+            if joint < len(skeleton) and any(abs(places[joint] - places[hand]) > 1e-3)
+        ]
+        parts |= {
+            f"{side}Shoulder": (above[upper], above[upper], upper),
+            f"{side}UpperArm": (upper, upper, lower),
+            f"{side}LowerArm": (lower, lower, hand),
+            f"{side}Hand": (hand, hand, fingers[-1]),
+            f"{side}Fingers": (bent[0] if bent else hand, hand, fingers[-1]),
+            f"{side}UpperLeg": (thigh, thigh, shin),
+            f"{side}LowerLeg": (shin, shin, foot),
+            f"{side}Foot": (foot, foot, toes),
+            f"{side}Toes": (roles.get(f"{side}Toes", foot), toes, tip),
+        }
+    found = np.array([parts[part] for part in PARTS])
+    ends = places[found[:, 1:]]
+    holder = max(at for at, joint in enumerate(spine) if joint in _path(above, found[2, 0]))
+    scale = _leg_length(ends) / _leg_length(stored_mesh()["ends"])
+    tip = float(ends[0, 1, 1])
+    ends[0, 1] = places[roles["head"]]
+    return _Fit(found[:, 0], found[:, 1:], ends, scale, spine, holder, tip)
 
 
-def _weights(mesh: MeshBuilder, given: Floats) -> tuple[Integers, Bytes]:
+def _path(above: Sequence[int], point: int) -> list[int]:
+    """Return a point and its ancestors, up to the root."""
+    path = [point]
+    while above[path[-1]] >= 0:
+        path.append(above[path[-1]])
+    return path
+
+
+def _limb(ends: Floats, side: str, *parts: str) -> Floats:
+    """Return the ends (K, 2, 3) of some parts of a side."""
+    found: Floats = ends[[PARTS.index(side + part) for part in parts]]
+    return found
+
+
+def _leg_length(ends: Floats) -> float:
+    legs = np.stack([_limb(ends, side, "UpperLeg", "LowerLeg") for side in SIDES])
+    return float(np.linalg.norm(legs[:, :, 1] - legs[:, :, 0], axis=-1).sum() / 2.0)
+
+
+def _landmarks(ends: Floats) -> tuple[Floats, Floats]:
+    """Return the middles (2, 3) of hips and shoulders, and half their widths (2,), m."""
+    pairs = np.stack([_limb(ends, side, "UpperLeg", "UpperArm")[:, 0] for side in SIDES])
+    return pairs.mean(axis=0), 0.5 * (pairs[0] - pairs[1])[:, 0]
+
+
+def _upright(ends: Floats) -> bool:
+    """Return whether a rig stands as people do: head above arms above hips above ankles."""
+    long = _leg_length(ends)
+    (_, shoulders), widths = _landmarks(ends)
+    ankles = np.mean([_limb(ends, side, "Foot")[0, 0] for side in SIDES], axis=0)
+    arms = [np.ptp(_limb(ends, side, "UpperArm", "LowerArm"), axis=1) for side in SIDES]
+    return bool(
+        -ankles[1] > 0.7 * long
+        and shoulders[1] > 0.3 * long
+        and ends[0, 1, 1] - shoulders[1] > -0.1 * long
+        and widths.min() > 0.02 * long
+        and min(float(np.linalg.norm(arm, axis=-1).sum()) for arm in arms) > 0.3 * long
+    )
+
+
+def _fitted_points(stored: Mapping[str, Any], fit: _Fit) -> Floats:
+    """Return the points (P, 3) as the parts carry them, m, in the axes of the parts' ends."""
+    points, ends = stored["points"].astype(float), stored["ends"].astype(float)
+    carried = np.empty((len(PARTS), *points.shape))
+    for part, name in enumerate(PARTS):
+        if name == "trunk" or name.endswith("Shoulder"):
+            carried[part] = _on_trunk(points, ends, fit)
+        elif name.endswith(("Foot", "Toes")):
+            foot = PARTS.index(f"{name[:-4]}Foot")
+            carried[part] = _on_foot(points, ends[foot : foot + 2], fit.ends[foot : foot + 2], fit)
+        else:
+            is_hand = name.endswith(("Hand", "Fingers"))
+            carried[part] = _on_bone(points, ends[part], fit.ends[part], fit.scale, is_hand)
+    rows = np.arange(len(points))
+    shares = stored["weights"].astype(float)[..., None] / FULL_WEIGHT
+    found: Floats = np.sum(shares * carried[stored["parts"], rows[:, None]], axis=1)
+    # The shin has no part in the feet, so that their soles are flat.
+    feet = [part for part, name in enumerate(PARTS) if name.endswith(("Foot", "Toes"))]
+    standing = np.isin(stored["bone"], feet)
+    found[standing] = carried[stored["bone"], rows][standing]
+    return found
+
+
+def _on_bone(points: Floats, stored: Floats, ends: Floats, scale: float, is_hand: bool) -> Floats:
+    """Return points turned and stretched with a bone, and scaled across it."""
+    old, new = stored[1] - stored[0], ends[1] - ends[0]
+    length, long = float(np.linalg.norm(old)), float(np.linalg.norm(new))
+    old /= length
+    new = new / long if long > 0.0 else old
+    if is_hand:
+        length, long = length + FINGERTIP, max(HAND * scale, long + FINGERTIP * scale)
+    off = points - stored[0]
+    along = off @ old
+    across = scale * (off - along[:, None] * old)
+    # The shortest turn from one direction to the other.
+    turn = np.cross(old, new)
+    once = np.cross(turn, across)
+    turned = across + once + np.cross(turn, once) / max(1.0 + float(old @ new), 1e-9)
+    found: Floats = ends[0] + (long / length) * along[:, None] * new + turned
+    return found
+
+
+def _on_trunk(points: Floats, stored: Floats, fit: _Fit) -> Floats:
+    """Return points stretched between hips, shoulders and head, and widened with them."""
+    (old, old_widths), (new, new_widths) = _landmarks(stored), _landmarks(fit.ends)
+    head, scale = fit.ends[0, 1].copy(), fit.scale
+    head[1] = max(head[1], new[1, 1] + scale * CHIN)
+    before, after = (np.vstack([some, top]) for some, top in ((old, stored[0, 1]), (new, head)))
+    x, y, z = points.T
+    low, high = before[0, 1], before[2, 1]
+    height = np.interp(y, before[:, 1], after[:, 1])
+    height += scale * (np.minimum(y - low, 0.0) + np.maximum(y - high, 0.0))
+    off = [np.interp(y, before[:, 1], some[:, axis]) for axis in (0, 2) for some in (before, after)]
+    waist = 0.5 * (before[0, 1] + before[1, 1])
+    rates = new_widths / old_widths
+    wide = np.interp(y, [low, waist, before[1, 1], high], [rates[0], scale, rates[1], scale])
+    found: Floats = np.stack(
+        [off[1] + wide * (x - off[0]), height, off[3] + scale * (z - off[2])], axis=-1
+    )
+    return found
+
+
+def _on_foot(points: Floats, stored: Floats, ends: Floats, fit: _Fit) -> Floats:
+    """Return points of a foot that stands flat; stored, ends (2, 2, 3): of foot and toes, m."""
+    scale = fit.scale
+    (ankle, ball), (_, tip) = ends
+    old_ankle, old_ball = stored[0]
+    known = [ball[1] - scale * SOLE, tip[1] - scale * TIP] if np.any(ball != ankle) else []
+    sole = min(known, default=ankle[1] - scale * ANKLE)
+    old_sole = min(old_ball[1] - SOLE, stored[1, 1, 1] - TIP)
+    x, y, z = points.T
+    ahead, old_ahead = ball[2] - ankle[2], old_ball[2] - old_ankle[2]
+    far = np.clip((z - old_ankle[2]) / old_ahead, 0.0, 1.0)
+    forth = ahead / old_ahead if ahead > 0.3 * scale * old_ahead else scale
+    beside = far * (ball[0] - ankle[0] if known else scale * (old_ball[0] - old_ankle[0]))
+    found: Floats = np.stack(
+        [
+            ankle[0] + beside + scale * (x - old_ankle[0] - far * (old_ball[0] - old_ankle[0])),
+            sole + (y - old_sole) * (ankle[1] - sole) / (old_ankle[1] - old_sole),
+            ankle[2]
+            + np.where(far < 1.0, forth, scale) * (z - old_ankle[2])
+            + np.where(far < 1.0, 0.0, (forth - scale) * old_ahead),
+        ],
+        axis=-1,
+    )
+    return found
+
+
+def _spine_marks(fit: _Fit, marks: Floats) -> Floats:
+    """Return the heights (K,) from which on the joints of the spine move the skin, m.
+
+    The joint that holds the arms moves the shoulders, although the neck may begin below them.
+    """
+    shoulders = _landmarks(fit.ends)[0][1, 1]
+    raised = marks.copy()
+    raised[fit.arms + 1 :] = np.maximum(raised[fit.arms + 1 :], shoulders + fit.scale * NECK)
+    return np.maximum.accumulate(raised)
+
+
+def _weights(
+    stored: Mapping[str, Any], fit: _Fit, joints: int, heights: Floats, marks: Floats
+) -> tuple[Integers, Bytes]:
     """Return the joints (P, 4) that move each point, heaviest first, and their weights.
 
-    The weights of a point sum to FULL_WEIGHT. given (P, J): they are smoothed over the mesh, so
-    that they are continuous where two chains of bones meet.
+    heights (P,): of the points, m; marks: of the joints of the spine, which share what the trunk
+    moves by height. The weights of a point sum to FULL_WEIGHT.
     """
-    joints, smooth = given.shape[1], _smoothed(mesh, given)
-    chosen = np.argsort(-smooth, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
-    if joints < INFLUENCES:
-        chosen = np.pad(chosen, ((0, 0), (0, INFLUENCES - joints)))
-    heavy = np.take_along_axis(smooth, chosen, axis=1)
-    heavy[:, joints:] = 0.0
+    rows = np.arange(len(heights))
+    parts = np.zeros((len(heights), len(PARTS)))
+    np.add.at(parts, (rows[:, None], stored["parts"]), stored["weights"] / FULL_WEIGHT)
+    found = np.zeros((len(heights), joints))
+    np.add.at(found, (rows[:, None], fit.joints[None, 1:]), parts[:, 1:])
+    marks = _spine_marks(fit, marks)
+    gaps = np.diff([*marks, marks[-1] + HEAD * fit.scale])
+    gaps[0] += BELOW * fit.scale
+    half = np.maximum(SOFTNESS * np.minimum(gaps[:-1], gaps[1:]), SHORTEST * fit.scale)
+    shares = 0.5 + 0.5 * (heights[:, None] - marks[1:]) / half
+    passed = np.minimum.accumulate(blend.smoothstep(np.clip(shares, 0.0, 1.0)), axis=1)
+    passed = np.pad(passed, ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
+    np.add.at(found, (rows[:, None], fit.spine), parts[:, :1] * -np.diff(passed, axis=1))
+    chosen = np.argsort(-found, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
+    heavy = np.take_along_axis(found, chosen, axis=1)
     heavy /= heavy.sum(axis=1, keepdims=True)
     whole = np.floor(FULL_WEIGHT * heavy + 1e-9).astype(np.int64)
     whole[:, 0] += FULL_WEIGHT - whole.sum(axis=1)
@@ -99,27 +326,17 @@ def _weights(mesh: MeshBuilder, given: Floats) -> tuple[Integers, Bytes]:
     return chosen, whole.astype(np.uint8)
 
 
-def along_chains(mesh: MeshBuilder, joints: int) -> Floats:
-    """Return the weights (P, J) that each point has along its chain of bones."""
-    found = np.zeros((len(mesh.points), joints))
-    for point, (chain, place) in enumerate(zip(mesh.chains, mesh.places, strict=True)):
-        for joint, share in chain.weights(place).items():
-            found[point, joint] += share
-    return found
-
-
-def _smoothed(mesh: MeshBuilder, given: Floats) -> Floats:
-    edges = {
-        (min(a, b), max(a, b))
-        for face in mesh.faces
-        for a, b in zip(face, (*face[1:], face[0]), strict=True)
-    }
-    ends = np.array(sorted(edges))
-    degree = np.bincount(ends.reshape(-1), minlength=len(given)).astype(float)[:, None]
-    found = given
-    for _ in range(ROUNDS):
-        summed = np.zeros_like(found)
-        np.add.at(summed, ends[:, 0], found[ends[:, 1]])
-        np.add.at(summed, ends[:, 1], found[ends[:, 0]])
-        found = (1.0 - PULL) * found + PULL * summed / np.maximum(degree, 1.0)
-    return found
+def _places(stored: Mapping[str, Any], fit: _Fit, marks: Floats) -> tuple[Integers, Floats]:
+    """Return the anchors (P, 2) between which points lie, and their share of the way (P,)."""
+    anchors, shares = fit.anchors[stored["bone"]].copy(), stored["share"].astype(float)
+    trunk = np.flatnonzero(stored["bone"] == 0)
+    level = np.zeros((len(trunk), 3))
+    level[:, 1] = shares[trunk]
+    heights = _on_trunk(level, stored["ends"].astype(float), fit)[:, 1]
+    path = np.array([*fit.spine, fit.anchors[0, 1]])
+    ends = np.append(_spine_marks(fit, marks), fit.tip)
+    first = np.clip(np.searchsorted(ends, heights, "right") - 1, 0, len(path) - 2)
+    anchors[trunk] = np.stack([path[first], path[first + 1]], axis=-1)
+    long = np.maximum(ends[first + 1] - ends[first], 1e-6)
+    shares[trunk] = np.clip((heights - ends[first]) / long, 0.0, 1.0)
+    return anchors.astype(np.int32), shares

@@ -10,6 +10,10 @@ from posefield.common.units import Floats, Singles
 Integers = npt.NDArray[np.int32]
 Bytes = npt.NDArray[np.uint8]
 
+SKIN, ROUGHNESS = (0.62, 0.64, 0.69), 0.6
+"""Colour and roughness of a body's material."""
+# Centre, left, right: readers that support one colour per mesh use the first.
+TINTS = np.array([(0.75, 0.75, 0.75), (0.25, 0.45, 0.85), (0.85, 0.4, 0.25)])
 FULL_WEIGHT = 255
 """Sum of the weights of a point, which are whole numbers, so that they fit a byte in glTF."""
 
@@ -42,7 +46,8 @@ class SkinnedMesh:
     each point moves with where bones are longer or shorter. joints, weights (P, I): the joints that
     move each point, and their weights out of FULL_WEIGHT; points with fewer of them have zeros.
     counts: corners of each face; corners: their points, counterclockwise from outside. tints (P,):
-    index of the point's colour.
+    index of the point's colour. coarse (T, 3): fewer triangles
+    on the same points, for characters seen from afar.
     """
 
     points: Singles
@@ -54,12 +59,19 @@ class SkinnedMesh:
     counts: Integers
     corners: Integers
     tints: Integers
+    coarse: Integers
 
     def points_at(self, moved: Floats) -> Singles:
         """Return the points (M, P, 3), m, for places that move by (M, R, 3), m."""
         found = moved.astype(np.float32).take(self.place, axis=1)
         found += self.points
         return found
+
+
+def colours(mesh: SkinnedMesh) -> Singles:
+    """Return the colours (C, 3) that the tints of a mesh stand for: one for all, or three."""
+    found = TINTS if mesh.tints.any() else np.array([SKIN])
+    return found.astype(np.float32)
 
 
 def distinct_places(anchors: Integers, shares: Floats) -> tuple[BonePlaces, Integers]:

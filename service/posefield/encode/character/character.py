@@ -82,7 +82,7 @@ def _cached_rig(key: _SkeletonKey, kind: BodyKind) -> CharacterRig:
 def _mesh(skeleton: Skeleton, kind: BodyKind) -> SkinnedMesh | None:
     if kind == "none":
         return None
-    return mannequin(skeleton) if kind == "mannequin" else bones_body(skeleton)
+    return (mannequin(skeleton) if kind == "mannequin" else None) or bones_body(skeleton)
 
 
 @dataclass(frozen=True)

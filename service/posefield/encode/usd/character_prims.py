@@ -9,7 +9,7 @@ import numpy as np
 from pxr import Gf, Vt
 
 from posefield.common.units import Singles
-from posefield.encode.body import body_colours
+from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
 from posefield.encode.character import joint_names
 from posefield.encode.character.character import CharacterArrays, CharacterRig
@@ -50,7 +50,7 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
         return None
     used = max(1, int(np.flatnonzero(mesh.weights.any(axis=0)).max(initial=0)) + 1)
     weights = mesh.weights[:, :used].astype(np.float32) / np.float32(FULL_WEIGHT)
-    colours = body_colours.colours(mesh)
+    colours = skinned_mesh.colours(mesh)
     return _MeshArrays(
         Vt.IntArray.FromNumpy(mesh.counts),
         Vt.IntArray.FromNumpy(mesh.corners),
@@ -210,8 +210,8 @@ def _material(parent: Any, *, tinted: bool) -> Any:
         result = prim_specs.varying_attribute(reader, "outputs:result", ValueTypes.Float3)
         _connect(colour, result)
     else:
-        colour.default = Gf.Vec3f(*body_colours.SKIN)
-    for name, value in (("roughness", body_colours.ROUGHNESS), ("metallic", 0.0)):
+        colour.default = Gf.Vec3f(*skinned_mesh.SKIN)
+    for name, value in (("roughness", skinned_mesh.ROUGHNESS), ("metallic", 0.0)):
         prim_specs.varying_attribute(surface, f"inputs:{name}", ValueTypes.Float, value)
     output = prim_specs.varying_attribute(surface, "outputs:surface", ValueTypes.Token)
     _connect(prim_specs.varying_attribute(made, "outputs:surface", ValueTypes.Token), output)

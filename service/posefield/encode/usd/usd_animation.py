@@ -23,15 +23,10 @@ class AnimationLayerBuilder(BaseLayerBuilder):
     paths: tuple[str, ...]
     curves: tuple[str, ...] = ()
 
-    def head(self, content: LayerContent) -> Any:
-        """Return the layer without its prims."""
-        made = Sdf.Layer.CreateAnonymous("animation.usda")
-        self.set_metadata(made, ANIMATION_NAME, content)
-        return made
-
     def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
-        made = self.head(content)
+        made = Sdf.Layer.CreateAnonymous("animation.usda")
+        self.set_metadata(made, ANIMATION_NAME, content)
         with Sdf.ChangeBlock():
             prim_specs.set_time_samples(
                 character_prims.animation(made, ANIMATION_NAME, self.paths, self.curves),

@@ -18,7 +18,6 @@ from posefield.encode.usd import character_prims, clip_arrays
 from posefield.encode.usd_layers import crate_template, prim_specs
 from posefield.encode.usd_layers.layer_content import LayerContent
 from posefield.encode.usd_layers.layer_metadata import BaseLayerBuilder
-from posefield.encode.usd_layers.text_cache import TEXTS
 from posefield.question.results import SampledClip
 
 ROOT = Sdf.Path("/Character")
@@ -31,12 +30,6 @@ class ClipLayerBuilder(BaseLayerBuilder):
 
     rig: CharacterRig
     curves: tuple[str, ...] = ()
-
-    def head(self, content: LayerContent) -> Any:
-        """Return the layer without its prims."""
-        made = Sdf.Layer.CreateAnonymous("clip.usda")
-        self.set_metadata(made, ROOT.name, content)
-        return made
 
     def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
@@ -67,7 +60,10 @@ def _character_prims(rig: CharacterRig, convention: Convention, curves: tuple[st
 
 def usda(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:
     """Return USD layers as text."""
-    return [TEXTS.write(*each) for each in builders_and_contents(answers, convention)]
+    layers = (
+        author.layer(content) for author, content in builders_and_contents(answers, convention)
+    )
+    return [layer.ExportToString().encode() for layer in layers]
 
 
 def usdc(answers: Sequence[SampledClip], convention: Convention) -> list[bytes]:

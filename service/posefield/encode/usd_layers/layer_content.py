@@ -64,9 +64,6 @@ class LayerBuilder(Protocol):
     def with_rate(self, rate: float) -> Self:
         """Return the same kind at other frames a second."""
 
-    def head(self, content: LayerContent) -> Any:
-        """Return the layer without its prims."""
-
     def layer(self, content: LayerContent) -> Any:
         """Return the layer, built by usd-core; its prims are valid while the caller holds it."""
 
@@ -76,11 +73,6 @@ class LayerBuilder(Protocol):
 def first_frame(content: LayerContent) -> LayerContent:
     """Return the content with the first sample of each attribute alone."""
     return replace(content, samples={name: rows[:1] for name, rows in content.samples.items()})
-
-
-def samples_size(content: LayerContent) -> int:
-    """Return the bytes of the samples of a content."""
-    return sum(rows.nbytes for rows in content.samples.values())
 
 
 def random_content(pattern: LayerPattern, facts: Mapping[str, Any], seed: int) -> LayerContent:

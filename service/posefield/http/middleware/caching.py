@@ -31,7 +31,9 @@ def code_digest() -> bytes:
     """
     digest = blake2b(digest_size=16)
     root = Path(posefield.__file__).parent
-    for source in sorted([*root.rglob("*.py"), *root.rglob("*.yaml")]):
+    for source in sorted(
+        [each for kind in ("py", "yaml", "npz") for each in root.rglob(f"*.{kind}")]
+    ):
         digest.update(source.relative_to(root).as_posix().encode() + b"\0")
         digest.update(source.read_bytes())
     for name in LIBRARIES:
