@@ -73,7 +73,7 @@ def test_it_is_a_command_of_its_own():
     command = str(Path(sys.executable).parent / "posefield")
     done = subprocess.run([command, "--help"], capture_output=True, text=True, check=False)
     assert done.returncode == 0
-    for name in ("sample", "train", "inspect", "pose", "clip", "why", "suggest", "serve", "check"):
+    for name in ("sample", "train", "inspect", "pose", "clip", "why", "suggest", "serve"):
         assert re.search(rf"\b{name}\b", done.stdout)
 
 
@@ -638,45 +638,6 @@ def test_a_clip_replaces_one_that_was_there(posefield, model_path, tmp_path):
 def test_an_unknown_format_is_refused_before_anything_is_read(refused, tmp_path, name):
     said = refused(2, "clip", tmp_path / "none.onnx", "-o", tmp_path / name)
     assert said.startswith(f"output: {name!r} ends in none of usda, usdc")
-
-
-# --- check ----------------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def written(posefield, model_path, tmp_path):
-    path = tmp_path / "clip.usda"
-    assert posefield("clip", model_path, *CONTROLS, "-o", path)[0] == 0
-    return path
-
-
-def test_check_finds_nothing_in_our_own_files(posefield, written):
-    assert posefield("check", written) == (0, f"{written}: 0 findings\n", "")
-    assert json.loads(posefield("check", written, "--json")[1]) == []
-
-
-def test_check_ends_with_code_1_where_it_finds_a_defect(posefield, written):
-    text = written.read_text()
-    broken = re.sub(r"uniform matrix4d\[\] bindTransforms = .*\n", "", text)
-    assert broken != text
-    written.write_text(broken)
-    code, out, _ = posefield("check", written, "--json")
-    findings = json.loads(out)
-    assert code == 1
-    assert [f["severity"] for f in findings if f["code"] == "missing-bindTransforms"] == ["error"]
-    assert set(findings[0]) == {"code", "severity", "prim", "message"}
-    code, out, _ = posefield("check", written)
-    assert code == 1
-    assert "[missing-bindTransforms]" in out
-    assert out.splitlines()[-1] == f"{written}: {len(findings)} findings"
-
-
-@pytest.mark.parametrize("content", [None, b"", b"#usda 1.0\n(", b"PXR-USDC"])
-def test_check_of_what_is_no_usd_ends_with_code_3(refused, tmp_path, content):
-    path = tmp_path / "broken.usda"
-    if content is not None:
-        path.write_bytes(content)
-    assert str(path) in refused(3, "check", path)
 
 
 # --- serve ----------------------------------------------------------------------------------------

@@ -12,6 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+# Helpers of the tests that these checks use too.
+sys.path.append(str(ROOT / "tests"))
 THREE = ROOT / "build" / "three"
 NEWEST, OLDER = "5.0.1", "4.5.15"
 """Versions of Blender: CI takes the newest, `make test-all` the older one too."""

@@ -15,6 +15,7 @@ import environment
 import httpx
 import numpy as np
 import running
+from usd_checks import defects
 
 COMMAND = Path(sys.executable).with_name("posefield")
 PAGE_TEST = environment.ROOT / "clients/viewer/test/face.browser.ts"
@@ -56,7 +57,7 @@ def _in_files(python: Path, node: Path, address: str, folder: Path) -> Iterator[
             names, values = found[f"{file.name}/names"], found[f"{file.name}/values"]
             yield from _differences(file.name, names.tolist(), values, meant)
     for file in (file for file in files if file.suffix != ".glb"):
-        _call(COMMAND, "check", file)
+        yield from (f"{file.name}: {line}" for line in defects(file))
     yield from _invalid(node, folder)
 
 

@@ -67,7 +67,6 @@ def test_one_joint_passes_the_commands(tmp_path):
         ["train", folder / "tiny.toml", "-o", model, "--report", folder / "tiny.html"],
         ["inspect", model],
         ["clip", model, "-c", "speed=3", "-o", folder / "prop.usdc"],
-        ["check", folder / "prop.usdc"],
         ["why", model, "-c", "speed=3"],
     ):
         done = subprocess.run([POSEFIELD, *map(str, words)], capture_output=True, text=True)

@@ -58,7 +58,11 @@ def bones_body(skeleton: Skeleton) -> SkinnedMesh:
     rows = np.round(np.concatenate([starts, arms], axis=-1), 5)
     kept = np.sort(np.unique(rows, axis=0, return_index=True)[1])
     joints, ends, starts, arms, radii = (
-        values[kept] for values in (joints, ends, starts, arms, radii)
+        joints[kept],
+        ends[kept],
+        starts[kept],
+        arms[kept],
+        radii[kept],
     )
     side = starts[:, 0] + arms[:, 0] / 2 - skeleton.offsets[0, 0]
     tints = np.where(np.abs(side) > radii / 2, np.where(side > 0, 1, 2), 0).astype(np.int32)

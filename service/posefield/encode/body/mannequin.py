@@ -61,8 +61,8 @@ class _Fit(NamedTuple):
     joints (19,): the joint that moves each part; the hips for the trunk. anchors (19, 2): ends of
     each part, as joints or, after all joints, tips. ends (19, 2, 3): m, to the left, up and ahead
     of the middle of the hips. scale: size beside the stored rig, by the length of the legs. spine:
-    joints from the hips to the head. arms:
-    index in the spine of the joint that holds the arms. tip: height of the end of the head, m.
+    joints from the hips to the head. arms: index in the spine of the joint that holds the arms.
+    crown: height of the end of the head, m.
     """
 
     joints: Indices
@@ -71,7 +71,7 @@ class _Fit(NamedTuple):
     scale: float
     spine: list[int]
     arms: int
-    tip: float
+    crown: float
 
 
 def mannequin(skeleton: Skeleton) -> SkinnedMesh | None:
@@ -83,6 +83,8 @@ def mannequin(skeleton: Skeleton) -> SkinnedMesh | None:
     places = skeleton.at_rest(skeleton.offsets)
     places = np.concatenate([places, places[list(skeleton.tip_joints)] + skeleton.tip_offsets])
     joints = {role: index[name] for role, name in roles.items()}
+    if not all(joints["hips"] in _path(skeleton.parents, joint) for joint in joints.values()):
+        return None
     hips = places[[joints["leftUpperLeg"], joints["rightUpperLeg"]]]
     side = (hips[0] - hips[1]) * (1.0, 0.0, 1.0)
     if not side.any():
@@ -123,9 +125,8 @@ def _fit(skeleton: Skeleton, roles: Mapping[str, int], places: Floats) -> _Fit:
             below += [[*path, point] for point, parent in enumerate(above) if parent == path[-1]]
         return max(below, key=lambda path: float(np.linalg.norm(places[path[-1]] - places[joint])))
 
-    spine = [roles["head"]]
-    while spine[0] != roles["hips"] and spine[0] >= 0:
-        spine.insert(0, above[spine[0]])
+    spine = _path(above, roles["head"])[::-1]
+    spine = spine[spine.index(roles["hips"]) :]
     parts = {"trunk": (roles["hips"], roles["hips"], furthest(roles["head"])[-1])}
     for side in SIDES:
         upper, lower, hand = (roles[side + name] for name in NEEDED[:3])
@@ -152,9 +153,9 @@ def _fit(skeleton: Skeleton, roles: Mapping[str, int], places: Floats) -> _Fit:
     ends = places[found[:, 1:]]
     holder = max(at for at, joint in enumerate(spine) if joint in _path(above, found[2, 0]))
     scale = _leg_length(ends) / _leg_length(stored_mesh()["ends"])
-    tip = float(ends[0, 1, 1])
+    crown = float(ends[0, 1, 1])
     ends[0, 1] = places[roles["head"]]
-    return _Fit(found[:, 0], found[:, 1:], ends, scale, spine, holder, tip)
+    return _Fit(found[:, 0], found[:, 1:], ends, scale, spine, holder, crown)
 
 
 def _path(above: Sequence[int], point: int) -> list[int]:
@@ -316,7 +317,7 @@ def _weights(
     shares = 0.5 + 0.5 * (heights[:, None] - marks[1:]) / half
     passed = np.minimum.accumulate(blend.smoothstep(np.clip(shares, 0.0, 1.0)), axis=1)
     passed = np.pad(passed, ((0, 0), (1, 1)), constant_values=((0, 0), (1, 0)))
-    np.add.at(found, (rows[:, None], fit.spine), parts[:, :1] * -np.diff(passed, axis=1))
+    np.add.at(found, (rows[:, None], np.array(fit.spine)), parts[:, :1] * -np.diff(passed, axis=1))
     chosen = np.argsort(-found, axis=1, kind="stable")[:, :INFLUENCES].astype(np.int32)
     heavy = np.take_along_axis(found, chosen, axis=1)
     heavy /= heavy.sum(axis=1, keepdims=True)
@@ -334,7 +335,7 @@ def _places(stored: Mapping[str, Any], fit: _Fit, marks: Floats) -> tuple[Intege
     level[:, 1] = shares[trunk]
     heights = _on_trunk(level, stored["ends"].astype(float), fit)[:, 1]
     path = np.array([*fit.spine, fit.anchors[0, 1]])
-    ends = np.append(_spine_marks(fit, marks), fit.tip)
+    ends = np.append(_spine_marks(fit, marks), fit.crown)
     first = np.clip(np.searchsorted(ends, heights, "right") - 1, 0, len(path) - 2)
     anchors[trunk] = np.stack([path[first], path[first + 1]], axis=-1)
     long = np.maximum(ends[first + 1] - ends[first], 1e-6)
