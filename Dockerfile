@@ -35,7 +35,7 @@ COPY api api
 COPY service service
 # `make page` builds them, once for every machine: the image needs no Node.
 # hadolint ignore=SC2086
-RUN { test -f service/posefield/http/pages/viewer/index.html && test -f service/posefield/http/pages/viewer/crowd-webgpu.js && test -f service/posefield/http/pages/docs/index.html || { echo "no page: run make page first" >&2; exit 1; }; } && \
+RUN { test -f service/posefield/http/pages/viewer/index.html && test -f service/posefield/http/pages/docs/index.html || { echo "no page: run make page first" >&2; exit 1; }; } && \
     uv sync --frozen --no-dev --package posefield --no-editable ${EXTRAS}
 # What is in it, by what is installed: /opt/posefield/share/sbom.cdx.json (CycloneDX).
 RUN mkdir -p /opt/posefield/share && uv run --frozen --isolated --only-group sbom cyclonedx-py environment --pyproject service/pyproject.toml --output-reproducible --output-file /opt/posefield/share/sbom.cdx.json /opt/posefield/bin/python

@@ -36,10 +36,9 @@ $(NODE): clients/package.json clients/package-lock.json clients/typescript/packa
 .PHONY: node
 node: $(NODE) ## install into clients/node_modules what its lock file names
 
-# The service's answer to `/`: one file, made of the page's sources and of nothing else, and a script beside it for
-# browsers with WebGPU; `posefield page` writes copies of the page with computed answers.
+# The service's answer to `/`: one file, made of the page's sources and of nothing else.
 PAGE := service/posefield/http/pages/viewer/index.html
-$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/viewer/vite.webgpu.config.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
+$(PAGE): $(NODE) $(shell find clients/viewer/src clients/typescript/src -type f) clients/viewer/index.html clients/viewer/vite.config.ts clients/tsconfig.base.json clients/viewer/tsconfig.json
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/npm run build --prefix clients/viewer --silent
 
 # The service's answer to `/docs`: Swagger UI as its package holds it, within one file of HTML.

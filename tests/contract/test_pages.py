@@ -17,7 +17,7 @@ from posefield.http.pages import static_page
 
 BUILT = {"/": static_page.VIEWER, "/docs": static_page.DOCS}
 NO_ICON = '<link rel="icon" href="data:,"'
-ALL = ["/openapi.yaml", "/openapi.json", "/problems", "/crowd-webgpu.js", *BUILT]
+ALL = ["/openapi.yaml", "/openapi.json", "/problems", *BUILT]
 
 
 def test_the_contract_is_served_as_it_is_written(ask, spec):
@@ -112,23 +112,6 @@ def test_only_scripts_and_styles_of_the_page_itself_are_named():
         "script-src 'none'; style-src 'none'"
         in static_page.headers(b"<p>")["Content-Security-Policy"]
     )
-
-
-def test_only_the_viewer_loads_scripts_and_only_from_the_service(ask):
-    policies = {path: ask("GET", path).headers["content-security-policy"] for path in BUILT}
-    assert "script-src 'self' 'sha256-" in policies["/"]
-    assert "script-src 'sha256-" in policies["/docs"]
-    script = ask("GET", "/crowd-webgpu.js")
-    assert script.headers["x-content-type-options"] == "nosniff"
-    assert script.content == static_page.VIEWER_SCRIPT.read_bytes()
-    # A page without scripts, as where it is not built, needs none.
-    bare = static_page.headers(b"<p>", loads_scripts=True)["Content-Security-Policy"]
-    assert "script-src 'none';" in bare
-
-
-def test_a_script_that_is_not_built_says_so(tmp_path):
-    content = static_page.viewer_script(tmp_path / "crowd-webgpu.js")
-    assert content.startswith(b"throw new Error(") and b"make page" in content
 
 
 def test_every_link_of_the_problems_leads_somewhere(ask):

@@ -811,13 +811,6 @@ OPERATIONS = {
             "getCharacter", "GET", "/v1/models/{model}/character.glb", ("model/gltf-binary",), {}
         ),
         Operation(
-            "getKernel",
-            "GET",
-            "/v1/models/{model}/kernel.safetensors",
-            ("application/vnd.safetensors",),
-            {},
-        ),
-        Operation(
             "getPose",
             "GET",
             "/v1/models/{model}/pose",
@@ -1148,7 +1141,6 @@ OPERATIONS = {
         Operation("getContract", "GET", "/openapi.yaml", ("application/yaml",), {}),
         Operation("getContractJson", "GET", "/openapi.json", ("application/json",), {}),
         Operation("getViewer", "GET", "/", ("text/html",), {}),
-        Operation("getViewerCrowd", "GET", "/crowd-webgpu.js", ("text/javascript",), {}),
         Operation("getDocs", "GET", "/docs", ("text/html",), {}),
         Operation("getProblems", "GET", "/problems", ("text/html",), {}),
     )

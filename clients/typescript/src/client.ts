@@ -99,13 +99,6 @@ export class Client {
     return this.#file(asked, `${model}.glb`, { signal });
   }
 
-  /** The model's numbers for a graphics card, a safetensors file. */
-  async kernel(model: string, signal?: AbortSignal): Promise<Download> {
-    const mediaType = "application/vnd.safetensors";
-    const asked = { ...get(under(model, "/kernel.safetensors")), mediaType };
-    return this.#file(asked, `${model}.safetensors`, { signal });
-  }
-
   async pose(model: string, question: PoseQuestion, signal?: AbortSignal): Promise<Poses> {
     const asked = this.#request(model, "/pose.msgpack", "PoseQuestion", question);
     return this.#read(asked, poses, signal);

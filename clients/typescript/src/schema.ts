@@ -69,32 +69,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/v1/models/{model}/kernel.safetensors": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                /**
-                 * @description Model name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        /**
-         * Get a model's numbers for a graphics card
-         * @description The constants of the model file as float32 arrays in a safetensors file, laid out for a kernel that computes one pose a workgroup: kriging weights, core tensor, bases, directions of the pose, bones and mean rotations, of all levels of detail. The reference of the model file lists the arrays. The crowd of the page at `/` is computed from them by WebGPU. Since 4.4.0.
-         */
-        get: operations["getKernel"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/v1/models/{model}/pose": {
         parameters: {
             query?: never;
@@ -697,26 +671,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/crowd-webgpu.js": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Get the viewer's script for graphics cards
-         * @description JavaScript module that the model viewer loads in browsers with WebGPU, to compute and draw crowds. Since 4.4.0.
-         */
-        get: operations["getViewerCrowd"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/docs": {
         parameters: {
             query?: never;
@@ -726,7 +680,7 @@ export interface paths {
         };
         /**
          * Read the documentation of the operations
-         * @description HTML page to search and try all operations. The page loads no external resources.
+         * @description HTML page to read and try all operations. The page loads no external resources.
          */
         get: operations["getDocs"];
         put?: never;
@@ -2674,19 +2628,6 @@ export interface components {
                 "text/html": string;
             };
         };
-        /** @description A JavaScript module. */
-        ViewerScript: {
-            headers: {
-                "X-Request-Id": components["headers"]["RequestId"];
-                "Cache-Control": components["headers"]["PageCacheControl"];
-                ETag: components["headers"]["ETag"];
-                Vary: components["headers"]["Vary"];
-                [name: string]: unknown;
-            };
-            content: {
-                "text/javascript": string;
-            };
-        };
         /** @description The document matches If-None-Match. */
         PageNotModified: {
             headers: {
@@ -3306,50 +3247,6 @@ export interface operations {
                 };
                 content: {
                     "model/gltf-binary": string;
-                };
-            };
-            304: components["responses"]["NotModified"];
-            400: components["responses"]["BadRequest"];
-            401: components["responses"]["Unauthenticated"];
-            403: components["responses"]["Forbidden"];
-            404: components["responses"]["NotFound"];
-            405: components["responses"]["MethodNotAllowed"];
-            414: components["responses"]["UrlTooLong"];
-            421: components["responses"]["UnknownHost"];
-            431: components["responses"]["HeadTooLarge"];
-            500: components["responses"]["InternalError"];
-            503: components["responses"]["Overloaded"];
-        };
-    };
-    getKernel: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path: {
-                /**
-                 * @description Model name, or name@hash.
-                 * @example reach
-                 */
-                model: components["parameters"]["model"];
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description The kernel table. */
-            200: {
-                headers: {
-                    "X-Request-Id": components["headers"]["RequestId"];
-                    "Cache-Control": components["headers"]["CacheControl"];
-                    ETag: components["headers"]["ETag"];
-                    "Content-Disposition": components["headers"]["Disposition"];
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/vnd.safetensors": string;
                 };
             };
             304: components["responses"]["NotModified"];
@@ -4965,28 +4862,6 @@ export interface operations {
         requestBody?: never;
         responses: {
             200: components["responses"]["Page"];
-            304: components["responses"]["PageNotModified"];
-            400: components["responses"]["BadRequest"];
-            405: components["responses"]["MethodNotAllowed"];
-            414: components["responses"]["UrlTooLong"];
-            421: components["responses"]["UnknownHost"];
-            431: components["responses"]["HeadTooLarge"];
-            500: components["responses"]["InternalError"];
-        };
-    };
-    getViewerCrowd: {
-        parameters: {
-            query?: never;
-            header?: {
-                /** @description Entity tags of responses in the client's cache. If one matches, the response is 304 without a body. */
-                "If-None-Match"?: components["parameters"]["ifNoneMatch"];
-            };
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            200: components["responses"]["ViewerScript"];
             304: components["responses"]["PageNotModified"];
             400: components["responses"]["BadRequest"];
             405: components["responses"]["MethodNotAllowed"];

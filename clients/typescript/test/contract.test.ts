@@ -88,7 +88,6 @@ const ASKED: Record<string, Ask | string | ByFormat> = {
   listCharacters: (client) => client.characters(),
   getModel: (client, model) => client.card(model),
   getCharacter: (client, model) => client.character(model),
-  getKernel: (client, model) => client.kernel(model),
   getPose: NEGOTIATED,
   queryPose: NEGOTIATED,
   getPoseInFormat: POSES,
@@ -125,7 +124,6 @@ const ASKED: Record<string, Ask | string | ByFormat> = {
   getDocs: PAGE,
   getProblems: PAGE,
   getViewer: PAGE,
-  getViewerCrowd: PAGE,
 };
 
 interface Example {

@@ -1,115 +1,135 @@
-/** The page as a whole: which model is shown, and what happens when the service does not answer. */
+/** The page as a whole: the shown model, its parts, and what happens when the service does not answer. */
 
+import "./style.css";
 import { type ModelCard, type ModelSummary, Problem, Unexpected } from "@posefield/client";
 
+import * as bodies from "./bodies.ts";
 import { type Character, read } from "./character.ts";
-import { understood } from "./faults.ts";
-import { type Address, address, restored } from "./hash.ts";
-import { Header } from "./header.ts";
-import { KeyDialog } from "./key.ts";
-import { Notice } from "./notice.ts";
-import { offline } from "./offline.ts";
-import type { Source } from "./page.ts";
-import * as parts from "./parts.ts";
-import { Player } from "./player.ts";
+import * as controls from "./controls.ts";
+import * as crowd from "./crowd.ts";
+import { KeyDialog, Notice, understood } from "./faults.ts";
+import * as feet from "./feet.ts";
+import * as files from "./files.ts";
+import { type Address, address, follow, restored } from "./hash.ts";
+import { Header, mountJumps, mountWelcome } from "./header.ts";
+import * as levels from "./levels.ts";
+import * as map from "./map.ts";
+import * as panels from "./panels.ts";
+import * as performance from "./performance/part.ts";
+import { Player, type Session } from "./player.ts";
 import { Scene } from "./scene.ts";
-import { mismatch, Service } from "./service.ts";
-import { Store } from "./state.ts";
-import * as sync from "./sync.ts";
-import { still } from "./theme.ts";
-import { Watch } from "./watch.ts";
+import { mismatch, Service, Watch } from "./service.ts";
+import { type State, Store } from "./state.ts";
+import * as target from "./target.ts";
+import * as theme from "./theme.ts";
+import * as transport from "./transport.ts";
+import * as trust from "./trust.ts";
 
-/** A model as it is shown. */
-interface Shape {
+type Mount = (host: HTMLElement, session: Session) => void;
+
+/** Parts in their order; each gets a section, named for styles and tests. */
+const PARTS: Readonly<Record<"stage" | "side" | "transport", Readonly<Record<string, Mount>>>> = {
+  stage: {
+    options: panels.mountOptions,
+    ghost: bodies.mount,
+    levels: levels.mount,
+    crowd: crowd.mount,
+  },
+  side: {
+    jumps: mountJumps,
+    welcome: mountWelcome,
+    controls: controls.mount,
+    takes: panels.mountTakes,
+    trust: trust.mount,
+    curves: panels.mountCurves,
+    target: target.mount,
+    map: map.mount,
+    feet: feet.mount,
+    files: files.mount,
+    detail: panels.mountDetail,
+  },
+  transport: { time: transport.mount },
+};
+
+/** A model with its character. */
+interface Model {
   readonly card: ModelCard;
   readonly character: Character;
 }
 
-interface Open extends Shape {
+interface Open extends Model {
   readonly model: string;
   readonly store: Store;
   readonly end: AbortController;
 }
 
-export class App {
+class App {
   readonly #service = new Service();
-  #source: Source = this.#service;
   readonly #notice = new Notice(at("#notice"));
   readonly #header = new Header(at("#bar"), (model) => this.#choose(model));
-  readonly #key = new KeyDialog(document.body, (key) => this.#unlock(key));
+  readonly #key = new KeyDialog(document.body, (key) => {
+    this.#service.use(key);
+    void this.#reconnect();
+  });
   readonly #watch = new Watch(
-    () => this.#look(),
-    () => this.#back(),
+    () => this.#check(),
+    () => this.#reconnect(),
   );
   #scene: Scene | null = null;
   #open: Open | null = null;
-  /** What is asked for and not shown yet. */
+  /** Address that is not shown yet. */
   #wanted: Address | null = null;
+  /** Number of the newest navigation, which overtakes earlier ones. */
   #turn = 0;
 
-  async start(): Promise<void> {
-    try {
-      // A copy without a service has its answers in itself.
-      this.#source = (await offline()) ?? this.#service;
-    } catch (fault) {
-      this.#fault(`The answers in this page cannot be opened: ${fault}`);
-      return;
-    }
-    void this.#go(address(location.hash));
-    if (this.#source === this.#service) void this.#compare();
+  start(): void {
+    void this.#navigate(address(location.hash));
+    void this.#compareVersions();
     addEventListener("popstate", () => void this.#restore(address(location.hash)));
-    // What was asked for is on its way while this takes its time.
+    // The answers are on their way while the scene is built.
     try {
       this.#scene = new Scene(at("#stage"));
     } catch {
-      this.#blind();
+      this.#wanted = null;
+      this.#turn += 1;
+      this.#watch.end();
+      this.#fault(NO_GRAPHICS);
     }
   }
 
-  /** Whether service and page speak the same contract. */
-  async #compare(): Promise<void> {
+  async #compareVersions(): Promise<void> {
     this.#notice.remark("version", await mismatch());
   }
 
-  /** Without a stage there is nothing to show. */
-  #blind(): void {
-    this.#wanted = null;
-    this.#turn += 1;
-    this.#watch.end();
-    this.#fault(
-      "This browser shows no 3-D graphics (WebGL 2), and this page shows nothing without. Turn on hardware acceleration in its settings, or open the page in another browser.",
-    );
-  }
-
-  /** A step that one may go back. */
+  /** Open another model, as a step of the history. */
   #choose(model: string): void {
     history.pushState(null, "", `#${encodeURIComponent(model)}`);
-    // A performance is not of one model, and stays as it is.
+    // A performance may use several models, and stays as it is.
     const script = this.#open?.store.state.script;
-    void this.#go({ model, entries: script ? [["~script", script]] : [] });
+    void this.#navigate({ model, entries: script ? [["~script", script]] : [] });
   }
 
-  /** Shows that model as the address says, or says why not. A later call overtakes this one. */
-  async #go(wanted: Address): Promise<void> {
+  /** Show the model of an address, or say why not. */
+  async #navigate(wanted: Address): Promise<void> {
     const turn = ++this.#turn;
     this.#wanted = wanted;
     try {
-      const [models, hoped] = await Promise.all([
-        this.#source.models(),
-        wanted.model ? this.#hoped(wanted.model) : null,
+      const [models, candidate] = await Promise.all([
+        this.#service.client.models(),
+        wanted.model ? this.#fetchIfThere(wanted.model) : null,
       ]);
-      const found = hoped && listed(models, wanted.model!) ? hoped : null;
-      const model = found ? wanted.model! : models[0]?.name;
-      if (!model) throw none(wanted.model);
-      const shape = found ?? (await this.#shape(model));
+      const there = candidate && isListed(models, wanted.model!) ? candidate : null;
+      const name = there ? wanted.model! : models[0]?.name;
+      if (!name) throw noModel(wanted.model);
+      const model = there ?? (await this.#fetch(name));
       if (turn !== this.#turn) return;
-      const missing = wanted.model && !found ? gone(wanted.model, model) : "";
-      const { state, faults } = restored(
-        missing ? { model, entries: [] } : wanted,
-        model,
-        shape.card,
-      );
-      this.#show(model, shape, new Store(calm(state, wanted)), models);
+      const missing =
+        wanted.model && !there
+          ? `${wanted.model} is not on this service (any more): showing ${name} instead.`
+          : "";
+      const entries = missing ? [] : wanted.entries;
+      const { state, faults } = restored({ model: name, entries }, name, model.card);
+      this.#show(name, model, new Store(calm(state, wanted)), models);
       this.#wanted = null;
       this.#notice.fault(null);
       this.#notice.remark("model", [missing, ...faults].filter(Boolean).join(" · ") || null);
@@ -118,52 +138,54 @@ export class App {
     }
   }
 
-  /** null where there is no such model; other faults do not say that. */
-  async #hoped(model: string): Promise<Shape | null> {
-    try {
-      return await this.#shape(model);
-    } catch (fault) {
-      if (lacks(fault)) return null;
-      throw fault;
-    }
-  }
-
-  async #shape(model: string): Promise<Shape> {
+  async #fetch(name: string): Promise<Model> {
     const [card, { content }] = await Promise.all([
-      this.#source.card(model),
-      this.#source.character(model),
+      this.#service.client.card(name),
+      this.#service.client.character(name),
     ]);
     return { card, character: read(content) };
   }
 
-  #show(model: string, shape: Shape, store: Store, models: readonly ModelSummary[]): void {
-    const { card } = shape;
+  /** Return null where there is no such model; throw other faults. */
+  async #fetchIfThere(name: string): Promise<Model | null> {
+    try {
+      return await this.#fetch(name);
+    } catch (fault) {
+      const cause = fault instanceof Unexpected ? fault.cause : fault;
+      // A name that no model can have is no path at all.
+      const kinds = ["unknown-model", "no-such-path"];
+      if (cause instanceof Problem && kinds.includes(cause.kind)) return null;
+      throw fault;
+    }
+  }
+
+  #show(name: string, model: Model, store: Store, models: readonly ModelSummary[]): void {
+    const { card } = model;
     this.#open?.end.abort();
-    if (this.#open?.model !== model) this.#scene!.frame();
+    if (this.#open?.model !== name) this.#scene!.frame();
     const end = new AbortController();
     const page = {
       store,
-      source: this.#source,
-      ...shape,
+      service: this.#service,
+      ...model,
       scene: this.#scene!,
       notice: (fault: unknown) => this.#fault(fault),
       signal: end.signal,
     };
-    this.#open = { model, ...shape, store, end };
-    this.#header.list(models, model);
+    this.#open = { model: name, ...model, store, end };
+    this.#header.list(models, name);
     this.#header.follow(store, end.signal);
     const player = new Player(page);
     player.ask();
-    parts.mount({ ...page, player });
-    sync.follow(store, card, end.signal);
-    document.title = `${model} · posefield`;
+    mountParts({ ...page, player });
+    follow(store, card, end.signal);
+    document.title = `${name} · posefield`;
   }
 
-  /** Back and forward, and addresses that somebody typed. */
+  /** Show the address after a step of the history, or one that was typed. */
   async #restore(wanted: Address): Promise<void> {
     const open = this.#open;
-    if (!open || wanted.model !== open.model) return this.#go(wanted);
-    // Whatever was on its way is not wanted any more.
+    if (!open || wanted.model !== open.model) return this.#navigate(wanted);
     this.#turn += 1;
     this.#wanted = null;
     this.#header.choose(open.model);
@@ -171,56 +193,52 @@ export class App {
     this.#notice.remark("model", faults.join(" · ") || null);
     const { controls } = open.store.state;
     const same = Object.entries(state.controls).every(([name, value]) => controls[name] === value);
-    const playing = state.playing && !still();
+    const playing = state.playing && !theme.still();
     open.store.set({ ...state, playing, ...(same ? { controls } : {}) });
   }
 
-  /** Whether the model that is shown is still there, and the same. */
-  async #look(): Promise<void> {
-    if (this.#wanted) return this.#go(this.#wanted);
+  /** Check that the shown model is still there, and the same. */
+  async #check(): Promise<void> {
+    if (this.#wanted) return this.#navigate(this.#wanted);
     const open = this.#open;
     if (!open) return;
     try {
-      const models = await this.#source.models();
+      const models = await this.#service.client.models();
       if (open !== this.#open || this.#wanted) return;
-      if (!listed(models, open.model)) return await this.#go({ model: open.model, entries: [] });
-      const found = models.find(({ name }) => name === open.model);
+      if (!isListed(models, open.model))
+        return await this.#navigate({ model: open.model, entries: [] });
       this.#header.list(models, open.model);
-      if (found && found.identity !== open.card.identity) await this.#renew(open, models);
+      const listed = models.find(({ name }) => name === open.model);
+      if (listed && listed.identity !== open.card.identity) await this.#replace(open, models);
     } catch (fault) {
       this.#fault(fault);
     }
   }
 
-  async #renew(open: Open, models: readonly ModelSummary[]): Promise<void> {
-    const { model, store } = open;
-    const shape = await this.#shape(model);
-    const { card } = shape;
+  /** Show the new version of a model, with the state as far as it fits. */
+  async #replace({ model: name, store }: Open, models: readonly ModelSummary[]): Promise<void> {
+    const open = this.#open;
+    const model = await this.#fetch(name);
     if (open !== this.#open || this.#wanted) return;
-    const known = new Set(card.controls.map(({ name }) => name));
+    const known = new Set(model.card.controls.map(({ name }) => name));
     const entries = Object.entries(store.state.controls)
-      .filter(([name]) => known.has(name))
-      .map(([name, value]) => [name, String(value)] as const);
-    const { state } = restored({ model, entries }, model, card);
+      .filter(([control]) => known.has(control))
+      .map(([control, value]) => [control, String(value)] as const);
+    const { state } = restored({ model: name, entries }, name, model.card);
     const { playing, body, fan, ghost, feet, loop, speed } = store.state;
     const { script, take, variety, view } = store.state;
     const kept = { playing, body, fan, ghost, feet, loop, speed, script, take, variety, view };
-    this.#show(model, shape, new Store({ ...state, ...kept }), models);
-    this.#notice.remark("model", `${model} has been replaced on the service: this is the new one.`);
+    this.#show(name, model, new Store({ ...state, ...kept }), models);
+    this.#notice.remark("model", `${name} has been replaced on the service: this is the new one.`);
   }
 
-  /** The service answers again. */
-  async #back(): Promise<void> {
-    void this.#compare();
+  /** Ask anew for everything that is shown. */
+  async #reconnect(): Promise<void> {
+    void this.#compareVersions();
     const open = this.#open;
-    await this.#look();
-    // As if somebody had moved them: every part asks anew.
+    await this.#check();
+    // Every part asks anew when controls change.
     if (open && open === this.#open) open.store.set({ controls: { ...open.store.state.controls } });
-  }
-
-  #unlock(key: string): void {
-    this.#service.use(key);
-    void this.#back();
   }
 
   #fault(fault: unknown): void {
@@ -229,41 +247,52 @@ export class App {
       this.#watch.well();
       return;
     }
-    const found = understood(fault);
-    if (!found) return;
-    this.#notice.fault(found.text, found.remedy === "key" ? this.#key.opener : null);
-    if (found.remedy === "wait") this.#watch.failed();
-    if (found.remedy === "key") this.#key.ask(found.text);
-    if (found.remedy === "model") void this.#look();
+    const shown = understood(fault);
+    if (!shown) return;
+    const { remedy, text } = shown;
+    this.#notice.fault(text, remedy === "key" ? this.#key.opener : null);
+    if (remedy === "wait") this.#watch.failed();
+    if (remedy === "key") this.#key.ask(text);
+    if (remedy === "model") void this.#check();
   }
 }
 
-function gone(lost: string, shown: string): string {
-  return `${lost} is not on this service (any more): showing ${shown} instead.`;
+const NO_GRAPHICS =
+  "This browser shows no 3-D graphics (WebGL 2), and this page shows nothing without. Turn on hardware acceleration in its settings, or open the page in another browser.";
+
+function noModel(wanted: string | null): string {
+  if (!wanted) return "This service has no models yet.";
+  return `${wanted} is not on this service (any more), and there is no other model to show.`;
 }
 
-function none(lost: string | null): string {
-  if (!lost) return "This service has no models yet.";
-  return `${lost} is not on this service (any more), and there is no other model to show.`;
-}
-
-/** By its name, or by that of one of its versions. */
-function listed(models: readonly ModelSummary[], model: string): boolean {
+/** Tell whether the model is listed, by its name or by that of a version. */
+function isListed(models: readonly ModelSummary[], model: string): boolean {
   return models.some(({ name, versions }) => name === model || versions.includes(model));
 }
 
-/** Whether the service says that it has no such model; a name that cannot be is no path at all. */
-function lacks(fault: unknown): boolean {
-  const said = fault instanceof Unexpected ? fault.cause : fault;
-  return said instanceof Problem && ["unknown-model", "no-such-path"].includes(said.kind);
+/** Pause for users who want no motion by itself, unless the address asks for it. */
+function calm(state: State, { entries }: Address): State {
+  const asked = entries.some(([key]) => key === "~playing");
+  return theme.still() && !asked ? { ...state, playing: false } : state;
 }
 
-/** Nothing moves by itself for those who want it so, unless the address asks for it. */
-function calm(state: ConstructorParameters<typeof Store>[0], { entries }: Address) {
-  const asked = entries.some(([key]) => key === "~playing");
-  return still() && !asked ? { ...state, playing: false } : state;
+/** Mount all parts, until the session's signal. */
+function mountParts(session: Session): void {
+  for (const [area, parts] of Object.entries(PARTS)) {
+    for (const [name, mount] of Object.entries(parts)) {
+      const section = document.createElement("section");
+      section.dataset["part"] = name;
+      at(`#${area}`).append(section);
+      session.signal.addEventListener("abort", () => section.remove());
+      mount(section, session);
+    }
+  }
+  performance.mount(session);
 }
 
 function at(selector: string): HTMLElement {
   return document.querySelector<HTMLElement>(selector)!;
 }
+
+theme.start();
+new App().start();

@@ -1,29 +1,17 @@
-/** A map's drawing: sigma as colours, captured clips as dots, and where one is. */
+/** Drawing of a map: sigma as colours, hatching without support, captured clips, and the controls. */
 
-import type { ModelCard, SigmaGrid } from "@posefield/client";
+import type { SigmaGrid } from "@posefield/client";
 
-import { viridis } from "./colours.ts";
-import * as hatch from "./hatch.ts";
+import type { Control, Dot } from "./examples.ts";
 import * as theme from "./theme.ts";
-import type { Veil } from "./veil.ts";
 import { figure } from "./written.ts";
 
-export type Control = ModelCard["controls"][number];
-
-/** How far the map goes beyond what was sampled, as a share of it. */
+/** Margin of the map beyond the sampled ranges, as a share of them. */
 export const MARGIN = 0.25;
 const [LEFT, RIGHT, TOP, BOTTOM] = [46, 10, 10, 34];
 const [DOT, RING] = [2.5, 7];
 
-/** A captured clip on the map; `error` is the share of the largest, `near` 1 where one is. */
-export interface Dot {
-  readonly index: number;
-  readonly at: readonly [number, number];
-  readonly error: number;
-  readonly near: number;
-}
-
-/** Values of two controls as places on a canvas of a size in CSS pixels, and back. */
+/** Conversion between values of two controls and points of a canvas, in CSS pixels. */
 export class Frame {
   readonly left = LEFT;
   readonly top = TOP;
@@ -45,7 +33,7 @@ export class Frame {
     return this.top + this.height * (1 - share(this.#controls[1], value));
   }
 
-  /** The values at a place, within the map. */
+  /** Return the values at a point, within the map. */
   values(x: number, y: number): [number, number] {
     const [across, along] = this.#controls;
     return [
@@ -79,22 +67,21 @@ export function rounded(value: number, range: number): number {
   return Number((Math.round(value / step) * step).toPrecision(10));
 }
 
-/** For each row and column whether anything like it was captured; whether all was sampled, where
- * an older service says that alone. */
+/** Tell for each row and column whether similar clips were captured. */
 export function captured(grid: SigmaGrid): readonly (readonly boolean[])[] {
   return grid.supported ?? grid.inside;
 }
 
-/** Least and greatest sigma, m, within what was captured; beyond, colours are the last one. */
+/** Return the least and greatest sigma, m, of the part with support; beyond, colours are the last one. */
 export function extent(grid: SigmaGrid): [number, number] {
   const all = grid.sigma.flat();
-  const near = captured(grid).flat();
-  const known = all.filter((_, i) => near[i]);
-  const counted = known.length ? known : all;
-  return [Math.min(...counted), Math.max(...counted)];
+  const supported = captured(grid).flat();
+  const near = all.filter((_, i) => supported[i]);
+  const values = near.length ? near : all;
+  return [Math.min(...values), Math.max(...values)];
 }
 
-/** A picture of one pixel a number, which the canvas stretches smoothly. */
+/** Return a picture of one pixel a value, which the canvas stretches smoothly. */
 export function heat(grid: SigmaGrid): HTMLCanvasElement {
   const [low, high] = extent(grid);
   const [rows, columns] = [grid.sigma.length, grid.sigma[0]!.length];
@@ -117,10 +104,8 @@ export interface Drawing {
   readonly frame: Frame;
   readonly controls: readonly [Control, Control];
   readonly picture: HTMLCanvasElement | null;
-  /** Where nothing like it was captured; null where the service does not say. */
+  /** The part without support. */
   readonly veil: Veil | null;
-  /** Whether the controls that are no axes lie inside what was sampled. */
-  readonly inside: boolean;
   readonly dots: readonly Dot[];
   readonly point: readonly [number, number];
   readonly chosen: number | null;
@@ -135,15 +120,14 @@ export function draw(pen: CanvasRenderingContext2D, it: Drawing): void {
   pen.fill();
   pen.clip();
   if (it.picture) stretch(pen, it.picture, frame);
-  if (it.veil) hatch.unsupported(pen, frame, it.veil);
-  else hatch.unsampled(pen, frame, it.inside);
+  if (it.veil) hatch(pen, frame, it.veil);
   for (const dot of it.dots) mark(pen, frame, dot, dot.index === it.chosen);
   cross(pen, frame, it.point);
   pen.restore();
   axes(pen, it);
 }
 
-/** Numbers stand in the middle of their pixels, so the picture's border lies outside the map. */
+/** Draw the picture; values are in the middle of their pixels, so its border lies outside the map. */
 function stretch(pen: CanvasRenderingContext2D, picture: HTMLCanvasElement, frame: Frame): void {
   const [w, h] = [frame.width / (picture.width - 1), frame.height / (picture.height - 1)];
   pen.imageSmoothingEnabled = true;
@@ -223,3 +207,137 @@ function axes(pen: CanvasRenderingContext2D, { frame, controls }: Drawing): void
 }
 
 const titled = (control: Control): string => `${control.name} (${control.unit})`;
+
+export type Point = readonly [x: number, y: number];
+
+/** Polygons and edges, in columns and rows of a grid. */
+export interface Shape {
+  readonly area: readonly (readonly Point[])[];
+  readonly edges: readonly (readonly [Point, Point])[];
+}
+
+const CORNERS = [
+  [0, 0],
+  [1, 0],
+  [1, 1],
+  [0, 1],
+] as const;
+
+/** Return the part without support, whose edges lie half-way to points with it (marching squares). */
+export function shape(supported: readonly (readonly boolean[])[]): Shape {
+  const area: Point[][] = [];
+  const edges: [Point, Point][] = [];
+  for (let row = 0; row + 1 < supported.length; row++) {
+    for (let column = 0; column + 1 < supported[0]!.length; column++) {
+      const corners = CORNERS.map(([x, y]): Point => [column + x, row + y]);
+      const { points, sides } = square(corners, ([x, y]) => supported[y]![x]!);
+      if (points.length) area.push(points);
+      edges.push(...sides);
+    }
+  }
+  return { area, edges };
+}
+
+/** Walk around a square: the polygon without support, and the edges across the square. */
+function square(corners: readonly Point[], supported: (point: Point) => boolean) {
+  const points: Point[] = [];
+  const crossings: Point[] = [];
+  for (const [i, from] of corners.entries()) {
+    const to = corners[(i + 1) % corners.length]!;
+    if (!supported(from)) points.push(from);
+    if (supported(from) === supported(to)) continue;
+    const middle: Point = [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2];
+    points.push(middle);
+    crossings.push(middle);
+  }
+  // The polygon is left and entered by turns.
+  if (supported(corners[0]!)) crossings.push(...crossings.splice(0, 1));
+  const sides = crossings.flatMap((from, i): [Point, Point][] =>
+    i % 2 ? [] : [[from, crossings[i + 1]!]],
+  );
+  return { points, sides };
+}
+
+/** The part without support as paths, and the size of their grid. */
+export interface Veil {
+  readonly area: Path2D;
+  readonly edge: Path2D;
+  readonly columns: number;
+  readonly rows: number;
+}
+
+export function veil(grid: SigmaGrid): Veil {
+  const supported = captured(grid);
+  const found = shape(supported);
+  const [area, edge] = [new Path2D(), new Path2D()];
+  for (const points of found.area) trace(area, points).closePath();
+  for (const side of found.edges) trace(edge, side);
+  return { area, edge, columns: supported[0]!.length, rows: supported.length };
+}
+
+function trace(path: Path2D, [first, ...rest]: readonly Point[]): Path2D {
+  path.moveTo(...first!);
+  for (const point of rest) path.lineTo(...point);
+  return path;
+}
+
+/** Pixels from one stripe to the next. */
+const APART = 7;
+
+/** Hatch the part without support and draw its edge, and dash the sampled ranges. */
+function hatch(pen: CanvasRenderingContext2D, frame: Frame, veil: Veil): void {
+  pen.save();
+  pen.clip(onCanvas(veil.area, frame, veil));
+  pen.fillStyle = theme.colour("--veil");
+  pen.fillRect(frame.left, frame.top, frame.width, frame.height);
+  pen.strokeStyle = theme.colour("--stripe");
+  pen.lineWidth = 1;
+  pen.beginPath();
+  for (let x = frame.left - frame.height; x < frame.left + frame.width; x += APART) {
+    pen.moveTo(x, frame.top + frame.height);
+    pen.lineTo(x + frame.height, frame.top);
+  }
+  pen.stroke();
+  pen.restore();
+  const edge = onCanvas(veil.edge, frame, veil);
+  pen.lineCap = "round";
+  for (const [width, colour] of [
+    [3.5, "#000a"],
+    [1.5, "#fff"],
+  ] as const) {
+    pen.lineWidth = width;
+    pen.strokeStyle = colour;
+    pen.stroke(edge);
+  }
+  pen.strokeStyle = "#fffc";
+  pen.lineWidth = 1;
+  pen.setLineDash([4, 3]);
+  pen.strokeRect(...frame.range);
+  pen.setLineDash([]);
+}
+
+/** Transform from columns and rows to a canvas, on which rows go down. */
+function onCanvas(path: Path2D, frame: Frame, { columns, rows }: Veil): Path2D {
+  const [right, up] = [frame.width / (columns - 1), frame.height / (rows - 1)];
+  const found = new Path2D();
+  found.addPath(path, new DOMMatrix([right, 0, 0, -up, frame.left, frame.top + frame.height]));
+  return found;
+}
+
+// Viridis (van der Walt and Smith, 2015): even steps look even, to the colour-blind too.
+const VIRIDIS = [
+  0x440154, 0x482878, 0x3e4a89, 0x31688e, 0x26828e, 0x1f9e89, 0x35b779, 0x6ece58, 0xb5de2b,
+  0xfde725,
+] as const;
+
+/** Write red, green and blue, 0 to 255, at a share of the scale into `out`. */
+export function viridis(share: number, out: Uint8ClampedArray | number[], at = 0): void {
+  const position = Math.min(1, Math.max(0, share)) * (VIRIDIS.length - 1);
+  const first = Math.min(VIRIDIS.length - 2, Math.floor(position));
+  const [low, high] = [VIRIDIS[first]!, VIRIDIS[first + 1]!];
+  for (let i = 0; i < 3; i++) {
+    const shift = 16 - 8 * i;
+    const [a, b] = [(low >> shift) & 255, (high >> shift) & 255];
+    out[at + i] = a + (b - a) * (position - first);
+  }
+}

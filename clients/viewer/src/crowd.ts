@@ -1,4 +1,4 @@
-/** A crowd coloured by level of detail, each character at the coarsest that does not show. */
+/** The view of a crowd, coloured by level of detail, each character at the coarsest that does not show. */
 
 import {
   BufferAttribute,
@@ -13,278 +13,311 @@ import {
 } from "three";
 
 import "./crowd.css";
-import { levelColour } from "./colours.ts";
-import { BakedCrowd } from "./crowd-baked.ts";
-import { type Library, library, type Motions } from "./crowd-library.ts";
-import { type CrowdDrawing, CrowdMesh } from "./crowd-mesh.ts";
-import { Panel } from "./crowd-panel.ts";
-import { Crowd, half, REACH } from "./crowd-walk.ts";
-import { type ComputedCrowd, open, WebGpuCrowd } from "./crowd-webgpu.ts";
+import { CrowdDrawing } from "./crowd-drawing.ts";
+import { Crowd, fetchMotions, half, type Motions, TAKES } from "./crowd-motions.ts";
 import { type Ladder, ladder, lens, pixels } from "./detail.ts";
+import { el, labelled, toggle } from "./dom.ts";
 import { understood } from "./faults.ts";
-import { served } from "./page.ts";
-import type { Session } from "./session.ts";
-import type { State } from "./state.ts";
+import type { Session } from "./player.ts";
+import { type Changes, has, type State } from "./state.ts";
 import * as theme from "./theme.ts";
+import { figure } from "./written.ts";
 
-export const MOST = 10_000;
-/** Most characters that are drawn as one mesh of them all, where a processor draws. */
-const ONE_MESH = 1000;
-/** Metres between lines of the ground, and seconds between two readings of numbers. */
+const [FEWEST, MOST] = [50, 10_000];
+/** Powers of two between which the limit in pixels lies. */
+const [SHARP, COARSE] = [-2, 4];
+/** Most characters that the camera shows all of. */
+const SHOWN = 1000;
+/** Metres between lines of the ground, and seconds between two changes of the numbers. */
 const [GROUND, READING] = [5, 0.25];
 /** Pixels to a metre from which on a character has all triangles. */
 const FINE = 90;
+/** Radius about a character that contains its body with arms out, m. */
+const RADIUS = 1.3;
 
 export function mount(host: HTMLElement, session: Session): void {
-  new CrowdView(host, session).begin();
+  new CrowdView(host, session);
 }
 
 class CrowdView {
-  readonly #page: Session;
+  readonly #session: Session;
   readonly #panel: Panel;
   readonly #group = new Group();
   readonly #ladder: Ladder;
   readonly #frustum = new Frustum();
-  readonly #sphere = new Sphere(new Vector3(), REACH);
-  #library: Library | null = null;
-  /** In browsers with WebGPU, in place of a library. */
-  #computed: ComputedCrowd | null = null;
-  #lost = false;
+  readonly #sphere = new Sphere(new Vector3(), RADIUS);
+  readonly #projection = new Matrix4();
+  #motions: Motions | null = null;
   #loading = false;
   #crowd: Crowd | null = null;
-  #mesh: CrowdDrawing | null = null;
+  #drawing: CrowdDrawing | null = null;
   #ground: LineSegments<BufferGeometry, LineBasicMaterial> | null = null;
+  /** Camera of the view before. */
   #before: { position: Vector3; target: Vector3 } | null = null;
-  #since = 0;
-  #frames = 0;
-  #spent = 0;
-  #begun = 0;
+  /** Since the last change of the numbers: its time, the frames, and milliseconds of own work. */
+  #read = { since: 0, frames: 0, spent: 0 };
 
-  constructor(host: HTMLElement, page: Session) {
-    this.#page = page;
-    this.#ladder = ladder(page.card);
-    this.#panel = new Panel(host, page);
+  constructor(host: HTMLElement, session: Session) {
+    this.#session = session;
+    this.#ladder = ladder(session.card);
+    this.#panel = new Panel(host, session);
     this.#group.visible = false;
-    page.scene.root.add(this.#group);
-  }
-
-  begin(): void {
-    const { store, scene, signal } = this.#page;
-    const ends = [
-      store.listen((state, changed) => this.#changed(state, changed)),
-      scene.add((seconds) => this.#step(seconds)),
-    ];
+    const { scene, signal, store } = session;
+    scene.root.add(this.#group);
+    store.listen((state, changed) => this.#update(state, changed), signal);
+    scene.add((seconds) => this.#step(seconds), signal);
     signal.addEventListener("abort", () => {
-      for (const end of ends) end();
       this.#leave();
       this.#group.removeFromParent();
-      this.#bare();
-      this.#computed?.drawing.dispose();
+      this.#disposeDrawing();
     });
-    theme.listen(() => this.#paint(), signal);
-    this.#paint();
-    this.#changed(store.state, new Set(["view"]));
+    theme.listen(() => this.#tint(), signal);
+    this.#update(store.state, new Set(["view"]));
   }
 
-  #changed(state: State, changed: ReadonlySet<keyof State>): void {
+  #update(state: State, changed: Changes): void {
     if (changed.has("view")) {
       if (state.view === "crowd") this.#enter();
       else this.#leave();
     }
-    if (changed.has("crowd") && this.#motions) this.#people();
-    if (changed.has("varied")) this.#again();
-    // The page says so when the service is back, and one may move a control to try again.
-    if (changed.has("controls")) this.#want();
-    if (changed.has("playing") && changed.has("time")) this.#goOn(state);
-    if (this.#group.visible) this.#page.scene.redraw();
+    if (changed.has("crowd") && this.#motions) this.#drawCharacters();
+    if (changed.has("varied")) this.#motions = null;
+    // The page changes controls when the service is back, and users may try again with one.
+    if (has(changed, "controls", "varied")) void this.#loadMotions();
+    if (changed.has("playing") && changed.has("time")) this.#loopTime(state);
+    if (this.#group.visible) this.#session.scene.redraw();
   }
 
   #enter(): void {
-    const { camera, orbit } = this.#page.scene;
+    const { camera, orbit } = this.#session.scene;
     this.#before = { position: camera.position.clone(), target: orbit.target.clone() };
     this.#group.visible = true;
-    this.#cover();
     this.#panel.show(true);
-    this.#look();
-    this.#want();
-  }
-
-  #want(): void {
-    if (this.#group.visible && !this.#motions && !this.#loading) void this.#load();
-  }
-
-  get #motions(): Motions | null {
-    return this.#computed?.motions ?? this.#library;
-  }
-
-  /** Shows the canvas of a crowd that has its own, while the crowd is shown. */
-  #cover(): void {
-    const own = this.#mesh instanceof WebGpuCrowd && this.#group.visible;
-    this.#page.scene.cover(own ? this.#computed!.drawing.canvas : null);
-  }
-
-  /** The clip of one body ends where it does not loop; a crowd does not. */
-  #goOn({ playing, time }: State): void {
-    const ended = !playing && time >= this.#page.player.duration;
-    if (this.#group.visible && ended) this.#page.store.set({ playing: true, time: 0 });
+    this.#placeCamera();
+    void this.#loadMotions();
   }
 
   #leave(): void {
     this.#group.visible = false;
-    this.#cover();
     this.#panel.show(false);
     if (!this.#before) return;
-    const { camera, orbit } = this.#page.scene;
+    const { camera, orbit } = this.#session.scene;
     camera.position.copy(this.#before.position);
     orbit.target.copy(this.#before.target);
     orbit.update();
     this.#before = null;
   }
 
-  /** From a corner of a thousand, so that near and far are both in view; more stand around it. */
-  #look(): void {
-    const { scene, store } = this.#page;
+  /** Show near and far characters, from a corner of a thousand. */
+  #placeCamera(): void {
+    const { scene, store } = this.#session;
     const { camera, orbit } = scene;
-    const far = half(Math.min(ONE_MESH, store.state.crowd));
+    const far = half(Math.min(SHOWN, store.state.crowd));
     camera.position.set(far * 0.35, 4.5, far * 1.02);
     orbit.target.set(-far * 0.05, 0.5, far * 0.1);
     orbit.update();
   }
 
-  /** Other motions; those that are there go on until then. */
-  #again(): void {
-    this.#library = null;
-    this.#forget();
-    this.#want();
+  /** The clip of one body ends where it does not loop; a crowd goes on. */
+  #loopTime({ playing, time }: State): void {
+    const ended = !playing && time >= this.#session.player.duration;
+    if (this.#group.visible && ended) this.#session.store.set({ playing: true, time: 0 });
   }
 
-  #forget(): void {
-    if (this.#mesh instanceof WebGpuCrowd) {
-      this.#mesh = null;
-      this.#crowd = null;
-      this.#cover();
-    }
-    this.#computed?.drawing.dispose();
-    this.#computed = null;
-  }
-
-  async #load(): Promise<void> {
-    const { source, store, card, signal, notice } = this.#page;
+  /** Fetch the motions, unless they are there; earlier ones are drawn until then. */
+  async #loadMotions(): Promise<void> {
+    if (!this.#group.visible || this.#motions || this.#loading) return;
+    const { store, signal, notice } = this.#session;
     const { varied } = store.state;
     this.#loading = true;
     try {
       this.#panel.say("Computing the motions …");
-      const done = (share: number) => this.#panel.progress(share);
-      const takes = varied && served(source);
-      if (!takes && !this.#lost) {
-        this.#computed = await open(this.#page, done, MOST, () => {
-          this.#lost = true;
-          this.#again();
-        });
-      }
-      if (!this.#computed)
-        this.#library = await library(source, store.state.model, card, signal, done, takes);
+      const progress = (share: number) => this.#panel.showProgress(share);
+      this.#motions = await fetchMotions(this.#session, progress, varied);
       this.#panel.say("");
-      if (!signal.aborted) this.#people();
+      if (!signal.aborted) this.#drawCharacters();
     } catch (fault) {
       if (signal.aborted) return;
       this.#panel.say(`The motions could not be computed. ${understood(fault)?.text ?? ""}`);
       notice(fault);
     } finally {
       this.#loading = false;
-      this.#panel.progress(null);
-      if (!signal.aborted && varied !== store.state.varied) this.#again();
+      this.#panel.showProgress(null);
+      if (!signal.aborted && varied !== store.state.varied) {
+        this.#motions = null;
+        void this.#loadMotions();
+      }
     }
   }
 
-  #people(): void {
-    this.#crowd = new Crowd(this.#motions!, Math.min(MOST, this.#page.store.state.crowd));
-    this.#bare();
-    this.#mesh = this.#computed?.drawing ?? this.#drawn(this.#library!, this.#crowd.count);
-    this.#cover();
-    this.#group.add(this.#mesh.group);
-    this.#ground = ground(this.#crowd.half);
-    this.#group.add(this.#ground);
-    this.#paint();
-  }
-
-  /** Who draws so many by WebGL. */
-  #drawn(own: Library, count: number): CrowdDrawing {
-    const { card, character, scene } = this.#page;
+  #drawCharacters(): void {
+    const { card, character, store } = this.#session;
+    const count = Math.min(MOST, store.state.crowd);
+    this.#disposeDrawing();
+    this.#crowd = new Crowd(this.#motions!, count);
     const joints = card.skeleton.names.length;
-    return scene.software && count <= ONE_MESH
-      ? new CrowdMesh(character, own, joints, count)
-      : new BakedCrowd(character, own, joints, count);
+    this.#drawing = new CrowdDrawing(character, this.#motions!, joints, count);
+    this.#ground = ground(this.#crowd.half);
+    this.#group.add(this.#drawing.group, this.#ground);
+    this.#tint();
   }
 
-  #bare(): void {
-    this.#mesh?.group.removeFromParent();
-    if (!(this.#mesh instanceof WebGpuCrowd)) this.#mesh?.dispose();
+  #disposeDrawing(): void {
+    this.#drawing?.dispose();
     this.#ground?.geometry.dispose();
     this.#ground?.material.dispose();
     this.#ground?.removeFromParent();
   }
 
-  #paint(): void {
-    this.#mesh?.paint(this.#page.card.levels.map((_, level) => levelColour(level)));
+  #tint(): void {
+    this.#drawing?.tint(this.#session.card.levels.map((_, level) => theme.levelColour(level)));
     this.#ground?.material.color.set(theme.colour("--line"));
-    this.#page.scene.redraw();
+    this.#session.scene.redraw();
   }
 
   #step(seconds: number): boolean {
     if (!this.#group.visible || !this.#crowd) return false;
     const begun = performance.now();
-    const { playing, speed, pixels } = this.#page.store.state;
-    const { camera, renderer } = this.#page.scene;
+    const { playing, speed, pixels: limit } = this.#session.store.state;
+    const { camera, renderer } = this.#session.scene;
     if (playing) this.#crowd.step(seconds * speed);
     camera.updateMatrixWorld();
     const seen = lens(camera.fov, renderer.domElement);
-    this.#crowd.detail(this.#ladder, seen, camera.position, pixels);
-    this.#read(begun, this.#fill());
+    this.#crowd.chooseLevels(this.#ladder, seen, camera.position, limit);
+    const visible = this.#visible((renderer.getPixelRatio() * pixels(seen)) / FINE);
+    this.#drawing!.draw(this.#crowd, visible);
+    this.#showNumbers(begun, visible.length);
     return playing;
   }
 
-  /** Writes where all are who may be seen; gives how many they are. */
-  #fill(): number {
-    const [crowd, mesh] = [this.#crowd!, this.#mesh!];
-    const { camera, renderer } = this.#page.scene;
+  /** Return the characters in view. near: distance within which they have all triangles, m. */
+  #visible(near: number): (readonly [number, boolean])[] {
+    const { count, x, z } = this.#crowd!;
+    const { camera } = this.#session.scene;
     this.#frustum.setFromProjectionMatrix(
-      VIEW.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
+      this.#projection.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
     );
-    const near = (renderer.getPixelRatio() * pixels(lens(camera.fov, renderer.domElement))) / FINE;
-    let seen = 0;
-    mesh.begin();
-    for (let i = 0; i < crowd.count; i++) {
-      this.#sphere.center.set(crowd.x[i]!, 0.9, crowd.z[i]!);
+    const found: (readonly [number, boolean])[] = [];
+    for (let i = 0; i < count; i++) {
+      this.#sphere.center.set(x[i]!, 0.9, z[i]!);
       if (!this.#frustum.intersectsSphere(this.#sphere)) continue;
-      const [x, z] = [crowd.x[i]! - camera.position.x, crowd.z[i]! - camera.position.z];
-      mesh.add(x * x + z * z < near * near, crowd, i);
-      seen++;
+      const [dx, dz] = [x[i]! - camera.position.x, z[i]! - camera.position.z];
+      found.push([i, dx * dx + dz * dz < near * near]);
     }
-    mesh.end();
-    return seen;
+    return found;
   }
 
-  #read(begun: number, seen: number): void {
-    this.#frames++;
-    this.#spent += performance.now() - begun;
-    if (begun - this.#begun < 1000 * READING && this.#since) return;
-    const frame = (begun - this.#begun) / this.#frames;
+  #showNumbers(begun: number, seen: number): void {
+    const read = this.#read;
+    read.frames++;
+    read.spent += performance.now() - begun;
+    if (begun - read.since < 1000 * READING) return;
     this.#panel.count(this.#crowd!.counts, seen);
-    if (this.#page.store.state.playing) this.#panel.time(frame, this.#spent / this.#frames);
-    [this.#frames, this.#spent, this.#begun, this.#since] = [0, 0, begun, 1];
+    if (this.#session.store.state.playing && read.since)
+      this.#panel.showTimes((begun - read.since) / read.frames, read.spent / read.frames);
+    this.#read = { since: begun, frames: 0, spent: 0 };
   }
 }
-
-const VIEW = new Matrix4();
 
 function ground(half: number): LineSegments<BufferGeometry, LineBasicMaterial> {
   const ends: number[] = [];
   const side = Math.ceil(half / GROUND) * GROUND;
-  for (let at = -side; at <= side; at += GROUND) {
+  for (let at = -side; at <= side; at += GROUND)
     ends.push(at, 0, -side, at, 0, side, -side, 0, at, side, 0, at);
-  }
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(ends), 3));
   return new LineSegments(geometry, new LineBasicMaterial());
+}
+
+/** Settings of the crowd, and its counts and times. */
+class Panel {
+  readonly #host = el("section", { class: "crowd", hidden: true, "aria-label": "Crowd" });
+  readonly #status = el("p", { class: "about" });
+  readonly #time = el("p", { class: "about" });
+  readonly #seen = el("p", { class: "about" });
+  readonly #progress = el("progress", { max: 1, hidden: true, "aria-label": "Motions computed" });
+  readonly #counts: readonly HTMLElement[];
+
+  constructor(host: HTMLElement, session: Session) {
+    const { card, signal, store } = session;
+    this.#counts = card.levels.map(() => el("b", {}, "–"));
+    const levels = this.#counts.map((count, level) =>
+      el("li", { class: `crowd-${Math.min(level, 3)}` }, `level ${level}`, count),
+    );
+    const about =
+      card.cyclic && card.root === "travelling"
+        ? "Characters walk along straight or gently curved paths, and re-enter on the opposite side."
+        : "This model does not walk: each character stays in place and repeats a captured motion forwards and backwards.";
+    const label = `No two alike: ${TAKES} motions instead of a few, each a take of its own`;
+    const varied = toggle("No two alike", label, (on) => store.set({ varied: on }));
+    store.follow((state) => varied.set(state.varied), signal);
+    const count = slider(session, "crowd", [FEWEST, MOST, 50], Number, Number);
+    const limit = slider(
+      session,
+      "pixels",
+      [SHARP, COARSE, 0.25],
+      (power) => Number((2 ** power).toPrecision(3)),
+      Math.log2,
+    );
+    this.#host.append(
+      el("h2", {}, "Crowd"),
+      el("p", { class: "about" }, about),
+      ...[this.#status, this.#progress, count, varied, limit],
+      el("ul", {}, ...levels),
+      ...[this.#seen, this.#time],
+    );
+    host.append(this.#host);
+  }
+
+  show(shown: boolean): void {
+    this.#host.hidden = !shown;
+  }
+
+  say(text: string): void {
+    this.#status.textContent = text;
+  }
+
+  /** share: of the motions that have come; null hides the bar. */
+  showProgress(share: number | null): void {
+    this.#progress.hidden = share === null;
+    this.#progress.value = share ?? 0;
+  }
+
+  count(counts: Int32Array, seen: number): void {
+    this.#counts.forEach((element, level) => {
+      element.textContent = String(counts[level]);
+    });
+    this.#seen.textContent = `${seen} in view`;
+  }
+
+  /** Show the milliseconds from a frame to the next, and those of this page's own work in them. */
+  showTimes(frame: number, spent: number): void {
+    this.#host.dataset["frame"] = frame.toFixed(2);
+    this.#time.textContent = `${figure(frame)} ms a frame (${Math.round(1000 / frame)} a second); moving all: ${spent.toFixed(1)} ms`;
+  }
+}
+
+const TEXTS = {
+  crowd: (value: number) => `${value.toLocaleString("en")} characters`,
+  pixels: (value: number) => `errors up to ${figure(value)} px`,
+} as const;
+
+/** A slider of one of the state's numbers, which its label tells. */
+function slider(
+  { signal, store }: Session,
+  key: keyof typeof TEXTS,
+  [min, max, step]: readonly [number, number, number],
+  valueAt: (position: number) => number,
+  positionOf: (value: number) => number,
+): HTMLElement {
+  const input = el("input", { type: "range", min, max, step });
+  const host = labelled("", input);
+  store.follow((state) => {
+    const text = TEXTS[key](state[key]);
+    input.value = String(positionOf(state[key]));
+    host.firstElementChild!.textContent = text;
+    input.setAttribute("aria-valuetext", text);
+  }, signal);
+  input.addEventListener("input", () => store.set({ [key]: valueAt(Number(input.value)) }));
+  return host;
 }

@@ -1,9 +1,9 @@
-/** Levels of detail by what shows of their errors: the service's own rule (POST crowd, `auto`). */
+/** Choice of a level of detail by its error in pixels: the rule of the service (crowds, `auto`). */
 
 import type { ModelCard } from "@posefield/client";
 
-/** A coarser level than that held is taken where its error is below the limit by this share. */
-export const HYSTERESIS = 0.2;
+/** Share of the limit by which the error of a coarser level must be below it. */
+const HYSTERESIS = 0.2;
 
 /** A lens: vertical field of view, rad, and height of the image, pixels. */
 export interface Lens {
@@ -11,18 +11,18 @@ export interface Lens {
   readonly height: number;
 }
 
-/** The lens that a canvas is seen through, at the screen's own pixels, however coarsely it is drawn. */
+/** Return the lens of a canvas, in pixels of the screen, however coarsely it is drawn. */
 export function lens(fov: number, canvas: HTMLCanvasElement): Lens {
   return { fov: (fov * Math.PI) / 180, height: canvas.clientHeight * devicePixelRatio };
 }
 
-/** What the rule knows of a model. */
+/** Errors and size of a model. */
 export interface Ladder {
   /** Error of each level's worst pose, m; none is below that of a finer one. */
   readonly errors: Float64Array;
-  /** Where the root is at rest, m. */
+  /** Position of the root at rest, m. */
   readonly middle: readonly number[];
-  /** Of a sphere about the root that holds the body at rest, m. */
+  /** Radius of a sphere about the root that contains the body at rest, m. */
   readonly radius: number;
 }
 
@@ -43,24 +43,25 @@ function radius({ skeleton }: ModelCard): number {
   return Math.max(...rest.map((point) => Math.hypot(...point)));
 }
 
-/** Pixels that a metre covers at a metre's distance, in the middle of the image. */
+/** Return the pixels that a metre covers at a metre's distance, in the middle of the image. */
 export function pixels(lens: Lens): number {
   return lens.height / (2 * Math.tan(lens.fov / 2));
 }
 
-/** The coarsest level whose error covers at most `limit` pixels where a metre covers `scale`; with
- * the level held before, a coarser one must keep the limit less HYSTERESIS of it. */
+/** Return the coarsest level whose error covers at most `limit` pixels, where a metre covers `scale`.
+ *
+ * previous: level before; a coarser one must be below the limit by HYSTERESIS. */
 export function choose(errors: Float64Array, scale: number, limit: number, previous = -1): number {
   let level = 0;
   for (let coarser = 1; coarser < errors.length; coarser++) {
-    const own = errors[coarser]! * scale;
-    const threshold = previous >= 0 && coarser > previous ? own / (1 - HYSTERESIS) : own;
-    if (threshold <= limit) level++;
+    const error = errors[coarser]! * scale;
+    const margin = previous >= 0 && coarser > previous ? 1 - HYSTERESIS : 1;
+    if (error / margin <= limit) level++;
   }
   return level;
 }
 
-/** Metres from which on a level's worst pose covers less than a pixel. */
-export function farEnough(own: Ladder, level: number, lens: Lens): number {
-  return own.errors[level]! * pixels(lens) + own.radius;
+/** Return the metres from which on a level's worst pose is off by less than a pixel. */
+export function farEnough({ errors, radius }: Ladder, level: number, lens: Lens): number {
+  return errors[level]! * pixels(lens) + radius;
 }

@@ -1,4 +1,4 @@
-/** Elements, made by hand; text is text, never markup. */
+/** Elements, files to save, and values that the browser keeps. Text is inserted as text, never as markup. */
 
 type Attributes = Readonly<Record<string, string | number | boolean | null>>;
 
@@ -8,10 +8,7 @@ export function el<Tag extends keyof HTMLElementTagNameMap>(
   attributes: Attributes = {},
   ...content: readonly (Node | string)[]
 ): HTMLElementTagNameMap[Tag] {
-  const made = document.createElement(tag);
-  assign(made, attributes);
-  made.append(...content);
-  return made;
+  return assign(document.createElement(tag), attributes, content);
 }
 
 export function svg<Tag extends keyof SVGElementTagNameMap>(
@@ -19,82 +16,141 @@ export function svg<Tag extends keyof SVGElementTagNameMap>(
   attributes: Attributes = {},
   ...content: readonly Node[]
 ): SVGElementTagNameMap[Tag] {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  assign(made, attributes);
-  made.append(...content);
-  return made;
+  return assign(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, content);
 }
 
-function assign(made: Element, attributes: Attributes): void {
+function assign<Kind extends Element>(
+  element: Kind,
+  attributes: Attributes,
+  content: readonly (Node | string)[],
+): Kind {
   for (const [name, value] of Object.entries(attributes)) {
     if (value === null || value === false) continue;
-    made.setAttribute(name, value === true ? "" : String(value));
+    element.setAttribute(name, value === true ? "" : String(value));
   }
+  element.append(...content);
+  return element;
 }
 
-/** A button that says what it does; `label` is for those who do not see the sign on it. */
+/** A button; `label` names it for tooltips and screen readers. */
 export function button(sign: string | Node, label: string, act: () => void): HTMLButtonElement {
-  const made = el("button", { type: "button", "aria-label": label, title: label }, sign);
-  made.addEventListener("click", act);
-  return made;
+  const element = el("button", { type: "button", "aria-label": label, title: label }, sign);
+  element.addEventListener("click", act);
+  return element;
 }
 
-/** A button that is in or out. */
+/** A button with its text as its name. */
+export function textButton(text: string, act: () => void, classes = ""): HTMLButtonElement {
+  const element = el("button", { type: "button", class: classes || null }, text);
+  element.addEventListener("click", act);
+  return element;
+}
+
+/** A button with two states. */
 export function toggle(
   sign: string | Node,
   label: string,
   act: (pressed: boolean) => void,
 ): HTMLButtonElement & { set(pressed: boolean): void } {
-  const made = button(sign, label, () => act(made.getAttribute("aria-pressed") !== "true"));
-  made.setAttribute("aria-pressed", "false");
-  return Object.assign(made, {
-    set: (pressed: boolean) => made.setAttribute("aria-pressed", String(pressed)),
+  const element = button(sign, label, () => act(element.getAttribute("aria-pressed") !== "true"));
+  element.setAttribute("aria-pressed", "false");
+  return Object.assign(element, {
+    set: (pressed: boolean) => element.setAttribute("aria-pressed", String(pressed)),
   });
 }
 
-/** One of a few, as buttons in a row. */
+/** A choice among few values, as buttons in a row. */
 export function choice<Value extends string>(
   label: string,
   values: readonly (readonly [Value, string])[],
   act: (value: Value) => void,
 ): HTMLElement & { set(value: Value): void } {
   const buttons = values.map(([value, name]) => {
-    const made = el("button", { type: "button", "data-value": value }, name);
-    made.addEventListener("click", () => act(value));
-    return made;
+    const element = textButton(name, () => act(value));
+    element.dataset["value"] = value;
+    return element;
   });
   const group = el("div", { class: "choice", role: "group", "aria-label": label }, ...buttons);
   return Object.assign(group, {
     set: (value: Value) => {
-      for (const each of buttons)
-        each.setAttribute("aria-pressed", String(each.dataset["value"] === value));
+      for (const element of buttons)
+        element.setAttribute("aria-pressed", String(element.dataset["value"] === value));
     },
   });
 }
 
-/** A word and the field that it names, for everybody; the word may change. */
+/** A field with its label. */
 export function labelled(word: string, field: HTMLElement): HTMLDivElement {
   field.id ||= id();
   return el("div", { class: "field" }, el("label", { for: field.id }, word), field);
 }
 
-/** A list to choose from; values and what they are called. */
+/** A list to choose from: values and their names. */
 export function chooser(
   options: readonly (readonly [string, string])[],
   chosen: string,
-  taken: (value: string) => void,
+  take: (value: string) => void,
 ): HTMLSelectElement {
-  const made = el("select", {}, ...options.map(([value, name]) => el("option", { value }, name)));
-  made.value = chosen;
-  made.addEventListener("change", () => taken(made.value));
-  return made;
+  const list = el("select", {}, ...options.map(([value, name]) => el("option", { value }, name)));
+  list.value = chosen;
+  list.addEventListener("change", () => take(list.value));
+  return list;
 }
 
-let made = 0;
+/** A checkbox with its text. */
+export function checkbox(
+  text: string,
+  take: (checked: boolean) => void,
+): HTMLElement & { set(checked: boolean): void } {
+  const box = el("input", { type: "checkbox" });
+  box.addEventListener("change", () => take(box.checked));
+  return Object.assign(el("label", { class: "check" }, box, el("span", {}, text)), {
+    set: (checked: boolean) => {
+      box.checked = checked;
+    },
+  });
+}
 
-/** An id that nothing else on the page has. */
+/** A heading with something beside it. */
+export function titled(title: string, beside: Node): HTMLElement {
+  return el("div", { class: "title" }, el("h2", {}, title), beside);
+}
+
+let ids = 0;
+
+/** An id that no other element of the page has. */
 export function id(): string {
-  return `e${made++}`;
+  return `e${ids++}`;
+}
+
+/** Let the browser save content as a file. */
+export function saveFile(name: string, content: Blob): void {
+  const address = URL.createObjectURL(content);
+  el("a", { href: address, download: name }).click();
+  // The browser has read it by then.
+  setTimeout(() => URL.revokeObjectURL(address), 60_000);
+}
+
+/** Return a value that the browser keeps; null without one, or where it keeps none. */
+export function recall(kind: "localStorage" | "sessionStorage", name: string): string | null {
+  try {
+    return globalThis[kind].getItem(name);
+  } catch {
+    return null;
+  }
+}
+
+/** Let the browser keep a value, where it keeps any. */
+export function remember(
+  kind: "localStorage" | "sessionStorage",
+  name: string,
+  value: string,
+): void {
+  try {
+    globalThis[kind].setItem(name, value);
+  } catch {
+    // The value then holds until the page is closed.
+  }
 }
 
 const ICONS = {

@@ -1,34 +1,44 @@
-/** Captured clips of a model, as places among its controls. */
+/** Captured clips of a model, as points among its controls. */
 
 import type { ModelCard } from "@posefield/client";
 
-import type { Control, Dot } from "./chart.ts";
+export type Control = ModelCard["controls"][number];
+
+/** A captured clip on the map of two controls. */
+export interface Dot {
+  readonly index: number;
+  readonly at: readonly [number, number];
+  /** Share of the largest leave-one-out error. */
+  readonly error: number;
+  /** 1 where the other controls are those of the clip. */
+  readonly near: number;
+}
 
 type Controls = Readonly<Record<string, number>>;
 
-/** Who moved a captured clip; null where nobody is told apart. */
-export function mover({ moved_by, performers }: ModelCard, index: number): string | null {
+/** Return the performer of a captured clip; null for a model without performers. */
+export function performerOf({ moved_by, performers }: ModelCard, index: number): string | null {
   return performers[moved_by[index] ?? -1] ?? null;
 }
 
-/** Label sets besides performers, who are asked for in a field of their own. */
+/** Return the label sets besides performers. */
 export function otherSets({ labels = [] }: ModelCard): NonNullable<ModelCard["labels"]> {
   return labels.filter(({ name }) => name !== "performer");
 }
 
-/** Names of a captured clip in the label sets besides performers. */
+/** Return the labels of a captured clip besides its performer. */
 export function labelsOf(card: ModelCard, index: number): Record<string, string> {
   const named = otherSets(card).map(({ name, names, clips }) => [name, names[clips[index]!]!]);
   return Object.fromEntries(named) as Record<string, string>;
 }
 
-/** Values of the controls that are none of those. */
+/** Return the values of the other controls. */
 export function others(controls: Controls, axes: readonly Control[]): Record<string, number> {
   const names = new Set(axes.map(({ name }) => name));
   return Object.fromEntries(Object.entries(controls).filter(([name]) => !names.has(name)));
 }
 
-/** Every captured clip on the map of two controls. */
+/** Return the captured clips on the map of two controls. */
 export function clips(card: ModelCard, axes: readonly [Control, Control], now: Controls): Dot[] {
   const [x, y] = axes.map((axis) => card.controls.indexOf(axis)) as [number, number];
   const left = card.left_out ?? [];
@@ -41,7 +51,7 @@ export function clips(card: ModelCard, axes: readonly [Control, Control], now: C
   }));
 }
 
-/** The greatest gap to a captured clip among the controls that are no axes, as a share of a range. */
+/** Return the greatest gap to a captured clip in a control that is no axis, as a share of its range. */
 export function distance(
   card: ModelCard,
   now: Controls,
@@ -55,17 +65,17 @@ export function distance(
   return Math.max(0, ...gaps);
 }
 
-/** The captured clip nearest to controls, each on a scale of its range. */
+/** Return the captured clip nearest to the controls, each on a scale of its range. */
 export function nearestTo(card: ModelCard, now: Controls): { index: number; apart: number } {
-  let found = { index: 0, apart: Number.POSITIVE_INFINITY };
+  let nearest = { index: 0, apart: Number.POSITIVE_INFINITY };
   card.examples.forEach((values, index) => {
     const apart = Math.hypot(...card.controls.map((control, i) => gap(control, now, values[i]!)));
-    if (apart < found.apart) found = { index, apart };
+    if (apart < nearest.apart) nearest = { index, apart };
   });
-  return found;
+  return nearest;
 }
 
 function gap(control: Control, now: Controls, value: number): number {
-  const own = now[control.name] ?? control.default;
-  return Math.abs(own - value) / (control.maximum - control.minimum || 1);
+  const current = now[control.name] ?? control.default;
+  return Math.abs(current - value) / (control.maximum - control.minimum || 1);
 }

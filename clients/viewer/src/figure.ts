@@ -1,20 +1,38 @@
 /** A body on the stage, as sticks or as a mannequin, solid or as a ghost. */
 
 import type { ModelCard } from "@posefield/client";
-import { Group, type Material, MeshLambertMaterial } from "three";
+import {
+  Bone,
+  type BufferAttribute,
+  type BufferGeometry,
+  CylinderGeometry,
+  Group,
+  InstancedMesh,
+  type Material,
+  Matrix4,
+  MeshLambertMaterial,
+  Object3D,
+  Quaternion,
+  Skeleton,
+  SkinnedMesh,
+  SphereGeometry,
+  Vector3,
+} from "three";
 
 import type { Character } from "./character.ts";
+import * as characters from "./character.ts";
 import type { Shown } from "./player.ts";
-import { SkinnedBody } from "./skinned-body.ts";
+import { type Placed, place, placed } from "./skeleton.ts";
 import type { State } from "./state.ts";
-import { Stick } from "./stick.ts";
 import * as theme from "./theme.ts";
 
-export type Body = State["body"];
+type BodyPose = Pick<Shown, "rotations" | "root" | "offsets">;
 
-/** The names of the colours of skin, sticks and joints among the custom properties. */
+/** Custom properties with the colours of skin, sticks and joints. */
 const SOLID = { skin: "--body", stick: "--ink", joint: "--accent" } as const;
 const GHOST = { skin: "--ghost", stick: "--ghost", joint: "--ghost" } as const;
+/** Draws ghosts behind a body that they coincide with. */
+const BEHIND = { polygonOffset: true, polygonOffsetFactor: 6, polygonOffsetUnits: 6 };
 
 export class Figure {
   readonly group = new Group();
@@ -24,7 +42,7 @@ export class Figure {
   readonly #colours: typeof SOLID | typeof GHOST;
   readonly #before: readonly Material[];
   #body: Stick | SkinnedBody | null = null;
-  #kind: Body | null = null;
+  #kind: State["body"] | null = null;
   #shown: Shown | null = null;
 
   /** opacity: of a ghost. */
@@ -32,16 +50,18 @@ export class Figure {
     this.#card = card;
     this.#character = character;
     this.#colours = ghost ? GHOST : SOLID;
-    const made = () => (ghost ? pale(opacity) : new MeshLambertMaterial());
-    this.#materials = { skin: made(), stick: made(), joint: made() };
-    this.#before = ghost ? [hollow()] : [];
+    const material = () =>
+      new MeshLambertMaterial(ghost ? { transparent: true, opacity, ...BEHIND } : {});
+    this.#materials = { skin: material(), stick: material(), joint: material() };
+    // Fills the depth alone, so that a ghost shows its outside once and not its inside.
+    this.#before = ghost ? [new MeshLambertMaterial({ colorWrite: false, ...BEHIND })] : [];
     this.tint();
   }
 
-  wear(kind: Body): void {
+  wear(kind: State["body"]): void {
     if (kind === this.#kind) return;
     this.#kind = kind;
-    this.#undress();
+    this.#removeBody();
     const { skin, stick, joint } = this.#materials;
     this.#body =
       kind === "stick"
@@ -64,12 +84,12 @@ export class Figure {
   }
 
   dispose(): void {
-    this.#undress();
+    this.#removeBody();
     this.group.removeFromParent();
     for (const material of [...Object.values(this.#materials), ...this.#before]) material.dispose();
   }
 
-  #undress(): void {
+  #removeBody(): void {
     if (!this.#body) return;
     this.group.remove(this.#body);
     this.#body.dispose();
@@ -77,14 +97,161 @@ export class Figure {
   }
 }
 
-/** Where it coincides with the body, that is what one sees. */
-const BEHIND = { polygonOffset: true, polygonOffsetFactor: 6, polygonOffsetUnits: 6 };
+/** Lengths of bones that differ by less are the same, m. */
+const SAME = 0.0005;
 
-function pale(opacity: number): MeshLambertMaterial {
-  return new MeshLambertMaterial({ transparent: true, opacity, ...BEHIND });
+/** The skin of the model's files, fitted to the bones of each answer. */
+export class SkinnedBody extends Object3D {
+  readonly #card: ModelCard;
+  readonly #character: Character;
+  readonly #rest: Float32Array;
+  readonly #joints: readonly Bone[];
+  readonly #skeleton: Skeleton;
+  readonly #geometry: BufferGeometry;
+  #offsets: Float32Array;
+
+  /** materials: the skin is drawn once with each, in this order. */
+  constructor(card: ModelCard, character: Character, materials: readonly Material[]) {
+    super();
+    const { names, offsets, parents } = card.skeleton;
+    this.#card = card;
+    this.#character = character;
+    this.#offsets = Float32Array.from(offsets.flat());
+    this.#rest = characters.standing(card, this.#offsets);
+    this.#joints = names.map(() => new Bone());
+    parents.forEach((parent, joint) => {
+      (parent < 0 ? this : this.#joints[parent]!).add(this.#joints[joint]!);
+    });
+    this.#skeleton = new Skeleton(
+      [...this.#joints],
+      names.map(() => new Matrix4()),
+    );
+    this.#geometry = characters.geometry(character, character.fine);
+    this.#bind(this.#rest);
+    materials.forEach((material, order) => {
+      const mesh = new SkinnedMesh(this.#geometry, material);
+      mesh.bind(this.#skeleton, new Matrix4());
+      mesh.frustumCulled = false;
+      mesh.renderOrder = order;
+      mesh.castShadow = !material.transparent && material.colorWrite;
+      this.add(mesh);
+    });
+  }
+
+  show({ rotations, root, offsets }: BodyPose): void {
+    // The root's own offset moves no bone.
+    if (offsets.some((x, i) => i > 2 && Math.abs(x - this.#offsets[i]!) > SAME)) this.#fit(offsets);
+    this.#joints.forEach((joint, at) => {
+      const [w, x, y, z] = rotations.subarray(4 * at, 4 * at + 4);
+      joint.quaternion.set(x!, y!, z!, w!);
+      if (this.#card.skeleton.parents[at]! < 0) joint.position.fromArray(root);
+      else joint.position.fromArray(offsets, 3 * at);
+    });
+  }
+
+  override dispose(): void {
+    this.#geometry.dispose();
+    this.#skeleton.dispose();
+  }
+
+  #fit(offsets: Float32Array): void {
+    this.#offsets = offsets.slice();
+    const now = characters.standing(this.#card, offsets);
+    const position = this.#geometry.getAttribute("position") as BufferAttribute;
+    characters.fitted(position.array as Float32Array, this.#character, this.#rest, now);
+    position.needsUpdate = true;
+    this.#bind(now);
+  }
+
+  #bind(rest: Float32Array): void {
+    this.#skeleton.boneInverses.forEach((inverse, at) => {
+      inverse.makeTranslation(-rest[3 * at]!, -rest[3 * at + 1]!, -rest[3 * at + 2]!);
+    });
+  }
 }
 
-/** Fills the depth alone, so that what is pale shows its outside once and not its inside. */
-function hollow(): Material {
-  return new MeshLambertMaterial({ colorWrite: false, ...BEHIND });
+const UP = new Vector3(0, 1, 0);
+/** Radii of joints and bones, and of the thickest bone as a share of its length; shortest bone, m. */
+const [BALL, STICK, SLENDER, SHORTEST] = [0.017, 0.0095, 0.15, 0.008];
+
+/** A bone from a joint to another, or to a tip (m) that is no joint. */
+interface Stretch {
+  readonly from: number;
+  readonly to: number | null;
+  readonly tip: readonly number[];
+  readonly length: number;
 }
+
+/** Sticks and balls: exactly the joints, and nothing that hides them. */
+class Stick extends Object3D {
+  readonly #parents: readonly number[];
+  readonly #placed: Placed;
+  readonly #bones: readonly Stretch[];
+  readonly #sticks: InstancedMesh;
+  readonly #balls: InstancedMesh;
+
+  constructor({ skeleton }: ModelCard, bone: Material, joint: Material) {
+    super();
+    this.#parents = skeleton.parents;
+    this.#bones = stretches(skeleton);
+    this.#placed = placed(skeleton.names.length);
+    const cone = new CylinderGeometry(0.55, 1, 1, 8).translate(0, 0.5, 0);
+    this.#sticks = new InstancedMesh(cone, bone, this.#bones.length);
+    this.#balls = new InstancedMesh(new SphereGeometry(1, 12, 8), joint, this.#bones.length + 1);
+    for (const mesh of [this.#sticks, this.#balls]) {
+      mesh.frustumCulled = false;
+      mesh.castShadow = !bone.transparent;
+      this.add(mesh);
+    }
+  }
+
+  show({ rotations, root, offsets }: BodyPose): void {
+    place(this.#placed, this.#parents, offsets, rotations, root, 0);
+    const { positions } = this.#placed;
+    this.#setBall(0, start.fromArray(positions), BALL);
+    this.#bones.forEach(({ from, to, tip, length }, i) => {
+      start.fromArray(positions, 3 * from);
+      if (to === null) {
+        const [w, x, y, z] = this.#placed.rotations.subarray(4 * from, 4 * from + 4);
+        end
+          .fromArray(tip)
+          .applyQuaternion(turn.set(x!, y!, z!, w!))
+          .add(start);
+      } else end.fromArray(positions, 3 * to);
+      const long = along.subVectors(end, start).length();
+      turn.setFromUnitVectors(UP, along.divideScalar(long || 1));
+      const thick = Math.min(STICK, SLENDER * length);
+      this.#sticks.setMatrixAt(i, matrix.compose(start, turn, size.set(thick, long, thick)));
+      this.#setBall(i + 1, end, to === null ? 0.5 * STICK : Math.min(BALL, 2 * SLENDER * length));
+    });
+    this.#sticks.instanceMatrix.needsUpdate = this.#balls.instanceMatrix.needsUpdate = true;
+  }
+
+  override dispose(): void {
+    for (const mesh of [this.#sticks, this.#balls]) {
+      mesh.geometry.dispose();
+      mesh.dispose();
+    }
+  }
+
+  #setBall(i: number, centre: Vector3, radius: number): void {
+    this.#balls.setMatrixAt(i, matrix.makeScale(radius, radius, radius).setPosition(centre));
+  }
+}
+
+function stretches({
+  offsets,
+  parents,
+  tip_joints,
+  tip_offsets,
+}: ModelCard["skeleton"]): Stretch[] {
+  const inner = parents.map((from, to) => ({ from, to, tip: offsets[to]! }));
+  const outer = tip_joints.map((from, i) => ({ from, to: null, tip: tip_offsets[i]! }));
+  return [...inner, ...outer]
+    .map((bone) => ({ ...bone, length: Math.hypot(...bone.tip) }))
+    .filter(({ from, length }) => from >= 0 && length > SHORTEST);
+}
+
+const [start, end, along, size] = [new Vector3(), new Vector3(), new Vector3(), new Vector3()];
+const turn = new Quaternion();
+const matrix = new Matrix4();

@@ -1,14 +1,14 @@
 /** The state as the address bar's hash: `#reaching?stature=1.72&turn=20&~time=0.5`.
  *
- * Controls by their names; everything else begins with `~` and is written only where it is not as
- * at the start. What cannot be read is named, and the rest holds.
+ * Controls go by their names; other entries begin with `~` and are written where they differ from the
+ * start. Entries that cannot be read are reported, and the others are used.
  */
 
 import type { ModelCard } from "@posefield/client";
 
+import { defaults } from "./controls.ts";
 import { otherSets } from "./examples.ts";
 import { LONGEST_SCRIPT, read as readScript } from "./performance/script.ts";
-import type { State } from "./state.ts";
 import {
   HIGHEST_FLOOR,
   hasDetail,
@@ -16,11 +16,12 @@ import {
   standsByDefault,
   VARIETY,
   whyFeetCannotStand,
-} from "./takes.ts";
+} from "./questions.ts";
+import type { State, Store } from "./state.ts";
 import { read as number } from "./written.ts";
 
 export interface Address {
-  /** null where none is named. */
+  /** null for an address without a model. */
   readonly model: string | null;
   readonly entries: readonly (readonly [string, string])[];
 }
@@ -28,7 +29,7 @@ export interface Address {
 type Rest = Omit<State, "model" | "controls">;
 type Key = keyof Rest;
 
-/** `undefined` where the text says nothing that is expected. */
+/** An entry; `read` returns undefined for a text that is not as expected. */
 interface Field<Value> {
   readonly expected: (card: ModelCard) => string;
   readonly read: (text: string, card: ModelCard) => Value | undefined;
@@ -47,20 +48,15 @@ export function address(hash: string): Address {
   return { model: plain(model) || null, entries };
 }
 
-/** Controls in the order in which they are worth a map: those of few values last. */
-function mapped({ controls }: ModelCard): readonly string[] {
-  const [few, many] = [true, false].map((is) =>
-    controls.filter(({ values }) => values.length > 0 === is),
-  );
-  return [...many!, ...few!].map(({ name }) => name);
-}
-
-/** What a model's page shows where nobody says otherwise. */
+/** Return the state of a model's page at the start. */
 export function initial(model: string, card: ModelCard): State {
-  const [across = "", along = ""] = mapped(card);
+  // Controls of few values make poor maps.
+  const few = ({ values }: ModelCard["controls"][number]) => Number(values.length > 0);
+  const axes = card.controls.toSorted((a, b) => few(a) - few(b)).map(({ name }) => name);
+  const [across = "", along = ""] = axes;
   return {
     model,
-    controls: Object.fromEntries(card.controls.map(({ name, default: value }) => [name, value])),
+    controls: defaults(card),
     performer: null,
     labels: {},
     level: 0,
@@ -89,8 +85,9 @@ export function initial(model: string, card: ModelCard): State {
   };
 }
 
+/** Return the state of an address, and a sentence for each entry that cannot be read. */
 export function restored(
-  found: Address,
+  { entries }: Address,
   model: string,
   card: ModelCard,
 ): { state: State; faults: readonly string[] } {
@@ -98,10 +95,10 @@ export function restored(
   const controls: Record<string, number> = { ...start.controls };
   const rest: Partial<Record<Key, unknown>> = {};
   const faults: string[] = [];
-  for (const [key, text] of found.entries) {
+  for (const [key, text] of entries) {
     const fault = key.startsWith("~")
-      ? take(rest, key.slice(1), text, card)
-      : steer(controls, key, text);
+      ? readEntry(rest, key.slice(1), text, card)
+      : readControl(controls, key, text);
     if (fault) faults.push(fault);
   }
   return { state: { ...start, ...(rest as Partial<Rest>), controls }, faults };
@@ -113,17 +110,17 @@ export function written(state: State, card: ModelCard): string {
     ([name, value]) => `${safe(name)}=${rounded(value)}`,
   );
   const rest = (Object.keys(FIELDS) as Key[])
-    .map((key) => [key, spelt(state, key)] as const)
-    .filter(([key, text]) => text !== spelt(start, key))
+    .map((key) => [key, entryOf(state, key)] as const)
+    .filter(([key, text]) => text !== entryOf(start, key))
     .map(([key, text]) => `~${key}=${safe(text)}`);
   return `#${safe(state.model)}?${[...controls, ...rest].join("&")}`;
 }
 
-function spelt(state: State, key: Key): string {
+function entryOf(state: State, key: Key): string {
   return (FIELDS[key] as Field<unknown>).write(state[key]);
 }
 
-function steer(controls: Record<string, number>, name: string, text: string): string | null {
+function readControl(controls: Record<string, number>, name: string, text: string): string | null {
   if (!Object.hasOwn(controls, name)) return `${name}: this model has no such control`;
   const value = number(text);
   if (typeof value === "string") return `${name}: ${value}`;
@@ -131,7 +128,7 @@ function steer(controls: Record<string, number>, name: string, text: string): st
   return null;
 }
 
-function take(
+function readEntry(
   rest: Partial<Record<Key, unknown>>,
   key: string,
   text: string,
@@ -147,7 +144,7 @@ function take(
 
 const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   performer: {
-    expected: (card) => card.performers.join(", ") || "nobody: performers are not told apart",
+    expected: (card) => card.performers.join(", ") || "none: this model has no performers",
     read: (text, card) => (card.performers.includes(text) ? text : undefined),
     write: (value) => value ?? "",
   },
@@ -155,7 +152,7 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
     expected: (card) =>
       otherSets(card)
         .map(({ name, names }) => `${name}:${names.join(" or ")}`)
-        .join(", ") || "nothing: there are no label sets",
+        .join(", ") || "none: this model has no label sets",
     read: readLabels,
     write: (value) =>
       Object.entries(value)
@@ -164,19 +161,19 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   },
   level: between((card) => [0, card.levels.length - 1], Number.isInteger),
   time: between(() => [0, 3600]),
-  playing: yes(),
+  playing: flag(),
   speed: between(() => [0.1, 2]),
-  loop: yes(),
+  loop: flag(),
   root: one("travelling", "in_place"),
   body: one("stick", "mannequin"),
-  ghost: yes(),
-  fan: yes(),
-  feet: yes(),
-  stands: possible(whyFeetCannotStand),
+  ghost: flag(),
+  fan: flag(),
+  feet: flag(),
+  stands: flag(whyFeetCannotStand),
   floor: between(() => [-HIGHEST_FLOOR, HIGHEST_FLOOR]),
   take: between(() => [0, LARGEST_SEED], Number.isInteger),
   variety: between(() => [0, 1]),
-  detail: possible((card) => (hasDetail(card) ? null : "this model has no details to sample")),
+  detail: flag((card) => (hasDetail(card) ? null : "this model has no details to sample")),
   target: {
     expected: () => "x,y,z in metres",
     read: point,
@@ -186,12 +183,12 @@ const FIELDS: { readonly [K in Key]: Field<State[K]> } = {
   across: control(),
   along: control(),
   crowd: between(() => [50, 10_000], Number.isInteger),
-  varied: yes(),
+  varied: flag(),
   pixels: between(() => [0.25, 16]),
   script: {
     expected: () => "the script of a performance as JSON",
     read: (text) => (typeof readScript(text) === "string" ? undefined : text),
-    // A longer one is a file: not all that pass links on keep them whole.
+    // Longer links are cut by some programs that pass them on.
     write: (value) => (value.length > LONGEST_SCRIPT ? "" : value),
   },
 };
@@ -212,17 +209,17 @@ function between(
   };
 }
 
-/** A name for each of some label sets, commas between. */
+/** Read `set:name` pairs between commas. */
 function readLabels(text: string, card: ModelCard): State["labels"] | undefined {
   const pairs = text.split(",").map((part) => part.split(/:(.*)/s));
   const known = otherSets(card);
   const good = pairs.every(([name, label]) =>
-    known.some((own) => own.name === name && own.names.includes(label ?? "")),
+    known.some((set) => set.name === name && set.names.includes(label ?? "")),
   );
   return good ? (Object.fromEntries(pairs) as Record<string, string>) : undefined;
 }
 
-/** Three numbers between commas. */
+/** Read three numbers between commas. */
 function point(text: string): State["target"] | undefined {
   const found = text.split(",").map(number);
   const [x, y, z] = found;
@@ -230,21 +227,13 @@ function point(text: string): State["target"] | undefined {
   return good ? [x as number, y as number, z as number] : undefined;
 }
 
-function yes(): Field<boolean> {
+/** why: says why a model cannot do it; null where it can. */
+function flag(why: (card: ModelCard) => string | null = () => null): Field<boolean> {
   return {
-    expected: () => "yes or no",
-    read: (text) => ({ yes: true, no: false })[text],
+    expected: (card) => (why(card) ? `no: ${why(card)}` : "yes or no"),
+    read: (text, card) =>
+      text === "yes" && why(card) ? undefined : { yes: true, no: false }[text],
     write: (value) => (value ? "yes" : "no"),
-  };
-}
-
-/** lacks: in words, why a model cannot do it; null where it can. */
-function possible(lacks: (card: ModelCard) => string | null): Field<boolean> {
-  const { expected, read, write } = yes();
-  return {
-    expected: (card) => (lacks(card) ? `no: ${lacks(card)}` : expected(card)),
-    read: (text, card) => (text === "yes" && lacks(card) ? undefined : read(text, card)),
-    write,
   };
 }
 
@@ -265,7 +254,7 @@ function control(): Field<string> {
   };
 }
 
-/** Six digits: finer than any slider, and the same text again when read back. */
+/** Write six digits: finer than any slider, and the same text again when read back. */
 function rounded(value: number): string {
   return String(Number(value.toPrecision(6)));
 }
@@ -274,11 +263,38 @@ function safe(text: string): string {
   return encodeURIComponent(text).replaceAll("%40", "@");
 }
 
-/** As it stands, where percent signs make no sense. */
+/** Decode percent signs; a text in which they make no sense stays as it is. */
 function plain(text: string): string {
   try {
     return decodeURIComponent(text);
   } catch {
     return text;
   }
+}
+
+/** Milliseconds without a change until the address is written. */
+const REST = 350;
+
+/** Write each change of the state into the address; those of time make no step of the history. */
+export function follow(store: Store, card: ModelCard, signal: AbortSignal): void {
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  let lasting = false;
+  const write = () => {
+    // A time that passes is not worth keeping.
+    const { state } = store;
+    const text = written(state.playing ? { ...state, time: 0 } : state, card);
+    if (text !== location.hash) {
+      if (lasting) history.pushState(null, "", text);
+      else history.replaceState(null, "", text);
+    }
+    lasting = false;
+  };
+  store.listen((state, changed) => {
+    if (changed.size === 1 && changed.has("time") && state.playing) return;
+    lasting ||= [...changed].some((key) => key !== "time" && key !== "playing");
+    clearTimeout(timer);
+    timer = setTimeout(write, REST);
+  }, signal);
+  write();
+  signal.addEventListener("abort", () => clearTimeout(timer));
 }

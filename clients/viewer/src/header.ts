@@ -1,10 +1,10 @@
-/** The bar at the top: which model, which view, light or dark, and help. */
+/** The bar at the top, the buttons that lead to sections of the side, and the hint of a first visit. */
 
 import type { ModelSummary } from "@posefield/client";
 
-import { button, choice, el, icon, id } from "./dom.ts";
-import { shareButton } from "./share.ts";
-import type { Store, View } from "./state.ts";
+import { button, choice, el, icon, id, recall, remember, textButton } from "./dom.ts";
+import type { Session } from "./player.ts";
+import { has, type Store, type View } from "./state.ts";
 import * as theme from "./theme.ts";
 
 const VIEWS = [
@@ -12,7 +12,6 @@ const VIEWS = [
   ["crowd", "Crowd"],
   ["performance", "Performance"],
 ] as const;
-
 const KEYS = [
   ["Space", "play or pause"],
   ["← →", "one frame back or forward"],
@@ -29,6 +28,10 @@ const KEYS = [
   ["B", "mannequin or sticks"],
   ["T", "light or dark"],
 ] as const;
+const DRAG =
+  "Drag turns the view, the wheel or two fingers bring it nearer, the right button or two fingers move it.";
+/** Milliseconds for which a button says that the link is copied. */
+const COPIED = 2500;
 
 export class Header {
   readonly #models = el("select", { id: id() });
@@ -36,21 +39,29 @@ export class Header {
   readonly #views: ReturnType<typeof choice<View>>;
   #store: Store | null = null;
 
-  /** open: shows another model. */
+  /** open: called with the name of the chosen model. */
   constructor(host: HTMLElement, open: (model: string) => void) {
     this.#models.addEventListener("change", () => open(this.#models.value));
     this.#views = choice<View>("View", VIEWS, (view) => this.#store?.set({ view }));
-    const help = helped();
-    const sign = el("button", { type: "button", popovertarget: help.id, class: "sign" }, "Keys");
-    const shade = button(icon("light"), "Light or dark (T)", theme.toggle);
+    const rows = KEYS.flatMap(([key, text]) => [
+      el("dt", {}, el("kbd", {}, key)),
+      el("dd", {}, text),
+    ]);
+    const help = el(
+      "div",
+      { popover: "auto", id: id(), class: "help", role: "dialog", "aria-label": "Keys" },
+      el("h2", {}, "Keys"),
+      el("dl", {}, ...rows),
+      el("p", { class: "about" }, DRAG),
+    );
     host.append(
       el("h1", {}, "posefield"),
       el("span", { class: "field" }, el("label", { for: this.#models.id }, "Model"), this.#models),
       this.#about,
       this.#views,
       shareButton(),
-      shade,
-      sign,
+      button(icon("light"), "Light or dark (T)", theme.toggle),
+      el("button", { type: "button", popovertarget: help.id, class: "sign" }, "Keys"),
       help,
     );
   }
@@ -62,37 +73,86 @@ export class Header {
     if (before.join("\n") !== all.join("\n"))
       this.#models.replaceChildren(...all.map((name) => el("option", { value: name }, name)));
     this.#models.value = shown;
-    const found = models.find(({ name }) => name === shown);
-    this.#about.textContent = found?.description ?? "";
+    this.#about.textContent = models.find(({ name }) => name === shown)?.description ?? "";
   }
 
-  /** Says which model is shown, where another was chosen and never came. */
+  /** Name the shown model, where another was chosen and never came. */
   choose(shown: string): void {
     this.#models.value = shown;
   }
 
   follow(store: Store, signal: AbortSignal): void {
     this.#store = store;
-    const show = () => this.#views.set(store.state.view);
-    show();
-    signal.addEventListener("abort", store.listen(show));
+    store.follow(({ view }) => this.#views.set(view), signal);
   }
 }
 
-function helped(): HTMLElement {
-  const rows = KEYS.flatMap(([key, what]) => [
-    el("dt", {}, el("kbd", {}, key)),
-    el("dd", {}, what),
-  ]);
-  return el(
-    "div",
-    { popover: "auto", id: id(), class: "help", role: "dialog", "aria-label": "Keys" },
-    el("h2", {}, "Keys"),
-    el("dl", {}, ...rows),
+function shareButton(): HTMLButtonElement {
+  const name = "Copy link";
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const element = textButton(
+    name,
+    async () => {
+      const copied = await navigator.clipboard?.writeText(location.href).then(
+        () => true,
+        () => false,
+      );
+      element.textContent = copied ? "Copied" : "Copy the address bar";
+      clearTimeout(timer);
+      timer = setTimeout(() => {
+        element.textContent = name;
+      }, COPIED);
+    },
+    "share",
+  );
+  element.setAttribute("aria-live", "polite");
+  return element;
+}
+
+const SECTIONS = [
+  ["controls", "Controls"],
+  ["map", "Map"],
+  ["files", "Download"],
+  ["detail", "Detail"],
+] as const;
+
+/** Buttons that scroll to sections, always in view. */
+export function mountJumps(host: HTMLElement): void {
+  const buttons = SECTIONS.map(([part, name]) => {
+    const element = textButton(name, () => {
+      const section = host.parentElement?.querySelector<HTMLElement>(`[data-part="${part}"]`);
+      if (!section) return;
+      // The keyboard goes on from there.
+      section.tabIndex = -1;
+      section.focus({ preventScroll: true });
+      section.scrollIntoView();
+    });
+    element.dataset["to"] = part;
+    return element;
+  });
+  host.append(el("nav", { class: "jumps", "aria-label": "Sections" }, ...buttons));
+}
+
+const WELCOMED = "posefield-welcomed";
+
+/** A hint on the first visit, until it is closed or a control is moved. */
+export function mountWelcome(host: HTMLElement, { signal, store }: Session): void {
+  host.hidden = recall("localStorage", WELCOMED) !== null;
+  if (host.hidden) return;
+  const close = () => {
+    remember("localStorage", WELCOMED, "yes");
+    host.hidden = true;
+  };
+  const hint = "Move a slider and the motion follows. Download it for Blender, Unreal or Maya.";
+  host.append(
     el(
-      "p",
-      { class: "about" },
-      "Drag turns the view, the wheel or two fingers bring it nearer, the right button or two fingers move it.",
+      "div",
+      { class: "welcome", role: "note" },
+      el("div", {}, el("h2", {}, "Motion from a few sliders"), el("p", {}, hint)),
+      button("Close", "Close this hint", close),
     ),
   );
+  store.listen((_, changed) => {
+    if (has(changed, "controls", "performer", "labels")) close();
+  }, signal);
 }

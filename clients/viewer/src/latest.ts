@@ -1,6 +1,4 @@
-/** Questions of which only the latest matters: one at a time, and what came meanwhile is dropped. */
-
-/** Runs `answer` for the newest argument; never two at once, and never one that is out of date. */
+/** Requests for the newest of many questions: one at a time, older ones are dropped. */
 export class Latest<Question> {
   readonly #answer: (question: Question) => Promise<void>;
   #waiting: { readonly question: Question } | null = null;

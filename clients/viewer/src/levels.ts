@@ -1,43 +1,41 @@
-/** All levels of detail side by side: the same moment, and how far each is off as seen from here. */
+/** All levels of detail side by side at the same moment, with the error of each as seen from here. */
 
-import type { ClipQuestion, Motion } from "@posefield/client";
-import { Color, Group, MeshStandardMaterial, type PerspectiveCamera, Vector3 } from "three";
+import type { ClipQuestion, ModelCard, Motion } from "@posefield/client";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Color,
+  Group,
+  LineBasicMaterial,
+  LineSegments,
+  MeshStandardMaterial,
+  type PerspectiveCamera,
+  Vector3,
+} from "three";
 
 import "./levels.css";
-import { levelColour } from "./colours.ts";
-import { type Ladder, ladder, lens } from "./detail.ts";
+import { farEnough, type Ladder, type Lens, ladder, lens } from "./detail.ts";
 import { el } from "./dom.ts";
-import { Ghost } from "./ghost-lines.ts";
+import { SkinnedBody } from "./figure.ts";
 import { Latest } from "./latest.ts";
-import { type Apart, Note } from "./level-notes.ts";
-import type { Mount, Page } from "./page.ts";
+import type { Session } from "./player.ts";
+import { RATE, TAKE_AND_FEET, takeAndFeet } from "./questions.ts";
 import { type Placed, place, placed } from "./skeleton.ts";
-import { SkinnedBody } from "./skinned-body.ts";
-import type { State } from "./state.ts";
-import { TAKE_AND_FEET, takeAndFeet } from "./takes.ts";
+import { type Changes, has, type State } from "./state.ts";
 import * as theme from "./theme.ts";
+import { figure as digits, whole } from "./written.ts";
 
-/** Frames a second of the clips: what a screen shows. */
-const RATE = 60;
-/** Seconds between two changes of the numbers that are read. */
+/** Seconds between two changes of the numbers. */
 const READING = 0.15;
-/** How far the picture moves up, as a share of its height. */
+/** Share of its height by which the picture moves up, so that notes hide no feet. */
 const RAISED = 0.12;
 
-export const mount: Mount = (host, page) => new Levels(host, page).begin();
-
-/** One level's character, and where its joints are now. */
-interface Figure {
-  readonly body: SkinnedBody;
-  readonly material: MeshStandardMaterial;
-  readonly ghost: Ghost;
-  readonly joints: Placed;
-  readonly note: Note;
-  motion: Motion | null;
+export function mount(host: HTMLElement, session: Session): void {
+  new Levels(host, session);
 }
 
 class Levels {
-  readonly #page: Page;
+  readonly #session: Session;
   readonly #host = el("section", {
     class: "levels",
     hidden: true,
@@ -45,93 +43,69 @@ class Levels {
   });
   readonly #group = new Group();
   readonly #ladder: Ladder;
-  readonly #figures: Figure[];
-  readonly #asking: Latest<ClipQuestion>;
+  readonly #figures: readonly LevelFigure[];
+  readonly #latest = new Latest<ClipQuestion>((question) => this.#fetch(question));
   #since = READING;
 
-  constructor(host: HTMLElement, page: Page) {
-    this.#page = page;
-    this.#ladder = ladder(page.card);
-    this.#figures = page.card.levels.map((_, level) => this.#figure(level));
+  constructor(host: HTMLElement, session: Session) {
+    this.#session = session;
+    const { card, scene, signal, store } = session;
+    this.#ladder = ladder(card);
+    this.#figures = card.levels.map((_, level) => new LevelFigure(session, level));
+    for (const { body, bones } of this.#figures) this.#group.add(body, bones);
     this.#group.visible = false;
-    this.#host.append(...this.#figures.map(({ note }) => note.host));
-    this.#asking = new Latest((question) => this.#ask(question));
-    page.scene.root.add(this.#group);
+    this.#host.append(...this.#figures.map(({ note }) => note));
+    scene.root.add(this.#group);
     host.append(this.#host);
-  }
-
-  begin(): void {
-    const { store, scene, signal } = this.#page;
-    const ends = [
-      store.listen((state, changed) => this.#changed(state, changed)),
-      scene.add((seconds) => this.#step(seconds)),
-    ];
+    store.listen((state, changed) => this.#update(state, changed), signal);
+    scene.add((seconds) => this.#step(seconds), signal);
+    theme.listen(() => this.#tint(), signal);
     signal.addEventListener("abort", () => {
-      for (const end of ends) end();
       if (this.#group.visible) scene.camera.clearViewOffset();
-      this.#host.remove();
       this.#group.removeFromParent();
-      for (const { body, ghost, material } of this.#figures) {
-        body.dispose();
-        material.dispose();
-        ghost.dispose();
-      }
+      for (const figure of this.#figures) figure.dispose();
     });
-    theme.listen(() => this.#paint(), signal);
-    this.#paint();
+    this.#tint();
     this.#show(store.state);
   }
 
-  #figure(level: number): Figure {
-    const material = new MeshStandardMaterial({ roughness: 0.75 });
-    const { card, character } = this.#page;
-    const body = new SkinnedBody(card, character, [material]);
-    // The light's shadows reach as far as one body does.
-    for (const skin of body.children) skin.castShadow = false;
-    const ghost = new Ghost(card, level > 0);
-    this.#group.add(body, ghost.lines);
-    const joints = placed(card.skeleton.parents.length);
-    return { body, material, ghost, joints, note: new Note(level, card), motion: null };
+  #tint(): void {
+    for (const figure of this.#figures) figure.tint();
+    this.#session.scene.redraw();
   }
 
-  #paint(): void {
-    this.#figures.forEach(({ material, ghost }, level) => {
-      material.color = new Color(levelColour(level));
-      ghost.paint();
-    });
-    this.#page.scene.redraw();
-  }
-
-  #changed(state: State, changed: ReadonlySet<keyof State>): void {
-    const asked = ["controls", "performer", "labels", "root", "view", ...TAKE_AND_FEET] as const;
-    if (asked.some((key) => changed.has(key))) this.#show(state);
-    if (changed.has("time") && this.#group.visible) this.#page.scene.redraw();
+  #update(state: State, changed: Changes): void {
+    if (has(changed, "controls", "performer", "labels", "root", "view", ...TAKE_AND_FEET))
+      this.#show(state);
+    if (changed.has("time") && this.#group.visible) this.#session.scene.redraw();
   }
 
   #show(state: State): void {
-    if (this.#group.visible && state.view !== "levels") this.#page.scene.camera.clearViewOffset();
+    const { card, scene } = this.#session;
+    if (this.#group.visible && state.view !== "levels") scene.camera.clearViewOffset();
     this.#group.visible = state.view === "levels";
     this.#host.hidden = !this.#group.visible;
-    this.#page.scene.redraw();
+    scene.redraw();
     if (!this.#group.visible) return;
-    const { card } = this.#page;
-    // Who walks away would not stay side by side.
+    // Characters that walk away would not stay side by side.
     const root = card.cyclic ? "in_place" : state.root;
     const { controls, labels, performer } = state;
-    const how = takeAndFeet(this.#page.source, card, state);
-    this.#asking.ask({ controls, performer, labels, root, fps: RATE, ...how });
+    const rest = takeAndFeet(card, state);
+    this.#latest.ask({ controls, performer, labels, root, fps: RATE, ...rest });
   }
 
-  async #ask(question: ClipQuestion): Promise<void> {
-    const { source, store, signal, notice } = this.#page;
+  async #fetch(question: ClipQuestion): Promise<void> {
+    const { service, store, signal, notice, scene } = this.#session;
     try {
-      const asked = this.#figures.map((_, level) =>
-        source.clip(store.state.model, { ...question, level }, signal),
+      const motions = await Promise.all(
+        this.#figures.map((_, level) =>
+          service.client.clip(store.state.model, { ...question, level }, signal),
+        ),
       );
-      (await Promise.all(asked)).forEach((motion, level) => {
+      motions.forEach((motion, level) => {
         this.#figures[level]!.motion = motion;
       });
-      this.#page.scene.redraw();
+      scene.redraw();
     } catch (fault) {
       if (!signal.aborted) notice(fault);
     }
@@ -139,59 +113,126 @@ class Levels {
 
   #step(seconds: number): boolean {
     if (!this.#group.visible || !this.#figures.every(({ motion }) => motion)) return false;
-    const { store, scene } = this.#page;
-    raise(scene.camera, scene.renderer.domElement);
-    const aside = beside(scene.camera, scene.orbit.target, this.#figures.length);
+    const { playing, time } = this.#session.store.state;
+    const { camera, orbit, renderer } = this.#session.scene;
+    const { clientWidth, clientHeight } = renderer.domElement;
+    const up = RAISED * clientHeight;
+    camera.setViewOffset(clientWidth, clientHeight, 0, up, clientWidth, clientHeight);
+    const aside = spacing(camera, orbit.target, this.#figures.length);
+    const middle = (this.#figures.length - 1) / 2;
     for (const [level, figure] of this.#figures.entries()) {
-      this.#place(figure, level, store.state.time, aside);
+      const shift = aside.clone().multiplyScalar(level - middle);
+      figure.place(time, shift, this.#figures[0]!.joints);
     }
     this.#since += seconds;
-    if (this.#since > READING || !store.state.playing) {
+    if (this.#since > READING || !playing) {
       this.#since = 0;
-      this.#tell();
+      camera.updateMatrixWorld();
+      const seen = lens(camera.fov, renderer.domElement);
+      for (const figure of this.#figures)
+        figure.describe(camera, seen, this.#ladder, this.#figures[0]!.joints);
     }
-    return store.state.playing;
+    return playing;
+  }
+}
+
+/** One level's character, with the finest level's bones as lines over it, and its note. */
+class LevelFigure {
+  readonly body: SkinnedBody;
+  readonly joints: Placed;
+  readonly bones: LineSegments<BufferGeometry, LineBasicMaterial>;
+  readonly note: HTMLElement;
+  motion: Motion | null = null;
+  readonly #level: number;
+  readonly #material = new MeshStandardMaterial({ roughness: 0.75 });
+  readonly #now = el("dd", { class: "levels-now" });
+  readonly #from = el("dd");
+
+  constructor({ card, character }: Session, level: number) {
+    this.#level = level;
+    this.body = new SkinnedBody(card, character, [this.#material]);
+    // The light's shadows reach as far as one body.
+    for (const skin of this.body.children) skin.castShadow = false;
+    const joints = card.skeleton.parents.length;
+    this.joints = placed(joints);
+    this.bones = new LineSegments(
+      new BufferGeometry().setAttribute(
+        "position",
+        new BufferAttribute(new Float32Array(6 * joints), 3),
+      ),
+      new LineBasicMaterial({ depthTest: false, transparent: true, opacity: 0.9 }),
+    );
+    this.bones.frustumCulled = false;
+    this.bones.renderOrder = 1;
+    this.bones.visible = level > 0;
+    this.note = note(level, card, this.#now, this.#from);
   }
 
-  #place(figure: Figure, level: number, time: number, aside: Vector3): void {
-    const motion = figure.motion!;
-    const frame = Math.min(motion.frames - 1, Math.max(0, Math.round(time * motion.rate)));
-    const { rotations, rootPosition, boneOffsets, parents } = motion;
-    place(figure.joints, parents, boneOffsets, rotations, rootPosition, frame);
+  tint(): void {
+    this.#material.color = new Color(theme.levelColour(this.#level));
+    this.bones.material.color.set(theme.colour("--ink"));
+  }
+
+  /** finest: joints of level 0. */
+  place(time: number, shift: Vector3, finest: Placed): void {
+    const { boneOffsets, frames, parents, rate, rootPosition, rotations } = this.motion!;
+    const frame = Math.min(frames - 1, Math.max(0, Math.round(time * rate)));
+    place(this.joints, parents, boneOffsets, rotations, rootPosition, frame);
     const [turns, root] = [4 * parents.length, 3 * frame];
-    figure.body.show({
+    this.body.show({
       rotations: rotations.subarray(frame * turns, (frame + 1) * turns),
       root: rootPosition.subarray(root, root + 3),
       offsets: boneOffsets,
     });
-    const shift = aside.clone().multiplyScalar(level - (this.#figures.length - 1) / 2);
-    figure.body.position.copy(shift);
-    figure.ghost.place(this.#figures[0]!.joints, shift);
+    this.body.position.copy(shift);
+    if (!this.bones.visible) return;
+    this.bones.position.copy(shift);
+    const ends = this.bones.geometry.getAttribute("position") as BufferAttribute;
+    parents.forEach((parent, joint) => {
+      const from = 3 * Math.max(0, parent);
+      ends.array.set(finest.positions.subarray(from, from + 3), 6 * joint);
+      ends.array.set(finest.positions.subarray(3 * joint, 3 * joint + 3), 6 * joint + 3);
+    });
+    ends.needsUpdate = true;
   }
 
-  #tell(): void {
-    const { camera, renderer } = this.#page.scene;
-    camera.updateMatrixWorld();
-    const seen = lens(camera.fov, renderer.domElement);
-    const size = [seen.height * camera.aspect, seen.height] as const;
-    for (const { joints, note, body } of this.#figures) {
-      note.show(
-        apart(camera, size, this.#figures[0]!.joints, joints, body.position),
-        this.#ladder,
-        seen,
-      );
-    }
+  describe(camera: PerspectiveCamera, seen: Lens, ladder: Ladder, finest: Placed): void {
+    const { most, rms } = apart(camera, seen.height, finest, this.joints, this.body.position);
+    const now = `${pixels(rms)} px, worst ${pixels(most)}`;
+    this.#now.textContent = this.#level ? now : "reference";
+    this.#from.textContent = `from ${whole(Math.ceil(farEnough(ladder, this.#level, seen)))} m on`;
+  }
+
+  dispose(): void {
+    this.body.dispose();
+    this.#material.dispose();
+    this.bones.geometry.dispose();
+    this.bones.material.dispose();
   }
 }
 
-/** Moves the picture up, so that notes hide nobody's feet. */
-function raise(camera: PerspectiveCamera, { clientWidth, clientHeight }: HTMLCanvasElement): void {
-  const up = RAISED * clientHeight;
-  camera.setViewOffset(clientWidth, clientHeight, 0, up, clientWidth, clientHeight);
+function note(level: number, card: ModelCard, now: HTMLElement, from: HTMLElement): HTMLElement {
+  const { bytes, operations, rms, pose, ranks } = card.levels[level]!;
+  const centimetres = (metres: number) => String(Number((100 * metres).toPrecision(2)));
+  const rows = [
+    ["size", el("dd", {}, `${digits(bytes / 1000)} kB`)],
+    ["cost", el("dd", {}, `${whole(operations)} multiply-adds`)],
+    ["off by", el("dd", {}, `${centimetres(rms)} cm, worst pose ${centimetres(pose)}`)],
+    ["now", now],
+    ["≤ 1 px", from],
+  ] as const;
+  return el(
+    "article",
+    { class: `level-${Math.min(level, 3)}` },
+    el("h3", {}, `Level ${level}`, el("small", {}, ranks.join(" × "))),
+    el("dl", {}, ...rows.flatMap(([term, value]) => [el("dt", {}, term), value])),
+  );
 }
 
-/** From one character to the next: along the image, so that each stands above its column. */
-function beside(camera: PerspectiveCamera, target: Vector3, count: number): Vector3 {
+const pixels = (value: number): string => value.toFixed(value < 10 ? 1 : 0);
+
+/** Return the way from one character to the next, along the image. */
+function spacing(camera: PerspectiveCamera, target: Vector3, count: number): Vector3 {
   const away = camera.position.distanceTo(target);
   const width = 2 * away * Math.tan((camera.fov * Math.PI) / 360) * camera.aspect;
   const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
@@ -203,24 +244,25 @@ function beside(camera: PerspectiveCamera, target: Vector3, count: number): Vect
 
 const [ONE, OTHER] = [new Vector3(), new Vector3()];
 
-/** How far joints lie from those of another pose, in pixels of the image, both standing there. */
-export function apart(
+/** Return the greatest and the root mean square distance of joints of two poses, in pixels. */
+function apart(
   camera: PerspectiveCamera,
-  [width, height]: readonly [number, number],
-  right: Placed,
-  found: Placed,
+  height: number,
+  finest: Placed,
+  other: Placed,
   shift: Vector3,
-): Apart {
+): { most: number; rms: number } {
   let [most, sum] = [0, 0];
-  const joints = found.positions.length / 3;
+  const joints = other.positions.length / 3;
   for (let joint = 0; joint < joints; joint++) {
-    ONE.fromArray(right.positions, 3 * joint)
+    ONE.fromArray(finest.positions, 3 * joint)
       .add(shift)
       .project(camera);
-    OTHER.fromArray(found.positions, 3 * joint)
+    OTHER.fromArray(other.positions, 3 * joint)
       .add(shift)
       .project(camera);
-    const [x, y] = [((ONE.x - OTHER.x) * width) / 2, ((ONE.y - OTHER.y) * height) / 2];
+    const x = ((ONE.x - OTHER.x) * height * camera.aspect) / 2;
+    const y = ((ONE.y - OTHER.y) * height) / 2;
     most = Math.max(most, Math.hypot(x, y));
     sum += x * x + y * y;
   }

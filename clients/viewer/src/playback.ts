@@ -1,11 +1,11 @@
-/** The time of a clip that plays, and the pose between two of its frames. */
+/** Time of a clip that plays, and its pose and curves between two frames. */
 
 import type { Motion } from "@posefield/client";
 
 export interface Moment {
   readonly time: number;
   readonly playing: boolean;
-  /** How often the end was passed on the way here. */
+  /** Number of times that the end was passed. */
   readonly laps: number;
 }
 
@@ -27,17 +27,13 @@ export function pose(joints: number): Pose {
   return { rotations: new Float32Array(4 * joints), root: new Float32Array(3) };
 }
 
-/** What poses between frames are taken from. */
+/** Frames of a motion, from which poses are interpolated. */
 export type Track = Pick<Motion, "rate" | "times" | "rotations" | "rootPosition">;
 
 /** The pose at `time` between the two frames around it, written into `out`. */
 export function sample(out: Pose, clip: Track, time: number): Pose {
   const joints = out.rotations.length / 4;
-  const last = clip.times.length - 1;
-  const at = Math.min(last, Math.max(0, (time - clip.times[0]!) / step(clip)));
-  const first = Math.min(Math.floor(at), Math.max(0, last - 1));
-  const second = Math.min(last, first + 1);
-  const share = at - first;
+  const [first, second, share] = around(clip, time);
   for (let i = 0; i < 3; i++)
     out.root[i] = mixed(
       clip.rootPosition[3 * first + i]!,
@@ -56,13 +52,32 @@ export function sample(out: Pose, clip: Track, time: number): Pose {
   return out;
 }
 
+/** Curves at `time` between the two frames around it; null for a clip without curves. */
+export function curvesAt(clip: Motion, time: number): Float32Array | null {
+  const { curves, times } = clip;
+  if (!curves) return null;
+  const width = curves.length / times.length;
+  const [first, second, share] = around(clip, time);
+  return Float32Array.from({ length: width }, (_, i) =>
+    mixed(curves[width * first + i]!, curves[width * second + i]!, share),
+  );
+}
+
+/** The frames around a time, and the share of the way from the first to the second. */
+function around(clip: Pick<Track, "rate" | "times">, time: number): [number, number, number] {
+  const last = clip.times.length - 1;
+  const at = Math.min(last, Math.max(0, (time - clip.times[0]!) / step(clip)));
+  const first = Math.min(Math.floor(at), Math.max(0, last - 1));
+  return [first, Math.min(last, first + 1), at - first];
+}
+
 /** Seconds from a frame to the next. */
 export function step(clip: Pick<Track, "rate" | "times">): number {
   const { times } = clip;
   return times.length > 1 ? (times.at(-1)! - times[0]!) / (times.length - 1) : 1 / clip.rate;
 }
 
-/** How a lap carries the ground under a character on: a turn about +Y, then a way. */
+/** Displacement by a lap of a cycle: a turn about +Y, then a translation. */
 export interface Carried {
   readonly turn: number;
   readonly x: number;
@@ -71,7 +86,7 @@ export interface Carried {
 
 export const NOWHERE: Carried = { turn: 0, x: 0, z: 0 };
 
-/** From a cycle's first frame to its last, which is the first carried on. */
+/** Displacement from the first frame of a cycle to its last. */
 export function carried(clip: Motion, joints: number): Carried {
   const last = clip.times.length - 1;
   const turn = heading(clip.rotations, 4 * joints * last) - heading(clip.rotations, 0);
@@ -83,19 +98,19 @@ export function carried(clip: Motion, joints: number): Carried {
   };
 }
 
-/** One after the other. */
+/** Two displacements after each other. */
 export function after(first: Carried, then: Carried): Carried {
   const [x, z] = turned(then.x, then.z, first.turn);
   return { turn: first.turn + then.turn, x: first.x + x, z: first.z + z };
 }
 
-/** Of a point on the ground about the origin, positive from +Z to +X. */
+/** Turn a point of the ground about the origin, positive from +Z to +X. */
 export function turned(x: number, z: number, turn: number): readonly [number, number] {
   const [c, s] = [Math.cos(turn), Math.sin(turn)];
   return [c * x + s * z, c * z - s * x];
 }
 
-/** The part of a rotation that is about +Y. */
+/** Angle of a rotation about +Y. */
 function heading(q: Float32Array, at: number): number {
   return 2 * Math.atan2(q[at + 2]!, q[at]!);
 }

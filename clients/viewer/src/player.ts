@@ -1,9 +1,7 @@
-/** What the body does: asks for poses while something is dragged, then for the clip, and plays it. */
+/** The body's motion: poses are asked for while something is dragged, then the clip, which plays. */
 
 import type { ModelCard, Motion, Poses, Trust } from "@posefield/client";
 
-import * as ask from "./ask.ts";
-import { curvesAt } from "./curves.ts";
 import { Latest } from "./latest.ts";
 import type { Page } from "./page.ts";
 import {
@@ -11,60 +9,59 @@ import {
   after,
   type Carried,
   carried,
+  curvesAt,
   NOWHERE,
   type Pose,
   pose,
   sample,
 } from "./playback.ts";
-import type { State } from "./state.ts";
-import { Stopwatch } from "./stopwatch.ts";
-import { TAKE_AND_FEET } from "./takes.ts";
+import * as questions from "./questions.ts";
+import { type Changes, has, type State } from "./state.ts";
 
-/** Milliseconds without a change until the whole clip is worth asking for. */
+/** Milliseconds without a change until the whole clip is fetched. */
 const IDLE = 140;
 
-/** A body in space: its pose, its bones (J × 3, m), and where laps have carried it. */
+/** A body in space: its pose, its bones (J × 3, m), and the displacement by its laps. */
 export interface Shown extends Pose {
   readonly offsets: Float32Array;
   readonly carried: Carried;
-  /** Values of the card's curves; none where only a crowd's pose is known. */
+  /** Values of the card's curves. */
   readonly curves?: Float32Array | null;
 }
 
-export type Watcher = (shown: Shown) => void;
+/** Everything that a part of the page is given. */
+export interface Session extends Page {
+  readonly player: Player;
+}
 
 export class Player {
   readonly #page: Page;
   readonly #stopwatch = new Stopwatch();
-  readonly #watchers = new Set<Watcher>();
-  readonly #trusted = new Set<(trust: Trust) => void>();
+  readonly #watchers = new Set<(shown: Shown) => void>();
+  readonly #trusts = new Set<(trust: Trust) => void>();
   readonly #clips = new Set<(clip: Motion) => void>();
   readonly #pose: Pose;
-  readonly #poses = new Latest<number>((asked) => this.#askPose(asked));
-  readonly #whole = new Latest<number>((asked) => this.#askClip(asked));
+  readonly #poses = new Latest<number>((turn) => this.#askPose(turn));
+  readonly #whole = new Latest<number>((turn) => this.#askClip(turn));
   #offsets: Float32Array;
   #curves: Float32Array | null = null;
   #clip: Motion | null = null;
   #lap: Carried = NOWHERE;
   #carried: Carried = NOWHERE;
-  #asked = 0;
-  #coming = new AbortController();
+  /** Number of the newest question, and of the newest that is answered. */
+  #turn = 0;
   #answered = 0;
+  #request = new AbortController();
   #idle: ReturnType<typeof setTimeout> | undefined;
   trust: Trust | null = null;
 
   constructor(page: Page) {
     this.#page = page;
-    const { offsets } = page.card.skeleton;
-    this.#offsets = Float32Array.from(offsets.flat());
+    this.#offsets = Float32Array.from(page.card.skeleton.offsets.flat());
     this.#pose = atRest(page.card);
-    const leave = page.store.listen((state, changed) => this.#changed(state, changed));
-    const stop = page.scene.add((seconds) => this.#step(seconds));
-    page.signal.addEventListener("abort", () => {
-      clearTimeout(this.#idle);
-      leave();
-      stop();
-    });
+    page.store.listen((state, changed) => this.#update(state, changed), page.signal);
+    page.scene.add((seconds) => this.#step(seconds), page.signal);
+    page.signal.addEventListener("abort", () => clearTimeout(this.#idle));
   }
 
   /** The clip that plays; null while controls are on the move. */
@@ -81,103 +78,95 @@ export class Player {
     return { ...this.#pose, offsets, carried, curves };
   }
 
-  /** Called with every new pose that is shown, and once at the start. */
-  watch(watcher: Watcher): void {
+  /** Call now and with each new pose. */
+  watch(watcher: (shown: Shown) => void): void {
     this.#watchers.add(watcher);
     watcher(this.shown);
   }
 
-  /** Called with what each answer says of itself. */
+  /** Call with the trust of each answer. */
   onTrust(listener: (trust: Trust) => void): void {
-    this.#trusted.add(listener);
+    this.#trusts.add(listener);
     if (this.trust) listener(this.trust);
   }
 
+  /** Call with each clip. */
   onClip(listener: (clip: Motion) => void): void {
     this.#clips.add(listener);
     if (this.#clip) listener(this.#clip);
   }
 
-  /** Asks for a pose at once, and for the clip when nothing moves any more. */
+  /** Ask for a pose at once, and for the clip when nothing moves any more. */
   ask(): void {
     this.#next();
-    this.#hold(null);
-    this.#stopwatch.asked(this.#asked);
-    this.#poses.ask(this.#asked);
-    this.#soon(this.#answered ? IDLE : 0);
+    this.#setClip(null);
+    this.#stopwatch.asked(this.#turn);
+    this.#poses.ask(this.#turn);
+    this.#fetchClip(this.#answered ? IDLE : 0);
   }
 
-  /** The body goes back to where its clip begins. */
-  home(): void {
-    this.#carried = NOWHERE;
-  }
-
-  /** What was asked before is not waited for any more, however slowly it comes. */
+  /** Number a question, and abort the clip that was asked for before. */
   #next(): void {
-    this.#asked += 1;
-    this.#coming.abort();
+    this.#turn += 1;
+    this.#request.abort();
   }
 
-  /** What is held is marked on the stage, for who tests the page. */
-  #hold(clip: Motion | null): void {
+  /** The attribute on the stage tells tests that the clip has come. */
+  #setClip(clip: Motion | null): void {
     this.#clip = clip;
     document.querySelector("#stage")!.toggleAttribute("data-clip", clip !== null);
   }
 
-  #soon(wait: number): void {
+  #fetchClip(wait: number): void {
     clearTimeout(this.#idle);
-    this.#idle = setTimeout(() => this.#whole.ask(this.#asked), wait);
+    this.#idle = setTimeout(() => this.#whole.ask(this.#turn), wait);
   }
 
-  #changed(state: State, changed: ReadonlySet<keyof State>): void {
-    if (ASKED_ANEW.some((key) => changed.has(key))) this.ask();
-    else if (REPLACED.some((key) => changed.has(key))) this.#replaced(changed);
-    else if (changed.has("time") && !state.playing) this.#show(state.time);
-    if (changed.has("playing") || changed.has("view")) this.#page.scene.redraw();
+  #update(state: State, changed: Changes): void {
+    if (has(changed, "controls", "performer", "labels", "level", "target")) this.ask();
+    else if (has(changed, "loop", "root", ...questions.TAKE_AND_FEET)) {
+      // The shown motion goes on until the other clip comes; another take goes on where it was.
+      if (has(changed, "loop", "root")) this.#carried = NOWHERE;
+      this.#next();
+      this.#fetchClip(0);
+    } else if (changed.has("time") && !state.playing) this.#show(state.time);
+    if (has(changed, "playing", "view")) this.#page.scene.redraw();
   }
 
-  /** The same question's motion as another clip: what is shown goes on meanwhile. */
-  #replaced(changed: ReadonlySet<keyof State>): void {
-    // Another take goes on where the last one was.
-    if (changed.has("loop") || changed.has("root")) this.home();
-    this.#next();
-    this.#soon(0);
-  }
-
-  async #askPose(asked: number): Promise<void> {
-    const { card, source, store } = this.#page;
+  async #askPose(turn: number): Promise<void> {
+    const { card, service, signal, store } = this.#page;
     const { duration } = this;
     const time = Math.min(store.state.time, duration);
-    const question = ask.pose(source, card, store.state, time, duration, this.#page.signal);
-    const answer = await this.#tried(question);
-    if (!answer || asked < this.#answered) return;
+    const question = questions.pose(service, card, store.state, time, duration, signal);
+    const answer = await this.#answer(question);
+    if (!answer || turn < this.#answered) return;
     this.#pose.rotations.set(answer.rotations.subarray(0, this.#pose.rotations.length));
     this.#pose.root.set(answer.rootPosition.subarray(0, 3));
     this.#curves = answer.curves;
-    this.#take(asked, answer);
-    this.#told();
+    this.#take(turn, answer);
+    this.#announce();
   }
 
-  async #askClip(asked: number): Promise<void> {
-    const { card, source, store } = this.#page;
-    this.#coming = new AbortController();
-    const signal = AbortSignal.any([this.#page.signal, this.#coming.signal]);
+  async #askClip(turn: number): Promise<void> {
+    const { card, service, signal, store } = this.#page;
+    this.#request = new AbortController();
     const { loop, root } = store.state;
-    const clip = await this.#tried(ask.clip(source, card, store.state, signal));
-    if (!clip || asked !== this.#asked) return;
-    this.#hold(clip);
+    const either = AbortSignal.any([signal, this.#request.signal]);
+    const clip = await this.#answer(questions.clip(service, card, store.state, either));
+    if (!clip || turn !== this.#turn) return;
+    this.#setClip(clip);
     const travels = card.cyclic && loop && root === "travelling";
     this.#lap = travels ? carried(clip, card.skeleton.names.length) : NOWHERE;
-    this.#take(asked, clip);
+    this.#take(turn, clip);
     this.#show(store.state.time);
     for (const listener of this.#clips) listener(clip);
   }
 
-  /** null where there is no answer, or nobody wants it any more. */
-  async #tried<Answer>(asked: Promise<Answer>): Promise<Answer | null> {
+  /** Return the answer; null for a fault, which is shown, and when the page has gone on. */
+  async #answer<Answer>(request: Promise<Answer>): Promise<Answer | null> {
     const { notice, signal } = this.#page;
     try {
-      const answer = await asked;
+      const answer = await request;
       if (!signal.aborted) notice(null);
       return signal.aborted ? null : answer;
     } catch (fault) {
@@ -186,14 +175,14 @@ export class Player {
     }
   }
 
-  #take(asked: number, answer: Poses): void {
-    this.#answered = asked;
-    this.#stopwatch.answered(asked);
-    this.#offsets = answer.boneOffsets;
-    this.trust = answer.trust;
-    for (const listener of this.#trusted) listener(answer.trust);
-    const { time } = this.#page.store.state;
-    if (time > answer.trust.duration) this.#page.store.set({ time: answer.trust.duration });
+  #take(turn: number, { boneOffsets, trust }: Poses): void {
+    this.#answered = turn;
+    this.#stopwatch.answered(turn);
+    this.#offsets = boneOffsets;
+    this.trust = trust;
+    for (const listener of this.#trusts) listener(trust);
+    const { store } = this.#page;
+    if (store.state.time > trust.duration) store.set({ time: trust.duration });
   }
 
   #step(seconds: number): boolean {
@@ -212,36 +201,71 @@ export class Player {
   #show(time: number): void {
     if (!this.#clip) {
       this.#next();
-      this.#poses.ask(this.#asked);
-      this.#soon(IDLE);
+      this.#poses.ask(this.#turn);
+      this.#fetchClip(IDLE);
       return;
     }
     sample(this.#pose, this.#clip, time);
     this.#curves = curvesAt(this.#clip, time);
-    this.#told();
+    this.#announce();
   }
 
-  #told(): void {
+  #announce(): void {
     for (const watcher of this.#watchers) watcher(this.shown);
     this.#page.scene.redraw();
   }
 }
 
-const ASKED_ANEW = ["controls", "performer", "labels", "level"] as const;
-const REPLACED = ["loop", "root", ...TAKE_AND_FEET] as const;
-
-/** No joint turned, and as high as the legs are long. */
-function atRest(card: ModelCard): Pose {
-  const rest = pose(card.skeleton.names.length);
+/** The pose without turned joints, as high as the legs are long. */
+function atRest({ skeleton }: ModelCard): Pose {
+  const rest = pose(skeleton.names.length);
   for (let at = 0; at < rest.rotations.length; at += 4) rest.rotations[at] = 1;
-  rest.root[1] = depth(card);
-  return rest;
-}
-
-function depth({ skeleton }: ModelCard): number {
   const heights: number[] = [];
   skeleton.parents.forEach((parent, joint) => {
     heights.push(parent < 0 ? 0 : heights[parent]! + skeleton.offsets[joint]![1]!);
   });
-  return -Math.min(...heights);
+  rest.root[1] = -Math.min(...heights);
+  return rest;
+}
+
+/** Measures of dragging that the browser keeps; then all of them are dropped. */
+const KEPT = 1000;
+let first = true;
+let kept = 0;
+
+/** Latency of answers, as measures of the browser that tests read.
+ *
+ * `posefield:first-pose` from the opening of the page; `posefield:drag` from each change of a
+ * control to the drawing of a pose that answers it or a newer one.
+ */
+class Stopwatch {
+  readonly #open: { readonly turn: number; readonly since: number }[] = [];
+  #answered = 0;
+
+  asked(turn: number): void {
+    this.#open.push({ turn, since: performance.now() });
+  }
+
+  answered(turn: number): void {
+    this.#answered = turn;
+  }
+
+  /** Call before the drawing of an answer, which ends with this turn of the event loop. */
+  drawn(): void {
+    if (this.#answered && this.#open.length) queueMicrotask(() => this.#close());
+  }
+
+  #close(): void {
+    const end = performance.now();
+    while (this.#open.length && this.#open[0]!.turn <= this.#answered) {
+      const { since } = this.#open.shift()!;
+      if (++kept > KEPT) {
+        performance.clearMeasures("posefield:drag");
+        kept = 1;
+      }
+      if (first) performance.measure("posefield:first-pose", { start: 0, end });
+      else performance.measure("posefield:drag", { start: since, end });
+      first = false;
+    }
+  }
 }

@@ -1,18 +1,21 @@
-/** The stage: a camera, a ground, light, and one loop that draws only what changed. */
+/** The stage: a camera, a ground, light, and one loop that draws when something has changed. */
 
 import {
   Color,
   DirectionalLight,
   HemisphereLight,
+  Mesh,
   PCFShadowMap,
   PerspectiveCamera,
+  PlaneGeometry,
   Scene as Root,
+  ShaderMaterial,
+  UniformsLib,
+  UniformsUtils,
   WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-import { Ground } from "./ground.ts";
-import { isSoftware, Quality } from "./quality.ts";
 import * as theme from "./theme.ts";
 
 /** Called before each drawing with the seconds since the last; true asks to be called again. */
@@ -23,31 +26,28 @@ const LEASH = 0.15;
 
 export class Scene {
   readonly root = new Root();
-  #leash = LEASH;
   readonly camera = new PerspectiveCamera(38, 1, 0.05, 500);
   readonly renderer: WebGLRenderer;
   readonly orbit: OrbitControls;
-  /** Whether a processor draws, not a graphics card. */
-  readonly software = isSoftware();
+  readonly #software = isSoftware();
   readonly #quality: Quality;
   readonly #steps = new Set<Step>();
   readonly #ground = new Ground();
+  #leash = LEASH;
   #floor = 0;
   readonly #sun = sun();
   #asked = false;
-  #cover: HTMLCanvasElement | null = null;
-  readonly #drawn = new Set<() => void>();
   #last = 0;
 
   constructor(host: HTMLElement) {
-    this.renderer = new WebGLRenderer({ antialias: !this.software });
-    this.#quality = new Quality(this.renderer, this.software, () => this.redraw());
-    if (this.software) this.#sun.shadow.mapSize.set(512, 512);
+    this.renderer = new WebGLRenderer({ antialias: !this.#software });
+    this.#quality = new Quality(this.renderer, this.#software, () => this.redraw());
+    if (this.#software) this.#sun.shadow.mapSize.set(512, 512);
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     const canvas = this.renderer.domElement;
     canvas.setAttribute("aria-hidden", "true");
-    // What the graphics card lost is made again by then, but not drawn.
+    // By then three.js has restored everything, but not drawn it.
     canvas.addEventListener("webglcontextrestored", () => this.redraw());
     host.append(canvas);
     this.orbit = new OrbitControls(this.camera, canvas);
@@ -62,37 +62,14 @@ export class Scene {
     new ResizeObserver(() => this.#fit(host)).observe(host);
   }
 
-  /** Returns how to take it away again. */
-  add(step: Step): () => void {
+  /** Call the step before each drawing, until the signal. */
+  add(step: Step, signal: AbortSignal): void {
     this.#steps.add(step);
+    signal.addEventListener("abort", () => this.#steps.delete(step));
     this.redraw();
-    return () => this.#steps.delete(step);
   }
 
-  /** Height of the ground, m. */
-  get floor(): number {
-    return this.#floor;
-  }
-
-  /** What is to be seen: the stage, and what lies over it. */
-  get canvases(): readonly HTMLCanvasElement[] {
-    return [this.renderer.domElement, ...(this.#cover ? [this.#cover] : [])];
-  }
-
-  /** Puts a canvas over the stage, which its owner draws, or takes it away. */
-  cover(canvas: HTMLCanvasElement | null): void {
-    this.#cover?.remove();
-    this.#cover = canvas;
-    if (canvas) this.renderer.domElement.after(canvas);
-  }
-
-  /** Calls after each drawing; returns how to end that. */
-  watch(seen: () => void): () => void {
-    this.#drawn.add(seen);
-    return () => this.#drawn.delete(seen);
-  }
-
-  /** Draws once at the next chance, and on while a step asks for it. */
+  /** Draw once in the next frame, and on while a step asks for it. */
   redraw(): void {
     if (this.#asked) return;
     this.#asked = true;
@@ -100,8 +77,9 @@ export class Scene {
   }
 
   /**
-   * Shows the whole of a body at the origin. `scale`: its size relative to a person's; `middle`: the
-   * height of its middle, m.
+   * Show all of a body at the origin.
+   *
+   * scale: its size relative to a person's. middle: height of its middle, m.
    */
   frame(scale = 1, middle = 0.88): void {
     this.#leash = LEASH * scale;
@@ -112,37 +90,25 @@ export class Scene {
     this.#light();
   }
 
-  /** Goes along with a body at that place on the ground, on a loose leash. */
+  /** Follow a body at that point of the ground, on a loose leash. */
   follow(x: number, z: number): void {
     const { target } = this.orbit;
     const way = Math.hypot(x - target.x, z - target.z);
     if (way <= this.#leash) return;
     const share = 1 - this.#leash / way;
     const [dx, dz] = [share * (x - target.x), share * (z - target.z)];
-    for (const place of [target, this.camera.position]) {
-      place.x += dx;
-      place.z += dz;
+    for (const point of [target, this.camera.position]) {
+      point.x += dx;
+      point.z += dz;
     }
     this.orbit.update();
     this.#light();
   }
 
-  /** Lays the ground at a height, m. */
-  lay(floor: number): void {
+  /** Set the height of the ground, m. */
+  setFloor(floor: number): void {
     if (floor === this.#floor) return;
     this.#floor = floor;
-    this.#light();
-    this.redraw();
-  }
-
-  /** Shows that place on the ground from above, +Z upwards; `size`: of what is to be seen, m. */
-  above(x: number, z: number, size: number): void {
-    const half = Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, this.camera.aspect);
-    const up = Math.min(this.orbit.maxDistance, Math.max(3, (0.6 * size) / half));
-    this.orbit.target.set(x, 0, z);
-    // Never straight down, where the camera would not know which way is up.
-    this.camera.position.set(x, up, z - 0.02 * up);
-    this.orbit.update();
     this.#light();
     this.redraw();
   }
@@ -157,7 +123,7 @@ export class Scene {
     this.redraw();
   }
 
-  /** Shadows and ground are where one looks. */
+  /** Move shadows and ground to where the camera looks. */
   #light(): void {
     const { x, z } = this.orbit.target;
     this.#sun.position.set(x + 1.8, 4.5, z + 2.2);
@@ -171,10 +137,9 @@ export class Scene {
     this.#last = now;
     this.#quality.drawing(since);
     this.#asked = false;
-    const goOn = [...this.#steps].map((step) => step(seconds)).some(Boolean);
+    const again = [...this.#steps].map((step) => step(seconds)).some(Boolean);
     this.renderer.render(this.root, this.camera);
-    for (const seen of this.#drawn) seen();
-    if (goOn) this.redraw();
+    if (again) this.redraw();
   }
 
   #fit(host: HTMLElement): void {
@@ -195,4 +160,150 @@ function sun(): DirectionalLight {
   light.shadow.normalBias = 0.01;
   Object.assign(light.shadow.camera, { left: -1.6, right: 1.6, top: 1.8, bottom: -1.6, far: 12 });
   return light;
+}
+
+const VERTEX = `
+#include <common>
+#include <shadowmap_pars_vertex>
+varying vec3 place;
+varying vec2 local;
+void main() {
+  vec3 objectNormal = vec3(0.0, 0.0, 1.0);
+  vec3 transformedNormal = normalMatrix * objectNormal;
+  local = position.xy;
+  vec4 worldPosition = modelMatrix * vec4(position, 1.0);
+  place = worldPosition.xyz;
+  gl_Position = projectionMatrix * viewMatrix * worldPosition;
+  #include <shadowmap_vertex>
+}`;
+
+const FRAGMENT = `
+#include <common>
+#include <packing>
+#include <lights_pars_begin>
+#include <shadowmap_pars_fragment>
+#include <shadowmask_pars_fragment>
+uniform vec3 paper;
+uniform vec3 ink;
+uniform float dim;
+varying vec3 place;
+varying vec2 local;
+float lines(float every) {
+  vec2 at = place.xz / every;
+  vec2 wide = fwidth(at);
+  vec2 far = abs(fract(at - 0.5) - 0.5) / max(wide, 1e-6);
+  return (1.0 - min(min(far.x, far.y), 1.0)) * (1.0 - smoothstep(0.2, 0.6, max(wide.x, wide.y)));
+}
+void main() {
+  float fade = 1.0 - smoothstep(0.1, 1.0, length(local) / 12.0);
+  float line = max(0.55 * lines(1.0), 0.2 * lines(0.25));
+  vec3 colour = mix(paper, ink, line * fade * 0.5);
+  // Shadows fall near the middle, and cost where they are looked for.
+  if (length(local) < 2.6) colour = mix(colour, colour * dim, 1.0 - getShadowMask());
+  gl_FragColor = vec4(colour, 1.0);
+  #include <colorspace_fragment>
+}`;
+
+/** The floor: lines a metre and a quarter of one apart, which fade into the distance. */
+class Ground {
+  readonly mesh: Mesh<PlaneGeometry, ShaderMaterial>;
+
+  constructor() {
+    const uniforms = UniformsUtils.merge([
+      UniformsLib.lights,
+      { paper: { value: new Color() }, ink: { value: new Color() }, dim: { value: 0.8 } },
+    ]);
+    const material = new ShaderMaterial({
+      vertexShader: VERTEX,
+      fragmentShader: FRAGMENT,
+      uniforms,
+      lights: true,
+    });
+    this.mesh = new Mesh(new PlaneGeometry(60, 60), material);
+    this.mesh.rotation.x = -Math.PI / 2;
+    this.mesh.receiveShadow = true;
+  }
+
+  tint(paper: string, ink: string, dim: number): void {
+    const { uniforms } = this.mesh.material;
+    (uniforms["paper"]!.value as Color).set(paper);
+    (uniforms["ink"]!.value as Color).set(ink);
+    uniforms["dim"]!.value = dim;
+  }
+}
+
+/** Pixels a CSS pixel, in one direction. */
+const COARSEST = 0.5;
+/** Milliseconds a frame above which drawings become coarser, and below which finer. */
+const SLOW = 34;
+const FAST = 20;
+/** Milliseconds without a drawing until one is drawn as finely as possible. */
+const REST = 300;
+
+/** Tell whether a processor draws, not a graphics card. */
+function isSoftware(): boolean {
+  const gl = document.createElement("canvas").getContext("webgl2");
+  const known = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = gl && known ? String(gl.getParameter(known.UNMASKED_RENDERER_WEBGL)) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software|basic render/i.test(name);
+}
+
+/** Resolution of drawings: as fine as this machine can while things move, and finer at rest. */
+class Quality {
+  readonly #renderer: WebGLRenderer;
+  readonly #redraw: () => void;
+  /** Twice as fine at rest where edges are not smoothed otherwise. */
+  readonly #finest: number;
+  #moving: number;
+  #ratio = 0;
+  #mean = 25;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+  #resting = false;
+
+  constructor(renderer: WebGLRenderer, software: boolean, redraw: () => void) {
+    this.#renderer = renderer;
+    this.#redraw = redraw;
+    this.#moving = software ? 1 : this.#own;
+    this.#finest = software ? 2 : 1;
+  }
+
+  get #own(): number {
+    return Math.min(devicePixelRatio, 2);
+  }
+
+  /** Call before a drawing. since: milliseconds after the last. */
+  drawing(since: number): void {
+    if (!this.#resting) {
+      if (since < REST) this.#judge(since);
+      clearTimeout(this.#timer);
+      this.#timer = setTimeout(() => this.#rest(), REST);
+    }
+    // Tells tests that nothing has moved since.
+    this.#renderer.domElement.toggleAttribute("data-rest", this.#resting);
+    this.#use(this.#resting ? Math.max(this.#own, this.#finest) : this.#moving);
+    this.#resting = false;
+  }
+
+  #rest(): void {
+    this.#resting = true;
+    this.#redraw();
+  }
+
+  #judge(since: number): void {
+    this.#mean += 0.15 * (Math.min(since, 150) - this.#mean);
+    if (this.#mean > SLOW && this.#moving > COARSEST) this.#change(0.8);
+    else if (this.#mean < FAST && this.#moving < this.#own) this.#change(1.1);
+  }
+
+  #change(factor: number): void {
+    this.#moving = Math.min(this.#own, Math.max(COARSEST, this.#moving * factor));
+    this.#mean = (SLOW + FAST) / 2;
+  }
+
+  #use(ratio: number): void {
+    if (Math.abs(ratio - this.#ratio) < 0.01) return;
+    this.#ratio = ratio;
+    this.#renderer.setPixelRatio(ratio);
+  }
 }

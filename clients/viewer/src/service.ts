@@ -1,45 +1,43 @@
-/** The service that this page came from, with the key that it may ask for. */
+/** The service that this page came from: its clients, its key, and checks that it answers. */
 
 import { Client, type ClientOptions, CONTRACT } from "@posefield/client";
 
-import type { Source } from "./page.ts";
-import { post } from "./post.ts";
+import { recall, remember } from "./dom.ts";
 
-/** The page asks again by itself (watch.ts), and asks so that nothing fills caches on the way. */
-const ASKING: ClientOptions = { retries: 0, timeout: 8000, longestLink: 0 };
-const KEPT = "posefield-key";
+/** `Watch` repeats requests; links stay short, so that no cache on the way fills up. */
+const OPTIONS: ClientOptions = { retries: 0, timeout: 8000, longestLink: 0 };
+/** Timeout of performances, ms: up to ten minutes of motion. */
+const PERFORMANCE_TIMEOUT = 60_000;
+const KEY = "posefield-key";
 
-/** A source whose key may change while others hold it. */
-export class Service implements Source {
-  #client = new Client("", kept());
-  #key = stored();
+export class Service {
+  client!: Client;
+  /** Client with a longer timeout. */
+  performances!: Client;
 
-  /** For this tab alone, and gone with it. */
-  use(key: string): void {
-    // First, for it refuses a key that none can be: kept, that would refuse the whole page.
-    this.#client = new Client("", { ...ASKING, key });
-    this.#key = key;
-    keep(key);
+  constructor() {
+    const key = recall("sessionStorage", KEY);
+    this.#connect(key && usable(key) ? { key } : {});
   }
 
-  readonly models: Source["models"] = (...words) => this.#client.models(...words);
-  readonly card: Source["card"] = (...words) => this.#client.card(...words);
-  readonly character: Source["character"] = (...words) => this.#client.character(...words);
-  readonly pose: Source["pose"] = (...words) => this.#client.pose(...words);
-  readonly clip: Source["clip"] = (...words) => this.#client.clip(...words);
-  readonly crowd: Source["crowd"] = (...words) => this.#client.crowd(...words);
-  readonly sigma: Source["sigma"] = (...words) => this.#client.sigma(...words);
-  readonly kernel: Client["kernel"] = (...words) => this.#client.kernel(...words);
-  readonly file: Client["file"] = (...words) => this.#client.file(...words);
-  readonly why: Source["why"] = (...words) => this.#client.why(...words);
+  /** Send that key from now on; it is kept for this tab. */
+  use(key: string): void {
+    this.#connect({ key });
+    remember("sessionStorage", KEY, key);
+  }
 
-  /** The answer to a question as JSON; a Problem where it is refused. */
-  readonly post = (path: string, body: string, signal: AbortSignal): Promise<Response> =>
-    post(path, body, this.#key, signal);
+  #connect(key: ClientOptions): void {
+    this.client = new Client("", { ...OPTIONS, ...key });
+    this.performances = new Client("", { ...OPTIONS, timeout: PERFORMANCE_TIMEOUT, ...key });
+  }
 }
 
-/** Whether it may be asked again. */
-export async function ready(): Promise<boolean> {
+/** Tell whether a header can carry the key, as those of all keys that a service gives out. */
+export function usable(key: string): boolean {
+  return /^[\x21-\x7e]+$/.test(key);
+}
+
+async function ready(): Promise<boolean> {
   try {
     return (await fetch("/readyz", { signal: AbortSignal.timeout(4000) })).ok;
   } catch {
@@ -47,7 +45,7 @@ export async function ready(): Promise<boolean> {
   }
 }
 
-/** In words, where the service's contract is not this page's; null where it is, or nobody answers. */
+/** Return a sentence where the service speaks another contract than this page; null otherwise. */
 export async function mismatch(): Promise<string | null> {
   try {
     const answer = await fetch("/livez", { signal: AbortSignal.timeout(4000) });
@@ -65,28 +63,69 @@ export function differs({ contract }: { readonly contract?: string }): string | 
   return `The service is of another version: it speaks contract ${contract}, and ${page}. Reload the page; if that does not help, what it shows may be wrong.`;
 }
 
-/** Whether it can be sent in a header, as all keys can that a service gives out. */
-export function usable(key: string): boolean {
-  return /^[\x21-\x7e]+$/.test(key);
-}
+/** Milliseconds between two checks while all is well; first and longest wait while it is not. */
+const [CALM, FIRST, LONGEST] = [5000, 400, 8000];
+const GROWTH = 1.7;
 
-function keep(key: string): void {
-  try {
-    sessionStorage.setItem(KEPT, key);
-  } catch {
-    // Where nothing may be kept, it holds until the page is closed.
+/** Repeated check of the service, more often while it does not answer. */
+export class Watch {
+  readonly #check: () => Promise<void>;
+  readonly #back: () => Promise<void>;
+  #down = false;
+  #ended = false;
+  #wait = FIRST;
+  #timer: ReturnType<typeof setTimeout> | undefined;
+
+  /** check: called while all is well. back: called when the service is ready again. */
+  constructor(check: () => Promise<void>, back: () => Promise<void>) {
+    this.#check = check;
+    this.#back = back;
+    this.#next();
   }
-}
 
-function kept(): ClientOptions {
-  const key = stored();
-  return key && usable(key) ? { ...ASKING, key } : ASKING;
-}
+  get down(): boolean {
+    return this.#down;
+  }
 
-function stored(): string | null {
-  try {
-    return sessionStorage.getItem(KEPT);
-  } catch {
-    return null;
+  /** Report a request that failed. */
+  failed(): void {
+    if (this.#down) return;
+    this.#down = true;
+    this.#next();
+  }
+
+  /** Report a request that succeeded: the next failure is checked at once. */
+  well(): void {
+    if (!this.#down) this.#wait = FIRST;
+  }
+
+  end(): void {
+    this.#ended = true;
+    clearTimeout(this.#timer);
+  }
+
+  #next(): void {
+    clearTimeout(this.#timer);
+    if (this.#ended) return;
+    this.#timer = setTimeout(() => void this.#turn(), this.#down ? this.#wait : CALM);
+  }
+
+  async #turn(): Promise<void> {
+    try {
+      if (this.#down) await this.#retry();
+      else if (!document.hidden) await this.#check();
+    } catch (fault) {
+      // Shown as an uncaught error, but the checks go on.
+      reportError(fault);
+    }
+    this.#next();
+  }
+
+  async #retry(): Promise<void> {
+    // A service may be ready and fail all the same, so the wait grows in any case.
+    this.#wait = Math.min(LONGEST, GROWTH * this.#wait);
+    if (!(await ready())) return;
+    this.#down = false;
+    await this.#back();
   }
 }

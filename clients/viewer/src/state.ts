@@ -1,4 +1,4 @@
-/** What the page shows, in one place; the address bar's hash holds it, so that it can be sent on. */
+/** State of the page in one place; the address bar's hash holds it, so that it can be sent on. */
 
 export type View = "one" | "levels" | "crowd" | "performance";
 
@@ -7,23 +7,23 @@ export interface State {
   /** A number for each control, in its unit. */
   readonly controls: Readonly<Record<string, number>>;
   readonly performer: string | null;
-  /** A name for each label set besides performers; those that are not named are left open. */
+  /** A name for each label set besides performers; sets without a name are left open. */
   readonly labels: Readonly<Record<string, string>>;
   readonly level: number;
   /** Seconds from the start of the clip. */
   readonly time: number;
   readonly playing: boolean;
-  /** Times as fast as it was moved. */
+  /** Factor of the playback speed. */
   readonly speed: number;
   readonly loop: boolean;
   readonly root: "travelling" | "in_place";
   readonly body: "stick" | "mannequin";
   readonly ghost: boolean;
-  /** Takes beside the motion that is shown. */
+  /** Show other takes beside the motion. */
   readonly fan: boolean;
-  /** Contacts and skate. */
+  /** Show contacts and skate. */
   readonly feet: boolean;
-  /** Whether the feet of clips are made to stand; else they are as predicted. */
+  /** Ask for feet that stand; else they are as predicted. */
   readonly stands: boolean;
   /** Height of the floor on which feet stand, m. */
   readonly floor: number;
@@ -31,9 +31,9 @@ export interface State {
   readonly take: number;
   /** Size of a take's deviations, from 0 to 1. */
   readonly variety: number;
-  /** Details that no control predicts, sampled by the seed. */
+  /** Sample the details that no control predicts. */
   readonly detail: boolean;
-  /** Where the event's joint shall be, m; null while no target is wanted. */
+  /** Target of the event's joint, m. */
   readonly target: readonly [number, number, number] | null;
   readonly view: View;
   /** The two controls of the map. */
@@ -41,16 +41,21 @@ export interface State {
   readonly along: string;
   /** Characters of the crowd, and the pixels that their errors may cover. */
   readonly crowd: number;
-  /** Whether the crowd's motions are takes, so that hardly any two are alike. */
-  readonly varied: boolean;
   readonly pixels: number;
-  /** Of the performance, as JSON; empty until one is begun. */
+  /** Give the crowd many takes as motions. */
+  readonly varied: boolean;
+  /** Script of the performance, as JSON; empty until one is begun. */
   readonly script: string;
 }
 
-export type Listener = (state: State, changed: ReadonlySet<keyof State>) => void;
+export type Changes = ReadonlySet<keyof State>;
+export type Listener = (state: State, changed: Changes) => void;
 
-/** The state and who wants to know of its changes. */
+/** Tell whether one of these parts has changed. */
+export function has(changed: Changes, ...keys: readonly (keyof State)[]): boolean {
+  return keys.some((key) => changed.has(key));
+}
+
 export class Store {
   #state: State;
   readonly #listeners = new Set<Listener>();
@@ -63,7 +68,7 @@ export class Store {
     return this.#state;
   }
 
-  /** Takes what differs, and tells everybody once. */
+  /** Take over the values that differ, and call each listener once. */
   set(part: Partial<State>): void {
     const before = this.#state;
     const entries = Object.entries(part) as [keyof State, State[keyof State]][];
@@ -75,9 +80,15 @@ export class Store {
     for (const listener of this.#listeners) listener(this.#state, changed);
   }
 
-  /** Returns how to stop being told. */
-  listen(listener: Listener): () => void {
+  /** Call the listener after each change, until the signal. */
+  listen(listener: Listener, signal: AbortSignal): void {
     this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
+    signal.addEventListener("abort", () => this.#listeners.delete(listener));
+  }
+
+  /** Call now, and after each change. */
+  follow(show: (state: State) => void, signal: AbortSignal): void {
+    show(this.#state);
+    this.listen(show, signal);
   }
 }

@@ -1,81 +1,108 @@
-/** A point in space that a joint shall reach: drag it, and the controls follow. */
+/** A target of the event's joint: dragged on the stage or typed, and met by the service. */
 
+import type { ModelCard, Motion, Trust } from "@posefield/client";
 import { Mesh, MeshBasicMaterial, Object3D, SphereGeometry } from "three";
 import { TransformControls } from "three/addons/controls/TransformControls.js";
 
-import { el, id } from "./dom.ts";
+import { el, id, titled } from "./dom.ts";
 import { Latest } from "./latest.ts";
-import { Reach } from "./reach.ts";
-import type { CardEvent, Session } from "./session.ts";
-import type { Point } from "./solve.ts";
+import { pose, sample } from "./playback.ts";
+import type { Session } from "./player.ts";
+import { targetFields } from "./questions.ts";
+import { place, placed } from "./skeleton.ts";
+import type { State } from "./state.ts";
 import * as theme from "./theme.ts";
 import * as written from "./written.ts";
 
-export function mount(host: HTMLElement, session: Session): void {
-  const { event: found } = session.card;
-  host.hidden = !found || session.card.cyclic;
-  if (found && !session.card.cyclic) new Target(host, session, found);
-}
+type Point = NonNullable<State["target"]>;
+type CardEvent = NonNullable<ModelCard["event"]>;
 
 const AXES = ["x", "y", "z"] as const;
 
+export function mount(host: HTMLElement, session: Session): void {
+  const { cyclic, event } = session.card;
+  host.hidden = !event || cyclic;
+  if (event && !cyclic) new Target(host, session, event);
+}
+
 class Target {
   readonly #session: Session;
-  readonly #reach: Reach;
+  readonly #event: CardEvent;
+  readonly #joint: string;
   readonly #handle = new Object3D();
-  readonly #ball: Mesh<SphereGeometry, MeshBasicMaterial>;
+  readonly #ball = new Mesh(new SphereGeometry(0.035, 20, 14), new MeshBasicMaterial());
   readonly #gizmo: TransformControls;
   readonly #miss = el("strong", { "data-miss": "" });
   readonly #fault = el("p", { class: "fault", role: "alert" });
   readonly #fields: readonly HTMLInputElement[];
-  readonly #ask = new Latest<Point>((point) => this.#follow(point));
-  /** Wanted, while somebody drags or has typed; else the handle follows the joint. */
-  #wanted: Point | null = null;
+  readonly #latest = new Latest<Point>((point) => this.#askControls(point));
+  /** Controls are being set for the target; other changes of controls end it. */
+  #setting = false;
 
-  constructor(host: HTMLElement, session: Session, found: CardEvent) {
+  constructor(host: HTMLElement, session: Session, event: CardEvent) {
     const { card, player, scene, signal, store } = session;
     this.#session = session;
-    this.#wanted = store.state.target;
-    if (this.#wanted) this.#handle.position.set(...this.#wanted);
-    this.#reach = new Reach(session, found);
-    this.#ball = new Mesh(new SphereGeometry(0.035, 20, 14), new MeshBasicMaterial());
+    this.#event = event;
+    this.#joint = card.skeleton.names[event.joint]!;
+    if (store.state.target) this.#handle.position.set(...store.state.target);
     this.#handle.add(this.#ball);
     this.#gizmo = new TransformControls(scene.camera, scene.renderer.domElement);
     this.#gizmo.setSize(0.55);
     this.#gizmo.attach(this.#handle);
     this.#fields = AXES.map((axis) => this.#field(axis));
-    const joint = card.skeleton.names[found.joint]!;
+    const share = Math.round(100 * event.share);
+    const moment = event.share > 0.995 ? " at the end of the clip" : `, ${share} % into the clip`;
     host.append(
-      el(
-        "div",
-        { class: "title" },
-        el("h2", {}, "Target"),
-        el("span", {}, "misses by ", this.#miss),
-      ),
+      titled("Target", el("span", {}, "misses by ", this.#miss)),
       el(
         "p",
         { class: "about" },
-        `Drag the handle on the stage, or type a position for ${joint}${moment(found.share)}. The controls follow within their sampled ranges.`,
+        `Drag the handle on the stage, or type a position for ${this.#joint}${moment}. The controls follow as captured clips near the target have them.`,
       ),
-      el("div", { class: "point" }, ...this.#fields.map((field, i) => labelled(AXES[i]!, field))),
+      el(
+        "div",
+        { class: "point" },
+        ...this.#fields.map((field, i) =>
+          el(
+            "span",
+            { class: "field" },
+            el("label", { for: field.id }, AXES[i]!),
+            field,
+            el("span", { class: "unit" }, "m"),
+          ),
+        ),
+      ),
       this.#fault,
     );
     scene.root.add(this.#handle, this.#gizmo.getHelper());
-    const stop = scene.add(() => this.#tell(host));
-    this.#listen();
-    player.onClip(() => this.#rest());
-    theme.listen(() => this.#tint(), signal);
-    this.#tint();
-    const leave = store.listen((_, changed) => {
-      if (changed.has("view")) this.#appear();
-      if (changed.has("target")) this.#restore(store.state.target);
-      if (changed.has("controls") && !changed.has("target") && !this.#reach.taking)
-        store.set({ target: null });
+    this.#gizmo.addEventListener("dragging-changed", ({ value }) => {
+      scene.orbit.enabled = !value;
+      if (value) this.#begin();
     });
+    this.#gizmo.addEventListener("objectChange", () => this.#set());
+    this.#gizmo.addEventListener("change", () => scene.redraw());
+    // The position of the handle on the stage, px, which tests press.
+    scene.add(() => {
+      const { clientWidth, clientHeight } = scene.renderer.domElement;
+      const { x, y } = this.#handle.position.clone().project(scene.camera);
+      const at = [((x + 1) / 2) * clientWidth, ((1 - y) / 2) * clientHeight];
+      host.dataset["handle"] = at.map((pixel) => pixel.toFixed(0)).join(" ");
+      return false;
+    }, signal);
+    player.onClip((clip) => this.#rest(clip));
+    player.onTrust((trust) => this.#showMiss(trust));
+    const tint = () => this.#ball.material.color.set(theme.colour("--accent"));
+    theme.listen(tint, signal);
+    tint();
+    store.listen((state, changed) => {
+      if (changed.has("view")) this.#appear();
+      if (changed.has("target") && state.target) this.#handle.position.set(...state.target);
+      if (changed.has("target") && player.clip) this.#rest(player.clip);
+      if (changed.has("controls") && !changed.has("target") && !this.#setting)
+        store.set({ target: null });
+    }, signal);
     signal.addEventListener("abort", () => {
-      leave();
-      stop();
-      // Who drags while the model is replaced has let go of it.
+      // A drag ends when the model is replaced.
       scene.orbit.enabled = true;
       this.#gizmo.dispose();
       this.#ball.geometry.dispose();
@@ -86,102 +113,89 @@ class Target {
     this.#appear();
   }
 
-  #listen(): void {
-    const { scene } = this.#session;
-    const gizmo = this.#gizmo;
-    gizmo.addEventListener("dragging-changed", ({ value }) => {
-      scene.orbit.enabled = !value;
-      if (value) this.#reach.begin();
-    });
-    gizmo.addEventListener("objectChange", () => {
-      const { x, y, z } = this.#handle.position;
-      this.#want([x, y, z]);
-    });
-    gizmo.addEventListener("change", () => scene.redraw());
+  /** Show the moment of the event. */
+  #begin(): void {
+    const { player, store } = this.#session;
+    store.set({ playing: false, time: this.#event.share * player.duration });
   }
 
-  #want(point: Point): void {
-    this.#wanted = point;
+  /** Take the handle's position as the target, and ask for controls that fit it. */
+  #set(): void {
+    const { x, y, z } = this.#handle.position;
+    const point: Point = [x, y, z];
     this.#session.store.set({ target: point });
     this.#write(point);
-    this.#ask.ask(point);
+    this.#latest.ask(point);
   }
 
-  /** A target that another part or the address has set or taken away. */
-  #restore(target: Point | null): void {
-    if (target === this.#wanted) return;
-    this.#wanted = target;
-    if (target) this.#handle.position.set(...target);
-    this.#rest();
-  }
-
-  async #follow(point: Point): Promise<void> {
-    const { notice, signal } = this.#session;
+  /** Set the controls that the service infers from the target; those of few values stay. */
+  async #askControls(target: Point): Promise<void> {
+    const { card, notice, service, signal, store } = this.#session;
+    const { controls, labels, model, performer } = store.state;
+    const fixed = card.controls.filter(({ values }) => values.length > 0);
+    const question = {
+      controls: Object.fromEntries(fixed.map(({ name }) => [name, controls[name]!])),
+      times: [0],
+      ...{ labels, performer, ...targetFields(card, { target }) },
+    };
     try {
-      for await (const miss of this.#reach.towards(point, () => this.#wanted === point)) {
-        if (signal.aborted) return;
-        this.#miss.textContent = written.centimetres(miss);
-      }
+      const { trust } = await service.client.pose(model, question, signal);
+      if (signal.aborted || store.state.target !== target) return;
+      const rounded = Object.entries(trust.controls).map(
+        ([name, value]) => [name, Number(value.toPrecision(6))] as const,
+      );
+      this.#setting = true;
+      store.set({
+        controls: { ...controls, ...Object.fromEntries(rounded) },
+        time: this.#event.share * trust.duration,
+      });
+      this.#setting = false;
     } catch (fault) {
       if (!signal.aborted) notice(fault);
     }
   }
 
-  /** Where the joint is, when nobody wants it elsewhere. */
-  #rest(): void {
-    const { clip } = this.#session.player;
-    if (!clip) return;
-    const at = this.#reach.reached(clip);
-    if (this.#wanted) {
-      const [x, y, z] = this.#wanted;
-      this.#miss.textContent = written.centimetres(Math.hypot(at[0] - x, at[1] - y, at[2] - z));
-      return;
-    }
-    this.#handle.position.set(...at);
-    this.#write(at);
+  /** Without a target, show the joint's own position. */
+  #rest(clip: Motion): void {
+    if (this.#session.store.state.target) return;
+    const { parents } = this.#session.card.skeleton;
+    const now = pose(parents.length);
+    sample(now, clip, this.#event.share * clip.trust.duration);
+    const joints = placed(parents.length);
+    const { positions } = place(joints, parents, clip.boneOffsets, now.rotations, now.root, 0);
+    const point = [...positions.subarray(3 * this.#event.joint, 3 * this.#event.joint + 3)];
+    this.#handle.position.fromArray(point);
+    this.#write(point);
     this.#miss.textContent = written.centimetres(0);
   }
 
+  #showMiss({ targets = [] }: Trust): void {
+    if (!this.#session.store.state.target) return;
+    const met = targets.find(({ what }) => what === `${this.#joint} at event`);
+    if (met) this.#miss.textContent = written.centimetres(met.miss);
+  }
+
   #field(axis: (typeof AXES)[number]): HTMLInputElement {
-    const field = el("input", {
-      type: "text",
-      inputmode: "decimal",
-      autocomplete: "off",
-      id: id(),
+    const text = { type: "text", inputmode: "decimal", autocomplete: "off", id: id() };
+    const field = el("input", { ...text, "data-axis": axis });
+    field.addEventListener("change", () => {
+      const value = written.read(field.value);
+      const wrong = typeof value === "string";
+      field.setAttribute("aria-invalid", String(wrong));
+      this.#fault.textContent = wrong ? value : "";
+      if (wrong) return;
+      this.#handle.position.setComponent(AXES.indexOf(axis), value);
+      this.#begin();
+      this.#set();
     });
-    field.dataset["axis"] = axis;
-    field.addEventListener("change", () => this.#typed(field));
     return field;
   }
 
-  #typed(field: HTMLInputElement): void {
-    const found = written.read(field.value);
-    const wrong = typeof found === "string";
-    field.setAttribute("aria-invalid", String(wrong));
-    this.#fault.textContent = wrong ? found : "";
-    if (wrong) return;
-    const axis = this.#fields.indexOf(field);
-    this.#handle.position.setComponent(axis, found);
-    const { x, y, z } = this.#handle.position;
-    this.#reach.begin();
-    this.#want([x, y, z]);
-  }
-
-  #write(point: Point): void {
+  #write(point: readonly number[]): void {
     this.#fields.forEach((field, i) => {
       if (document.activeElement !== field || this.#gizmo.dragging)
         field.value = point[i]!.toFixed(3);
     });
-  }
-
-  /** Where on the stage the handle is drawn, px: for those who press there without eyes. */
-  #tell(host: HTMLElement): boolean {
-    const { camera, renderer } = this.#session.scene;
-    const { clientWidth, clientHeight } = renderer.domElement;
-    const { x, y } = this.#handle.position.clone().project(camera);
-    const at = [((x + 1) / 2) * clientWidth, ((1 - y) / 2) * clientHeight];
-    host.dataset["handle"] = at.map((pixel) => pixel.toFixed(0)).join(" ");
-    return false;
   }
 
   #appear(): void {
@@ -189,23 +203,4 @@ class Target {
     this.#handle.visible = this.#gizmo.getHelper().visible = this.#gizmo.enabled = shown;
     this.#session.scene.redraw();
   }
-
-  #tint(): void {
-    this.#ball.material.color.set(theme.colour("--accent"));
-  }
-}
-
-/** When the event is, in words. */
-function moment(share: number): string {
-  return share > 0.995 ? " at the end of the clip" : `, ${Math.round(100 * share)} % into the clip`;
-}
-
-function labelled(axis: string, field: HTMLInputElement): HTMLElement {
-  return el(
-    "span",
-    { class: "field" },
-    el("label", { for: field.id }, axis),
-    field,
-    el("span", { class: "unit" }, "m"),
-  );
 }

@@ -1,57 +1,52 @@
-/** Light or dark: as the system has it, until somebody says otherwise. */
+/** Light or dark, as the system has it until the user chooses, and the colours of drawings. */
 
-const KEPT = "posefield-theme";
-const dark = () => matchMedia("(prefers-color-scheme: dark)");
+import { recall, remember } from "./dom.ts";
+
+const KEY = "posefield-theme";
+const system = () => matchMedia("(prefers-color-scheme: dark)");
 
 type Listener = () => void;
 const listeners = new Set<Listener>();
 
 export function isDark(): boolean {
-  const said = document.documentElement.dataset["theme"];
-  return said ? said === "dark" : dark().matches;
+  return document.documentElement.dataset["theme"] === "dark";
 }
 
-/** Applies what was said last time. */
+/** Apply the chosen theme, and follow the system without one. */
 export function start(): void {
-  const kept = stored();
-  if (kept) document.documentElement.dataset["theme"] = kept;
-  dark().addEventListener("change", tell);
+  const follow = () => apply(recall("localStorage", KEY) ?? (system().matches ? "dark" : "light"));
+  system().addEventListener("change", follow);
+  follow();
 }
 
 export function toggle(): void {
   const next = isDark() ? "light" : "dark";
-  document.documentElement.dataset["theme"] = next;
-  try {
-    localStorage.setItem(KEPT, next);
-  } catch {
-    // Where nothing may be kept, it holds until the page is closed.
-  }
-  tell();
+  remember("localStorage", KEY, next);
+  apply(next);
 }
 
-/** Told whenever colours change, until the signal. */
+function apply(theme: string): void {
+  document.documentElement.dataset["theme"] = theme;
+  for (const listener of listeners) listener();
+}
+
+/** Call whenever colours change, until the signal. */
 export function listen(listener: Listener, signal?: AbortSignal): void {
   listeners.add(listener);
   signal?.addEventListener("abort", () => listeners.delete(listener));
 }
 
-/** What a custom property of style.css says now. */
+/** Return the value of a custom property of style.css. */
 export function colour(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 }
 
+/** Return the colour of a level of detail; those beyond the fourth share its colour. */
+export function levelColour(level: number): string {
+  return colour(`--level-${Math.min(level, 3)}`);
+}
+
+/** Tell whether the user wants no motion that starts by itself. */
 export function still(): boolean {
   return matchMedia("(prefers-reduced-motion: reduce)").matches;
-}
-
-function tell(): void {
-  for (const listener of listeners) listener();
-}
-
-function stored(): string | null {
-  try {
-    return localStorage.getItem(KEPT);
-  } catch {
-    return null;
-  }
 }

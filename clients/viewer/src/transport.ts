@@ -1,62 +1,97 @@
-/** Time: play, frame by frame, where in the clip, how fast, and again and again. */
+/** Time: play, single frames, position in the clip, speed and loop, by buttons and keys. */
 
+import { defaults } from "./controls.ts";
 import { button, el, icon, toggle } from "./dom.ts";
 import { step } from "./playback.ts";
-import type { Session } from "./session.ts";
+import type { Session } from "./player.ts";
+import { nextSeed, whyFeetCannotStand } from "./questions.ts";
+import * as theme from "./theme.ts";
 import * as written from "./written.ts";
+
+/** Time of a motion, and whether it plays. */
+export interface Clock {
+  readonly time: number;
+  readonly duration: number;
+  readonly playing: boolean;
+  readonly loop: boolean;
+}
+
+/** A play button, a slider over the time, its text, and a loop button. */
+export class TimeBar {
+  readonly play: HTMLButtonElement;
+  readonly scrubber: HTMLInputElement;
+  readonly time = el("span", { class: "time" });
+  readonly loop: ReturnType<typeof toggle>;
+
+  constructor(
+    label: string,
+    play: () => void,
+    seek: (time: number) => void,
+    loop: (on: boolean) => void,
+  ) {
+    this.play = button(icon("play"), "Play (space)", play);
+    this.play.classList.add("play");
+    this.loop = toggle(icon("loop"), "Loop", loop);
+    const range = { type: "range", min: 0, max: 1, step: "any", "aria-label": label };
+    this.scrubber = el("input", range);
+    this.scrubber.addEventListener("input", () => seek(Number(this.scrubber.value)));
+  }
+
+  show({ time, duration, playing, loop }: Clock): void {
+    const label = playing ? "Pause (space)" : "Play (space)";
+    if (this.play.title !== label) {
+      this.play.title = label;
+      this.play.setAttribute("aria-label", label);
+      this.play.replaceChildren(icon(playing ? "pause" : "play"));
+    }
+    this.loop.set(loop);
+    const text = `${written.seconds(time)} / ${written.seconds(duration)}`;
+    this.time.textContent = text;
+    this.scrubber.max = String(duration || 1);
+    this.scrubber.value = String(time);
+    this.scrubber.setAttribute("aria-valuetext", text);
+    this.scrubber.style.setProperty("--done", `${(100 * time) / (duration || 1)}%`);
+  }
+}
 
 export function mount(host: HTMLElement, session: Session): void {
   const { card, player, signal, store } = session;
-  const play = button(icon("play"), "Play (space)", () => togglePlay(session));
-  play.classList.add("play");
+  const bar = new TimeBar(
+    "Time",
+    () => togglePlay(session),
+    (time) => store.set({ playing: false, time: Math.min(player.duration, time) }),
+    (loop) => store.set({ loop }),
+  );
+  bar.loop.dataset["cyclic"] = String(card.cyclic);
   const back = button(icon("back"), "One frame back (left arrow)", () => move(session, -1));
   const forward = button(icon("forward"), "One frame forward (right arrow)", () =>
     move(session, 1),
   );
-  const loop = toggle(icon("loop"), "Loop", (on) => store.set({ loop: on }));
-  const scrubber = el("input", {
-    type: "range",
-    min: 0,
-    max: 1,
-    step: "any",
-    "aria-label": "Time",
-  });
-  // No output: nobody wants to be told of each frame.
-  const time = el("span", { class: "time" });
-  scrubber.addEventListener("input", () =>
-    store.set({ playing: false, time: Math.min(player.duration, Number(scrubber.value)) }),
-  );
+  const speed = el("input", { type: "range", min: 0.1, max: 2, step: 0.05, "aria-label": "Speed" });
+  const factor = el("span");
+  speed.addEventListener("input", () => store.set({ speed: Number(speed.value) }));
+  host.append(back, bar.play, forward, bar.scrubber, bar.time, bar.loop);
+  host.append(el("span", { class: "pace" }, speed, factor));
   const show = () => {
     const { state } = store;
-    const label = state.playing ? "Pause (space)" : "Play (space)";
-    if (play.title !== label) {
-      play.title = label;
-      play.setAttribute("aria-label", label);
-      play.replaceChildren(icon(state.playing ? "pause" : "play"));
-    }
-    loop.set(state.loop);
-    scrubber.max = String(player.duration);
-    scrubber.value = String(state.time);
-    const text = `${written.seconds(state.time)} / ${written.seconds(player.duration)}`;
-    time.textContent = text;
-    scrubber.setAttribute("aria-valuetext", text);
-    scrubber.style.setProperty("--done", `${(100 * state.time) / player.duration}%`);
+    bar.show({ ...state, duration: player.duration });
+    speed.value = String(state.speed);
+    factor.textContent = `${state.speed.toFixed(2)}×`;
+    speed.setAttribute("aria-valuetext", `${state.speed.toFixed(2)} times`);
   };
-  host.append(back, play, forward, scrubber, time, loop, pace(session));
-  loop.dataset["cyclic"] = String(card.cyclic);
-  show();
   player.onTrust(show);
-  signal.addEventListener("abort", store.listen(show));
+  store.follow(show, signal);
+  listenToKeys(session);
 }
 
-export function togglePlay({ player, store }: Session): void {
+function togglePlay({ player, store }: Session): void {
   const { playing, time, loop } = store.state;
   const ended = !playing && !loop && time >= player.duration;
   store.set({ playing: !playing, ...(ended ? { time: 0 } : {}) });
 }
 
-/** So many frames on, around the ends of what loops. */
-export function move({ card, player, store }: Session, frames: number): void {
+/** Step some frames, around the ends. */
+function move({ card, player, store }: Session, frames: number): void {
   const { duration } = player;
   const frame = player.clip ? step(player.clip) : 1 / card.rate;
   const to = (Math.round(store.state.time / frame) + frames) * frame;
@@ -64,18 +99,52 @@ export function move({ card, player, store }: Session, frames: number): void {
   store.set({ playing: false, time: Math.min(duration, Math.max(0, around)) });
 }
 
-/** How fast, as a slider and a number. */
-function pace({ signal, store }: Session): HTMLElement {
-  const range = el("input", { type: "range", min: 0.1, max: 2, step: 0.05, "aria-label": "Speed" });
-  const text = el("span");
-  range.addEventListener("input", () => store.set({ speed: Number(range.value) }));
-  const show = () => {
-    const { speed } = store.state;
-    range.value = String(speed);
-    text.textContent = `${speed.toFixed(2)}×`;
-    range.setAttribute("aria-valuetext", `${speed.toFixed(2)} times`);
+function listenToKeys(session: Session): void {
+  const { card, player, signal, store } = session;
+  const flip = (key: "loop" | "ghost" | "feet" | "fan" | "stands") => () =>
+    store.set({ [key]: !store.state[key] });
+  const acts: Readonly<Record<string, (event: KeyboardEvent) => void>> = {
+    " ": () => togglePlay(session),
+    arrowleft: ({ shiftKey }) => move(session, shiftKey ? -10 : -1),
+    arrowright: ({ shiftKey }) => move(session, shiftKey ? 10 : 1),
+    home: () => store.set({ playing: false, time: 0 }),
+    end: () => store.set({ playing: false, time: player.duration }),
+    r: () => store.set({ controls: defaults(card) }),
+    l: flip("loop"),
+    g: flip("ghost"),
+    f: flip("feet"),
+    n: () => store.set({ take: nextSeed(store.state.take) }),
+    p: () => store.set({ take: 0 }),
+    v: flip("fan"),
+    ...(!whyFeetCannotStand(card) && { s: flip("stands") }),
+    b: () => store.set({ body: store.state.body === "stick" ? "mannequin" : "stick" }),
+    t: theme.toggle,
   };
-  show();
-  signal.addEventListener("abort", store.listen(show));
-  return el("span", { class: "pace" }, range, text);
+  // A performance has keys of its own.
+  onKeys(acts, () => store.state.view !== "performance", signal);
+}
+
+/** Call the function of a pressed key, where no element uses the key itself. */
+export function onKeys(
+  acts: Readonly<Record<string, (event: KeyboardEvent) => void>>,
+  active: () => boolean,
+  signal: AbortSignal,
+): void {
+  const press = (event: KeyboardEvent) => {
+    const key = event.key.toLowerCase();
+    const act = acts[key];
+    if (!act || !active() || event.ctrlKey || event.metaKey || event.altKey) return;
+    if (taken(event.target, key)) return;
+    event.preventDefault();
+    act(event);
+  };
+  document.addEventListener("keydown", press, { signal });
+}
+
+/** Tell whether the focused element uses the key itself. */
+function taken(target: EventTarget | null, key: string): boolean {
+  if (!(target instanceof HTMLElement) || target.closest("dialog")) return true;
+  if (target instanceof HTMLInputElement) return target.type !== "range" || key.length > 1;
+  if (target instanceof HTMLSelectElement || target instanceof HTMLTextAreaElement) return true;
+  return key === " " && target.closest("button, a, summary") !== null;
 }

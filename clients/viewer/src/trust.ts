@@ -1,37 +1,43 @@
-/** What the answer is worth: sigma, whether anything like it was captured, what lies outside, and the
- * captured clips that it is made of. */
+/** Trust in the answer: sigma, support, warnings, feet, and the captured clips behind it. */
 
 import type { ModelCard, Reasons, Trust } from "@posefield/client";
 
-import { named, SCALE, worded } from "./bands.ts";
-import { el } from "./dom.ts";
-import { says as feetSay } from "./feet-words.ts";
+import { el, icon } from "./dom.ts";
 import { Latest } from "./latest.ts";
-import { items, marks } from "./marks.ts";
-import { served } from "./page.ts";
-import type { Session } from "./session.ts";
-import { title } from "./slider.ts";
+import type { Session } from "./player.ts";
+import { whyFeetCannotStand } from "./questions.ts";
 import * as written from "./written.ts";
 
-/** How many captured clips are named. */
+/** Number of captured clips that are named. */
 const NEAREST = 4;
-/** Milliseconds without a new answer until somebody asks why, and until it is said aloud. */
+/** Milliseconds without a new answer until the captured clips are asked for, and screen readers told. */
 const CALM = 160;
+/** Sigma at which the meter is full, m. */
+const SCALE = 0.2;
+/** Distances below are left out of sentences, m. */
+const SLIGHT = 0.0005;
+/** Limits of the contract's `Band`. */
+const LIMITS: Readonly<Record<string, string>> = {
+  close: "up to 3 cm",
+  near: "3 to 7.5 cm",
+  rough: "7.5 to 15 cm",
+  guess: "more than 15 cm",
+};
 
 type Captured = Reasons["nearest"][number];
 
 export function mount(host: HTMLElement, session: Session): void {
-  const { card, player, signal, source, store } = session;
+  const { card, player, service, signal, store } = session;
   const sigma = el("strong", { "data-sigma": "" }, "…");
   const band = el("span", { "data-band": "", title: "One scale for all models" });
+  const meter = el("meter", { min: 0, max: 1, "aria-hidden": "true" });
   const known = el("ul", { class: "marks", "aria-label": "What was captured" });
   const sentence = el("p", { class: "sentence" });
   const warnings = el("ul", { class: "warnings" });
-  const list = el("ol", { class: "nearest" });
-  const others = el("p", { class: "about" });
   const feet = el("p", { class: "about", "data-feet": "" });
   const aloud = el("p", { class: "unseen", "aria-live": "polite" });
-  const meter = el("meter", { min: 0, max: 1, "aria-hidden": "true" });
+  const list = el("ol", { class: "nearest" });
+  const others = el("p", { class: "about" });
   host.append(
     el(
       "div",
@@ -39,96 +45,153 @@ export function mount(host: HTMLElement, session: Session): void {
       el("h2", {}, "Trust"),
       el("span", { class: "sigma" }, "σ ", sigma, " ", band),
     ),
-    meter,
-    known,
-    sentence,
-    warnings,
-    feet,
-    aloud,
+    ...[meter, known, sentence, warnings, feet, aloud],
+    el("h3", {}, "Made of these captured clips"),
+    ...[list, others],
   );
-  if (served(source)) host.append(el("h3", {}, "Made of these captured clips"), list, others);
   const why = new Latest<null>(async () => {
     const { controls, labels, model, performer } = store.state;
     const question = { controls, performer, labels, nearest: NEAREST };
-    const reasons = await source.why(model, question, signal).catch(() => null);
+    const reasons = await service.client.why(model, question, signal).catch(() => null);
     if (!reasons || signal.aborted) return;
     list.replaceChildren(...reasons.nearest.map((clip) => item(clip, card, session)));
-    others.textContent = rest(reasons);
+    const { count } = reasons.others;
+    others.textContent = count
+      ? `${count} others together ${percent(reasons.others.share ?? 0)}`
+      : "";
   });
   let timer: ReturnType<typeof setTimeout> | undefined;
   signal.addEventListener("abort", () => clearTimeout(timer));
   // A single pose says nothing of feet: they are placed over a whole clip.
   player.onClip(({ trust }) => {
-    feet.textContent = feetSay(card, store.state.stands, trust.feet, served(source));
+    feet.textContent = feetSentence(card, store.state.stands, trust.feet);
   });
-  const crowded = () => {
-    // Nor are they placed in crowds.
-    feet.hidden = store.state.view === "crowd";
-  };
-  crowded();
-  signal.addEventListener("abort", store.listen(crowded));
+  // Nor are they placed in crowds.
+  store.follow(({ view }) => {
+    feet.hidden = view === "crowd";
+  }, signal);
   player.onTrust((trust) => {
+    const found = marks(trust);
+    const text = trustSentence(trust);
     sigma.textContent = written.centimetres(trust.sigma);
-    // Services older than 3.1.0, and single poses in place, say no band.
-    band.textContent = trust.band ? named(trust.band) : "";
+    band.textContent = trust.band ? bandName(trust.band) : "";
     meter.value = Math.min(1, trust.sigma / SCALE);
-    known.replaceChildren(...items(trust));
-    sentence.textContent = says(trust);
+    // The signs differ in shape, for users who do not tell the colours apart.
+    known.replaceChildren(
+      ...found.map(({ of, yes, words }) =>
+        el(
+          "li",
+          { "data-mark": of, "data-held": yes ? "yes" : "no" },
+          icon(SIGNS[of][yes ? 0 : 1]),
+          words,
+        ),
+      ),
+    );
+    sentence.textContent = text;
     warnings.replaceChildren(...trust.warnings.map((text) => el("li", {}, text)));
     host.toggleAttribute("data-outside", trust.warnings.length > 0);
     clearTimeout(timer);
     timer = setTimeout(() => {
-      if (served(source)) why.ask(null);
-      const told = marks(trust).map(({ words }) => `${words}.`);
-      aloud.textContent = [says(trust), ...told, ...trust.warnings].join(" ");
+      why.ask(null);
+      const spoken = [text, ...found.map(({ words }) => `${words}.`), ...trust.warnings];
+      aloud.textContent = spoken.join(" ");
     }, CALM);
   });
 }
 
-function says(trust: Trust): string {
-  const found = `A captured clip here would lie about ${written.centimetres(trust.sigma)} away, joint by joint.`;
-  // Services older than 2.2.0 warn of what lies outside, and say no more.
-  if (!(trust.supported ?? !trust.warnings.length)) return `${found} That is a guess.`;
-  return trust.band ? `${found} That is ${worded(trust.band)}.` : found;
+const bandName = (band: string): string => (band === "guess" ? "a guess" : band);
+
+function trustSentence({ sigma, supported, band }: Trust): string {
+  const text = `A captured clip here would lie about ${written.centimetres(sigma)} away, joint by joint.`;
+  if (supported === false) return `${text} That is a guess.`;
+  if (!band) return text;
+  const limits = LIMITS[band];
+  return `${text} That is ${limits ? `${bandName(band)}: ${limits}` : band}.`;
 }
 
+const SIGNS = { support: ["held", "gap"], performer: ["somebody", "nobody"] } as const;
+
+interface Mark {
+  readonly of: keyof typeof SIGNS;
+  readonly yes: boolean;
+  readonly words: string;
+}
+
+/** Return whether similar clips were captured, and, of models with performers, whether this one was. */
+export function marks({
+  supported,
+  performer_seen: seen,
+  performer,
+}: Pick<Trust, "supported" | "performer_seen" | "performer">): Mark[] {
+  const found: Mark[] = [];
+  if (supported !== undefined) {
+    const words = supported ? "Captured near here" : "Nothing like it was captured";
+    found.push({ of: "support", yes: supported, words });
+  }
+  if (seen !== undefined) {
+    const words = seen
+      ? `${performer ?? "The performer"} was captured`
+      : "Moves as an unseen performer";
+    found.push({ of: "performer", yes: seen, words });
+  }
+  return found;
+}
+
+/** A captured clip with its share in the answer, as a button that goes there. */
 function item(clip: Captured, card: ModelCard, { store }: Session): HTMLElement {
+  const { controls, distance, performer, share = 0, source } = clip;
+  const labels = clip.labels ?? {};
   const values = card.controls.map(({ name, unit, minimum, maximum }) => {
-    const value = written.short(clip.controls[name]!, maximum - minimum);
-    return `${title(name).toLowerCase()} ${value} ${unit}`;
+    const value = written.short(controls[name]!, maximum - minimum);
+    return `${written.title(name).toLowerCase()} ${value} ${unit}`;
   });
+  const names = [...(performer ? [performer] : []), ...Object.values(labels)];
   const go = el(
     "button",
     { type: "button", title: `Go there: ${values.join(", ")}` },
-    el("span", { class: "source" }, clip.source),
-    el("span", { class: "weight" }, percent(share(clip))),
-    el("meter", { min: 0, max: 1, value: share(clip), "aria-hidden": "true" }),
-    el("span", { class: "about" }, `distance ${clip.distance.toFixed(2)}${who(clip)}`),
+    el("span", { class: "source" }, source),
+    el("span", { class: "weight" }, percent(share)),
+    el("meter", { min: 0, max: 1, value: share, "aria-hidden": "true" }),
+    el("span", { class: "about" }, [`distance ${distance.toFixed(2)}`, ...names].join(" · ")),
   );
   go.addEventListener("click", () =>
-    store.set({
-      controls: { ...clip.controls },
-      performer: clip.performer,
-      labels: { ...clip.labels },
-    }),
+    store.set({ controls: { ...controls }, performer, labels: { ...labels } }),
   );
   return el("li", {}, go);
 }
 
-function who({ performer, labels = {} }: Captured): string {
-  const names = [...(performer ? [performer] : []), ...Object.values(labels)];
-  return names.map((name) => ` · ${name}`).join("");
-}
-
-/** Part of the clip in the positive weights; services older than 3.1.0 say the weight alone. */
-function share(clip: { readonly share?: number; readonly weight: number }): number {
-  return clip.share ?? Math.max(0, clip.weight);
-}
-
-function rest({ others }: Reasons): string {
-  return others.count ? `${others.count} others together ${percent(share(others))}` : "";
-}
-
 function percent(share: number): string {
   return `${(100 * share).toFixed(Math.abs(share) < 0.1 ? 1 : 0)} %`;
+}
+
+/** Say what the service did to the feet of a clip, or why nothing. */
+export function feetSentence(
+  card: Pick<ModelCard, "feet" | "root">,
+  stands: boolean,
+  feet: Trust["feet"],
+): string {
+  if (!feet) {
+    const why = whyFeetCannotStand(card);
+    if (why) return `Feet as predicted: ${why}.`;
+    return stands
+      ? "Feet as predicted: the service did not say that they stand."
+      : "Feet as predicted.";
+  }
+  const { stances, swings, left, skate, skate_before: before, drift, lowered, grounded } = feet;
+  const others = left.map((text) => ` ${/[.!?]$/.test(text) ? text : `${text}.`}`).join("");
+  if (!stances.length) return `Feet as predicted: none could be placed.${others}`;
+  const count = (number: number, word: string) => `${number} ${word}${number === 1 ? "" : "s"}`;
+  const speed = (value: number) => `${(100 * value).toFixed(1)} cm/s`;
+  const { centimetres } = written;
+  const parts = [
+    `${count(stances.length, "stance")}, ${count(swings, "swing")}`,
+    `skate ${speed(before)} before, ${speed(skate)} now`,
+    ...(drift > SLIGHT ? [`off its place by up to ${centimetres(drift)}`] : []),
+    lowered > SLIGHT ? `pelvis lowered by up to ${centimetres(lowered)}` : "pelvis not lowered",
+  ];
+  if (Math.abs(grounded) > SLIGHT) {
+    const way = grounded > 0 ? "lowered" : "raised";
+    parts.push(`body ${way} to the floor by ${centimetres(Math.abs(grounded))}`);
+  }
+  return `Feet stand: ${parts.join("; ")}.${others}`;
 }

@@ -1,8 +1,8 @@
-/** Numbers as people write them. */
+/** Numbers and names as people write them. */
 
 const NUMBER = /^[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?$/i;
 
-/** A number, or in words what is wrong with it. */
+/** Return the number, or a sentence that says what is wrong with the text. */
 export function read(text: string): number | string {
   const trimmed = text.trim().replace(/^−/, "-");
   if (!trimmed) return "Nothing is written here: a number is expected.";
@@ -15,17 +15,17 @@ export function read(text: string): number | string {
   return `“${trimmed}” is not a number.`;
 }
 
-/** With as many digits as its range makes worth reading. */
+/** Write a number with the digits that its range is worth. */
 export function short(value: number, range: number): string {
   const digits = Math.max(0, Math.min(4, Math.ceil(2 - Math.log10(range || 1))));
   const text = value.toFixed(digits);
   return Number(text) === 0 ? (0).toFixed(digits) : text;
 }
 
-/** A length in centimetres, with a digit after the point where that is worth reading. */
+/** Write a length in centimetres, below 10 cm with one decimal. */
 export function centimetres(metres: number): string {
-  const found = 100 * metres;
-  return `${found.toFixed(Math.abs(found) < 10 ? 1 : 0)} cm`;
+  const value = 100 * metres;
+  return `${value.toFixed(Math.abs(value) < 10 ? 1 : 0)} cm`;
 }
 
 export function seconds(value: number): string {
@@ -43,3 +43,9 @@ export const whole = (value: number): string => WHOLE.format(value);
 
 /** A length in centimetres to three digits, where one is compared with others. */
 export const precise = (metres: number): string => `${figure(100 * metres)} cm`;
+
+/** Write `target_height` as "Target height". */
+export function title(name: string): string {
+  const words = name.replaceAll("_", " ");
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}

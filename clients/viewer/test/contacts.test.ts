@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { ground } from "../src/contacts.ts";
+import { ground } from "../src/feet.ts";
 
 const RATE = 50;
 

@@ -5,7 +5,7 @@ import { test } from "node:test";
 
 import type { Motion } from "@posefield/client";
 
-import { curvesAt } from "../src/curves.ts";
+import { curvesAt } from "../src/playback.ts";
 
 /** Three frames of two curves, at 10 a second. */
 const CLIP = {

@@ -6,13 +6,7 @@ import { test } from "node:test";
 import { TimedOut } from "@posefield/client";
 
 import { understood } from "../src/faults.ts";
-import { NeedsService } from "../src/offline/door.ts";
 import { usable } from "../src/service.ts";
-
-test("what a model in the browser cannot do is said in its own words, and not asked again", () => {
-  const fault = new NeedsService("another unit");
-  assert.deepEqual(understood(fault), { text: fault.message, remedy: "none" });
-});
 
 test("slowness is waited for; a fault of the page is called that", () => {
   assert.equal(understood(new TimedOut("slow"))!.remedy, "wait");

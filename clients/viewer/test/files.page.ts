@@ -10,9 +10,11 @@ import { after, before, describe, it } from "node:test";
 import type { Browser, Page } from "playwright-core";
 
 import { browser, opened } from "./harness.ts";
-import { COMMAND } from "./static.ts";
 
-const PYTHON = join(dirname(COMMAND), "python");
+const PYTHON = join(
+  dirname(process.env["POSEFIELD_COMMAND"] ?? "../../.venv/bin/posefield"),
+  "python",
+);
 const FORMATS = ["usdc", "usda", "usdz", "glb", "bvh", "npz", "json"];
 
 describe("files", () => {

@@ -4,40 +4,23 @@ import { type Browser, chromium, type Page, type Request } from "playwright-core
 
 // As on a machine without a graphics card: the processor draws, and puts the page together by itself
 // (through SwiftShader too that took 60 ms a frame).
-const COMMON = [
+const ARGUMENTS = [
   "--no-sandbox",
   "--no-first-run",
   "--disable-quic",
   "--disable-background-networking",
   "--disable-component-update",
   "--disable-sync",
-];
-const ARGUMENTS = [...COMMON, "--disable-gpu", "--enable-unsafe-swiftshader"];
-// WebGPU without a graphics card, by SwiftShader, which must draw all else too for canvases of WebGPU.
-const WEBGPU = [
-  ...COMMON,
-  "--enable-unsafe-webgpu",
-  "--use-webgpu-adapter=swiftshader",
-  "--use-vulkan=swiftshader",
-  "--use-angle=swiftshader",
-  "--enable-features=Vulkan",
+  "--disable-gpu",
+  "--enable-unsafe-swiftshader",
 ];
 
 export const SERVICE = process.env["POSEFIELD_URL"] ?? "http://127.0.0.1:8000";
 
 export function browser(): Promise<Browser> {
-  return launched(ARGUMENTS);
-}
-
-/** A browser with WebGPU, computed by the processor: right, but slow. */
-export function browserWithWebGpu(): Promise<Browser> {
-  return launched(WEBGPU);
-}
-
-function launched(args: readonly string[]): Promise<Browser> {
   return chromium.launch({
     executablePath: process.env["CHROMIUM"] ?? "/usr/bin/chromium",
-    args: [...args],
+    args: ARGUMENTS,
   });
 }
 

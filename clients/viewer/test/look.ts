@@ -2,9 +2,6 @@
 
 import type { Locator, Page } from "playwright-core";
 
-/** Size of a picture that is compared with another. */
-const [WIDTH, HEIGHT] = [640, 360];
-
 /** The middle of the stage, when it has come to rest. */
 export async function picture(page: Page): Promise<Buffer> {
   const box = (await page.locator("#stage").boundingBox())!;
@@ -30,7 +27,7 @@ export function typed(page: Page, control: string): Locator {
 
 /** Seconds that the transport shows. */
 export async function time(page: Page): Promise<number> {
-  return Number((await page.locator(".time").textContent())!.split(" ")[0]);
+  return Number((await page.locator("[data-part=time] .time").textContent())!.split(" ")[0]);
 }
 
 /** In centimetres. */
@@ -51,35 +48,4 @@ export async function until(met: () => Promise<boolean>, what: string): Promise<
     await new Promise((done) => setTimeout(done, 100));
   }
   throw new Error(`within ten seconds it did not come true that ${what}`);
-}
-
-/** Brightness of the stage's pixels, small, so that smoothed edges do not count. */
-export async function lights(page: Page): Promise<number[]> {
-  const png = (await page.locator("#stage canvas").first().screenshot()).toString("base64");
-  return page.evaluate(
-    async ({ png, width, height }) => {
-      const image = Object.assign(new Image(), { src: `data:image/png;base64,${png}` });
-      await image.decode();
-      const pen = Object.assign(document.createElement("canvas"), { width, height }).getContext(
-        "2d",
-      )!;
-      pen.drawImage(image, 0, 0, width, height);
-      const { data } = pen.getImageData(0, 0, width, height);
-      return Array.from({ length: width * height }, (_, at) => data[4 * at + 1]!);
-    },
-    { png, width: WIDTH / 2, height: HEIGHT / 2 },
-  );
-}
-
-/** Share of pixels that differ by more than a tenth of the brightness. */
-export function unlike(one: readonly number[], other: readonly number[]): number {
-  return one.filter((value, at) => Math.abs(value - other[at]!) > 25).length / one.length;
-}
-
-/** In the page: WebGL names another renderer than the one it has. */
-export function hideRenderer(): void {
-  const own = WebGL2RenderingContext.prototype.getParameter;
-  WebGL2RenderingContext.prototype.getParameter = function (this: WebGL2RenderingContext, name) {
-    return name === 0x9246 ? "a graphics card" : (own.call(this, name) as unknown);
-  };
 }

@@ -6,8 +6,7 @@ import { after, before, describe, it } from "node:test";
 import { Client, type ModelCard, type SigmaGrid } from "@posefield/client";
 import type { Browser, Page } from "playwright-core";
 
-import { extent, Frame, MARGIN } from "../src/chart.ts";
-import { viridis } from "../src/colours.ts";
+import { extent, Frame, MARGIN, viridis } from "../src/chart.ts";
 import { browser, opened, SERVICE } from "./harness.ts";
 import { until } from "./look.ts";
 
@@ -275,23 +274,6 @@ describe("the map", () => {
     const share = grid.supported!.flat().filter(Boolean).length / grid.supported!.flat().length;
     const words = await page.locator(".map-words").innerText();
     assert.equal(Number(words.match(/captured, (\d+) % of this map/)![1]), Math.round(100 * share));
-  });
-
-  it("shows what was sampled where an older service says no more", async () => {
-    const other = await opened(from, `/${new URL(page.url()).hash}`);
-    await other.page.route(/sigma/, async (route) => {
-      const answer = await route.fetch();
-      const { supported, ...rest } = (await answer.json()) as SigmaGrid;
-      assert.ok(supported);
-      await route.fulfill({ response: answer, json: rest });
-    });
-    await other.page.reload();
-    const words = other.page.locator(".map-words", { hasText: "Within what was sampled" });
-    await words.waitFor();
-    assert.match(await other.page.locator(".map-legend").innerText(), /Hatched: never sampled/);
-    assert.match((await other.page.locator(".map caption").textContent())!, /outside what was/);
-    assert.deepEqual(other.faults, []);
-    await other.page.close();
   });
 
   it("keeps the focus where its axes are chosen by keys", async () => {

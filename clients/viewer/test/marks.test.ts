@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { marks } from "../src/marks.ts";
+import { marks } from "../src/trust.ts";
 
 const words = (trust: Parameters<typeof marks>[0]) => marks(trust).map((mark) => mark.words);
 
@@ -12,7 +12,7 @@ test("what was captured and what was not are told apart", () => {
   assert.deepEqual(words(near), ["Captured near here"]);
   assert.deepEqual(words({ ...near, supported: false }), ["Nothing like it was captured"]);
   assert.deepEqual(
-    marks({ ...near, supported: false }).map(({ held }) => held),
+    marks({ ...near, supported: false }).map(({ yes }) => yes),
     [false],
   );
 });
@@ -24,6 +24,6 @@ test("who moves has a mark of its own where performers are told apart", () => {
   assert.deepEqual(words(nobody)[1], "Moves as an unseen performer");
 });
 
-test("of what an older service does not say there is no mark", () => {
+test("there is no mark of a fact that the service does not state", () => {
   assert.deepEqual(marks({ performer: "kim" }), []);
 });

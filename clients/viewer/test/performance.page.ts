@@ -2,15 +2,14 @@
 
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 
 import type { Browser, Page } from "playwright-core";
 
+import { broken } from "./axe.ts";
 import { browser, opened, SERVICE } from "./harness.ts";
 import { picture, until } from "./look.ts";
 
-const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const EMPTY = "/#cmu_walk?~playing=no&~view=performance";
 const WALK = { kind: "walk", model: "cmu_walk", to: [0, 3], start: "standing" };
 const TURN = { kind: "walk", model: "cmu_walk", seconds: 2 };
@@ -55,23 +54,7 @@ const said = (page: Page, words: string | RegExp) =>
   page.locator(".performance-said", { hasText: words }).waitFor();
 const bars = (page: Page) => page.locator(".bars button").allTextContents();
 
-/** Where the chosen walk's points are drawn, px of the window. */
-async function points(page: Page): Promise<[number, number][]> {
-  let before: string | null = "";
-  const text = () => page.locator("[data-part=floor]").getAttribute("data-points");
-  await until(async () => {
-    await page.waitForTimeout(250);
-    await page.locator("#stage canvas[data-rest]").waitFor();
-    const [last, now] = [before, await text()];
-    before = now;
-    return now === last;
-  }, "the stage rests");
-  const box = (await page.locator("#stage canvas").boundingBox())!;
-  return before.split(" ").map((place) => {
-    const [x, y] = place.split(",").map(Number);
-    return [box.x + x!, box.y + y!];
-  });
-}
+const script = (page: Page) => page.getByLabel("Script as JSON");
 
 test("the shipped walk alone is a performance at once: timeline, contacts and duration", () =>
   on(EMPTY, async (page, asked) => {
@@ -85,80 +68,23 @@ test("the shipped walk alone is a performance at once: timeline, contacts and du
     await until(async () => page.url().includes("~script="), "the address has the script");
   }));
 
-test("points are clicked onto the floor and dragged there, and the walk follows", () =>
-  on(
-    at({ segments: [WALK] }),
-    async (page, asked) => {
-      await performedOn(page);
-      await page.getByRole("button", { name: /^Draw path/ }).click();
-      // The view may still move to above the floor when it is clicked for the first time.
-      await until(async () => {
-        const [[x, y]] = (await points(page)) as [[number, number]];
-        await page.mouse.click(x - 12, y - 80);
-        await page.waitForTimeout(2000);
-        return asked.at(-1)?.segments[0]?.["along"] !== undefined;
-      }, "a point is added");
-      const along = asked.at(-1)!.segments[0]!["along"] as number[][];
-      assert.deepEqual(along[0], [0, 3]);
-      assert.ok(along[1]![0]! > 0.05 && along[1]![1]! > 3.3, String(along));
-      await until(async () => (await points(page)).length === 2, "both points are drawn");
-      const [, [px, py]] = (await points(page)) as [unknown, [number, number]];
-      await page.mouse.move(px, py);
-      await page.mouse.down();
-      await page.mouse.move(px + 20, py - 10, { steps: 4 });
-      await page.mouse.up();
-      const moved = () => (asked.at(-1)!.segments[0]!["along"] as number[][])[1]!;
-      await until(async () => moved()[0]! < along[1]![0]! - 0.05, "the point is moved");
-      assert.ok(moved()[1]! > along[1]![1]!);
-      await said(page, /^1 segment/);
-      assert.equal(asked.at(-1)!.segments.length, 1);
-      // Without drawing, a click on the floor adds nothing.
-      await page.keyboard.press("Escape");
-      await page.waitForTimeout(600);
-      const count = asked.length;
-      await page.mouse.click(px - 90, py + 40);
-      await page.waitForTimeout(600);
-      assert.equal(asked.length, count);
-    },
-    "maybe",
-  ));
-
-test("segments are added, moved and deleted by the keyboard, which stays where it was", () =>
-  on(at({ segments: [WALK] }), async (page, asked) => {
-    await performedOn(page);
-    for (const kind of ["walk", "hold"]) {
-      await page.getByRole("button", { name: `Add a ${kind} after` }).focus();
-      await page.keyboard.press("Enter");
-      await page
-        .locator(".segments > li[data-chosen]", { hasText: new RegExp(kind, "i") })
-        .waitFor();
-    }
-    await said(page, /^3 segments/);
-    await until(async () => (await bars(page))[2] === "3 hold", "the timeline has it");
-    await page.getByLabel("Duration, s").fill("2.5");
-    await page.keyboard.press("Enter");
-    await until(async () => asked.at(-1)!.segments[2]?.["seconds"] === 2.5, "the hold is longer");
-    await page.getByRole("button", { name: "Move segment 3 up" }).focus();
-    await page.keyboard.press("Enter");
-    await until(async () => asked.at(-1)!.segments[1]?.["kind"] === "hold", "the hold has moved");
-    const focused = () => page.evaluate(() => document.activeElement?.getAttribute("aria-label"));
-    assert.equal(await focused(), "Move segment 2 up");
-    await page.getByRole("button", { name: "Delete segment 2" }).press("Enter");
-    await until(async () => asked.at(-1)!.segments.length === 2, "the hold is gone");
-    await until(async () => (await bars(page)).length === 2, "the timeline follows");
-  }));
-
-test("models of other skeletons are refused at their segment, and a mended script goes on", () =>
+test("models of other skeletons are refused at their line, and a mended script goes on", () =>
   on(
     at({ segments: [WALK, { kind: "act", model: "reaching" }] }),
     async (page) => {
       await said(page, /cannot be performed/);
-      const fault = page.locator(".segments > li [data-note=fault]");
-      assert.match((await fault.first().textContent())!, /another skeleton/);
-      const marked = page.locator('.segments > li[data-notes="fault"]');
-      assert.equal(await marked.count(), 1);
+      const fault = page.locator("[data-note=fault]");
+      assert.match(
+        (await fault.first().textContent())!,
+        /^Line 3, \/segments\/0.*another skeleton/,
+      );
       assert.ok(await page.getByRole("button", { name: /^Download/ }).isDisabled());
-      await page.getByRole("button", { name: "Delete segment 1" }).click();
+      await fault.first().getByRole("button").click();
+      const selected = await script(page).evaluate((text: HTMLTextAreaElement) =>
+        text.value.slice(text.selectionStart, text.selectionEnd),
+      );
+      assert.equal(selected, '"cmu_walk"');
+      await script(page).fill(JSON.stringify({ segments: [{ kind: "act", model: "reaching" }] }));
       await performedOn(page);
       await said(page, /^1 segment/);
       assert.equal(await fault.count(), 0);
@@ -167,64 +93,68 @@ test("models of other skeletons are refused at their segment, and a mended scrip
     true,
   ));
 
-test("a wrong field is marked where the service points at, until it is mended", () =>
-  on(
-    at({ segments: [WALK, TURN] }),
-    async (page) => {
-      await performedOn(page);
-      await page.locator(".segments .open").nth(1).click();
-      const speed = page.getByLabel("Speed, m/s");
-      await speed.fill("9");
-      await speed.press("Tab");
-      await said(page, /cannot be performed/);
-      await page.locator('.segments > li[data-notes="fault"]').nth(0).waitFor();
-      assert.equal(await speed.getAttribute("aria-invalid"), "true");
-      assert.equal(await page.getByLabel("Duration, s").getAttribute("aria-invalid"), null);
-      assert.equal(await page.locator(".bars [data-notes=fault]").count(), 1);
-      await speed.fill("1.2");
-      await speed.press("Tab");
-      await said(page, /^2 segments/);
-      assert.equal(await speed.getAttribute("aria-invalid"), null);
-      await speed.fill("fast");
-      await speed.press("Tab");
-      await page.locator(".segments .fault", { hasText: "not a number" }).waitFor();
-    },
-    true,
-  ));
-
-test("the text can be changed: what is no script is said, unknown fields at their segment", () =>
+test("the text is checked as it is typed: by its form, and by the contract", () =>
   on(
     at({ segments: [WALK] }),
     async (page, asked) => {
       await performedOn(page);
-      await page.getByText("Script as text").click();
-      const text = page.locator(".script-text textarea");
+      const text = script(page);
       const whole = await text.inputValue();
       assert.deepEqual(JSON.parse(whole), { segments: [WALK] });
+      const fault = (words: string) => page.locator("[data-note=fault]", { hasText: words });
       await text.fill("{");
-      await text.press("Tab");
-      await page.locator(".fault", { hasText: "not JSON" }).waitFor();
+      await fault("not JSON").waitFor();
+      assert.equal(await text.getAttribute("aria-invalid"), "true");
       await text.fill(whole.replace('"start"', '"begin"'));
-      await text.press("Tab");
-      await page.locator(".segments [data-note=fault]", { hasText: "begin" }).waitFor();
+      await fault("begin").waitFor();
+      await text.fill(whole.replace('"start"', '"speed": 90, "start"'));
+      await fault("Line 3, /segments/0/speed").waitFor();
+      assert.equal(await page.locator(".bars [data-notes=fault]").count(), 1);
       await text.fill(whole.replace("[0, 3]", "[1, 4]"));
-      await text.press("Tab");
+      await until(
+        async () => asked.at(-1)!.segments[0]!["to"]?.toString() === "1,4",
+        "it is asked",
+      );
       await said(page, /^1 segment/);
-      assert.deepEqual(asked.at(-1)!.segments[0]!["to"], [1, 4]);
+      assert.equal(await text.getAttribute("aria-invalid"), "false");
     },
     true,
   ));
+
+test("the plan shows the path, points, targets and obstacles", () => {
+  const act = {
+    kind: "act",
+    model: "reaching",
+    targets: [{ joint: "Head", at: "end", position: [0, 1.5, 1] }],
+  };
+  const obstacles = [{ position: [0.2, 2], radius: 0.4 }];
+  return on(
+    at({ segments: [WALK, act], obstacles }),
+    async (page) => {
+      await said(page, /cannot be performed/);
+      for (const kind of ["start", "target", "obstacle"])
+        await page.locator(`.plan .plan-${kind}`).waitFor();
+      await script(page).fill(JSON.stringify({ segments: [WALK, TURN] }));
+      await until(async () => (await page.locator(".plan .plan-path").count()) === 2, "two paths");
+      assert.equal(await page.locator(".plan .plan-point").count(), 1);
+    },
+    true,
+  );
+});
 
 test("the link shows the same performance; another time is another picture", () =>
   on(at({ segments: [WALK, TURN] }), async (page) => {
     await performedOn(page);
     const first = await picture(page);
-    await page.getByRole("button", { name: /^Follow/ }).click();
     await page.keyboard.press("End");
     const last = await picture(page);
     assert.ok(!first.equals(last));
+    // The camera follows on a leash, and comes back to another place once.
     await page.keyboard.press("Home");
-    assert.ok(first.equals(await picture(page)), "the first pose again");
+    const back = await picture(page);
+    await page.keyboard.press("End");
+    await page.keyboard.press("Home");
+    assert.ok(back.equals(await picture(page)), "the first pose again");
     await until(async () => page.url().includes("~script="), "the address has the script");
     await on(new URL(page.url()).hash.replace("#", "/#"), async (other) => {
       await performedOn(other);
@@ -236,24 +166,6 @@ test("the link shows the same performance; another time is another picture", () 
     await page.keyboard.press(" ");
     const time = page.getByLabel("Time in the performance");
     await until(async () => Number(await time.inputValue()) > 0.2, "it plays");
-  }));
-
-test("a target that is added is where the joint is, so that the act still can be performed", () =>
-  on(at({ segments: [{ kind: "act", model: "reaching" }] }), async (page, asked) => {
-    await performedOn(page);
-    await page.getByRole("button", { name: "Add a target" }).click();
-    await until(async () => asked.at(-1)!.segments[0]!["targets"] !== undefined, "it is asked for");
-    await page.locator("fieldset", { hasText: "Target 1" }).waitFor();
-    await until(
-      async () => (await page.locator("#stage[data-performed]").count()) === 1,
-      "the motion is there",
-    );
-    await page.waitForTimeout(500);
-    assert.equal(await page.locator("[data-note=fault]").count(), 0);
-    const [target] = asked.at(-1)!.segments[0]!["targets"] as { position: number[] }[];
-    assert.ok(target!.position.every(Number.isFinite));
-    await page.getByRole("button", { name: "Delete target 1" }).click();
-    await until(async () => !("targets" in asked.at(-1)!.segments[0]!), "it is gone");
   }));
 
 test("files are those that the service gives, and scripts are saved and opened", () =>
@@ -298,29 +210,13 @@ for (const [colorScheme, width, height] of [
     const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
     assert.ok(wide <= 0, `${wide} px too wide`);
     assert.deepEqual(await broken(page), []);
-    await page.getByText("Whole performance").click();
-    await page.getByText("Script as text").click();
-    await page.getByRole("button", { name: /^Draw path/ }).click();
-    for (const segment of [1, 2]) {
-      await page.locator(".segments .open").nth(segment).click();
-      assert.deepEqual(await broken(page), []);
-    }
     await page.evaluate(() => {
-      document.querySelector(".script-text textarea")!.removeAttribute("id");
+      document.querySelector(".performance-file select")!.removeAttribute("id");
     });
-    assert.match((await broken(page)).join(), /label/, "it would notice a field without a name");
+    assert.match(
+      (await broken(page)).join(),
+      /select-name/,
+      "it would notice a field without a name",
+    );
     await page.close();
   });
-
-/** Rules that are broken seriously, and where. */
-async function broken(page: Page): Promise<string[]> {
-  await page.evaluate(AXE);
-  return page.evaluate(async () => {
-    type Violation = { id: string; impact: string; nodes: { target: string[] }[] };
-    const { axe } = window as unknown as { axe: { run(): Promise<{ violations: Violation[] }> } };
-    const { violations } = await axe.run();
-    return violations
-      .filter(({ impact }) => impact === "serious" || impact === "critical")
-      .map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target.join(" ")).join(", ")}`);
-  });
-}

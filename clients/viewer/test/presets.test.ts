@@ -3,8 +3,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { isAt } from "../src/controls.ts";
 import { initial } from "../src/hash.ts";
-import { holds } from "../src/presets.ts";
 import { CARD } from "./card.ts";
 
 const PRESET = { name: "stroll", controls: { speed: 0.7, time: 5 }, performer: null };
@@ -12,13 +12,13 @@ const START = initial("hop", CARD);
 
 test("all values and the performer count", () => {
   const there = { ...START, controls: { speed: 0.7, time: 5 } };
-  assert.ok(holds(there, PRESET));
-  assert.ok(!holds(START, PRESET));
-  assert.ok(!holds({ ...there, controls: { speed: 0.7, time: 5.001 } }, PRESET));
-  assert.ok(!holds({ ...there, performer: "ann" }, PRESET));
-  assert.ok(holds({ ...there, performer: "ann" }, { ...PRESET, performer: "ann" }));
+  assert.ok(isAt(there, PRESET));
+  assert.ok(!isAt(START, PRESET));
+  assert.ok(!isAt({ ...there, controls: { speed: 0.7, time: 5.001 } }, PRESET));
+  assert.ok(!isAt({ ...there, performer: "ann" }, PRESET));
+  assert.ok(isAt({ ...there, performer: "ann" }, { ...PRESET, performer: "ann" }));
   const calm = { style: "calm" };
-  assert.ok(!holds({ ...there, labels: calm }, PRESET));
-  assert.ok(!holds(there, { ...PRESET, labels: calm }));
-  assert.ok(holds({ ...there, labels: calm }, { ...PRESET, labels: calm }));
+  assert.ok(!isAt({ ...there, labels: calm }, PRESET));
+  assert.ok(!isAt(there, { ...PRESET, labels: calm }));
+  assert.ok(isAt({ ...there, labels: calm }, { ...PRESET, labels: calm }));
 });

@@ -28,9 +28,6 @@ const SHOWN = {
   "page-crowd": "/#cmu_walk?speed=1.3&turn=0&stride_length=1.4&~playing=no&~view=crowd",
 };
 
-/** What the side shows where it is not the controls. */
-const SECTIONS: Readonly<Record<string, string>> = { "page-one": "Map", "page-levels": "Detail" };
-
 const [folder = "."] = process.argv.slice(2);
 const chromium = await browser();
 for (const [name, path] of Object.entries(SHOWN)) {

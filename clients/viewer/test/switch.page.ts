@@ -11,9 +11,9 @@ import type { Browser, Page } from "playwright-core";
 import { place, placed } from "../src/skeleton.ts";
 import { browser, opened, SERVICE } from "./harness.ts";
 import { picture, settled, until } from "./look.ts";
-import { COMMAND } from "./static.ts";
 
 const client = new Client(SERVICE);
+const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "../../.venv/bin/posefield";
 const PYTHON = resolve(join(dirname(COMMAND), "python"));
 const ROOT = resolve(import.meta.dirname, "../../..");
 

@@ -3,10 +3,16 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { says } from "../src/feet-words.ts";
 import { initial } from "../src/hash.ts";
-import type { Source } from "../src/page.ts";
-import { LARGEST_SEED, nextSeed, otherTakes, takeAndFeet, takeFields } from "../src/takes.ts";
+import {
+  LARGEST_SEED,
+  nextSeed,
+  otherTakes,
+  takeAndFeet,
+  takeFields,
+  targetFields,
+} from "../src/questions.ts";
+import { feetSentence as says } from "../src/trust.ts";
 import { CARD as PLAIN } from "./card.ts";
 
 const CARD = {
@@ -15,38 +21,43 @@ const CARD = {
   contacts: [{ joint: 2 }],
   diagnostics: { detail: { directions: 3 } },
 } as unknown as typeof PLAIN;
-const SERVICE = { file: () => undefined } as unknown as Source;
-const COPY = {} as Source;
 const START = initial("hop", CARD);
 
 test("the prediction asks for nothing new, so that its answer is that of before", () => {
-  assert.deepEqual(takeAndFeet(SERVICE, CARD, START), {});
-  assert.deepEqual(takeAndFeet(SERVICE, CARD, { ...START, variety: 0.2 }), {});
+  assert.deepEqual(takeAndFeet(CARD, START), {});
+  assert.deepEqual(takeAndFeet(CARD, { ...START, variety: 0.2 }), {});
 });
 
 test("a take asks for its seed, and for what is not usual", () => {
-  assert.deepEqual(takeAndFeet(SERVICE, CARD, { ...START, take: 7 }), { take: 7 });
+  assert.deepEqual(takeAndFeet(CARD, { ...START, take: 7 }), { take: 7 });
   const all = { ...START, take: 7, variety: 0, detail: true, stands: false } as const;
   const said = { take: 7, variety: 0, detail: true };
-  assert.deepEqual(takeFields(SERVICE, CARD, all), said);
-  assert.deepEqual(takeAndFeet(SERVICE, CARD, all), { ...said, feet: "as_predicted" });
-  assert.deepEqual(takeFields(SERVICE, CARD, { ...START, detail: true }), { detail: true });
+  assert.deepEqual(takeFields(CARD, all), said);
+  assert.deepEqual(takeAndFeet(CARD, all), { ...said, feet: "as_predicted" });
+  assert.deepEqual(takeFields(CARD, { ...START, detail: true }), { detail: true });
 });
 
 test("a floor is asked for where feet stand", () => {
   const raised = { ...START, floor: 0.2 };
-  assert.deepEqual(takeAndFeet(SERVICE, CARD, raised), { floor: 0.2 });
-  assert.deepEqual(takeAndFeet(SERVICE, CARD, { ...raised, stands: false }), {
+  assert.deepEqual(takeAndFeet(CARD, raised), { floor: 0.2 });
+  assert.deepEqual(takeAndFeet(CARD, { ...raised, stands: false }), {
     feet: "as_predicted",
   });
-  assert.deepEqual(takeAndFeet(SERVICE, PLAIN, { ...raised, stands: false }), {});
-  assert.deepEqual(takeAndFeet(COPY, CARD, raised), {});
+  assert.deepEqual(takeAndFeet(PLAIN, { ...raised, stands: false }), {});
 });
 
-test("a model without details is asked for none, and a copy of the page for nothing", () => {
-  assert.deepEqual(takeFields(SERVICE, PLAIN, { ...START, detail: true }), {});
-  const all = { ...START, take: 7, detail: true, stands: false } as const;
-  assert.deepEqual(takeAndFeet(COPY, CARD, all), {});
+test("a model without details is asked for none", () => {
+  assert.deepEqual(takeFields(PLAIN, { ...START, detail: true }), {});
+});
+
+test("a target is that of the event's joint", () => {
+  const target = [0.1, 1.23456, 0] as const;
+  const card = { ...PLAIN, event: { joint: 3, share: 1 } } as unknown as typeof PLAIN;
+  assert.deepEqual(targetFields(card, { target }), {
+    targets: [{ joint: "Arm", at: "event", position: [0.1, 1.2346, 0] }],
+  });
+  assert.deepEqual(targetFields(card, { target: null }), {});
+  assert.deepEqual(targetFields(PLAIN, { target }), {});
 });
 
 test("seeds go on, around the last, and a fan leaves out the one that is shown", () => {
@@ -92,6 +103,5 @@ test("why nothing was done is said", () => {
   assert.match(says(PLAIN, false, undefined), /names no feet/);
   const stays = { ...CARD, root: "in_place" } as const;
   assert.match(says(stays, false, undefined), /root stays in place/);
-  assert.match(says(CARD, true, undefined, false), /only a service/);
   assert.match(says(CARD, true, undefined), /did not say/);
 });

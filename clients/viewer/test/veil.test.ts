@@ -3,11 +3,11 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { type Place, shape } from "../src/veil.ts";
+import { type Point, shape } from "../src/chart.ts";
 import { noise } from "./noise.ts";
 
 /** Twice the area of a polygon, by its corners. */
-const doubled = (places: readonly Place[]): number =>
+const doubled = (places: readonly Point[]): number =>
   places.reduce((sum, [x, y], i) => {
     const [right, up] = places[(i + 1) % places.length]!;
     return sum + x * up - right * y;

@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { mock, test } from "node:test";
 
-import { Watch } from "../src/watch.ts";
+import { Watch } from "../src/service.ts";
 
 test("one look that fails is not the last", async () => {
   const faults: unknown[] = [];

@@ -23,7 +23,6 @@ from posefield.cli import (
     command_inspect,
     command_mcp,
     command_models,
-    command_page,
     command_perform,
     command_serve,
     command_why,
@@ -184,7 +183,6 @@ COMMANDS: dict[str, tuple[Callable[..., None], str, list[str]]] = {
     "serve": (command_serve.serve, SERVE, ["serve", "serve models/ --port 8080"]),
     "mcp": (command_mcp.mcp, SERVE, ["mcp my_models -o clips", "mcp --schema"]),
     "key": (command_serve.key, SERVE, ["key anna --model walk >> keys.txt"]),
-    "page": (command_page.page, SERVE, ["page walk.onnx -o walk.html"]),
 }
 """Functions of the commands, their groups and examples."""
 

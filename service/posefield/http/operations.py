@@ -5,7 +5,7 @@ from functools import partial
 from starlette.requests import Request
 from starlette.responses import Response
 
-from posefield.encode import character_file, kernel_file
+from posefield.encode import character_file
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http import (
     clip_operations,
@@ -38,15 +38,6 @@ async def get_character(service: Service, request: Request) -> Response:
         character_file.character_glb, model.session.card.skeleton, model.identity
     )
     return responses.attachment(content, CLIP_ENCODERS["glb"], model.name)
-
-
-async def get_kernel(service: Service, request: Request) -> Response:
-    """Return the kernel table of a model, made in a thread: that takes milliseconds."""
-    model = request.scope["model"]
-    content = await worker_threads.run_in_thread(
-        kernel_file.kernel_table, model.session.content, model.session.card, model.identity
-    )
-    return responses.attachment(content, kernel_file.FORMAT, model.name)
 
 
 async def list_characters(service: Service, request: Request) -> Response:
@@ -87,7 +78,6 @@ PAGES = (
     "getDocs",
     "getProblems",
     "getViewer",
-    "getViewerCrowd",
 )
 _FORMATTED: dict[str, Handler] = {
     "getPose": pose_operations.GET_POSE,
@@ -106,7 +96,6 @@ OPERATIONS: dict[str, Handler] = {
     "listModels": list_models,
     "getModel": get_model,
     "getCharacter": get_character,
-    "getKernel": get_kernel,
     "listCharacters": list_characters,
     "getWhy": trust_operations.GET_WHY,
     "queryWhy": trust_operations.QUERY_WHY,

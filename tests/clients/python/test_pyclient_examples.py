@@ -49,7 +49,6 @@ NOT_ASKED = {
         (name, None): "for people to read"
         for name in (
             "getViewer",
-            "getViewerCrowd",
             "getDocs",
             "getProblems",
             "getContract",
@@ -58,7 +57,6 @@ NOT_ASKED = {
     },
     ("getContract", None): "is in `generated`",
     ("getContractJson", None): "is in `generated`",
-    ("getKernel", None): "for graphics cards",
     ("getMetrics", None): "for Prometheus",
 }
 

@@ -1,113 +1,121 @@
-/** A plan as a timeline: places of bars and marks in per cent of the whole, and their words. */
+/** The performance over time: a bar for each segment, joins, contacts of feet, and the time. */
 
+import type { PerformanceReport } from "@posefield/client";
+
+import { button, el } from "../dom.ts";
+import { TimeBar } from "../transport.ts";
 import { figure, precise, seconds } from "../written.ts";
-import type { Report } from "./answers.ts";
+import type { Performance } from "./performance.ts";
+import { type Note, segmentOf } from "./script.ts";
+import { togglePlay } from "./stage.ts";
 
-export interface Span {
-  /** Per cent of the whole duration. */
+/** A part of the duration, in per cent. */
+interface Span {
   readonly left: number;
   readonly width: number;
 }
 
-export interface Bar extends Span {
-  readonly kind: string;
-  readonly sign: string;
-  /** Begins with the sign, for who hears it and says it. */
-  readonly words: string;
+export function mount(host: HTMLElement, performance: Performance): void {
+  const { signal, store } = performance.session;
+  const bar = new TimeBar(
+    "Time in the performance",
+    () => togglePlay(performance),
+    (time) => performance.rest(time),
+    (loop) => store.set({ loop }),
+  );
+  const segments = el("ol", { class: "bars", "aria-label": "Segments over time" });
+  const joins = el("div", { class: "joins", "aria-hidden": "true" });
+  const contacts = el("div", { class: "lanes", role: "img" });
+  const head = el("div", { class: "playhead", "aria-hidden": "true" });
+  const track = el("div", { class: "track-of-time" }, segments, joins, contacts, head);
+  host.append(
+    el("div", { class: "performance-time" }, bar.play, bar.scrubber, bar.time, bar.loop),
+    track,
+  );
+  const showTime = () => {
+    const { duration, time } = performance;
+    const { loop, playing } = store.state;
+    bar.show({ time, duration, playing, loop });
+    head.style.left = `${duration ? (100 * time) / duration : 0}%`;
+  };
+  const showReport = (report: PerformanceReport) => {
+    segments.replaceChildren(
+      ...bars(report).map(({ kind, name, words, ...span }, index) => {
+        const element = button(name, words, () => performance.rest(report.segments[index]!.begins));
+        element.dataset["kind"] = kind;
+        const state = notesState(performance.notes, index);
+        if (state) element.dataset["notes"] = state;
+        return placed(el("li", {}, element), span);
+      }),
+    );
+    joins.replaceChildren(
+      ...report.joins.map((join) =>
+        placed(el("i", { "data-hard": join.hard, title: joinWords(join) }), {
+          left: (100 * join.time) / report.duration,
+        }),
+      ),
+    );
+    const feet = lanes(report);
+    const words = feet.map(({ joint, spans }) => `${joint} stands ${spans.length} times`);
+    contacts.setAttribute("aria-label", words.join(", ") || "Contacts of feet: none planned");
+    contacts.replaceChildren(
+      ...feet.map(({ joint, spans }) =>
+        el("div", { title: `${joint} stands` }, ...spans.map((span) => placed(el("i"), span))),
+      ),
+    );
+  };
+  performance.listen((change) => {
+    if (change === "answer" && !performance.busy) {
+      track.toggleAttribute("data-refused", performance.refused);
+      if (performance.report) showReport(performance.report);
+    }
+    showTime();
+  });
+  store.follow(showTime, signal);
 }
 
-export interface Mark {
-  readonly segment: number;
-  readonly left: number;
-  readonly hard: boolean;
-  readonly words: string;
-}
-
-export interface Lane {
-  readonly joint: string;
-  readonly stays: readonly Span[];
-}
-
-export function bars({ duration, segments }: Report): Bar[] {
+/** Return the bars of the segments, whose words begin with the visible name. */
+export function bars({ duration, segments }: PerformanceReport) {
   return segments.map(({ kind, model, begins, ends }, index) => {
-    const name = kind === "hold" ? "" : plainName(model);
-    const sign = `${index + 1} ${name || kind}`;
-    const words = `${sign}${name ? `, ${kind}` : ""}: ${seconds(begins)} to ${seconds(ends)}`;
-    return { kind, sign, words, ...span(begins, ends, duration) };
+    const short = kind === "hold" ? "" : model.split("@")[0]!;
+    const name = `${index + 1} ${short || kind}`;
+    const words = `${name}${short ? `, ${kind}` : ""}: ${seconds(begins)} to ${seconds(ends)}`;
+    return { kind, name, words, ...spanOf(begins, ends, duration) };
   });
 }
 
-export function marks({ duration, joins }: Report): Mark[] {
-  return joins.map((join) => ({
-    segment: join.segment,
-    left: (100 * join.time) / duration,
-    hard: join.hard,
-    words: joinWords(join),
-  }));
+/** Say how hard a join is. */
+export function joinWords(join: PerformanceReport["joins"][number]): string {
+  const { distance, blend, peak, usual, hard } = join;
+  const text = `oin: poses ${precise(distance)} apart, blend ${blend} over ${seconds(join.seconds)}, peak ${figure(peak)} m/s² (else up to ${figure(usual)}).`;
+  return hard ? `Hard j${text} Nothing like it was captured.` : `J${text}`;
 }
 
-/** What is known of a join, in a sentence. */
-export function joinWords({
-  distance,
-  blend,
-  seconds: blended,
-  peak,
-  usual,
-  hard,
-}: Report["joins"][number]): string {
-  const apart = `Join: poses ${precise(distance)} apart, blend ${blend} over ${seconds(blended)}, peak ${figure(peak)} m/s² (else up to ${figure(usual)}).`;
-  return hard
-    ? `Hard ${apart[0]!.toLowerCase()}${apart.slice(1)} Nothing like it was captured.`
-    : apart;
-}
-
-/** When each foot stands; none for feet as predicted. */
-export function lanes({ duration, feet }: Report): Lane[] {
+/** Return when each foot stands; empty for feet as predicted. */
+export function lanes({ duration, feet }: PerformanceReport) {
   const found = new Map<string, Span[]>();
   for (const { joint, begin, end } of feet?.stances ?? []) {
-    const stays = found.get(joint) ?? [];
-    stays.push(span(begin, end, duration));
-    found.set(joint, stays);
+    const spans = found.get(joint) ?? [];
+    spans.push(spanOf(begin, end, duration));
+    found.set(joint, spans);
   }
-  return [...found].map(([joint, stays]) => ({ joint, stays }));
+  return [...found].map(([joint, spans]) => ({ joint, spans }));
 }
 
-/** A warning or a fault with the place in the script that it is about. */
-export interface Note {
-  readonly pointer: string;
-  readonly words: string;
-  readonly fault: boolean;
-}
-
-/** Index of the segment that a pointer leads into; null for other places. */
-export function segmentOf(pointer: string): number | null {
-  const found = /^\/?segments\/(\d+)(?:\/|$)/.exec(pointer);
-  return found ? Number(found[1]) : null;
-}
-
-/** The rest of a pointer within its segment, such as "targets/0". */
-export function within(pointer: string): string {
-  return pointer.replace(/^\/?segments\/\d+\/?/, "");
-}
-
-/** Notes on a segment, each once; those of no segment that is there for `null`. */
-export function notesOf(notes: readonly Note[], segment: number | null, count: number): Note[] {
-  const found = notes.filter(({ pointer }) => {
-    const index = segmentOf(pointer);
-    return (index !== null && index < count ? index : null) === segment;
-  });
-  return found.filter(
-    ({ pointer, words }, i) =>
-      found.findIndex((other) => other.pointer === pointer && other.words === words) === i,
-  );
-}
-
-/** Without the hash of its content. */
-export function plainName(model: string): string {
-  return model.split("@")[0]!;
-}
-
-function span(begin: number, end: number, duration: number): Span {
+function spanOf(begin: number, end: number, duration: number): Span {
   const share = duration > 0 ? 100 / duration : 0;
   return { left: share * begin, width: share * (end - begin) };
+}
+
+function notesState(notes: readonly Note[], segment: number): "fault" | "warning" | null {
+  const about = notes.filter(({ pointer }) => segmentOf(pointer) === segment);
+  if (!about.length) return null;
+  return about.some(({ fault }) => fault) ? "fault" : "warning";
+}
+
+/** Place an element; the page's policy allows no style attribute in markup. */
+function placed<Kind extends HTMLElement>(element: Kind, { left, width }: Partial<Span>): Kind {
+  element.style.left = `${(left ?? 0).toFixed(3)}%`;
+  if (width !== undefined) element.style.width = `${width.toFixed(3)}%`;
+  return element;
 }

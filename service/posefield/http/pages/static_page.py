@@ -44,7 +44,6 @@ class StaticPage:
 
 _PAGES = Path(__file__).parent
 VIEWER = _PAGES / "viewer/index.html"
-VIEWER_SCRIPT = _PAGES / "viewer/crowd-webgpu.js"
 DOCS = _PAGES / "docs/index.html"
 PROBLEMS = _PAGES / "problems.html"
 NO_SOURCE = "'none'"
@@ -58,10 +57,7 @@ def static_pages(agreed: Contract) -> dict[str, StaticPage]:
         "getContractJson": StaticPage("application/json", lambda: orjson.dumps(agreed.document)),
         "getDocs": StaticPage("text/html", partial(built_page, DOCS), headers),
         "getProblems": StaticPage("text/html", PROBLEMS.read_bytes, headers),
-        "getViewerCrowd": StaticPage("text/javascript", partial(viewer_script, VIEWER_SCRIPT)),
-        "getViewer": StaticPage(
-            "text/html", partial(built_page, VIEWER), partial(headers, loads_scripts=True)
-        ),
+        "getViewer": StaticPage("text/html", partial(built_page, VIEWER), headers),
     }
 
 
@@ -81,26 +77,13 @@ The contract is at <a href="/openapi.yaml">/openapi.yaml</a>.
 """
 
 
-def viewer_script(path: Path) -> bytes:
-    """Return the script beside the viewer that `make page` has built; one that fails if missing."""
-    try:
-        return path.read_bytes()
-    except FileNotFoundError:
-        return b'throw new Error("not built: run make page");\n'
-
-
-def headers(content: bytes, loads_scripts: bool = False) -> dict[str, str]:
-    """Return the headers of a page, which allow its inline scripts and styles only.
-
-    loads_scripts: whether a page with scripts may load others of its own origin.
-    """
+def headers(content: bytes) -> dict[str, str]:
+    """Return the headers of a page, which allow its inline scripts and styles only."""
     hashes: dict[str, list[str]] = {"script": [], "style": []}
     for tag, text in _INLINE.findall(content):
         digest = b64encode(sha256(text).digest()).decode()
         hashes[tag.decode()].append(f"'sha256-{digest}'")
     script, style = (" ".join(hashes[tag]) or NO_SOURCE for tag in hashes)
-    if loads_scripts and script != NO_SOURCE:
-        script = f"'self' {script}"
     return security_headers.page_headers(script, style)
 
 

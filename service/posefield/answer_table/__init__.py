@@ -1,1 +1,0 @@
-"""Tables of answers, for copies of the page that run without a service."""
