@@ -122,6 +122,11 @@ test-system: $(PAGE) $(DOCS) ## all that starts processes: services, exports, st
 test-all: test test-system ## both rings, the older Blender, and the engines MLServer and Triton
 	$(BIN)/python tests/interop/run.py --others
 
+.PHONY: fuzz
+fuzz: $(PAGE) $(DOCS) ## send requests drawn from the contract for half an hour; SECONDS, SEED
+	POSEFIELD_FUZZ_SECONDS=$(or $(SECONDS),900) POSEFIELD_FUZZ_SEED=$(or $(SEED),$(shell date +%s)) \
+		$(BIN)/python -m pytest -n 2 tests/contract/test_schemathesis.py -k drawn
+
 # Everything installable: both distributions of the workspace as wheels and sdists.
 .PHONY: wheels
 wheels: $(PAGE) $(DOCS) ## build wheels and sdists of posefield and posefield-train in dist

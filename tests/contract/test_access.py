@@ -222,7 +222,9 @@ def test_each_refusal_is_one_line_without_secrets(guarded, as_, issued, caplog):
         as_("reach", "GET", "/v1/models/walk")
         as_("reach", "GET", "/v1/models/anna-from-accounts")
         as_("reach", "GET", "/v1/models/reach")
-    said = [r.getMessage() for r in caplog.records if r.name == "posefield.http.access.audit"]
+    said = [
+        r.getMessage() for r in caplog.records if r.name == "posefield.http.access.access_control"
+    ]
     path = "/v1/models/{model}"
     asked = {"audit": "refused", "method": "GET"}
     assert json.loads(said[0]) == {

@@ -65,17 +65,11 @@ REFUSED = {
     "zero characters": ({"time": []}, 422, "/time"),
     "lengths that differ": ({"heading": [0.0, 1.0]}, 422, "/heading"),
     "a number that is none": ({"time": [0.0, 1e999, 0.0]}, 400, "/time/1"),
-    "a word for a number": ({"time": [0.0, "x", 0.0]}, 400, "/time/1"),
-    "a time after the clip": ({"time": [0.0, 0.0, 99.0]}, 422, "/time/2"),
     "an unknown level": ({"level": [0, 0, 9]}, 422, "/level/2"),
     "a level in parts": ({"level": [0, 0.5, 0]}, 400, "/level/1"),
     "an unknown performer": ({"performer": ["tall", "tall", "nobody"]}, 422, "/performer/2"),
-    "no field of view": ({"level": "auto", "camera": {**CAMERA, "fov": 0}}, 422, "/camera/fov"),
-    "half a turn of view": ({"level": "auto", "camera": HALF_TURN}, 422, "/camera/fov"),
     "no camera": ({"level": "auto"}, 422, "/camera"),
-    "a camera for nothing": ({"camera": CAMERA}, 422, "/camera"),
     "a share beyond the whole": ({"from_level": [0, 0, 0], "blend": [0, 0, 2]}, 400, "/blend/2"),
-    "a share of nothing": ({"blend": 0.5}, 422, "/blend"),
 }
 
 
@@ -149,9 +143,8 @@ def test_what_a_crowd_takes_is_counted_before_it_is_made(loaded, query):
         ("count=100000&motions=2000&seconds=1", "expected at most 268.4 MB"),
     ],
 )
-@pytest.mark.parametrize("ending", ["usda", "usdc", "usdz"])
-def test_a_crowd_that_takes_too_much_memory_is_refused(ask, ending, query, expected):
-    answer = ask("GET", f"{WALK}.{ending}?{query}")
+def test_a_crowd_that_takes_too_much_memory_is_refused(ask, query, expected):
+    answer = ask("GET", f"{WALK}.usdc?{query}")
     assert answer.status_code == 422, answer.status_code
     assert expected in answer.json()["detail"]
 
@@ -173,8 +166,10 @@ def skeletons(path):
     return stage, [UsdSkel.Skeleton(prim) for prim in inside if prim.IsA(UsdSkel.Skeleton)]
 
 
-@pytest.mark.parametrize("instancing", ["references", "scenegraph", "flatten"])
-@pytest.mark.parametrize("ending", ["usda", "usdc", "usdz"])
+@pytest.mark.parametrize(
+    ("ending", "instancing"),
+    [("usda", "references"), ("usdc", "scenegraph"), ("usdc", "flatten"), ("usdz", "references")],
+)
 def test_a_walk_opens_and_everybody_moves(ask, tmp_path, ending, instancing):
     answer = ask("GET", f"{WALK}.{ending}?count=4&seconds=0.5&instancing={instancing}")
     assert answer.status_code == 200
@@ -248,31 +243,14 @@ def test_shared_motions_are_sent_once(ask):
     ("query", "status", "parameter"),
     [
         ("label=performer=bob", 422, "label"),
-        ("label=mood=glad", 422, "label"),
-        ("label=performer=ann:0.8,ben:0.8", 422, "label"),
         ("label=ann", 400, "label"),
-        ("label=performer=ann&label=performer=ben", 400, "label"),
-        ("count=0", 422, "count"),
-        ("count=x", 400, "count"),
         ("count=5&motions=6", 422, "motions"),
         ("motions=2&camera=30,2,0", 422, "motions"),
-        ("seconds=0", 422, "seconds"),
-        ("fps=0.5", 422, "fps"),
-        ("level=9", 422, "level"),
-        ("level=1&camera=90,2,0", 422, "level"),
         ("camera=1e7,0,0", 422, "camera"),
-        ("camera=1,2", 400, "camera"),
-        ("camera=1,2,x", 400, "camera"),
-        ("camera=90,2,0&fov=0", 422, "fov"),
-        ("camera=90,2,0&pixels=-1", 422, "pixels"),
         ("pixels=2", 422, "pixels"),
         ("instancing=clones", 400, "instancing"),
-        ("feet=still", 400, "feet"),
         ("feet=stand&fps=10", 422, "feet"),
-        ("take=own", 400, "take"),
         ("take=-1", 400, "take"),
-        ("take=7&variety=1.5", 422, "variety"),
-        ("detail=yes", 400, "detail"),
     ],
 )
 def test_a_walk_that_cannot_be_is_refused_before_it_begins(ask, query, status, parameter):

@@ -7,7 +7,6 @@ import pytest
 from bad_scripts import ABSENT, REFUSED, UNREADABLE
 
 from posefield.encode import performance_files
-from posefield.encode.formats import CLIP_ENCODERS
 
 ADDRESS = "/v1/performances.json"
 JSON = {"content-type": "application/json"}
@@ -19,18 +18,18 @@ def assert_problem(answer, status):
     return answer.json()
 
 
-@pytest.mark.parametrize("name", UNREADABLE | REFUSED)
-def test_a_bad_script_is_a_problem_with_a_pointer(ask, name):
-    document, pointer, words = (UNREADABLE | REFUSED)[name]
-    found = assert_problem(ask("POST", ADDRESS, json=document), 400 if name in UNREADABLE else 422)
+# One of each kind: all of them are tried in process.
+@pytest.mark.parametrize(("scripts", "status"), [(UNREADABLE, 400), (REFUSED, 422)])
+def test_a_bad_script_is_a_problem_with_a_pointer(ask, scripts, status):
+    document, pointer, words = next(iter(scripts.values()))
+    found = assert_problem(ask("POST", ADDRESS, json=document), status)
     assert [own["pointer"] for own in found["errors"]] == [pointer]
     assert words in found["errors"][0]["detail"]
     assert len(found["detail"]) < 1000
 
 
-@pytest.mark.parametrize("name", ABSENT)
-def test_an_absent_model_is_not_found(ask, name):
-    document, pointer = ABSENT[name]
+def test_an_absent_model_is_not_found(ask):
+    document, pointer = next(iter(ABSENT.values()))
     found = assert_problem(ask("POST", ADDRESS, json=document), 404)
     assert [own["pointer"] for own in found["errors"]] == [pointer]
     assert "there are reach@" in found["errors"][0]["detail"]
@@ -70,9 +69,8 @@ def test_a_format_that_does_not_carry_a_convention_refuses_it(ask, form, field, 
     ],
     ids=["2 MB", "deep", "NaN", "1e999", "empty", "not UTF-8"],
 )
-@pytest.mark.parametrize("plan", ["", "?plan=true"])
-def test_a_body_that_is_no_script_is_a_problem(ask, content, status, plan):
-    found = assert_problem(ask("POST", ADDRESS + plan, content=content, headers=JSON), status)
+def test_a_body_that_is_no_script_is_a_problem(ask, content, status):
+    found = assert_problem(ask("POST", ADDRESS, content=content, headers=JSON), status)
     assert found["detail"]
 
 
@@ -95,7 +93,7 @@ def test_segments_are_a_layout_of_usd(ask):
         assert whole.content == ask("POST", f"/v1/performances.{form}", json=script).content
 
 
-@pytest.mark.parametrize("form", sorted(set(CLIP_ENCODERS) - set(performance_files.SEGMENTED)))
+@pytest.mark.parametrize("form", ["bvh"])
 def test_other_formats_refuse_a_layout(ask, form):
     script = bad_scripts.walk()
     answer = ask("POST", f"/v1/performances.{form}?layout=segments", json=script)

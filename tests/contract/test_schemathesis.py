@@ -1,6 +1,7 @@
 """Fuzzing with requests drawn from the contract, valid and invalid, by Schemathesis."""
 
 import copy
+import os
 from collections import Counter
 from urllib.parse import urlsplit
 
@@ -24,15 +25,24 @@ from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
 from posefield.registry.model_registry import ModelRegistry
 
-SEED = 1
+# `make fuzz` draws for longer, from another seed.
+SEED = int(os.environ.get("POSEFIELD_FUZZ_SEED", "1"))
+DETERMINISTIC = "POSEFIELD_FUZZ_SEED" not in os.environ
+SECONDS = int(os.environ.get("POSEFIELD_FUZZ_SECONDS", "30"))
+"""Budget of each of the two runs that draw requests, s."""
 
 HOST = "testserver"
 # The phases of a run, and how many requests each of them sends at least.
+EXAMPLES = {"examples": 20}
 LISTED = {"examples": 20, "coverage": 500}
-DRAWN = {"fuzzing": 500, "stateful": 10}
+DRAWN = {"fuzzing": 10, "stateful": 1}
 RINGS = pytest.mark.parametrize(
     "phases",
-    [pytest.param(LISTED, id="listed"), pytest.param(DRAWN, id="drawn", marks=pytest.mark.system)],
+    [
+        pytest.param(EXAMPLES, id="examples"),
+        pytest.param(LISTED, id="listed", marks=pytest.mark.system),
+        pytest.param(DRAWN, id="drawn", marks=pytest.mark.system),
+    ],
 )
 
 
@@ -54,7 +64,7 @@ def test_every_answer_keeps_the_contract(spec, app, phases):
     with_one_way(aimed)
     with_one_label(aimed)
     with_crowds_apart(aimed)
-    found, calls, asked = run(aimed, app, accepted, list(GenerationMode), phases, examples=40)
+    found, calls, asked = run(aimed, app, accepted, list(GenerationMode), phases)
     assert found == []
     assert_enough(calls, phases)
     if phases is LISTED:
@@ -70,9 +80,7 @@ def test_every_right_question_to_this_model_is_answered(spec, loaded, phases):
     narrow = narrowed(spec, own.card)
     with_few_tags(narrow)
     accepted = Acceptance(expected_statuses=["2xx", "304", "414"])
-    found, calls, asked = run(
-        narrow, alone, accepted, [GenerationMode.POSITIVE], phases, examples=40
-    )
+    found, calls, asked = run(narrow, alone, accepted, [GenerationMode.POSITIVE], phases)
     assert found == []
     assert_enough(calls, phases)
     if phases is LISTED:
@@ -84,7 +92,7 @@ def test_a_contract_that_the_service_breaks_is_found_out(spec, app):
     broken = copy.deepcopy({**spec, "paths": {"/livez": spec["paths"]["/livez"]}})
     broken["components"]["schemas"]["Liveness"]["properties"]["status"]["const"] = "dead"
     every = Acceptance(enabled=False)
-    found, _, _ = run(broken, app, every, list(GenerationMode), LISTED, examples=1)
+    found, _, _ = run(broken, app, every, list(GenerationMode), LISTED)
     assert any("Response violates schema" in line for line in found)
 
 
@@ -146,21 +154,27 @@ def with_crowds_apart(spec):
     paths[path.replace("{format}", "{form}")] = {"parameters": given, "get": walk}
 
 
-def run(spec, app, accepted, modes, phases, examples):
+def run(spec, app, accepted, modes, phases):
     """Failures that the phases find, one line each, requests of each phase, and method, path and
     status of the requests."""
-    generation = GenerationConfig(modes=modes, max_examples=examples, deterministic=True)
+    # The budget ends a run that draws, however many examples are left.
+    examples = 40 * max(1, SECONDS // 30)
+    generation = GenerationConfig(modes=modes, max_examples=examples, deterministic=DETERMINISTIC)
     checks = ChecksConfig(positive_data_acceptance=accepted)
     # A list that is too long may be a body that is too long.
     checks.negative_data_rejection.expected_statuses += ["413", "414"]
     project = ProjectConfig(generation=generation, checks=checks, continue_on_failure=True)
-    fewer = GenerationConfig(modes=modes, max_examples=max(1, examples // 8), deterministic=True)
+    fewer = GenerationConfig(modes=modes, max_examples=examples // 8, deterministic=DETERMINISTIC)
     project.phases.stateful = StatefulPhaseConfig(generation=fewer, max_steps=4)
     # It takes one operation's format for another's, as both parameters have one name.
     project.phases.stateful.inference.algorithms.remove(InferenceAlgorithm.DEPENDENCY_ANALYSIS)
     project.phases.update(phases=list(phases))
     project.phases.coverage.generate_duplicate_query_parameters = True
-    config = schemathesis.Config(seed=SEED, projects=ProjectsConfig(default=project))
+    config = schemathesis.Config(
+        seed=SEED,
+        max_time=SECONDS if phases is DRAWN else None,
+        projects=ProjectsConfig(default=project),
+    )
     schema = schemathesis.openapi.from_dict(copy.deepcopy(spec), config=config)
     schema.app = app
     found, calls, asked = [], Counter(), set()

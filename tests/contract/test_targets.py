@@ -24,25 +24,15 @@ WORDS = "RightHand@end:-0.2,1.1,0.49"
 # Words of a query, status, problem, parameter at fault, words of the detail
 IN_QUERY = [
     ("target", "RightHand", 400, "bad-parameter", "target", "expected JOINT@MOMENT:X,Y,Z, m"),
-    ("target", "@end:0,1,0", 400, "bad-parameter", "target", "expected JOINT@MOMENT:X,Y,Z"),
-    ("target", "RightHand@soon:0,1,0", 400, "bad-parameter", "target", "seconds or one of start"),
-    ("target", "RightHand@nan:0,1,0", 400, "bad-parameter", "target", "seconds or one of start"),
-    ("target", "RightHand@end:0,1", 400, "bad-parameter", "target", "expected JOINT@MOMENT:X,Y,Z"),
     ("target", "RightHand@end:0,NaN,0", 400, "bad-parameter", "target", "expected JOINT@MOMENT"),
-    ("target", "RightHand@end:0,1e400,0", 400, "bad-parameter", "target", "expected JOINT@MOMENT"),
-    ("target", "RightHand@end:0,101,0", 422, "invalid-field", "target", "expected -100 to 100 m"),
     ("target", "Tail@end:0,1,0", 422, "invalid-field", "target", "'Tail', expected one of Hips"),
-    ("target", "RightHand@-1:0,1,0", 422, "invalid-field", "target", "-1 s, expected 0 to"),
     ("target", "RightHand@1.6:0,1,0", 422, "invalid-field", "target", "1.6 s, expected 0 to 1.3"),
     ("exact", "", 400, "bad-parameter", "exact", "expected auto, none or names of controls"),
-    ("exact", "turn,", 400, "bad-parameter", "exact", "expected auto, none or names of controls"),
-    ("exact", "spin", 422, "invalid-field", "exact", "expected controls of this model: stature"),
     ("exact", "turn", 422, "invalid-field", "exact", "not measured on a motion, expected some of:"),
 ]
 
 # Fields of a body, status, problem, place at fault, words of the detail
 IN_BODY = [
-    ({"targets": {}}, 400, "bad-body", "/targets", "Expected `array`"),
     ({"targets": [{**AT_END, "time": 0}]}, 400, "bad-body", "/targets/0", "time and at"),
     (
         {"targets": [AT_END, {"joint": "Hips", "position": [0, 1, 0]}]},
@@ -51,10 +41,7 @@ IN_BODY = [
         "/targets/1",
         "neither time nor at, expected one",
     ),
-    ({"targets": [{**AT_END, "at": "soon"}]}, 400, "bad-body", "/targets/0/at", "'soon'"),
     ({"targets": [{**AT_END, "frame": 1}]}, 400, "bad-body", "/targets/0/frame", "unknown field"),
-    ({"targets": [{**AT_END, "joint": 27}]}, 400, "bad-body", "/targets/0/joint", "Expected `str`"),
-    ({"targets": [{**AT_END, "position": [0, 1]}]}, 400, "bad-body", "/targets/0/position", "ngth"),
     (
         {"targets": [{**AT_END, "position": [0, "1", 0]}]},
         400,
@@ -70,31 +57,13 @@ IN_BODY = [
         "expected one of Hips, LeftUpLeg",
     ),
     (
-        {"targets": [{**AT_END, "position": [0, 0, -200]}]},
-        422,
-        "invalid-field",
-        "/targets/0/position/2",
-        "-200 m, expected -100 to 100 m",
-    ),
-    (
-        {"targets": [{**EARLY, "time": -1}]},
-        422,
-        "invalid-field",
-        "/targets/0/time",
-        "expected 0 to",
-    ),
-    ({"targets": [{**EARLY, "time": 1.6}]}, 422, "invalid-field", "/targets/0/time", "to 1.3"),
-    (
         {"targets": [EARLY, AT_END, {**EARLY, "position": [0, 0, 0]}]},
         422,
         "invalid-field",
         "/targets/2",
         "RightHand at 0.4 s has a target already (targets/0), expected one",
     ),
-    ({"targets": [AT_END] * 33}, 422, "invalid-field", "/targets", "more than 32"),
-    ({"exact": "turn"}, 400, "bad-body", "/exact", "Invalid enum value 'turn'"),
     ({"exact": []}, 400, "bad-body", "/exact", "length >= 1"),
-    ({"exact": ["spin"]}, 422, "invalid-field", "/exact", "expected controls of this model"),
     ({"exact": ["turn"]}, 422, "invalid-field", "/exact", "'turn' is not measured on a motion"),
 ]
 
@@ -113,10 +82,8 @@ def problem(answer):
 
 
 @pytest.mark.parametrize(("name", "words", "status", "kind", "place", "said"), IN_QUERY)
-@pytest.mark.parametrize("path", ["clip.usda", "pose"])
-def test_bad_words_are_refused(ask, path, name, words, status, kind, place, said):
-    times = {"time": 0} if path == "pose" else {}
-    found = problem(ask("GET", query(path, **{name: words}, **times)))
+def test_bad_words_are_refused(ask, name, words, status, kind, place, said):
+    found = problem(ask("GET", query("clip.usda", **{name: words})))
     assert found[:3] == (status, kind, place)
     assert said in found[3]
 
@@ -134,7 +101,7 @@ def test_bad_feet_are_refused(ask):
 
 
 @pytest.mark.parametrize(("fields", "status", "kind", "place", "said"), IN_BODY)
-@pytest.mark.parametrize("path", ["clip.bvh", "pose", "clips"])
+@pytest.mark.parametrize("path", ["pose", "clips"])
 def test_bad_fields_are_refused(ask, path, fields, status, kind, place, said):
     body = {"controls": CONTROLS, **fields}
     if path == "pose":

@@ -10,7 +10,7 @@ import yaml
 
 import posefield
 from posefield.common.errors import InvalidField
-from posefield.http.access import access_policy, api_keys
+from posefield.http.access import access_control, api_keys
 from posefield.http.api import contract, settings
 from posefield.http.api.problems import RequestError
 from posefield.http.api.settings import PREFIX, Settings
@@ -160,12 +160,12 @@ def test_it_starts_with_these_settings_and_not_without_keys(container, tmp_path)
     assert given["POSEFIELD_KEYS_FILE"] == "/keys/keys"
     given["POSEFIELD_KEYS_FILE"] = str(mounted)
     own = settings.read_settings(environ=given)
-    access_policy.check_exposure(own, access_policy.from_settings(own))
+    access_control.from_settings(own)
     # Negative control.
     del given["POSEFIELD_KEYS_FILE"]
     open_to_all = settings.read_settings(environ=given)
     with pytest.raises(InvalidField, match="POSEFIELD_KEYS_FILE"):
-        access_policy.check_exposure(open_to_all, access_policy.from_settings(open_to_all))
+        access_control.from_settings(open_to_all)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.common.errors import UnknownFormat
 from posefield.common.name_suggestion import did_you_mean
 from posefield.http import request_cycle
-from posefield.http.access import access_policy
+from posefield.http.access import access_control
 from posefield.http.api import contract, problems
 from posefield.http.api.contract import Contract, Operation
 from posefield.http.api.problems import RequestError
@@ -69,8 +69,7 @@ def build_app(
     """
     _check_complete({operation.id for operation in agreed.operations}, set(handlers))
     readiness = Readiness(FixedRegistry(models)) if isinstance(models, ModelRegistry) else models
-    rules = access_policy.from_settings(settings)
-    access_policy.check_exposure(settings, rules)
+    rules = access_control.from_settings(settings)
     origins = cors.parse_origins(settings.origins, f"{PREFIX}ORIGINS")
     service = Service(
         readiness,

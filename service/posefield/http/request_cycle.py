@@ -22,8 +22,8 @@ from starlette.types import Message, Receive, Scope, Send
 from posefield.common.errors import QueryError
 from posefield.common.name_suggestion import did_you_mean
 from posefield.http.access import access_control
-from posefield.http.access.audit import AuditedRequest
-from posefield.http.access.principal import EVERYONE
+from posefield.http.access.access_control import AuditedRequest
+from posefield.http.access.api_keys import EVERYONE
 from posefield.http.api import problems
 from posefield.http.api.contract import Operation
 from posefield.http.api.problems import METHOD_NOT_ALLOWED, OVERLOADED, RequestError

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from posefield.characters.character_folder import EMPTY, CharacterFolder
-from posefield.http.access.access_policy import AccessPolicy
+from posefield.http.access.access_control import AccessPolicy
 from posefield.http.api.settings import Settings
 from posefield.http.concurrency.clip_batching import ClipBatcher
 from posefield.http.concurrency.pose_batching import PoseBatcher

@@ -1,4 +1,4 @@
-"""API keys: generation, and verification by their SHA-256 hashes.
+"""API keys and scopes: which models a client may read.
 
 A key is 256 random bits, so one SHA-256 suffices: slow password hashes protect against guessing,
 which is infeasible here.
@@ -9,36 +9,72 @@ import hashlib
 import hmac
 import re
 import secrets
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from posefield.common.errors import InvalidField
-from posefield.http.access import principal
-from posefield.http.access.principal import Principal
+from posefield.registry.model_loading import NAME
 
 KEY_PREFIX = "pf_"
 """Prefix of every key, by which secret scanners recognise a published one."""
-
+READ = "read"
+METRICS = "metrics"
+_ALL = f"{READ}:*"
 _NAME = re.compile(r"[A-Za-z0-9._-]{1,64}")
 _DIGEST = re.compile(r"[0-9a-f]{64}")
 
 
-@dataclass(frozen=True)
-class RegisteredKey:
-    """A registered key: its SHA-256 digest and its principal."""
+class InvalidCredentials(Exception):
+    """Error of invalid credentials; the message gives the reason and quotes no credentials."""
 
-    digest: bytes
-    principal: Principal
+
+@dataclass(frozen=True)
+class Principal:
+    """A client and its permissions.
+
+    name: in logs. models: names of the models it may read, None for all. metrics: it may read the
+    metrics.
+    """
+
+    name: str
+    models: frozenset[str] | None
+    metrics: bool
+
+    def may_read(self, model: str) -> bool:
+        """Return True if the principal may read the model of that name."""
+        return self.models is None or model in self.models
+
+    def may(self, scope: str) -> bool:
+        """Return True if the principal has the scope, READ (for at least one model) or METRICS."""
+        return self.metrics if scope == METRICS else self.models is None or bool(self.models)
+
+
+EVERYONE = Principal("everyone", None, True)
+"""Principal of every request to a service without keys and tokens."""
+NO_ACCESS = Principal("nobody", frozenset(), False)
+"""Principal of a request without credentials."""
+
+
+def from_scopes(name: str, scopes: Iterable[str]) -> Principal:
+    """Return the principal of scopes `read:*`, `read:MODEL` and `metrics`; ignore others."""
+    given = frozenset(scopes)
+    models = frozenset(s.removeprefix(f"{READ}:") for s in given if s.startswith(f"{READ}:"))
+    return Principal(name, None if _ALL in given else models, METRICS in given)
+
+
+def _is_scope(text: str) -> bool:
+    kind, _, model = text.partition(":")
+    return text in (METRICS, _ALL) or (kind == READ and NAME.fullmatch(model) is not None)
 
 
 @dataclass(frozen=True)
 class ApiKeys:
     """Registered keys.
 
-    known: by the first 8 bytes of their digests.
+    known: their digests and principals, by the first 8 bytes of the digest.
     """
 
-    known: Mapping[bytes, RegisteredKey]
+    known: Mapping[bytes, tuple[bytes, Principal]]
 
     def find(self, key: str) -> Principal | None:
         """Return the principal of a key; None for an unknown key.
@@ -47,10 +83,8 @@ class ApiKeys:
         which no key follows, and the whole digest is compared in constant time.
         """
         digest = hashlib.sha256(key.encode()).digest()
-        known = self.known.get(digest[:8])
-        if known is None or not hmac.compare_digest(known.digest, digest):
-            return None
-        return known.principal
+        registered, principal = self.known.get(digest[:8], (b"", None))
+        return principal if hmac.compare_digest(registered, digest) else None
 
 
 def generate_key() -> str:
@@ -76,24 +110,20 @@ def parse_keys(text: str, field: str) -> ApiKeys:
     field: name of the source in messages. Raises InvalidField for an invalid line and for two keys
     of one name; the message gives the line's number and quotes at most the key's name.
     """
-    known: dict[bytes, RegisteredKey] = {}
+    known: dict[bytes, tuple[bytes, Principal]] = {}
     names: set[str] = set()
-    for where, words in _lines(text, field):
-        key = _parse_line(words, where)
-        if key.principal.name in names:
-            raise InvalidField(where, f"a second key named {key.principal.name!r}")
-        names.add(key.principal.name)
-        known[key.digest[:8]] = key
+    for number, words in enumerate(re.split(r"[\n;]", text), start=1):
+        if not words.partition("#")[0].strip():
+            continue
+        digest, principal = _parse_line(words.partition("#")[0], f"{field}:{number}")
+        if principal.name in names:
+            raise InvalidField(f"{field}:{number}", f"a second key named {principal.name!r}")
+        names.add(principal.name)
+        known[digest[:8]] = digest, principal
     return ApiKeys(known)
 
 
-def _lines(text: str, field: str) -> Iterator[tuple[str, str]]:
-    for number, line in enumerate(re.split(r"[\n;]", text), start=1):
-        if words := line.partition("#")[0].strip():
-            yield f"{field}:{number}", words
-
-
-def _parse_line(text: str, where: str) -> RegisteredKey:
+def _parse_line(text: str, where: str) -> tuple[bytes, Principal]:
     # Messages do not quote the digest: an operator may have put the key itself in its place.
     name, digest, *scopes = (*text.split(), "", "")
     scopes = list(filter(None, scopes))
@@ -101,8 +131,8 @@ def _parse_line(text: str, where: str) -> RegisteredKey:
         raise InvalidField(where, f"its name, expected {_NAME.pattern}")
     if not _DIGEST.fullmatch(digest):
         raise InvalidField(where, f"the hash of {name!r}, expected 64 lower-case hex digits")
-    if not scopes or not all(principal.is_scope(scope) for scope in scopes):
+    if not scopes or not all(map(_is_scope, scopes)):
         raise InvalidField(
             where, f"the scopes of {name!r}, expected some of read:*, read:MODEL, metrics"
         )
-    return RegisteredKey(bytes.fromhex(digest), principal.from_scopes(name, scopes))
+    return bytes.fromhex(digest), from_scopes(name, scopes)

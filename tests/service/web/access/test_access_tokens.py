@@ -16,10 +16,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posefield.common.errors import FileError
-from posefield.http.access import access_policy
-from posefield.http.access.bearer_tokens import LATEST_TIME, TokenVerifier
-from posefield.http.access.principal import InvalidCredentials
-from posefield.http.access.token_keys import KeySet
+from posefield.http.access import access_control
+from posefield.http.access.api_keys import InvalidCredentials
+from posefield.http.access.bearer_tokens import LATEST_TIME, KeySet, TokenVerifier
 from posefield.http.api.settings import Settings
 
 UNREADABLE = "not a token that can be verified"
@@ -103,33 +102,20 @@ def test_the_log_gets_a_pseudonym_that_stays(checker, token):
         ({"iss": None}, "without one of exp, iss, aud"),
         ({"aud": None}, "without one of exp, iss, aud"),
         ({"exp": "soon"}, UNREADABLE),
-        ({"exp": 1e999}, UNREADABLE),
         ({"exp": float("nan")}, UNREADABLE),
         ({"exp": 10**400}, UNREADABLE),
-        ({"exp": 10**4200}, UNREADABLE),
         ({"exp": LATEST_TIME + 1}, UNREADABLE),
         ({"exp": str(LATEST_TIME)}, UNREADABLE),
-        ({"exp": "1" + 400 * "0"}, UNREADABLE),
-        ({"exp": [LATEST_TIME]}, UNREADABLE),
-        ({"exp": {}}, UNREADABLE),
         ({"exp": True}, "expired"),
-        ({"exp": -(10**400)}, "expired"),
         ({"nbf": 10**400}, "not valid yet"),
-        ({"nbf": 1e999}, UNREADABLE),
         ({"nbf": float("nan")}, UNREADABLE),
-        ({"nbf": []}, UNREADABLE),
-        ({"iat": 10**400}, "not valid yet"),
-        ({"iat": 1e999}, UNREADABLE),
         ({"iat": {}}, UNREADABLE),
         ({"sub": "\ud800"}, UNREADABLE),
-        ({"sub": 7}, UNREADABLE),
         ({"aud": {"posefield": 1}}, "meant for another audience"),
-        ({"aud": ["posefield", 10**400]}, "meant for another audience"),
         ({"jti": 10**400}, UNREADABLE),
         ({"kid": "two"}, "signed by a key that is not known"),
         ({"kid": "two", "headers": {"kid": "one"}}, "its signature is wrong"),
         ({"algorithm": "RS512"}, "signed by another algorithm"),
-        ({"algorithm": "PS256"}, "signed by another algorithm"),
         ({"headers": {"crit": ["exp"]}}, UNREADABLE),
     ],
 )
@@ -229,27 +215,6 @@ def test_without_an_id_the_only_key_is_meant(checker, pairs):
     assert checker.find(jwt.encode(claims, pairs["one"][0], "RS256"))
     with pytest.raises(InvalidCredentials):
         checker.find(jwt.encode(claims, pairs["two"][0], "RS256"))
-
-
-def test_a_token_is_kept_and_only_until_it_ends(checker, token):
-    given = token(exp=time.time() + 1)
-    assert checker.find(given) is checker.find(given)
-    time.sleep(1.1)
-    with pytest.raises(InvalidCredentials, match="expired"):
-        checker.find(given)
-
-
-def test_no_more_tokens_are_kept_than_said(source, token):
-    checker = TokenVerifier(SETTINGS, KeySet(str(source), "RS256"), most=2)
-    first, second, third = (token(jti=str(index)) for index in range(3))
-    found = {given: checker.find(given) for given in (first, second)}
-    with pytest.raises(InvalidCredentials):
-        checker.find("rubbish")
-    assert checker.find(first) is found[first]
-    checker.find(third)
-    # The second is the one that was used longest ago.
-    assert checker.find(first) is found[first]
-    assert checker.find(second) is not found[second]
 
 
 def test_a_key_that_goes_takes_its_tokens_with_it(checker, token, source, pairs):
@@ -429,4 +394,4 @@ def test_what_is_no_key_set_is_refused(content, tmp_path):
 
 
 def test_only_public_algorithms_can_be_chosen():
-    assert not any(name.startswith("HS") or name == "none" for name in access_policy.ALGORITHMS)
+    assert not any(name.startswith("HS") or name == "none" for name in access_control.ALGORITHMS)
