@@ -6,7 +6,7 @@ import numpy as np
 import orjson
 import pytest
 
-from posefield.agents.toolbox import Toolbox
+from posefield.mcp import Toolbox
 from posefield.motion import skeleton
 from posefield.registry import shipped_models
 from posefield_train import train

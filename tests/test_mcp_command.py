@@ -10,7 +10,7 @@ import pytest
 from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
 
-from posefield.agents import contract_schema
+from posefield.http.api import contract
 
 pytestmark = pytest.mark.system
 
@@ -39,7 +39,7 @@ def test_tools_are_listed_with_the_schemas_of_the_contract(with_client):
 
     found = {tool.name: tool for tool in with_client(talk).tools}
     assert list(found) == ["list_models", "plan_performance", "perform"]
-    script = contract_schema.schema("PerformanceQuestion")
+    script = contract.schema("PerformanceQuestion")
     assert found["plan_performance"].input_schema["properties"] == {"script": script}
     assert set(found["perform"].input_schema["required"]) == {"script", "file"}
     assert [tool.annotations.read_only_hint for tool in found.values()] == [True, True, False]
@@ -87,7 +87,7 @@ def test_nothing_but_messages_is_written_to_standard_output(models):
 
 def test_the_schema_of_scripts_is_printed(posefield):
     code, said, _ = posefield("mcp", "--schema")
-    assert code == 0 and json.loads(said) == contract_schema.script_schema()
+    assert code == 0 and json.loads(said) == contract.script_schema()
 
 
 def test_a_folder_that_is_not_there_is_named(posefield, tmp_path):

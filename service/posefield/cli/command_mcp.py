@@ -31,15 +31,14 @@ def mcp(
     They list models, plan performances and write them to files. The protocol is the Model Context
     Protocol (MCP).
     """
-    from posefield.agents import contract_schema
+    from posefield.http.api import contract
 
     if schema:
-        typer.echo(as_json(contract_schema.script_schema()))
+        typer.echo(as_json(contract.script_schema()))
         return
     # Imported here because mcp is an optional extra.
-    from posefield.agents import mcp_server
-    from posefield.agents.toolbox import Toolbox
+    from posefield import mcp as server
 
     if not output.is_dir():
         raise FileError(output, "no folder, expected one to write files to")
-    mcp_server.serve(Toolbox(shipped_models.with_shipped(places or ()), output.resolve()))
+    server.serve(server.Toolbox(shipped_models.with_shipped(places or ()), output.resolve()))

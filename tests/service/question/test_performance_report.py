@@ -2,11 +2,11 @@
 
 import jsonschema
 
-from posefield.agents import contract_schema
+from posefield.http.api import contract
 from posefield.question.performance_report import PerformanceReport, SegmentReport
 from posefield.question.results import FeetResult
 
-CHECK = jsonschema.Draft202012Validator(contract_schema.schema("PerformanceReport"))
+CHECK = jsonschema.Draft202012Validator(contract.schema("PerformanceReport"))
 
 
 def reported(feet):

@@ -2,13 +2,18 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 MEDIA_TYPE = "application/yaml"
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+PARTS = ("items", "additionalProperties", "not")
+"""Keywords whose value may be a schema."""
+LISTS = ("oneOf", "anyOf", "allOf")
+"""Keywords whose value is a list of schemas."""
 METHODS = ("get", "put", "post", "delete", "options", "head", "patch", "trace")
 
 
@@ -129,3 +134,35 @@ def resolve(document: Mapping[str, Any], node: Mapping[str, Any]) -> Mapping[str
         for part in target.removeprefix("#/").split("/"):
             found = found[part]
     return found  # type: ignore[no-any-return]
+
+
+def script_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scripts of performances, for files that contain one."""
+    return {"$schema": DIALECT, "title": "Script of a performance", **schema("PerformanceQuestion")}
+
+
+@cache
+def schema(name: str) -> dict[str, Any]:
+    """Return the JSON Schema of an object of the contract, with its parts in place of references.
+
+    Raises KeyError for a name that the contract does not have.
+    """
+    document = load_contract().document
+    return _standalone(document, document["components"]["schemas"][name])
+
+
+def _standalone(document: Mapping[str, Any], node: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a node without references, and without keywords that only OpenAPI has."""
+    schema: dict[str, Any] = {}
+    for key, value in resolve(document, node).items():
+        if key == "example":
+            schema["examples"] = [value]
+        elif key == "properties":
+            schema[key] = {name: _standalone(document, part) for name, part in value.items()}
+        elif key in LISTS:
+            schema[key] = [_standalone(document, part) for part in value]
+        elif key in PARTS and isinstance(value, Mapping):
+            schema[key] = _standalone(document, value)
+        elif key != "discriminator":
+            schema[key] = value
+    return schema

@@ -5,8 +5,8 @@ import json
 import jsonschema
 import pytest
 
-from posefield.agents.toolbox import Toolbox
 from posefield.common.errors import FileError, InvalidField, QueryError, UnknownModel
+from posefield.mcp import Toolbox
 from posefield.registry import model_registry
 
 WALKS = {

@@ -8,14 +8,13 @@ import jsonschema
 import msgspec
 import pytest
 
-from posefield.agents import contract_schema
 from posefield.common.errors import QueryError
 from posefield.http.api import contract
 from posefield.question import json_decoding
 from posefield.question.performance_question import PerformanceQuestion
 
-SCRIPTS = sorted((Path(__file__).parents[3] / "docs/scripts").glob("*.json"))
-SCHEMA = contract_schema.script_schema()
+SCRIPTS = sorted((Path(__file__).parents[2] / "docs/scripts").glob("*.json"))
+SCHEMA = contract.script_schema()
 CHECK = jsonschema.Draft202012Validator(SCHEMA)
 WALK = {"kind": "walk", "model": "walk"}
 WRONG = {
@@ -82,4 +81,4 @@ def test_schema_and_type_agree(name):
 
 def test_an_unknown_object_is_an_error():
     with pytest.raises(KeyError):
-        contract_schema.schema("Performer-ance")
+        contract.schema("Performer-ance")

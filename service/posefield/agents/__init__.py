@@ -1,1 +1,0 @@
-"""Server for agents: tools to look at models and to plan and write performances, over MCP."""
