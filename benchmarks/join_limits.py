@@ -23,7 +23,7 @@ from posefield.performance.joins import blends, cut_search, join_quality
 from posefield.performance.joins.blends import Blend
 from posefield.performance.passages.passage import RATE, Passage
 from posefield_train.graph import trained_card
-from posefield_train.source import ingest, recipe, shipped_recipes
+from posefield_train.source import data_folder, ingest, recipe
 from posefield_train.source.ingest import Example
 
 FACTORS = (1.5, 2.0, 2.5, 3.0, 4.0)
@@ -110,7 +110,7 @@ def family_peaks(path: Path, data: Path) -> tuple[float, Peaks]:
 
 def rows(data: Path) -> Iterator[Row]:
     """Yield the shares that each limit flags, by family."""
-    for path in sorted(Path(shipped_recipes.__file__).parents[1].glob("recipes/*.toml")):
+    for path in sorted(Path(data_folder.__file__).parents[1].glob("recipes/*.toml")):
         p99, found = family_peaks(path, data)
         sizes = f"{len(found.captured)} parts, {len(found.blended)} joins, p99 {p99:.3g} m/s²"
         for factor in FACTORS:

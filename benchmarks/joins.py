@@ -27,8 +27,7 @@ from posefield.performance.joins.cut_search import Cut
 from posefield.performance.joins.join_quality import JoinFacts, UsualMotion
 from posefield.performance.passages.passage import RATE, Passage
 from posefield_train.graph import trained_card
-from posefield_train.source import clip_table, ingest, recipe, shipped_recipes
-from posefield_train.source.canonical import half_turns
+from posefield_train.source import canonical, clip_table, data_folder, ingest, recipe
 
 ROOT = Path(__file__).resolve().parents[1]
 AFTER, LEAST = 1.2, 0.6
@@ -80,7 +79,7 @@ class Join:
 
 def takes(name: str, data: Path) -> list[Take]:
     """Return the takes of a recipe whose files go on beyond the clips."""
-    path = next(Path(shipped_recipes.__file__).parents[1].glob(f"recipes/{name}.toml"))
+    path = next(Path(data_folder.__file__).parents[1].glob(f"recipes/{name}.toml"))
     own = recipe.read(path)
     rows = clip_table.read(own, data)
     files = ingest.read_files(rows, own.source)
@@ -94,7 +93,7 @@ def takes(name: str, data: Path) -> list[Take]:
 
 def captured(name: str, data: Path) -> UsualMotion:
     """Return the accelerations of a recipe's clips, as the card of its model has them."""
-    path = next(Path(shipped_recipes.__file__).parents[1].glob(f"recipes/{name}.toml"))
+    path = next(Path(data_folder.__file__).parents[1].glob(f"recipes/{name}.toml"))
     examples, _ = ingest.ingest(recipe.read(path), data)
     found = trained_card.captured_acceleration(examples)
     if found is None:
@@ -104,7 +103,7 @@ def captured(name: str, data: Path) -> UsualMotion:
 
 def _take(row: clip_table.ClipRow, clip: Clip, feet: Sequence[str]) -> Take:
     """Return the take of a row, mended as training does: hips that turn half about their bone."""
-    clip, _ = half_turns.remove_jumps(clip, 0)
+    clip, _ = canonical.remove_jumps(clip, 0)
     joints = [clip.skeleton.names.index(name) for name in feet]
     every = round(clip.rate / RATE)
     paths = clip.positions()[:, joints]

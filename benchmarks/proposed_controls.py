@@ -12,7 +12,7 @@ from rows import Row, record, table
 from posefield_train.discover import control_proposals, take_prediction
 from posefield_train.discover.control_proposals import FamilyClips
 from posefield_train.discover.take_prediction import TakePrediction
-from posefield_train.source import ingest, measured_controls, recipe, shipped_recipes
+from posefield_train.source import data_folder, ingest, measured_controls, recipe
 
 RESULTS = Path(__file__).resolve().parents[1] / "docs/results"
 RECIPES = (
@@ -44,7 +44,7 @@ class Proposed:
 
 def propose(name: str, data: Path) -> Proposed:
     """Return the proposal for a shipped recipe. data: folder of the data sets."""
-    own = recipe.read(shipped_recipes.FOLDER / f"{name}.toml")
+    own = recipe.read(data_folder.RECIPES / f"{name}.toml")
     examples, _ = ingest.ingest(own, data)
     joints = examples[0].clip.skeleton.names
     motions = [measured_controls.measured_quantities(one.clip) for one in examples]

@@ -27,7 +27,7 @@ from posefield.retarget.retargeting import retarget
 from posefield.rigs.rig import Rig
 from posefield.rigs.rig_reader import read_rig
 from posefield.synthesis import clips
-from posefield_train.source import clip_table, ingest, recipe, shipped_recipes
+from posefield_train.source import clip_table, data_folder, ingest, recipe
 from posefield_train.source.recipe import Recipe
 
 BODIES = {
@@ -54,7 +54,7 @@ class Motion:
 
 def recipe_of(name: str, data: Path) -> Recipe:
     """Return a shipped recipe."""
-    return recipe.read(shipped_recipes.file_of(Path(name), data))
+    return recipe.read(data_folder.recipe_file(Path(name), data))
 
 
 def first_clip(name: str, beginning: str, data: Path) -> Clip:

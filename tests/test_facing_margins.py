@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posefield_train.source import ingest, recipe
-from posefield_train.source.rigs import facing
+from posefield_train.source import facing, ingest, recipe
 
 pytestmark = pytest.mark.system
 

@@ -23,8 +23,7 @@ from posefield_train import train
 from posefield_train.align import time_alignment
 from posefield_train.graph import onnx_export, parity_check
 from posefield_train.kriging import sample_points
-from posefield_train.source import data_folder, ingest, recipe
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical, data_folder, ingest, recipe
 
 pytestmark = pytest.mark.system
 
@@ -178,7 +177,7 @@ def test_a_clip_at_the_middle_begins_at_the_origin_and_faces_ahead(made, model):
     first = answer.clip.root_path[0]
     assert np.abs(first * (1.0 - UP)).max() < 0.02
     assert 0.7 < first[1] < 1.1
-    assert abs(placement.heading(answer.clip)[0]) < FACING[made[0].name]
+    assert abs(canonical.heading(answer.clip)[0]) < FACING[made[0].name]
     facing = quat.rotate(answer.clip.rotations[0, 0], np.array([0.0, 0.0, 1.0]))
     assert facing[2] > 0.9
     low, high = model.session.card.durations
@@ -251,7 +250,7 @@ def test_a_walk_closes_its_loop(made, model):
     clip = clips.synthesize_clip(
         model, ClipQuestion(controls=middle(model), fps=100 / duration, extrapolate="warn")
     ).clip
-    facing = quat.from_axis_angle(UP, -placement.heading(clip))[:, None]
+    facing = quat.from_axis_angle(UP, -canonical.heading(clip))[:, None]
     body = quat.rotate(facing, clip.positions() - clip.root_path[:, None])
     away = np.linalg.norm(body - body[0], axis=-1).max(axis=1)
     assert len(clip) == 101

@@ -19,7 +19,7 @@ from posefield_train.kriging import sample_points
 from posefield_train.report.drawing.significant_digits import round_number
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.recipe_sections.data_sections import PERFORMER
+from posefield_train.source.recipe_sections import PERFORMER
 from posefield_train.train import train
 
 MIN_OTHER_TAKES = 3

@@ -10,7 +10,7 @@ from posefield_train.graph import onnx_export
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.parallel import single_thread
 from posefield_train.parallel.jobs import Jobs
-from posefield_train.source import ingest, preset_check, recipe
+from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
@@ -43,7 +43,7 @@ def train_models(paths: Sequence[Path], data: Path | None, jobs: Jobs) -> Iterat
 def _train_model(name: str, own: Recipe, examples: list[Example], notes: list[str]) -> SweepResult:
     with single_thread.single_threaded():
         try:
-            preset_check.check_presets(own, examples)
+            ingest.check_presets(own, examples)
             trained = train.train(own, examples, lambda _: None)
             return SweepResult(name, onnx_export.export_model(own, trained, notes))
         except TrainingError as error:

@@ -39,8 +39,8 @@ from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.outliers import family_check, outlier_detection
 from posefield_train.parallel import single_thread
 from posefield_train.parallel.jobs import Jobs, ordered_results
-from posefield_train.source.canonical import clip_blocks
-from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source import canonical
+from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import (
@@ -103,14 +103,14 @@ def _train(
     family_check.check_family(recipe, examples)
     universal_kriging.check_samples(given, names, recipe.kriging.degree, recipe.kriging.nugget == 0)
     examples = _sorted(examples)
-    clip_blocks.return_freed_memory()
+    canonical.return_freed_memory()
     report(f"aligning {len(examples)} clips")
     weights = truncation_error.joint_weights(recipe, examples)
     examples = phase_alignment.align_phases(recipe, examples, weights)
     moved = _vectorize(recipe, examples, weights, jobs)
     report("decomposing the motion tensor")
     full = _decompose(moved)
-    clip_blocks.return_freed_memory()
+    canonical.return_freed_memory()
     report("fitting the fields")
     trained = _fit_and_truncate(recipe, examples, moved, full, jobs)
     return replace(trained, outliers=outlier_detection.find_outliers(recipe, trained))
@@ -246,7 +246,7 @@ def _fit_models(
         captured = warped_errors.captured_positions(examples[rows])
         return captured, predicted, len(own_tensor.curves)
 
-    compared = map(motions_of, clip_blocks.clip_blocks(len(examples)))
+    compared = map(motions_of, canonical.clip_blocks(len(examples)))
     warped = np.concatenate(ordered_results(jobs, warped_errors.mean_squared_errors, compared))
     event = _fit_event(recipe, laid, judge, full, pose, effector)
     return _FittedModels(proportions, values, pose, fitted, missed, warped, found_law, event)
@@ -424,7 +424,7 @@ def joint_error_shares(
         places = truncation_error.positions(own, predicted, judge.parents, judge.offsets[rows])
         return np.mean(np.sum(np.square(places - judge.whole[rows]), axis=-1), axis=1)
 
-    blocks = clip_blocks.clip_blocks(len(judge.whole))
+    blocks = canonical.clip_blocks(len(judge.whole))
     squares = np.concatenate([block_squares(rows) for rows in blocks])
     if travels is not None:
         squares[:, : len(judge.parents)] += travel.mean_squared_distance(travels)[:, None]

@@ -15,7 +15,7 @@ from posefield.motion import blend, bvh_writer, quat, skeleton
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
 from posefield_train.sample import two_bone_ik
-from posefield_train.source.rigs import facing
+from posefield_train.source import facing
 
 RATE = 60.0
 FACING: facing.Facing = "-x"

@@ -52,7 +52,7 @@ def examples(trained, who, controls):
     return [
         ingest.Example(
             replace(row, place=row.place.with_name(f"{who}{value:g}.bvh"), performer=who),
-            placement.canonicalize(newcomers.clip(who, value), False, False)[0],
+            canonical.canonicalize(newcomers.clip(who, value), False, False)[0],
             np.array([value]),
             (),
             (),

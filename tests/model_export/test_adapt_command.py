@@ -14,8 +14,7 @@ from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
 from posefield_train.graph import onnx_export, parity_check
-from posefield_train.source import ingest
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical, ingest
 from posefield_train.source.recipe import Recipe
 
 SHOWN = (2.0, 7.0, 12.5)
@@ -93,7 +92,7 @@ def head(path, who, level=0):
 def test_the_service_answers_for_the_newcomer_at_every_level(adapted):
     path, _ = adapted
     true = newcomers.clip("cy", 4.0)
-    expected = placement.canonicalize(true, False, False)[0].positions()[:, 2].mean(axis=0)
+    expected = canonical.canonicalize(true, False, False)[0].positions()[:, 2].mean(axis=0)
     for number, level in enumerate(session.load(path).card.levels):
         own, other = (np.linalg.norm(head(path, who, number) - expected) for who in ("cy", "a"))
         assert own < 0.02 + 2.0 * level.rms

@@ -16,7 +16,7 @@ from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.kriging import kriging_tuning
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.ingest import Example
 
@@ -226,7 +226,7 @@ def test_order_of_clips_does_not_matter(family, rng):
 def turned(family, angle, shift):
     """Every clip somewhere else, facing elsewhere."""
     return [
-        replace(e, clip=placement.place(e.clip, -np.array(shift), np.array(-angle))) for e in family
+        replace(e, clip=canonical.place(e.clip, -np.array(shift), np.array(-angle))) for e in family
     ]
 
 
@@ -235,8 +235,8 @@ def placed(family):
     return [
         replace(
             e,
-            clip=placement.place(
-                e.clip, e.clip.root_path[0] * (1.0 - UP), placement.heading(e.clip)[0]
+            clip=canonical.place(
+                e.clip, e.clip.root_path[0] * (1.0 - UP), canonical.heading(e.clip)[0]
             ),
         )
         for e in family

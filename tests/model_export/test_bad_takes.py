@@ -12,8 +12,7 @@ import rigid_takes
 
 from posefield_train.discover import take_copies, take_reading
 from posefield_train.probe import probe_report
-from posefield_train.source import motion_readers
-from posefield_train.source.takes import frame_faults
+from posefield_train.source import frame_faults, motion_readers
 
 FILES = bad_takes.contents()
 SEARCHED = [name for name, (_, said) in FILES.items() if not said or said.startswith("note: ")]

@@ -8,8 +8,7 @@ import pytest
 
 from posefield.common.errors import BvhError
 from posefield_train.source import bvh
-from posefield_train.source.bvh import bvh_reader
-from posefield_train.source.bvh.bvh_text import BLOCK
+from posefield_train.source.bvh import BLOCK
 
 VALID = """\
 HIERARCHY
@@ -497,7 +496,7 @@ class Endless(io.RawIOBase):
 def test_the_size_of_a_file_is_bounded():
     file = Endless(VALID, b" " * BLOCK)
     with pytest.raises(BvhError) as caught:
-        bvh_reader.load(file, "clips/walk.bvh")
+        bvh.load(file, "clips/walk.bvh")
     assert caught.value.message == "found more than 1000 MB, expected at most 1000 MB"
     assert file.given < 1_010_000_000
 
@@ -525,7 +524,7 @@ def test_far_too_many_numbers_are_not_counted_to_the_end():
     # A thousand joints leave 10,000 frames of one channel.
     file = Endless(flat(1000), b"0\n" * BLOCK)
     with pytest.raises(BvhError) as caught:
-        bvh_reader.load(file, "clips/walk.bvh")
+        bvh.load(file, "clips/walk.bvh")
     expected = "found more than 10001 numbers, expected 1 frames x 1 channels = 1"
     assert caught.value.message == expected
     assert file.given < 6_000_000

@@ -11,7 +11,7 @@ from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.kriging.universal_kriging import UniversalKriging as Field
-from posefield_train.source.recipe_sections.training_sections import Kriging
+from posefield_train.source.recipe_sections import Kriging
 
 BOTH = ("matern52", "gaussian")
 POSE = Hyper("matern52", (0,), np.array([0.5, 0.5]), 0.1, 1.0)

@@ -9,14 +9,13 @@ from exported_clips import encoded
 from minimal import small_clip
 from test_motion_readers import two_animations
 
-from posefield_train.source import motion_readers
-from posefield_train.source.motion_files import clip_conversion
+from posefield_train.source import motion_file, motion_readers
 
 SAME = 1e-5
 
 
 def gap(path, clip):
-    found = clip_conversion.to_clip(motion_readers.read(path), metres_per_unit=0.01, up="y")
+    found = motion_file.to_clip(motion_readers.read(path), metres_per_unit=0.01, up="y")
     return np.abs(found.positions() - clip.positions()).max()
 
 

@@ -6,7 +6,7 @@ from minimal import small_clip
 
 from posefield.common.units import UP
 from posefield.motion import quat
-from posefield_train.source.canonical import cycle_closing, placement
+from posefield_train.source import canonical
 
 FRAMES = 121
 
@@ -14,12 +14,12 @@ FRAMES = 121
 @pytest.fixture
 def opened():
     """A gait whose last pose is not its first."""
-    return placement.straighten_gait(small_clip(frames=FRAMES))
+    return canonical.straighten_gait(small_clip(frames=FRAMES))
 
 
 @pytest.fixture
 def closed(opened):
-    return cycle_closing.close_cycle(opened, placement.heading(opened))
+    return canonical.close_cycle(opened, canonical.heading(opened))
 
 
 def faded_linearly(clip):
@@ -43,7 +43,7 @@ def test_joints_move_at_most_half_as_far_as_by_a_linear_fade(opened, closed):
 
 
 def test_only_the_ends_of_a_cycle_move(opened, closed):
-    kept = slice(int(cycle_closing.FADE * FRAMES) + 1, -int(cycle_closing.FADE * FRAMES) - 1)
+    kept = slice(int(canonical.FADE * FRAMES) + 1, -int(canonical.FADE * FRAMES) - 1)
     assert np.abs(closed.rotations[kept] - opened.rotations[kept]).max() < 1e-12
     # Negative control: the ends do.
     assert np.abs(closed.rotations[0] - opened.rotations[0]).max() > 1e-3
@@ -64,7 +64,7 @@ def test_the_seam_has_no_corner(opened, closed):
 
 
 def test_a_closed_cycle_nearly_stays_as_it_is(opened, closed):
-    again = cycle_closing.close_cycle(closed, placement.heading(closed))
+    again = canonical.close_cycle(closed, canonical.heading(closed))
     gap = quat.log(quat.mul(quat.conj(closed.rotations[0, 1:]), closed.rotations[-1, 1:]))
     assert np.abs(gap).max() < 1e-9
     own, first, raw = (clip.positions() for clip in (again, closed, opened))

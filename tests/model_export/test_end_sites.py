@@ -10,8 +10,7 @@ from posefield.common.errors import RecipeError
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import bvh, ingest
-from posefield_train.source.bvh import end_sites
+from posefield_train.source import bvh, clip_joints, ingest
 
 CLIP = small_clip()
 # A file keeps a millionth of a metre and of a degree.
@@ -32,7 +31,7 @@ def tips(clip):
 
 
 def test_end_sites_are_named_after_their_joints():
-    assert end_sites.end_site_names(SKELETON) == ["Head_end", "LeftHand_end"]
+    assert clip_joints.end_site_names(SKELETON) == ["Head_end", "LeftHand_end"]
     forked = Skeleton(
         ("a", "b", "b_end"),
         (-1, 0, 1),
@@ -40,11 +39,11 @@ def test_end_sites_are_named_after_their_joints():
         (0, 1, 0, 2),
         np.zeros((4, 3)),
     )
-    assert end_sites.end_site_names(forked) == ["a_end", "", "a_end_2", "b_end_end"]
+    assert clip_joints.end_site_names(forked) == ["a_end", "", "a_end_2", "b_end_end"]
 
 
 def test_an_end_joint_is_where_the_end_site_was_and_changes_nothing_else():
-    found = end_sites.with_end_joints(CLIP, {"LeftHand_end", "Head_end", "Nobody"})
+    found = clip_joints.with_end_joints(CLIP, {"LeftHand_end", "Head_end", "Nobody"})
     joints = found.skeleton
     assert joints.names == (
         *("Hips", "Spine", "Head", "Head_end", "LeftArm", "LeftHand", "LeftHand_end"),
@@ -54,9 +53,9 @@ def test_an_end_joint_is_where_the_end_site_was_and_changes_nothing_else():
     assert np.abs(found.positions()[:, ends] - tips(CLIP)).max() < 1e-12
     others = [joints.names.index(name) for name in SKELETON.names]
     assert np.array_equal(found.positions()[:, others], CLIP.positions())
-    one = end_sites.with_end_joints(CLIP, {"Head_end"})
+    one = clip_joints.with_end_joints(CLIP, {"Head_end"})
     assert np.abs(tips(one) - tips(CLIP)[:, 1:]).max() < 1e-12
-    assert end_sites.with_end_joints(CLIP, {"Head"}) is CLIP
+    assert clip_joints.with_end_joints(CLIP, {"Head"}) is CLIP
 
 
 @pytest.mark.parametrize(

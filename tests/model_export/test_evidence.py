@@ -10,8 +10,7 @@ from posefield.motion import quat
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.outliers import mirrored_clips, outlier_detection, outlier_distances
-from posefield_train.source import bone_lengths
-from posefield_train.source.takes import joint_sides
+from posefield_train.source import clip_joints, take_groups
 
 HYPER = Hyper("matern52", (1,), np.array([0.5]), 0.1, 0.0)
 NAMES = ("Hips", "LeftHand", "RightHand", "lfoot", "rfoot", "Neck")
@@ -47,11 +46,11 @@ def test_a_size_names_the_unit_that_explains_it():
     offsets = (
         np.repeat(SKELETON.offsets[None], 5, axis=0) * np.array([1, 1, 100, 1, 1.1])[:, None, None]
     )
-    assert bone_lengths.relative_sizes(offsets) == pytest.approx([1, 1, 100, 1, 1.1])
-    assert bone_lengths.guess_unit(1.0, 100.0) == "centimetres"
-    assert bone_lengths.guess_unit(0.0564444, 1 / 17.72) == "metres"
-    assert bone_lengths.guess_unit(0.01, 1 / 2.54) == "inches"
-    assert bone_lengths.guess_unit(1.0, 1.7) == ""
+    assert clip_joints.relative_sizes(offsets) == pytest.approx([1, 1, 100, 1, 1.1])
+    assert clip_joints.guess_unit(1.0, 100.0) == "centimetres"
+    assert clip_joints.guess_unit(0.0564444, 1 / 17.72) == "metres"
+    assert clip_joints.guess_unit(0.01, 1 / 2.54) == "inches"
+    assert clip_joints.guess_unit(1.0, 1.7) == ""
 
 
 @pytest.fixture
@@ -65,37 +64,37 @@ WHO = tuple("aaabbbccc")
 
 
 def test_bones_of_another_performer_are_named(offsets):
-    assert all(bone_lengths.find_foreign_bones(offsets, WHO, clip) is None for clip in range(9))
+    assert all(clip_joints.find_foreign_bones(offsets, WHO, clip) is None for clip in range(9))
     wrong = offsets.copy()
     wrong[1] = offsets[7]
-    found = bone_lengths.find_foreign_bones(wrong, WHO, 1)
+    found = clip_joints.find_foreign_bones(wrong, WHO, 1)
     assert (found.nearest_performer, found.others, found.nearest_distance) == ("c", 2, 0.0)
     assert found.apart > 0.01
     assert all(
-        bone_lengths.find_foreign_bones(wrong, WHO, clip) is None for clip in range(9) if clip != 1
+        clip_joints.find_foreign_bones(wrong, WHO, clip) is None for clip in range(9) if clip != 1
     )
 
 
 def test_bones_of_nobody_are_found_where_others_agree(offsets):
     wrong = offsets.copy()
     wrong[1] *= 1.1
-    assert bone_lengths.find_foreign_bones(wrong, WHO, 1).nearest_performer == ""
-    assert bone_lengths.find_foreign_bones(wrong, ("",) * 9, 1) is None, "nobody says who moved"
+    assert clip_joints.find_foreign_bones(wrong, WHO, 1).nearest_performer == ""
+    assert clip_joints.find_foreign_bones(wrong, ("",) * 9, 1) is None, "nobody says who moved"
 
 
 def test_of_two_clips_that_differ_neither_is_believed(offsets):
     wrong = offsets[1:].copy()
     wrong[0] *= 1.1
-    assert bone_lengths.find_foreign_bones(wrong, WHO[1:], 0) is None
-    assert bone_lengths.find_foreign_bones(wrong, WHO[1:], 1) is None
+    assert clip_joints.find_foreign_bones(wrong, WHO[1:], 0) is None
+    assert clip_joints.find_foreign_bones(wrong, WHO[1:], 1) is None
 
 
 def test_sides_are_known_by_their_names():
-    assert joint_sides.mirrored_joints(NAMES) == (0, 2, 1, 4, 3, 5)
-    assert joint_sides.mirrored_joints(("root", "left", "relay")) == (0, 1, 2)
+    assert take_groups.mirrored_joints(NAMES) == (0, 2, 1, 4, 3, 5)
+    assert take_groups.mirrored_joints(("root", "left", "relay")) == (0, 1, 2)
     blender = ("hips", "arm_R", "arm_L", "mixamorig:LeftFoot", "mixamorig:RightFoot", "tail_l")
-    assert joint_sides.mirrored_joints(blender) == (0, 2, 1, 4, 3, 5)
-    assert joint_sides.right_joints(blender) == [1, 4]
+    assert take_groups.mirrored_joints(blender) == (0, 2, 1, 4, 3, 5)
+    assert take_groups.right_joints(blender) == [1, 4]
 
 
 def body(rng):
@@ -106,7 +105,7 @@ def body(rng):
 
 def test_a_disguise_is_seen_through(rng):
     expected, left = body(rng), np.array([1.0, 0.0, 0.0])
-    swap, flip = list(joint_sides.mirrored_joints(NAMES)), np.array([-1.0, 1.0, 1.0])
+    swap, flip = list(take_groups.mirrored_joints(NAMES)), np.array([-1.0, 1.0, 1.0])
     up = quat.rotate(quat.from_axis_angle(left, np.array(np.pi / 2)), expected)
     round_about = quat.rotate(
         quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi / 2)), expected

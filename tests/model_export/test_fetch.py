@@ -13,8 +13,8 @@ from posefield.motion import bvh_writer, quat
 from posefield.motion import clip as clips
 from posefield.motion.skeleton import Skeleton
 from posefield_train.fetch import cmu_trials, data_sets
-from posefield_train.source import bvh, data_folder, ingest, recipe, shipped_recipes
-from posefield_train.source.recipe_sections.data_sections import Condition
+from posefield_train.source import bvh, data_folder, ingest, recipe
+from posefield_train.source.recipe_sections import Condition
 
 UNIT = cmu_trials.METRES_PER_UNIT
 # Given files are written to four decimals of the unit: 5.3e-6 m was measured.
@@ -75,7 +75,7 @@ def test_reaches_are_converted_with_their_rows_and_hashes(fetch, downloaded, rea
         assert all(own["sha256"] == known[own["file"]] for own in one["sources"])
         given = data_folder.find(real_data, f"hdm05_reach/{one['file']}")
         assert_same_motion(place / one["file"], given)
-    own = recipe.read(shipped_recipes.FOLDER / "hdm05_grab_high.toml")
+    own = recipe.read(data_folder.RECIPES / "hdm05_grab_high.toml")
     made, notes = ingest.ingest(own, tmp_path / "data")
     given, _ = ingest.ingest(own, real_data)
     by_file = {example.row.place.name: example for example in given}
@@ -168,7 +168,7 @@ def test_walks_are_recognized_by_their_motion(fetch, acclaim_texts, walks, tmp_p
     assert facts["missing"]["bvh/p07_walking_5_tr.bvh"] == (
         "found no match, expected a trial of subject 07 of 329 frames"
     )
-    own = recipe.read(shipped_recipes.FOLDER / "cmu_walk.toml")
+    own = recipe.read(data_folder.RECIPES / "cmu_walk.toml")
     made, _ = ingest.ingest(own, tmp_path / "data")
     assert {example.row.place.name for example in made} == {Path(WALK).name, Path(TURN).name}
 
@@ -268,7 +268,7 @@ def test_a_folder_without_files_or_without_a_skeleton_is_refused(posefield, tmp_
 
 
 def test_the_package_has_tables_and_no_motion():
-    kinds = {path.suffix for path in shipped_recipes.FOLDER.rglob("*") if path.is_file()}
+    kinds = {path.suffix for path in data_folder.RECIPES.rglob("*") if path.is_file()}
     assert kinds == {".toml", ".json", ".csv"}
     for own in (data_sets.CMU, data_sets.HDM05):
         table = own.rows(own.table)
@@ -287,7 +287,7 @@ def test_the_help_names_the_subjects_of_the_table(posefield):
 
 
 def test_a_data_folder_without_a_table_takes_the_shipped_one_and_says_so(walks, tmp_path):
-    own = recipe.read(shipped_recipes.FOLDER / "cmu_walk.toml")
+    own = recipe.read(data_folder.RECIPES / "cmu_walk.toml")
     performer = {"performer": Condition(among=["cmu_07"])}
     own = own.model_copy(update={"clips": own.clips.model_copy(update={"where": performer})})
     for row in data_sets.CMU.rows("strides.csv"):
@@ -299,7 +299,7 @@ def test_a_data_folder_without_a_table_takes_the_shipped_one_and_says_so(walks, 
     said = "cmu_walk/strides.csv: the data folder has no such table, the one that ships was used"
     shipped, notes = ingest.ingest(own, tmp_path)
     assert said in notes
-    table = (shipped_recipes.FOLDER / "cmu_walk/strides.csv").read_bytes()
+    table = (data_folder.RECIPES / "cmu_walk/strides.csv").read_bytes()
     (tmp_path / "cmu_walk/strides.csv").write_bytes(table)
     own_table, notes = ingest.ingest(own, tmp_path)
     assert said not in notes

@@ -8,8 +8,7 @@ from exported_clips import FORMATS, encoded
 from fixture_models import RECIPES, strides_folder
 
 from posefield_train import train
-from posefield_train.source import ingest, motion_readers
-from posefield_train.source.motion_files import clip_conversion
+from posefield_train.source import ingest, motion_file, motion_readers
 
 SAME = 1e-5
 """Largest distance of a joint between formats, m: single precision in a chain of joints."""
@@ -28,7 +27,7 @@ def reread(folder, clip, ending, **kinds):
     path.write_bytes(encoded(clip, ending, **kinds))
     said = FORMATS[ending]
     file = motion_readers.read(path)
-    return clip_conversion.to_clip(file, metres_per_unit=said.metres_per_unit, up=said.up)
+    return motion_file.to_clip(file, metres_per_unit=said.metres_per_unit, up=said.up)
 
 
 def gap(found, clip):
@@ -66,7 +65,7 @@ def models(tmp_path_factory):
         folder = tmp_path_factory.mktemp(ending)
         for path in sorted(source.glob("*.bvh")):
             file = motion_readers.read(path)
-            clip = clip_conversion.to_clip(file, metres_per_unit=1.0, up="y")
+            clip = motion_file.to_clip(file, metres_per_unit=1.0, up="y")
             (folder / f"{path.stem}.{ending}").write_bytes(encoded(clip, ending))
         table = (source / "strides.csv").read_text().replace(".bvh", f".{ending}")
         (folder / "strides.csv").write_text(table)

@@ -11,7 +11,7 @@ from posefield.common.errors import FileError, MotionFileError
 from posefield.motion import quat
 from posefield.motion.skeleton import positions
 from posefield_train.source import motion_readers
-from posefield_train.source.motion_files.motion_file import ReadOptions
+from posefield_train.source.motion_file import ReadOptions
 
 FRAMES = 13
 TIMES = np.arange(FRAMES) / 30.0

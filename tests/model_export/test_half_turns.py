@@ -6,7 +6,7 @@ import pytest
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source.canonical import half_turns
+from posefield_train.source import canonical
 
 PARENTS = (-1, 0, 1, 2)
 OFFSETS = np.array([[0, 0.9, 0], [0, 0.4, 0], [0.3, 0, 0], [0.08, 0, 0]])
@@ -45,17 +45,17 @@ def apart(a, b):
 
 
 def test_small_joints_carry_nothing_beyond_a_hand():
-    assert half_turns.small_joints(PARENTS, OFFSETS).tolist() == [False, False, True, True]
-    assert half_turns.small_joints(PARENTS, 0.1 * OFFSETS).tolist() == [True] * 4
+    assert canonical.small_joints(PARENTS, OFFSETS).tolist() == [False, False, True, True]
+    assert canonical.small_joints(PARENTS, 0.1 * OFFSETS).tolist() == [True] * 4
     # A straight chain counts to its end, not to its next joint.
     chain = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0, 0], [0.1, 0, 0]])
-    assert half_turns.small_joints(PARENTS, chain).tolist() == [False, False, True, True]
+    assert canonical.small_joints(PARENTS, chain).tolist() == [False, False, True, True]
 
 
 def test_jump_of_a_small_joint_is_taken_out(smooth):
     broken = smooth.copy()
     broken[20:, FINGER] = quat.mul(broken[20:, FINGER], HALF_TURN)
-    clean, (finding,) = half_turns.remove_jumps(clip(broken), 7)
+    clean, (finding,) = canonical.remove_jumps(clip(broken), 7)
     assert steps(broken).max() > 3.0
     assert steps(clean.rotations).max() < 0.1
     assert apart(clean.rotations[:20], smooth[:20]) < 1e-7
@@ -67,7 +67,7 @@ def test_jump_of_a_small_joint_is_taken_out(smooth):
 def test_what_follows_a_jump_keeps_its_own_motion(smooth):
     broken = smooth.copy()
     broken[20:, FINGER] = quat.mul(HALF_TURN, broken[20:, FINGER])
-    clean, _ = half_turns.remove_jumps(clip(broken), 0)
+    clean, _ = canonical.remove_jumps(clip(broken), 0)
     own = steps(smooth)[20:, FINGER]
     assert np.max(np.abs(steps(clean.rotations)[20:, FINGER] - own)) < 1e-7
     assert np.ptp(own) > 1e-3
@@ -77,13 +77,13 @@ def test_jump_of_an_arm_is_left_alone(smooth):
     broken = smooth.copy()
     across = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi))
     broken[20:, ARM] = quat.mul(broken[20:, ARM], across)
-    clean, findings = half_turns.remove_jumps(clip(broken), 0)
+    clean, findings = canonical.remove_jumps(clip(broken), 0)
     assert np.array_equal(clean.rotations, broken)
     assert findings == []
 
 
 def test_smooth_clip_is_left_alone(smooth):
-    clean, findings = half_turns.remove_jumps(clip(smooth), 0)
+    clean, findings = canonical.remove_jumps(clip(smooth), 0)
     assert np.array_equal(clean.rotations, smooth)
     assert findings == []
 
@@ -91,11 +91,11 @@ def test_smooth_clip_is_left_alone(smooth):
 def test_sign_of_a_quaternion_is_no_jump(smooth):
     signed = smooth.copy()
     signed[20:] *= -1.0
-    assert half_turns.remove_jumps(clip(signed), 0)[1] == []
+    assert canonical.remove_jumps(clip(signed), 0)[1] == []
 
 
 def test_clip_of_one_frame_has_no_jumps(smooth):
-    clean, findings = half_turns.remove_jumps(clip(smooth[:1]), 0)
+    clean, findings = canonical.remove_jumps(clip(smooth[:1]), 0)
     assert np.array_equal(clean.rotations, smooth[:1])
     assert findings == []
 
@@ -104,8 +104,8 @@ def test_clip_of_one_frame_has_no_jumps(smooth):
 def test_clip_half_a_turn_off_is_turned_back(family, joint):
     broken = family.copy()
     broken[4, :, joint] = quat.mul(broken[4, :, joint], HALF_TURN)
-    small = half_turns.small_joints(PARENTS, OFFSETS)
-    clean, (finding,) = half_turns.remove_flips(broken, small)
+    small = canonical.small_joints(PARENTS, OFFSETS)
+    clean, (finding,) = canonical.remove_flips(broken, small)
     assert (finding.kind, finding.joint, finding.clip) == ("flip", joint, 4)
     assert abs(finding.angle - np.pi) < 0.5
     # The clip's own middle becomes the family's: it lies within its swing of it.
@@ -117,7 +117,7 @@ def test_clip_half_a_turn_off_is_turned_back(family, joint):
 
 def test_flip_of_an_arm_is_left_alone(family):
     family[4, :, ARM] = quat.mul(family[4, :, ARM], HALF_TURN)
-    clean, findings = half_turns.remove_flips(family, half_turns.small_joints(PARENTS, OFFSETS))
+    clean, findings = canonical.remove_flips(family, canonical.small_joints(PARENTS, OFFSETS))
     assert np.array_equal(clean, family)
     assert findings == []
 
@@ -125,7 +125,7 @@ def test_flip_of_an_arm_is_left_alone(family):
 def test_clip_that_only_passes_half_a_turn_is_no_flip(family):
     sweep = quat.from_axis_angle(AXIS, np.linspace(0.0, 3.0, 50))
     family[4, :, FINGER] = quat.mul(family[4, :, FINGER], sweep)
-    assert half_turns.remove_flips(family, half_turns.small_joints(PARENTS, OFFSETS))[1] == []
+    assert canonical.remove_flips(family, canonical.small_joints(PARENTS, OFFSETS))[1] == []
 
 
 def twisted(smooth, joint, frames):
@@ -140,7 +140,7 @@ def twisted(smooth, joint, frames):
 
 def test_a_twist_about_the_bone_moves_to_the_child_and_moves_no_joint(smooth):
     broken = clip(twisted(smooth, ARM, slice(30, None)))
-    clean, (finding,) = half_turns.move_twists(broken, 7)
+    clean, (finding,) = canonical.move_twists(broken, 7)
     assert steps(broken.rotations)[:, ARM].max() > 3.0
     assert (finding.kind, finding.joint, finding.clip) == ("twist", ARM, 7)
     assert steps(clean.rotations).max() < 0.1
@@ -153,7 +153,7 @@ def test_a_twist_about_the_bone_moves_to_the_child_and_moves_no_joint(smooth):
 
 @pytest.mark.parametrize("frames", [slice(20), slice(20, 24)])
 def test_the_longest_part_without_a_jump_tells_the_side(smooth, frames):
-    clean, _ = half_turns.move_twists(clip(twisted(smooth, ARM, frames)), 0)
+    clean, _ = canonical.move_twists(clip(twisted(smooth, ARM, frames)), 0)
     assert steps(clean.rotations).max() < 0.1
     assert apart(clean.rotations[30:], smooth[30:]) < 0.1
 
@@ -163,7 +163,7 @@ def test_twists_of_a_whole_chain_are_taken_out_by_removing_jumps(smooth):
     # What nothing turns back moves on along the chain until a small joint loses it.
     bone = OFFSETS[HAND] / np.linalg.norm(OFFSETS[HAND])
     broken[30:, ARM] = quat.mul(broken[30:, ARM], quat.from_axis_angle(bone, np.array(np.pi)))
-    clean, findings = half_turns.remove_jumps(clip(broken), 0)
+    clean, findings = canonical.remove_jumps(clip(broken), 0)
     assert findings[0].kind == "twist"
     assert steps(clean.rotations)[:, ARM].max() < 0.1
 
@@ -172,7 +172,7 @@ def test_a_jump_across_the_bone_is_not_a_twist(smooth):
     broken = smooth.copy()
     across = quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array(np.pi))
     broken[30:, ARM] = quat.mul(broken[30:, ARM], across)
-    clean, findings = half_turns.move_twists(clip(broken), 0)
+    clean, findings = canonical.move_twists(clip(broken), 0)
     assert findings == []
     assert np.array_equal(clean.rotations, broken)
 
@@ -187,4 +187,4 @@ def test_a_joint_whose_bones_point_apart_keeps_its_twist(smooth):
         np.zeros((0, 3)),
     )
     own = Clip(forked, broken, np.tile(forked.offsets, (len(broken), 1, 1)), 60.0)
-    assert half_turns.move_twists(own, 0)[1] == []
+    assert canonical.move_twists(own, 0)[1] == []

@@ -12,8 +12,7 @@ from posefield.common.units import UP
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import ingest
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical, ingest
 
 # A file keeps a millionth of a degree and of a metre: what comes back is off by less than this, m.
 WRITTEN = 1e-5
@@ -50,16 +49,16 @@ def gap(a, b):
 
 def around_root(clip):
     """Joint positions (F, J, 3) from below the root and seen from its heading, m."""
-    facing = quat.from_axis_angle(UP, -placement.heading(clip))[:, None]
+    facing = quat.from_axis_angle(UP, -canonical.heading(clip))[:, None]
     return quat.rotate(facing, clip.positions() - (clip.root_path * FLOOR)[:, None])
 
 
 def test_the_first_frame_stands_at_the_origin_and_faces_ahead(read):
     source = small_clip(heading=2.0)
-    assert placement.heading(source)[0] > 1.0 and np.abs(source.root_path[0] * FLOOR).max() > 1.0
+    assert canonical.heading(source)[0] > 1.0 and np.abs(source.root_path[0] * FLOOR).max() > 1.0
     clip = first(read(source))
     assert np.abs(clip.root_path[0] * FLOOR).max() < 1e-12
-    assert abs(placement.heading(clip)[0]) < 1e-12
+    assert abs(canonical.heading(clip)[0]) < 1e-12
     assert clip.root_path[0, 1] == pytest.approx(source.root_path[0, 1], abs=WRITTEN)
 
 
@@ -242,8 +241,8 @@ def test_a_cyclic_clip_still_gets_somewhere(read):
     assert travelled == pytest.approx(expected, abs=WRITTEN)
     assert travelled > 0.9
     # The straight line through the heading is where the walker turns; the rest is swing.
-    slope, _ = np.polyfit(np.linspace(0.0, 1.0, len(source)), placement.heading(source), 1)
-    heading = placement.heading(loop)
+    slope, _ = np.polyfit(np.linspace(0.0, 1.0, len(source)), canonical.heading(source), 1)
+    heading = canonical.heading(loop)
     assert heading[-1] - heading[0] == pytest.approx(slope, abs=WRITTEN)
     assert abs(slope) > 1000 * WRITTEN
 
@@ -265,10 +264,10 @@ def test_a_cyclic_clip_sets_out_along_the_line_of_its_heading(read):
     rotations = source.rotations.copy()
     rotations[:, 0] = swing
     loop = first(read(replace(source, rotations=rotations), motion={"cyclic": True}))
-    _, at_start = np.polyfit(t, placement.heading(loop), 1)
+    _, at_start = np.polyfit(t, canonical.heading(loop), 1)
     # What closes the seam may turn the line by a small part of a degree.
     assert abs(at_start) < 1e-3
-    assert placement.heading(loop)[0] > 0.3
+    assert canonical.heading(loop)[0] > 0.3
 
 
 def landmarked(tmp_path, marks):

@@ -17,7 +17,7 @@ from posefield.motion import skeleton
 from posefield_train.graph import level_errors, levels
 from posefield_train.kriging import thinning
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.source.recipe_sections.training_sections import Detail
+from posefield_train.source.recipe_sections import Detail
 
 HAND = "LeftHand"
 

@@ -14,9 +14,8 @@ from minimal import recipe_with, small_clip, write_clips
 from posefield.common.errors import AcclaimError, FileError, MotionFileError
 from posefield.motion import bvh_writer
 from posefield_train.probe import probe_report, recipe_draft
-from posefield_train.source import data_folder, ingest, motion_readers
-from posefield_train.source.motion_files import clip_conversion
-from posefield_train.source.motion_files.motion_file import ReadOptions
+from posefield_train.source import data_folder, ingest, motion_file, motion_readers
+from posefield_train.source.motion_file import ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
 
 PAGE = Path(__file__).parents[2] / "docs/guide/motion-files.md"
@@ -194,7 +193,7 @@ def test_probe_takes_what_files_state_and_says_what_contradicts_it(tmp_path, exa
     large = bvh_writer.dumps(clip, metres_per_unit=0.01)
     (tmp_path / "large.bvh").write_bytes(large)
     file = motion_readers.read(tmp_path / "large.bvh")
-    enlarged = clip_conversion.to_clip(file, metres_per_unit=1.0, up="y")
+    enlarged = motion_file.to_clip(file, metres_per_unit=1.0, up="y")
     (tmp_path / "large.glb").write_bytes(encoded(enlarged, "glb"))
     found = probe_report.probe([tmp_path / "large.glb"]).proposed["metres_per_unit"]
     assert (found.value, found.confidence) == (1.0, "low")

@@ -12,7 +12,7 @@ from posefield_train import train
 from posefield_train.adapt import model_reconstruction, new_clips
 from posefield_train.graph import onnx_export
 from posefield_train.source import bvh, ingest
-from posefield_train.source.recipe_sections.data_sections import Source
+from posefield_train.source.recipe_sections import Source
 
 CY = {"performer": "cy"}
 METRES = Source(metres_per_unit=1.0, up="y")

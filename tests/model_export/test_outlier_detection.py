@@ -8,8 +8,8 @@ import pytest
 from posefield.motion import quat
 from posefield_train import train
 from posefield_train.graph import onnx_export
-from posefield_train.source.canonical.placement import place
-from posefield_train.source.takes import joint_sides
+from posefield_train.source import take_groups
+from posefield_train.source.canonical import place
 
 # A clip from the middle of the family, and one of another performer far from it.
 PLANTED, OTHER = 15, 40
@@ -27,7 +27,7 @@ def reversed_axis(clip):
 
 
 def exchanged(clip):
-    other = list(joint_sides.mirrored_joints(clip.skeleton.names))
+    other = list(take_groups.mirrored_joints(clip.skeleton.names))
     return replace(
         clip, rotations=clip.rotations[:, other], translations=clip.translations[:, other]
     )

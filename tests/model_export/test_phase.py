@@ -12,7 +12,7 @@ from posefield.common.units import UP
 from posefield.motion import quat
 from posefield.motion.clip import assemble
 from posefield_train.align import phase_alignment, time_alignment
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.ingest import Example
 
@@ -33,7 +33,7 @@ def cycle(cut, size=1.0, turn=0.3, landmarks=()):
     path = np.stack([-np.cos(turn * u), 0 * u, np.sin(turn * u)], axis=1) * 1.2 / turn
     clip = assemble(SKELETON, rotations, path + 0.9 * UP, SKELETON.offsets, 100.0)
     row = ClipRow(Path("x.bvh"), "clips.csv", 2, "", 0, None, np.array([size]), ())
-    return Example(row, placement.straighten_gait(clip), row.controls, landmarks, jumps=())
+    return Example(row, canonical.straighten_gait(clip), row.controls, landmarks, jumps=())
 
 
 @pytest.fixture
@@ -100,7 +100,7 @@ def test_what_is_cut_off_goes_on_at_the_other_end(frames):
 def rotated(example, like):
     """Joints around the root, turned to the heading that another clip sets out in."""
     turn = quat.from_axis_angle(
-        UP, placement.heading(like.clip)[0] - placement.heading(example.clip)[0]
+        UP, canonical.heading(like.clip)[0] - canonical.heading(example.clip)[0]
     )
     return quat.rotate(np.broadcast_to(turn, (1, 1, 4)), around(example))
 
@@ -109,9 +109,9 @@ def test_the_line_of_the_heading_goes_on():
     """A pelvis swings: fitted anew, the line would depend on where in the swing it begins."""
     whole = cycle(0.0)
     quarter = phase_alignment.shift_start(whole, 0.25)
-    expected = placement.heading(whole.clip)[25] - 0.25 * 0.3
-    assert placement.heading(quarter.clip)[0] == pytest.approx(expected, abs=1e-6)
-    fitted = placement.heading(placement.straighten_gait(quarter.clip))[0]
+    expected = canonical.heading(whole.clip)[25] - 0.25 * 0.3
+    assert canonical.heading(quarter.clip)[0] == pytest.approx(expected, abs=1e-6)
+    fitted = canonical.heading(canonical.straighten_gait(quarter.clip))[0]
     assert abs(fitted - expected) > 0.01
 
 
@@ -153,7 +153,7 @@ def test_what_is_no_cycle_has_a_beginning(cuts):
 
 def test_in_place_stays_in_place():
     walker = cycle(0.0)
-    standing = replace(walker, clip=placement.remove_drift(walker.clip))
+    standing = replace(walker, clip=canonical.remove_drift(walker.clip))
     kept = phase_alignment.shift_start(standing, 0.3, in_place=True).clip.root_path
     assert np.abs((kept[-1] - kept[0]) * (1.0 - UP)).max() < ROUNDING
 

@@ -12,7 +12,7 @@ from posefield.common.errors import TrainingError
 from posefield.model_file import card_reader, onnx_check
 from posefield.model_file.model_card import Preset
 from posefield_train.graph import onnx_export
-from posefield_train.source import preset_check, shipped_recipes
+from posefield_train.source import data_folder, ingest
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe import read as read_recipe
 
@@ -64,7 +64,7 @@ def with_preset(values, performer=None):
 def test_a_preset_within_the_clips_is_accepted():
     examples = fixture_models.reaches()
     who = examples[0].row.performer
-    assert preset_check.check_presets(with_preset({}, who), examples) is None
+    assert ingest.check_presets(with_preset({}, who), examples) is None
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_preset_within_the_clips_is_accepted():
 )
 def test_a_preset_outside_the_clips_is_refused(values, performer, said):
     with pytest.raises(TrainingError, match=re.escape(said)):
-        preset_check.check_presets(with_preset(values, performer), fixture_models.reaches())
+        ingest.check_presets(with_preset(values, performer), fixture_models.reaches())
 
 
 def test_the_card_carries_the_presets_of_the_recipe():
@@ -95,7 +95,7 @@ def test_a_model_of_held_out_clips_has_no_presets():
     assert card_reader.decode(onnx_check.check(content).metadata).presets == ()
 
 
-@pytest.mark.parametrize("name", shipped_recipes.names())
+@pytest.mark.parametrize("name", data_folder.shipped_names())
 def test_shipped_recipes_name_presets(name):
-    own = read_recipe(shipped_recipes.FOLDER / f"{name}.toml")
+    own = read_recipe(data_folder.RECIPES / f"{name}.toml")
     assert len(own.presets) >= 2

@@ -13,7 +13,7 @@ from posefield.motion import bvh_writer, quat
 from posefield.motion.clip import Clip
 from posefield_train.probe import probe_report, recipe_draft
 from posefield_train.sample import noise_free
-from posefield_train.source import bvh, clip_table, recipe, table_cells
+from posefield_train.source import bvh, clip_table, recipe
 
 POINT = {"stature": 1.75, "hip_height": 0.94, "turn": 10.0, "target_height": 1.1}
 UNITS = {"metres": 1.0, "centimetres": 0.01, "inches": 0.0254, "ASF units": 0.0564444}
@@ -297,7 +297,7 @@ def test_a_table_without_motion_files_is_refused(tmp_path):
     path.write_text("a,b\n1,2\n")
     with pytest.raises(RecipeError, match=r"t\.csv:1: no column of the motion files"):
         recipe_draft.read_table(path)
-    assert table_cells.open_table(path).records
+    assert clip_table.open_table(path).records
 
 
 def test_the_names_of_a_folder_become_names_of_recipes():

@@ -18,8 +18,8 @@ from posefield_train.kriging.projected.projected_kriging import ProjectedProcess
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.source.canonical import clip_blocks
-from posefield_train.source.recipe_sections.training_sections import Kriging
+from posefield_train.source import canonical
+from posefield_train.source.recipe_sections import Kriging
 
 SAME = 1e-8
 NONE = 1e-12
@@ -263,9 +263,9 @@ def test_tunings_that_disagree_are_noted(trained):
 
 def test_motions_are_restored_in_blocks_that_cover_all_clips():
     for clips in (1, 300, 301, 900, 901):
-        blocks = clip_blocks.clip_blocks(clips)
+        blocks = canonical.clip_blocks(clips)
         assert np.concatenate([np.arange(clips)[own] for own in blocks]).tolist() == list(
             range(clips)
         )
         assert max(own.stop - own.start for own in blocks) <= 300
-    assert len(clip_blocks.clip_blocks(300)) == 1
+    assert len(canonical.clip_blocks(300)) == 1

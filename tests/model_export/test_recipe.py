@@ -11,8 +11,7 @@ from minimal import TOML
 
 from posefield.common.errors import RecipeError
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.source import recipe
-from posefield_train.source.recipe_sections import control_sources
+from posefield_train.source import control_sources, recipe
 
 RECIPES = Path(recipe.__file__).parents[1] / "recipes"
 SHIPPED = (

@@ -8,7 +8,7 @@ from minimal import TOML
 
 from posefield.common.errors import RecipeError
 from posefield_train.source import recipe
-from posefield_train.source.recipe_sections.toml_positions import key_positions, nearest_position
+from posefield_train.source.recipe_errors import key_positions, nearest_position
 
 TRICKY = '''
 # [not.a.table] = 1

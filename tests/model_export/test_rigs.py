@@ -12,8 +12,7 @@ from posefield.common.units import UP
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip, assemble
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import ingest
-from posefield_train.source.rigs import dummy_roots, facing, rest_pose
+from posefield_train.source import facing, ingest, skeleton_checks
 
 # A file keeps a millionth of a degree and of a metre.
 WRITTEN = 1e-5
@@ -150,11 +149,11 @@ def test_a_root_that_moves_with_its_body_is_kept():
     clip = walker()
     tumbling = quat.exp(np.linspace(0, 1, len(clip))[:, None] * np.array([0.5, 0.2, 0.1]))
     held = below(clip, tumbling, clip.root_path + 0.1)
-    assert dummy_roots.count_dummies([held]) == 0
-    assert dummy_roots.count_dummies([below(clip, *standing_root(clip))]) == 1
+    assert skeleton_checks.count_dummies([held]) == 0
+    assert skeleton_checks.count_dummies([below(clip, *standing_root(clip))]) == 1
     # A static root whose only child turns in place is a joint: the base of an arm.
     fixed = replace(clip, translations=np.broadcast_to(clip.translations[:1], (21, 7, 3)))
-    assert dummy_roots.count_dummies([below(fixed, *standing_root(fixed))]) == 0
+    assert skeleton_checks.count_dummies([below(fixed, *standing_root(fixed))]) == 0
 
 
 def test_a_dummy_root_that_the_recipe_names_is_refused(read):
@@ -252,17 +251,17 @@ def test_two_performers_under_one_name_are_a_sentence(read):
 def test_small_differences_are_one_body():
     rng = np.random.default_rng(1)
     offsets = BODY.offsets * (1.0 + 0.01 * rng.standard_normal((8, len(BODY), 1)))
-    assert rest_pose.find_two_bodies(offsets, ["ann"] * 8) is None
+    assert skeleton_checks.find_two_bodies(offsets, ["ann"] * 8) is None
     offsets[4:] *= 1.2
-    assert rest_pose.find_two_bodies(offsets, ["ann"] * 8).counts == (4, 4)
-    assert rest_pose.find_two_bodies(offsets, [""] * 8) is None
+    assert skeleton_checks.find_two_bodies(offsets, ["ann"] * 8).counts == (4, 4)
+    assert skeleton_checks.find_two_bodies(offsets, [""] * 8) is None
 
 
 def test_a_rest_pose_in_one_point_is_a_sentence(read):
     point = replace(BODY, offsets=np.zeros_like(BODY.offsets))
     said = refusal(read, family(body=point))
     assert "the rest pose is degenerate: all 7 joints lie in one point" in said
-    assert not rest_pose.is_degenerate(np.zeros((1, 3)))
+    assert not skeleton_checks.is_degenerate(np.zeros((1, 3)))
 
 
 # --- facing

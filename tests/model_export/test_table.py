@@ -6,7 +6,7 @@ import pytest
 from minimal import recipe_with
 
 from posefield.common.errors import RecipeError
-from posefield_train.source import clip_table, table_cells
+from posefield_train.source import clip_table
 
 FRAMES = {"first_frame": "from", "last_frame": "to"}
 
@@ -213,7 +213,7 @@ def test_the_number_of_columns_is_bounded(refused):
 
 
 def test_the_size_of_a_table_is_bounded(refused):
-    fault = refused("file,v\n" + " " * table_cells.MAX_BYTES)
+    fault = refused("file,v\n" + " " * clip_table.MAX_BYTES)
     assert fault.message == "found more than 16000 kB, expected a table of at most 16000 kB"
 
 

@@ -17,9 +17,8 @@ from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
 from posefield_train.adapt.adapted_file import NewPerformer
 from posefield_train.graph import onnx_export, trained_card
 from posefield_train.kriging import sample_points
-from posefield_train.source import ingest
-from posefield_train.source.takes import frame_features, shared_frames
-from posefield_train.source.takes.shared_frames import ClipPair
+from posefield_train.source import ingest, take_groups
+from posefield_train.source.take_groups import ClipPair
 
 NAMES = ("Hips", "Spine", "LeftArm", "LeftHand", "RightArm", "RightHand")
 SWAPPED = (0, 1, 4, 5, 2, 3)
@@ -45,7 +44,7 @@ def mirrored(motion):
 
 
 def relations(*motions):
-    return shared_frames.find_pairs(motions, SWAPPED)
+    return take_groups.find_pairs(motions, SWAPPED)
 
 
 def test_performances_of_their_own_share_nothing(rng):
@@ -100,7 +99,7 @@ def test_features_differ_no_more_than_joints_do(rng):
     one = wandering(rng)
     other = one + 0.02 * rng.normal(size=one.shape)
     other[:, 0] = one[:, 0]
-    features = frame_features.frame_features
+    features = take_groups.frame_features
     apart = np.sqrt(np.mean(np.sum(np.square(one - other), axis=-1), axis=-1))
     assert np.all(np.linalg.norm(features(one) - features(other), axis=1) <= apart + 1e-12)
     for same in (seen_elsewhere(one), one * [-1.0, 1.0, 1.0]):

@@ -9,13 +9,8 @@ from expressed_skeletons import arms_first, random_turns, renamed, with_joint, w
 
 from posefield.motion import quat
 from posefield_train.sample import sample_family
-from posefield_train.source.topology import (
-    common_topology,
-    recipe_topology,
-    role_joints,
-    unified_clips,
-)
-from posefield_train.source.topology.role_joints import TopologyError
+from posefield_train.source import common_topology, unified_clips
+from posefield_train.source.common_topology import TopologyError
 
 FEW = 6
 
@@ -27,7 +22,7 @@ def clips():
 
 def unify(clips, stated=None, stretches=False):
     files = [f"{at}.bvh" for at in range(len(clips))]
-    return recipe_topology.unify(clips, files, stated or {}, stretches)
+    return unified_clips.unify_recipe(clips, files, stated or {}, stretches)
 
 
 def index(clip, *names):
@@ -238,7 +233,7 @@ def test_a_neck_that_carries_the_arms_is_a_spine(clips):
         tip_joints=(),
         tip_offsets=np.zeros((0, 3)),
     )
-    found = role_joints.role_joints(flat, {})
+    found = common_topology.role_joints(flat, {})
     assert [flat.names[at] for at in found.spine] == ["Neck"]
     assert [flat.names[at] for at in found.neck] == ["Neck1"]
 

@@ -14,7 +14,7 @@ from posefield_train.evaluate import compared_motion, motion_errors, predictions
 from posefield_train.evaluate.predictions import Queries
 from posefield_train.sample import noise_free
 from posefield_train.sample import sample_controls as ranges
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical
 
 # A reference in float64 at the samples themselves: the rounding of one solve, m.
 EXACT = 1e-6
@@ -162,7 +162,7 @@ def true_positions(point, elapsed, figure):
     rotations, path, offsets = noise_free.poses(point, noise_free.phases(point, elapsed))
     clip = assemble(figure, rotations, path, offsets, 1.0)
     first = clip.root_path[0] * (1.0 - UP)
-    return placement.place(clip, first, placement.heading(clip)[0]).positions()
+    return canonical.place(clip, first, canonical.heading(clip)[0]).positions()
 
 
 def rms(gaps):

@@ -15,7 +15,7 @@ from posefield_train import train
 from posefield_train.graph import onnx_export, training_notes
 from posefield_train.graph.trained_model import Outlier
 from posefield_train.source import ingest, recipe
-from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source.canonical import Finding
 
 EIGHT = tuple(small_clip(0.1 * i, 21 + i % 3) for i in range(8))
 LABELLED = {"clips": {"performer": "who"}, "kriging": {"label": "performer"}}

@@ -9,7 +9,7 @@ from posefield.common.errors import TrainingError
 from posefield_train import train
 from posefield_train.align import time_alignment
 from posefield_train.graph import ranks, truncation_cost
-from posefield_train.source.recipe_sections.training_sections import Event
+from posefield_train.source.recipe_sections import Event
 from posefield_train.tensor import truncation_error
 
 # Rounding of the kinematics in float64, m.

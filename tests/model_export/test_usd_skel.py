@@ -8,9 +8,8 @@ from pxr import Sdf, Usd, UsdSkel
 from posefield.common.errors import FileError, MotionFileError
 from posefield.motion import quat
 from posefield.motion.skeleton import positions
-from posefield_train.source import motion_readers
-from posefield_train.source.motion_files import clip_conversion
-from posefield_train.source.motion_files.motion_file import ReadOptions
+from posefield_train.source import motion_file, motion_readers
+from posefield_train.source.motion_file import ReadOptions
 
 FRAMES = 13
 CODES = np.arange(FRAMES)
@@ -303,11 +302,11 @@ def test_damaged_text_is_refused_or_read_but_never_crashes(tmp_path, swinging, s
 def test_a_contradiction_of_the_recipe_is_an_error(swinging):
     found = swinging(unit=0.01, up="Z")
     told = {"metres_per_unit": 0.01, "up": "z"}
-    assert len(clip_conversion.to_clip(found, **told)) == FRAMES
+    assert len(motion_file.to_clip(found, **told)) == FRAMES
     for change, said in (
         ({"metres_per_unit": 1.0}, "states a unit of 0.01 m, expected source.metres_per_unit 1"),
         ({"up": "y"}, "states z as its up axis, expected source.up 'y'"),
         ({"rate": 25.0}, "30 frames a second .*, expected source.rate 25"),
     ):
         with pytest.raises(MotionFileError, match=said):
-            clip_conversion.to_clip(found, **{**told, **change})
+            motion_file.to_clip(found, **{**told, **change})

@@ -31,7 +31,7 @@ from posefield_train.kriging import sample_points, thinning
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
 from posefield_train.parallel import single_thread
-from posefield_train.source import table_cells
+from posefield_train.source import clip_table
 from posefield_train.source.ingest import Example
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.truncation_error import EventFrame, TruncationReference
@@ -59,8 +59,8 @@ def check_name(card: ModelCard, performer: str) -> None:
     if performer in card.performers:
         known = ", ".join(card.performers)
         raise InvalidField("performer", f"{performer!r} is known already, as are: {known}")
-    if not table_cells.is_label(performer):
-        raise InvalidField("performer", f"{performer!r}, expected {table_cells.LABEL_FORM}")
+    if not clip_table.is_label(performer):
+        raise InvalidField("performer", f"{performer!r}, expected {clip_table.LABEL_FORM}")
 
 
 def check_labels(card: ModelCard, labels: Mapping[str, str]) -> None:

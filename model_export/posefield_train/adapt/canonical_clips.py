@@ -20,9 +20,8 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.parallel import single_thread
-from posefield_train.source import bone_lengths
-from posefield_train.source.canonical import half_turns
-from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source import canonical, clip_joints
+from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
@@ -137,8 +136,8 @@ def _to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> Can
         aligned, gone["travel"] = travels.remove_travel(aligned)
     offsets = np.stack([e.offsets for e in examples])
     own_chart = adaptable.model.decoder.chart
-    small = half_turns.small_joints(adaptable.skeleton.parents, offsets.mean(axis=0))
-    rotations, flipped = half_turns.remove_flips_about(own_chart.means, aligned.rotations, small)
+    small = canonical.small_joints(adaptable.skeleton.parents, offsets.mean(axis=0))
+    rotations, flipped = canonical.remove_flips_about(own_chart.means, aligned.rotations, small)
     jumps = [replace(jump, clip=i) for i, e in enumerate(examples) for jump in e.jumps]
     findings = jumps + flipped + own_chart.far_joints(rotations)
     numbers = own_chart.numbers(rotations, aligned.root_path)
@@ -213,10 +212,10 @@ def _refuse_other_sizes(model: FloatModel, examples: Sequence[Example]) -> None:
         return
     for example in examples:
         size = np.linalg.norm(example.offsets, axis=-1).sum() / usual
-        if not 1.0 / bone_lengths.SIZE_LIMIT <= size <= bone_lengths.SIZE_LIMIT:
+        if not 1.0 / clip_joints.SIZE_LIMIT <= size <= clip_joints.SIZE_LIMIT:
             raise TrainingError(
                 f"{example.row.named}: its bones are {size:.2g} times as long as is usual here, "
-                f"expected at most {bone_lengths.SIZE_LIMIT:g} times either way; in another unit?"
+                f"expected at most {clip_joints.SIZE_LIMIT:g} times either way; in another unit?"
             )
 
 

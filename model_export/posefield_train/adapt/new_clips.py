@@ -20,24 +20,20 @@ from posefield_train.adapt import new_curves
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
 from posefield_train.adapt.new_curves import NewFiles
 from posefield_train.source import (
+    canonical,
     clip_joints,
-    clip_landmarks,
-    clip_notes,
     clip_table,
     data_folder,
+    facing,
     ingest,
     measured_controls,
-    table_cells,
+    skeleton_checks,
 )
-from posefield_train.source.bvh import end_sites
-from posefield_train.source.canonical import placement
-from posefield_train.source.clip_table import ClipRow
+from posefield_train.source.clip_table import ClipRow, ClipTable
+from posefield_train.source.control_sources import TIME_NAMES
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.ingest import Example
-from posefield_train.source.recipe_sections.control_sources import TIME_NAMES
-from posefield_train.source.recipe_sections.data_sections import Source
-from posefield_train.source.rigs import dummy_roots, facing
-from posefield_train.source.table_cells import ClipTable
+from posefield_train.source.recipe_sections import Source
 
 Labels = Mapping[str, str]
 """Names of clips by label set."""
@@ -87,7 +83,7 @@ def examples_of_table(
     and a skeleton. Raises RecipeError, naming line and column, for an invalid cell, and as
     `examples_of_files`.
     """
-    own = table_cells.open_table(path)
+    own = clip_table.open_table(path)
     landmarks, controls = _landmark_columns(reopened), reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
     sets = _open_sets(reopened, labels)
@@ -187,9 +183,9 @@ def _examples(
         notes += [note for note in (*left_out, *said) if note not in notes]
         stretches.append(stretch)
     if conventions.source.root_offset is None:
-        notes += clip_notes.offset_notes(files)
-    notes += clip_notes.reader_notes(files)
-    return examples, notes + clip_notes.stretch_notes(rows, stretches)
+        notes += ingest.offset_notes(files)
+    notes += ingest.reader_notes(files)
+    return examples, notes + ingest.stretch_notes(rows, stretches)
 
 
 def _example(
@@ -204,11 +200,11 @@ def _example(
     clip, notes = _reduce_to_skeleton(_without_dummies(cut, own.skeleton), own.skeleton, row)
     ahead = reopened.making.facing
     clip = facing.turn_basis(clip, ahead or 0.0)
-    clip, jumps, stretch = placement.canonicalize(
+    clip, jumps, stretch = canonical.canonicalize(
         clip, own.cyclic, own.root == "in_place", ahead is not None
     )
     marks = (
-        *clip_landmarks.landmarks(row, last, _landmark_columns(reopened)),
+        *measured_controls.landmarks(row, last, _landmark_columns(reopened)),
         *_found_landmarks(reopened, row, clip),
     )
     nothing = np.full(len(own.controls), np.nan)
@@ -222,7 +218,7 @@ def _without_dummies(clip: Clip, family: Skeleton) -> Clip:
     chain = list(range(-1, above))
     is_chain = list(own.parents[: above + 1]) == chain
     alone = all(own.parents.count(joint) == 1 for joint in range(above))
-    return dummy_roots.collapse_roots(clip, above) if is_chain and alone else clip
+    return skeleton_checks.collapse_roots(clip, above) if is_chain and alone else clip
 
 
 def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Clip, list[str]]:
@@ -230,7 +226,7 @@ def _reduce_to_skeleton(clip: Clip, family: Skeleton, row: ClipRow) -> tuple[Cli
 
     Raises RecipeError if joints are missing or have other parents.
     """
-    clip = end_sites.with_end_joints(clip, family.names)
+    clip = clip_joints.with_end_joints(clip, family.names)
     own = clip.skeleton
     missing = [name for name in family.names if name not in own.names]
     if missing:
@@ -304,7 +300,7 @@ def _found_landmarks(reopened: ReconstructedModel, row: ClipRow, clip: Clip) -> 
     for at in _found_names(reopened):
         share = measured_controls.moment_share(clip, event.joint, at)
         name = clip.skeleton.names[event.joint]
-        found.append(clip_landmarks.event_landmark(row, name, at, share))
+        found.append(measured_controls.event_landmark(row, name, at, share))
     return found
 
 

@@ -9,8 +9,8 @@ from posefield.model_file.model_card import ModelCard
 from posefield.motion.clip import Clip
 from posefield_train.source import curve_files, ingest
 from posefield_train.source.clip_table import ClipRow
-from posefield_train.source.motion_files.motion_file import MotionFile
-from posefield_train.source.recipe_sections.data_sections import Source
+from posefield_train.source.motion_file import MotionFile
+from posefield_train.source.recipe_sections import Source
 
 COLUMN, SUFFIX = "curves", ".curves.csv"
 """Column of a table with the file of a clip's curves, and how it ends beside a motion file."""

@@ -19,8 +19,7 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import CurveValues
 from posefield_train.align import time_alignment
-from posefield_train.source import measured_controls
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical, measured_controls
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 
@@ -169,13 +168,13 @@ def shift_start(example: Example, share: float, in_place: bool = False) -> Examp
     clip = _shift_clip(example.clip, frames)
     # The heading changes linearly over the cycle. A line fitted again to the shifted clip would
     # vary with the swing of the pelvis.
-    clip = placement.place(
+    clip = canonical.place(
         clip, clip.root_path[0] * (1.0 - UP), _heading_change(example.clip) * own
     )
     return replace(
         example,
         # The appended frames are turned by the change of heading, which moves the root again.
-        clip=placement.remove_drift(clip) if in_place else clip,
+        clip=canonical.remove_drift(clip) if in_place else clip,
         landmarks=tuple((mark - own) % 1.0 for mark in example.landmarks),
         shift=own - np.rint(own),
     )

@@ -29,8 +29,8 @@ from posefield.motion.clip import Clip
 from posefield_train.align import dtw
 from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.parallel.jobs import Jobs, SerialJobs, ordered_results
-from posefield_train.source.canonical import clip_blocks
-from posefield_train.source.canonical.placement import heading
+from posefield_train.source import canonical
+from posefield_train.source.canonical import heading
 from posefield_train.source.ingest import Example
 
 SERIAL = SerialJobs()
@@ -304,7 +304,7 @@ def _phases(
 ) -> ClipFrames:
     """Return `dtw.warp` of traces, block by block of clips."""
     own = np.broadcast_to(reference, traces.shape)
-    blocks = clip_blocks.clip_blocks(len(traces))
+    blocks = canonical.clip_blocks(len(traces))
     return np.concatenate(
         ordered_results(jobs, dtw.warp, ((traces[rows], own[rows]) for rows in blocks))
     )

@@ -84,7 +84,7 @@ def adapt(
     """
     from posefield_train.adapt import adapted_file, model_reconstruction, new_clips
     from posefield_train.adapt.adapted_file import NewPerformer
-    from posefield_train.source.recipe_sections.data_sections import Source
+    from posefield_train.source.recipe_sections import Source
 
     output_files.expect_onnx(output)
     if bool(files.clips) == bool(files.table):

@@ -70,7 +70,7 @@ def convert(
     """
     from posefield_train.convert import converted_file
     from posefield_train.convert.converted_file import Conventions
-    from posefield_train.source.motion_files.motion_file import ReadOptions
+    from posefield_train.source.motion_file import ReadOptions
 
     if output.suffix.lower() != ".bvh":
         raise InvalidField("output", f"{output.name!r}, expected a name that ends in .bvh")

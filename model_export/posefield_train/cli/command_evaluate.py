@@ -18,7 +18,7 @@ from posefield.console.question_options import with_option_groups
 from posefield.console.registration import MAKE, PlainCommand, register
 from posefield_train.cli import executors
 from posefield_train.cli.executors import Scheduler
-from posefield_train.source import shipped_recipes
+from posefield_train.source import data_folder
 
 if TYPE_CHECKING:
     from posefield.console.progress import ProgressBar
@@ -118,7 +118,7 @@ def json_file_words(words: Sequence[str]) -> list[str]:
     """
     found = list(words)
     for at, (word, after) in enumerate(zip_longest(words, words[1:], fillvalue="-")):
-        is_recipe = after.endswith(".toml") or after in shipped_recipes.names()
+        is_recipe = after.endswith(".toml") or after in data_folder.shipped_names()
         if word.startswith("--json=") or (
             word == "--json" and not after.startswith("-") and not is_recipe
         ):

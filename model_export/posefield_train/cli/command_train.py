@@ -13,7 +13,7 @@ from posefield.console.question_options import with_option_groups
 from posefield_train.cli import executors, output_files
 from posefield_train.cli.executors import ExecutorOptions
 from posefield_train.cli.progress_messages import ProgressPrinter
-from posefield_train.source import shipped_recipes
+from posefield_train.source import data_folder
 
 if TYPE_CHECKING:
     from posefield_train.graph.onnx_export import ExportedModel
@@ -52,7 +52,7 @@ def train_command(
 ) -> None:
     """Train the model of each recipe, one .onnx file each."""
     output_files.expect_html(report)
-    recipe_files = [shipped_recipes.file_of(given, data) for given in recipes]
+    recipe_files = [data_folder.recipe_file(given, data) for given in recipes]
     if len(recipe_files) == 1:
         _train(recipe_files[0], data, output, executor, report, json)
     elif report:
@@ -74,7 +74,7 @@ def _train(
     # SciPy and onnx take a second to import, and other commands do not need them.
     from posefield_train import train
     from posefield_train.graph import onnx_export
-    from posefield_train.source import ingest, preset_check, recipe
+    from posefield_train.source import ingest, recipe
 
     output_files.expect_onnx(output)
     own = recipe.read_accepted(recipe_file)
@@ -83,7 +83,7 @@ def _train(
         progress(f"reading {recipe_file}")
         examples, notes = ingest.ingest(own, data or recipe_file.parent)
         progress.expect(_step_seconds(len(examples)))
-        preset_check.check_presets(own, examples)
+        ingest.check_presets(own, examples)
         trained = train.train(own, examples, progress, jobs)
         progress("writing the graph and comparing it with the reference")
         exported = onnx_export.export_model(own, trained, notes)

@@ -12,9 +12,8 @@ from posefield.common.units import UpAxis
 from posefield.motion import bvh_writer
 from posefield.motion.clip import Clip
 from posefield_train.convert import blender_program
-from posefield_train.source import motion_readers
-from posefield_train.source.motion_files import clip_conversion
-from posefield_train.source.motion_files.motion_file import AS_STATED, MotionFile, ReadOptions
+from posefield_train.source import motion_file, motion_readers
+from posefield_train.source.motion_file import AS_STATED, MotionFile, ReadOptions
 
 METRES_PER_UNIT = 0.01
 FBX = ".fbx"
@@ -59,7 +58,7 @@ def convert(path: Path, said: Conventions) -> ConvertedFile:
             f"states no {'unit' if unit is None else 'up axis'}, expected {lacks}; posefield probe "
             "proposes it"
         )
-    clip = clip_conversion.to_clip(file, metres_per_unit=unit, up=up, rate=said.options.rate)
+    clip = motion_file.to_clip(file, metres_per_unit=unit, up=up, rate=said.options.rate)
     clip = replace(clip, translations=_rigid_bones(clip))
     try:
         content = bvh_writer.dumps(clip, metres_per_unit=METRES_PER_UNIT)

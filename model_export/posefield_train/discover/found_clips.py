@@ -15,7 +15,7 @@ from posefield_train.discover import example_search, motion_features, stride_det
 from posefield_train.discover.joined_features import Span
 from posefield_train.discover.motion_features import StillTakes
 from posefield_train.discover.take_reading import Take
-from posefield_train.source import data_folder, table_cells
+from posefield_train.source import clip_table, data_folder
 
 EXAMPLE = re.compile(r"(.+):(\d+(?:\.\d+)?)-(\d+(?:\.\d+)?)")
 SHORTEST_EXAMPLE, SHORTEST_ROW = 0.6, 0.2
@@ -126,7 +126,7 @@ def parse_examples(takes: Sequence[Take], text: str) -> Examples:
 
 def _reviewed(takes: Sequence[Take], path: Path) -> Examples:
     """Return the rows of a table that a person accepted or rejected."""
-    cells = table_cells.open_table(path)
+    cells = clip_table.open_table(path)
     cells.require(dict.fromkeys(("file", "first_frame", "last_frame", "accepted"), "discover"))
     spans: dict[str, list[Span]] = {"true": [], "rejected": [], "false": []}
     rates = {take.file: take.rate for take in takes}

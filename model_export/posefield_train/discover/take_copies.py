@@ -11,7 +11,7 @@ import numpy as np
 from posefield.common.array_shapes import Positions
 from posefield.common.units import Floats
 from posefield_train.probe.figure import ADULT_LEG
-from posefield_train.source.takes import shared_frames, take_groups
+from posefield_train.source import take_groups
 
 COMPARED = (
     "hips",
@@ -49,7 +49,7 @@ def find_copies(
     roles = [role for role in known if _counterpart(role) in known]
     motions = [_motion(own, roles) for own in places]
     swapped = tuple(roles.index(_counterpart(role)) for role in roles)
-    pairs = shared_frames.find_pairs(motions, swapped)
+    pairs = take_groups.find_pairs(motions, swapped)
     recordings = take_groups.connected(files, pairs)
     notes: dict[str, str] = {}
     # Relations to the recording itself come first.

@@ -18,12 +18,10 @@ from posefield_train.discover import take_copies
 from posefield_train.probe import figure, proposals
 from posefield_train.probe.figure import ADULT_LEG, MOST_WHOLE, OTHER_UNIT
 from posefield_train.probe.proposals import Proposal
-from posefield_train.source import motion_readers
-from posefield_train.source.motion_files import clip_conversion
-from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
+from posefield_train.source import frame_faults, motion_file, motion_readers
+from posefield_train.source.frame_faults import NO_FAULTS, FrameFaults
+from posefield_train.source.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
-from posefield_train.source.takes import frame_faults
-from posefield_train.source.takes.frame_faults import NO_FAULTS, FrameFaults
 
 LEG = ("UpperLeg", "LowerLeg", "Foot")
 SEARCHED = frozenset(
@@ -288,7 +286,7 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
                 "files of one up axis together"
             )
             continue
-        places = {r: clip_conversion.to_y_up(own, axis) for r, own in body.take.places.items()}
+        places = {r: motion_file.to_y_up(own, axis) for r, own in body.take.places.items()}
         found.append(replace(body.take, places=places))
     return found
 

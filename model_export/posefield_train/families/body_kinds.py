@@ -16,7 +16,7 @@ from posefield_train.probe.figure import Figure
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Proposal
 from posefield_train.source import motion_readers
-from posefield_train.source.motion_files.motion_file import ReadOptions
+from posefield_train.source.motion_file import ReadOptions
 
 SAME_BONE = 0.0005
 """Largest difference of a bone's length between files of one performer, m."""

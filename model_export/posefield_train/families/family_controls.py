@@ -8,10 +8,9 @@ from posefield_train.discover import control_proposals
 from posefield_train.discover.control_proposals import ControlProposal, FamilyClips
 from posefield_train.families import family_table
 from posefield_train.families.family_table import FamilyRow
-from posefield_train.source import ingest, measured_controls, recipe
+from posefield_train.source import common_topology, ingest, measured_controls, recipe
 from posefield_train.source.motion_readers import MotionFiles
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.topology import common_topology
 
 
 def propose(

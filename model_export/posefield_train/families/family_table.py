@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from posefield.common.errors import RecipeError
-from posefield_train.source import table_cells
+from posefield_train.source import clip_table
 
 COLUMNS = ("file", "first_frame", "last_frame", "performer", "take", "cost", "accepted")
 
@@ -49,7 +49,7 @@ def table(rows: Sequence[FamilyRow]) -> bytes:
 
 def read(path: Path) -> list[FamilyRow]:
     """Return the rows of a table; RecipeError names a cell that cannot be read."""
-    cells = table_cells.open_table(path)
+    cells = clip_table.open_table(path)
     cells.require(dict.fromkeys(COLUMNS, "the table of a family"))
     rows = []
     for line, record in cells.records:

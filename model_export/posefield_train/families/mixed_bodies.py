@@ -8,8 +8,8 @@ from posefield_train.families.body_kinds import STATED, BodyKind
 from posefield_train.probe import recipe_draft
 from posefield_train.probe.probe_report import ProbeReport
 from posefield_train.probe.proposals import Proposal
-from posefield_train.source.topology import common_topology, role_joints
-from posefield_train.source.topology.role_joints import RoleJoints, TopologyError
+from posefield_train.source import common_topology
+from posefield_train.source.common_topology import RoleJoints, TopologyError
 
 SAME_UNIT = 1e-4
 """Largest relative difference of two numbers that state the same unit."""
@@ -31,7 +31,9 @@ def can_share(kinds: Sequence[BodyKind]) -> bool:
 
 def _bodies(kinds: Sequence[BodyKind]) -> list[RoleJoints]:
     return [
-        role_joints.role_joints(own.skeleton, {role: [joint] for role, joint in own.stated.items()})
+        common_topology.role_joints(
+            own.skeleton, {role: [joint] for role, joint in own.stated.items()}
+        )
         for own in kinds
     ]
 

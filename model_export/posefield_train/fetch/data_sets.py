@@ -13,7 +13,7 @@ import orjson
 from posefield import __version__
 from posefield.common import atomic_files
 from posefield.common.errors import FileError
-from posefield_train.source import shipped_recipes, table_cells
+from posefield_train.source import clip_table, data_folder
 
 MOTION_SUFFIXES = (".asf", ".amc", ".bvh")
 
@@ -34,8 +34,8 @@ class DataSet:
 
     def rows(self, table: str) -> list[dict[str, str]]:
         """Return the rows of a shipped table of this data set."""
-        place = shipped_recipes.FOLDER / self.folder / table
-        return [record for _, record in table_cells.open_table(place).records]
+        place = data_folder.RECIPES / self.folder / table
+        return [record for _, record in clip_table.open_table(place).records]
 
     def hashes(self) -> dict[str, str]:
         """Return the known SHA-256 of files, by their names."""

@@ -19,7 +19,7 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import thinning
 from posefield_train.kriging.thinning import ThinningData
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.recipe_sections.training_sections import Detail
+from posefield_train.source.recipe_sections import Detail
 from posefield_train.tensor import truncation_error
 from posefield_train.tensor.decoder import LevelSize
 from posefield_train.tensor.hosvd import TuckerTensor

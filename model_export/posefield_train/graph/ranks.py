@@ -9,7 +9,7 @@ import numpy.typing as npt
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
 from posefield_train.graph.truncation_cost import RankCost
-from posefield_train.source.recipe_sections.training_sections import Size
+from posefield_train.source.recipe_sections import Size
 from posefield_train.tensor import hosvd
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.truncation_error import TruncationReference

@@ -37,10 +37,9 @@ from posefield_train.kriging.kriging_bank import EVENT
 from posefield_train.kriging.projected import inducing_clips
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.universal_kriging import UniversalKriging
-from posefield_train.source import measured_controls
+from posefield_train.source import common_topology, measured_controls
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.topology import common_topology
 from posefield_train.tensor import truncation_error
 
 # A control with more distinct values than this is continuous, and they are not listed.

@@ -12,7 +12,7 @@ from posefield_train.contacts.contact_model import FittedContacts
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging.kriging_tuning import TunedKriging
 from posefield_train.kriging.sample_points import SamplePoints
-from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor

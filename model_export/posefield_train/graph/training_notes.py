@@ -12,7 +12,7 @@ from posefield_train.align import phase_alignment
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.kriging.projected import inducing_clips
-from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 

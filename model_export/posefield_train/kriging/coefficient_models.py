@@ -25,7 +25,7 @@ from posefield_train.kriging.tuning_loss import (
 )
 from posefield_train.kriging.universal_kriging import Hyper
 from posefield_train.parallel.jobs import Jobs
-from posefield_train.source.recipe_sections.training_sections import Kriging
+from posefield_train.source.recipe_sections import Kriging
 from posefield_train.tensor.decoder import Proportions
 
 # Largest error of bone offsets that a model may make, m.

@@ -15,7 +15,7 @@ from posefield.kriging.kriging_model import half_ranges
 from posefield_train.kriging.projected import inducing_clips
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.recipe_sections.data_sections import PERFORMER
+from posefield_train.source.recipe_sections import PERFORMER
 
 LabelNames = Mapping[str, tuple[str, ...]]
 """Names of each label set, in the order of their columns."""

@@ -6,9 +6,9 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield_train.source import measured_controls
+from posefield_train.source.control_sources import Auto, Control, ControlMeasured
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.recipe_sections.control_sources import Auto, Control, ControlMeasured
 
 LEAST_RANGE = 10.0**-measured_controls.DECIMALS * 10
 """Range of a measured control below which its values differ by rounding only, in its unit."""

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import UP, Floats
-from posefield_train.source.bone_lengths import apart
-from posefield_train.source.takes import joint_sides
+from posefield_train.source import take_groups
+from posefield_train.source.clip_joints import apart
 
 # A transform is reported if undoing it reduces the distance below this share.
 MAX_DISTANCE_RATIO = 0.5
@@ -53,7 +53,7 @@ def _transformed(
     own: Floats, expected: Floats, names: tuple[str, ...], left: Floats
 ) -> Iterator[tuple[str, Floats]]:
     swapped, flipped = (
-        joint_sides.mirrored_joints(names),
+        take_groups.mirrored_joints(names),
         own - 2.0 * (own @ left)[..., None] * left,
     )
     turn = _best_rotation(own, expected)
@@ -70,8 +70,8 @@ def left_direction(joints: Floats, names: tuple[str, ...]) -> Floats:
 
     It is x if no joint names contain sides.
     """
-    swapped = np.array(joint_sides.mirrored_joints(names))
-    rights = joint_sides.right_joints(names)
+    swapped = np.array(take_groups.mirrored_joints(names))
+    rights = take_groups.right_joints(names)
     if not rights:
         return np.array([1.0, 0.0, 0.0])
     # The median over clips ignores a few mirrored clips.

@@ -16,11 +16,10 @@ from posefield_train.graph.trained_model import Outlier, TrainedModel
 from posefield_train.outliers import mirrored_clips, outlier_distances
 from posefield_train.outliers.mirrored_clips import ClipTransform
 from posefield_train.outliers.outlier_distances import OutlierDistances
-from posefield_train.source import bone_lengths
-from posefield_train.source.bone_lengths import ForeignBones
+from posefield_train.source import clip_joints, frame_faults
+from posefield_train.source.clip_joints import ForeignBones
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.takes import frame_faults
 
 
 @dataclass(frozen=True)
@@ -116,9 +115,7 @@ class _OutlierSearch:
         offsets = np.stack([example.offsets for example in self.trained.examples])
         usual = np.median(offsets, axis=0)
         left = mirrored_clips.left_direction(self._root_relative_positions(whole, usual), names)
-        for clip, size in zip(
-            suspects, bone_lengths.relative_sizes(offsets)[suspects], strict=True
-        ):
+        for clip, size in zip(suspects, clip_joints.relative_sizes(offsets)[suspects], strict=True):
             expected = whole[:, :, clip] - whole @ self.leave_one_out.left_out[clip]
             own = self._root_relative_positions(whole[:, :, [clip]], offsets[clip] / size)[0]
             there = self._root_relative_positions(expected[:, :, None], usual)[0]
@@ -146,9 +143,9 @@ class _OutlierSearch:
         """Yield clips with bones of another size, or another performer's."""
         offsets = np.stack([example.offsets for example in self.trained.examples])
         performers = tuple(example.row.performer for example in self.trained.examples)
-        for clip, size in enumerate(bone_lengths.relative_sizes(offsets)):
-            other = bone_lengths.find_foreign_bones(offsets, performers, clip)
-            if not 1.0 / bone_lengths.SIZE_LIMIT < size < bone_lengths.SIZE_LIMIT:
+        for clip, size in enumerate(clip_joints.relative_sizes(offsets)):
+            other = clip_joints.find_foreign_bones(offsets, performers, clip)
+            if not 1.0 / clip_joints.SIZE_LIMIT < size < clip_joints.SIZE_LIMIT:
                 yield Outlier(clip, "size", _size_text(size, self.recipe.source.metres_per_unit))
             elif other:
                 yield Outlier(clip, "bones", _bones_text(other, performers[clip]))
@@ -198,7 +195,7 @@ def _jump_text(leap: JointJump, example: Example) -> str:
 
 
 def _size_text(size: float, given: float) -> str:
-    unit = bone_lengths.guess_unit(given, size)
+    unit = clip_joints.guess_unit(given, size)
     guess = f": is the file in {unit}, not in units of {given:g} m?" if unit else ""
     return f"its bones are {size:.3g} times as long as the family's, expected about 1{guess}"
 

@@ -8,8 +8,8 @@ from posefield.common.units import Floats
 from posefield.motion import skeleton
 from posefield.roles import body_shape, joint_recognition
 from posefield.roles.joint_recognition import RoleGuess
-from posefield_train.source.motion_files.motion_file import MotionFile
-from posefield_train.source.takes import frame_faults
+from posefield_train.source import frame_faults
+from posefield_train.source.motion_file import MotionFile
 
 ADULT_LEG = 0.86
 """Length of the bones from hip to foot of an adult, m."""

@@ -9,8 +9,8 @@ import numpy as np
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import quat
 from posefield_train.probe.figure import ADULT_LEG, Figure
-from posefield_train.source.bone_lengths import UNITS
-from posefield_train.source.motion_files import clip_conversion
+from posefield_train.source import motion_file
+from posefield_train.source.clip_joints import UNITS
 
 Confidence = Literal["certain", "high", "medium", "low", "none"]
 
@@ -222,11 +222,11 @@ def _facing(figure: Figure, up: UpAxis) -> float | None:
     pair = figure.pair("UpperLeg") or figure.pair("UpperArm")
     if pair is None:
         return None
-    left, right = (clip_conversion.to_y_up(points, up) for points in pair)
+    left, right = (motion_file.to_y_up(points, up) for points in pair)
     across = left - right
     # Forward is left turned by a quarter: x to z, and z to -x.
     body = np.arctan2(-across[:, 2], across[:, 0])
     turns = figure.turns.copy()
-    turns[:, 1:] = clip_conversion.to_y_up(turns[:, 1:], up)
+    turns[:, 1:] = motion_file.to_y_up(turns[:, 1:], up)
     heading = quat.twist(turns, np.array([0.0, 1.0, 0.0]))
     return float(np.angle(np.mean(np.exp(1j * (body - heading)))))

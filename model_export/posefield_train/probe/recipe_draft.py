@@ -10,9 +10,9 @@ from pathlib import Path
 
 from posefield.common.errors import RecipeError
 from posefield_train.probe.probe_report import ProbeReport
-from posefield_train.source import table_cells
-from posefield_train.source.rigs.facing import LARGEST_ANGLE
-from posefield_train.source.table_cells import ClipTable
+from posefield_train.source import clip_table
+from posefield_train.source.clip_table import ClipTable
+from posefield_train.source.facing import LARGEST_ANGLE
 
 TABLE, RECIPE = "clips.csv", "recipe.toml"
 FRAME_NAME = re.compile(r"frame(?!s\b)|_frame$|^frame_")
@@ -63,7 +63,7 @@ def recipe_name(name: str) -> str:
 
 def read_table(path: Path) -> ClipTable:
     """Return a table that exists; RecipeError if it names no motion files."""
-    found = table_cells.open_table(path)
+    found = clip_table.open_table(path)
     if not found.records:
         raise RecipeError(path, "no rows below the heading")
     if not _first_of(found, FILE_COLUMNS):

@@ -1,12 +1,17 @@
-"""Joints of clips: those that a recipe names, drops and keeps, and equal skeletons of all."""
+"""Joints of clips: those that a recipe names, drops and keeps, end sites, and lengths of bones."""
 
+from collections import Counter
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
 
 from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import Floats
+from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source.bvh import end_sites
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.recipe import Recipe
 
@@ -17,8 +22,8 @@ def drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     End sites that the recipe names are joints of the clip.
     """
     needed = named_joints(recipe)
-    sites = [name for name in end_sites.end_site_names(clip.skeleton) if name]
-    clip = end_sites.with_end_joints(clip, needed)
+    sites = [name for name in end_site_names(clip.skeleton) if name]
+    clip = with_end_joints(clip, needed)
     joints = clip.skeleton
     missing = (needed | set(recipe.motion.drop_joints)) - set(joints.names)
     if missing:
@@ -103,3 +108,145 @@ def _difference(a: Skeleton, b: Skeleton) -> str:
     if set(a.names) != set(b.names):
         return f"only one of them has {sorted(set(a.names) ^ set(b.names))}"
     return "the same names in another order or hierarchy"
+
+
+ENDING = "_end"
+"""Ending of the name of an end site; motion files do not name them."""
+
+
+def end_site_names(joints: Skeleton) -> list[str]:
+    """Return a name for each end site: its joint's with the ending _end, then _end_2 and so on.
+
+    A name that a joint has is not given to an end site; it is empty instead.
+    """
+    counts: Counter[int] = Counter()
+    names = []
+    for joint in joints.tip_joints:
+        counts[joint] += 1
+        number = f"_{counts[joint]}" if counts[joint] > 1 else ""
+        name = f"{joints.names[joint]}{ENDING}{number}"
+        names.append("" if name in joints.names else name)
+    return names
+
+
+def with_end_joints(clip: Clip, wanted: Collection[str]) -> Clip:
+    """Return the clip with joints, each after its parent, in place of the end sites of some names.
+
+    The joints never turn and keep their distance from their parents.
+    """
+    joints, names = clip.skeleton, end_site_names(clip.skeleton)
+    chosen = [site for site, name in enumerate(names) if name and name in wanted]
+    if not chosen:
+        return clip
+    count = len(joints)
+    parents = [joints.tip_joints[site] for site in chosen]
+    # The end joints follow their parents, so that joints stay in depth-first order.
+    order = sorted(
+        range(count + len(chosen)),
+        key=lambda joint: (joint, 0) if joint < count else (parents[joint - count], joint),
+    )
+    place = {joint: index for index, joint in enumerate(order)}
+    above = [*joints.parents, *parents]
+    kept = [site for site in range(len(names)) if site not in chosen]
+    tips = joints.tip_offsets[chosen]
+    longer = Skeleton(
+        tuple([*joints.names, *(names[site] for site in chosen)][joint] for joint in order),
+        tuple(place[above[joint]] if joint else -1 for joint in order),
+        np.concatenate([joints.offsets, tips])[order],
+        tuple(place[joints.tip_joints[site]] for site in kept),
+        joints.tip_offsets[kept],
+    )
+    still = np.tile(quat.IDENTITY, (len(clip), len(chosen), 1))
+    moved = np.broadcast_to(tips, (len(clip), *tips.shape))
+    return replace(
+        clip,
+        skeleton=longer,
+        rotations=np.concatenate([clip.rotations, still], axis=1)[:, order],
+        translations=np.concatenate([clip.translations, moved], axis=1)[:, order],
+    )
+
+
+# Adults differ by less than this factor in size.
+SIZE_LIMIT = 1.5
+# Names of the units that files use, and their length in metres.
+UNITS = {
+    "millimetres": 0.001,
+    "centimetres": 0.01,
+    "inches": 0.0254,
+    "ASF units": 0.0564444,
+    "decimetres": 0.1,
+    "feet": 0.3048,
+    "metres": 1.0,
+}
+# Largest ratio between the factor found and a unit's factor.
+UNIT_TOLERANCE = 1.15
+# Bones of one performer differ by less than SAME, m, between clips, and from those of another
+# performer by more than CLEAR times that spread.
+SAME, CLEAR = 0.002, 3.0
+
+
+@dataclass(frozen=True)
+class ForeignBones:
+    """A clip whose bones differ from those of its performer's other clips.
+
+    apart: root mean square distance, m. others: number of the performer's other clips. alike:
+    another performer with matching bones, or "". within: distance from that performer's bones, m.
+    """
+
+    apart: float
+    others: int
+    nearest_performer: str
+    nearest_distance: float
+
+
+def relative_sizes(offsets: Floats) -> Floats:
+    """Return the total bone length (N,) of offsets (N, J, 3) relative to the family's median.
+
+    A single joint has no bones: its clips are alike.
+    """
+    lengths = np.linalg.norm(offsets, axis=-1).sum(axis=-1)
+    usual = np.median(lengths)
+    return np.asarray(lengths / usual) if usual > 0.0 else np.ones(len(lengths))
+
+
+def guess_unit(metres_per_unit: float, size: float) -> str:
+    """Return the unit of a file whose skeleton is `size` times too large; "" if none fits."""
+    fits = {name: abs(np.log(metres_per_unit / size / m)) for name, m in UNITS.items()}
+    name = min(fits, key=lambda name: fits[name])
+    return name if fits[name] < np.log(UNIT_TOLERANCE) else ""
+
+
+def find_foreign_bones(
+    offsets: Floats, performers: tuple[str, ...], clip: int
+) -> ForeignBones | None:
+    """Return how a clip's bones (N, J, 3) differ from its performer's; None if they match.
+
+    If a performer has only two clips and they differ, neither is reported unless it matches another
+    performer's bones.
+    """
+    whose = np.array(performers)
+    own = np.flatnonzero((whose == whose[clip]) & (np.arange(len(whose)) != clip))
+    if not whose[clip] or not len(own):
+        return None
+    usual = np.median(offsets[own], axis=0)
+    gap = apart(offsets[clip], usual)
+    spread = float(np.median([apart(one, usual) for one in offsets[own]]))
+    if gap < max(SAME, CLEAR * spread):
+        return None
+    near = _nearest(offsets, whose, clip)
+    if near[0] < gap / CLEAR:
+        return ForeignBones(gap, len(own), near[1], near[0])
+    return ForeignBones(gap, len(own), "", 0.0) if len(own) > 1 else None
+
+
+def _nearest(offsets: Floats, whose: npt.NDArray[np.str_], clip: int) -> tuple[float, str]:
+    """Return the distance, m, and name of the other performer with the most similar bones."""
+    names = sorted(set(whose.tolist()) - {whose[clip], ""})
+    means = [np.median(offsets[whose == name], axis=0) for name in names]
+    gaps = [(apart(offsets[clip], mean), name) for mean, name in zip(means, names, strict=True)]
+    return min(gaps, default=(np.inf, ""))
+
+
+def apart(a: Floats, b: Floats) -> float:
+    """Return the root mean square distance of points (..., 3)."""
+    return float(np.sqrt(np.mean(np.sum(np.square(a - b), axis=-1))))

@@ -13,11 +13,10 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.curves import Curve, CurveValues
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import table_cells
-from posefield_train.source.clip_table import ClipRow
+from posefield_train.source import clip_table
+from posefield_train.source.clip_table import ClipRow, ClipTable
+from posefield_train.source.control_sources import Curves
 from posefield_train.source.data_folder import FileLocation
-from posefield_train.source.recipe_sections.control_sources import Curves
-from posefield_train.source.table_cells import ClipTable
 
 FRAME = "frame"
 RESTING_JOINT = "Root"
@@ -37,7 +36,7 @@ class CurveReader:
         Raises RecipeError for a missing column or frame, and for a cell that is not a number within
         the curve's range.
         """
-        table = table_cells.open_table(place)
+        table = clip_table.open_table(place)
         _expect_frames(table)
         _expect_columns(table, [curve.name for curve in self.curves], self.keys)
         return _values(table, self.curves)
@@ -48,7 +47,7 @@ def reader(keys: Curves, rows: Sequence[ClipRow]) -> CurveReader:
 
     Raises RecipeError for keys of an unknown curve, and for a file without curves.
     """
-    first = table_cells.open_table(rows[0].curve_file)
+    first = clip_table.open_table(rows[0].curve_file)
     _expect_frames(first)
     found = [name for name in first.columns if name != FRAME]
     names = keys.names or found
@@ -67,7 +66,7 @@ def read_known(place: FileLocation, curves: tuple[Curve, ...]) -> tuple[CurveVal
     Raises RecipeError for a missing column or frame, and for a cell that is not a number within the
     curve's range.
     """
-    table, names = table_cells.open_table(place), [curve.name for curve in curves]
+    table, names = clip_table.open_table(place), [curve.name for curve in curves]
     _expect_frames(table)
     missing = [name for name in names if name not in table.columns]
     if missing:

@@ -1,4 +1,4 @@
-"""Data folder: motion files in subfolders, or in zip files named after those subfolders."""
+"""Data folder: motion files in folders or in zip files named after those; shipped recipes."""
 
 import io
 import struct
@@ -13,6 +13,9 @@ from posefield.common.errors import RecipeError
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
+
+from posefield.common.errors import InvalidField
+from posefield.common.name_suggestion import did_you_mean
 
 COMPRESSION_METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
 """Accepted compression methods. For bzip2 and LZMA, `zipfile` unpacks the whole content of 4 kB at
@@ -194,3 +197,52 @@ def _open_zip(archive: Path) -> zipfile.ZipFile:
         return zipfile.ZipFile(archive)
     except ZIP_ERRORS as fault:
         raise RecipeError(archive, f"not a zip file: {fault}") from fault
+
+
+RECIPES = Path(__file__).parents[1] / "recipes"
+
+
+def shipped_names() -> list[str]:
+    """Return the names of the recipes."""
+    return sorted(path.stem for path in RECIPES.glob("*.toml"))
+
+
+def recipe_file(given: Path, data: Path | None) -> Path:
+    """Return the recipe file of a command's argument: a path, or the name of a shipped recipe.
+
+    data: folder of the motion data, which a shipped recipe needs. Raises InvalidField for an
+    unknown name and for a shipped recipe without data.
+    """
+    if given.suffix or len(given.parts) > 1 or given.exists():
+        return given
+    if given.name not in (known := shipped_names()):
+        shipped = ", ".join(known)
+        found = f"{given.name!r}{did_you_mean(given.name, known)}"
+        raise InvalidField("RECIPE", f"{found}, expected a TOML file or one of {shipped}")
+    if data is None:
+        raise InvalidField("data", f"missing, expected the folder of the data of {given.name}")
+    return RECIPES / f"{given.name}.toml"
+
+
+def find_table(folder: Path, name: str, beside: Path | None = None) -> FileLocation:
+    """Return the table of clips in a data folder, else beside the recipe, else the shipped one.
+
+    beside: folder of the recipe. Raises RecipeError, as `data_folder.find`, if none exists.
+    """
+    try:
+        return find(folder, name)
+    except RecipeError:
+        if beside is not None and ".." not in Path(name).parts and (beside / name).is_file():
+            return beside / name
+        shipped = {path.relative_to(RECIPES).as_posix(): path for path in RECIPES.glob("*/*.csv")}
+        if name not in shipped:
+            raise
+        return shipped[name]
+
+
+def table_notes(place: str) -> list[str]:
+    """Return a note on the use of a shipped table; none for a table of the data folder."""
+    if not Path(place).is_relative_to(RECIPES):
+        return []
+    name = Path(place).relative_to(RECIPES).as_posix()
+    return [f"{name}: the data folder has no such table, the one that ships was used"]

@@ -5,34 +5,36 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
+
 from posefield.common.array_shapes import Positions
+from posefield.common.errors import TrainingError
+from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.motion.clip import Clip
 from posefield.motion.joint_roles import Role
 from posefield_train.source import (
+    canonical,
     clip_joints,
-    clip_landmarks,
-    clip_notes,
     clip_table,
     curve_files,
+    data_folder,
     measured_controls,
-    shipped_recipes,
+    motion_file,
+    skeleton_checks,
+    take_groups,
+    unified_clips,
 )
-from posefield_train.source.canonical import clip_blocks, placement
-from posefield_train.source.canonical.half_turns import Finding
-from posefield_train.source.clip_landmarks import Spans
+from posefield_train.source.canonical import Finding
 from posefield_train.source.clip_table import ClipRow
+from posefield_train.source.common_topology import TopologyError
 from posefield_train.source.curve_files import CurveReader
-from posefield_train.source.motion_files import clip_conversion
-from posefield_train.source.motion_files.motion_file import MotionFile, ReadOptions
+from posefield_train.source.measured_controls import Spans
+from posefield_train.source.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.recipe_sections.data_sections import Source
-from posefield_train.source.rigs import rig_normalization
-from posefield_train.source.rigs.rig_normalization import RigError, RiggedClips, RigSettings
-from posefield_train.source.takes import take_groups
-from posefield_train.source.topology import recipe_topology
-from posefield_train.source.topology.role_joints import TopologyError
+from posefield_train.source.recipe_sections import PERFORMER, Source
+from posefield_train.source.skeleton_checks import RigError, RiggedClips, RigSettings
 
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
 # second, which take 2.4 GB.
@@ -82,9 +84,9 @@ def ingest(
     alone = recipe.curves is not None and recipe.curves.alone
     files = {} if alone else read_files(rows, recipe.source, known)
     curves = curve_files.reader(recipe.curves, rows) if recipe.curves else None
-    notes = [*shipped_recipes.table_notes(rows[0].table), *clip_notes.reader_notes(files)]
+    notes = [*data_folder.table_notes(rows[0].table), *reader_notes(files)]
     if recipe.source.root_offset is None:
-        notes += clip_notes.offset_notes(files)
+        notes += offset_notes(files)
     # Converted once for all rows: a long file may have hundreds. Of thousands of clips each stage
     # takes hundreds of megabytes, so that the stage before is released.
     wholes = {motion: clip_of_file(files.pop(motion), recipe.source) for motion in list(files)}
@@ -103,17 +105,17 @@ def ingest(
     notes_of_rigs = rigged.notes
     del rigged
     clips.reverse()
-    clip_blocks.return_freed_memory()
+    canonical.return_freed_memory()
     found = [
         _example(recipe, row, clips.pop(), last, facing)
         for row, last in zip(rows, lasts, strict=True)
     ]
     examples = [own.example for own in found]
-    clip_landmarks.expect_same_order(
+    measured_controls.expect_same_order(
         recipe.landmark_names, rows, [own.landmarks for own in examples]
     )
-    notes += [*notes_of_rigs, *clip_notes.stretch_notes(rows, [own.stretch for own in found])]
-    clip_blocks.return_freed_memory()
+    notes += [*notes_of_rigs, *stretch_notes(rows, [own.stretch for own in found])]
+    canonical.return_freed_memory()
     takes, said = _takes(rows, found)
     examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]
     return examples, [*said, *notes]
@@ -189,7 +191,7 @@ def _on_one_topology(
     files = [row.place.name for row in rows]
     stretches = recipe.motion.bones == "stretch"
     try:
-        return recipe_topology.unify(clips, files, recipe.skeleton.stated, stretches)
+        return unified_clips.unify_recipe(clips, files, recipe.skeleton.stated, stretches)
     except TopologyError as fault:
         row = rows[fault.clip]
         raise row.error(f"{row.place}: {fault}") from fault
@@ -208,7 +210,7 @@ def _normalize_rigs(recipe: Recipe, rows: Sequence[ClipRow], clips: Sequence[Cli
     )
     performers = [row.performer for row in rows]
     try:
-        return rig_normalization.normalize(
+        return skeleton_checks.normalize(
             clips, performers, [row.place.name for row in rows], settings
         )
     except RigError as fault:
@@ -222,19 +224,19 @@ def _example(
     """Return the example of a row."""
     motion, has_facing = recipe.motion, facing is not None
     in_place = motion.root == "in_place"
-    opened, jumps = placement.without_jumps(captured, motion.cyclic, has_facing)
-    clip = placement.closed(opened, motion.cyclic, in_place)
-    before = placement.closed(opened, False, in_place) if motion.cyclic else None
+    opened, jumps = canonical.without_jumps(captured, motion.cyclic, has_facing)
+    clip = canonical.closed(opened, motion.cyclic, in_place)
+    before = canonical.closed(opened, False, in_place) if motion.cyclic else None
     marks = (
-        *clip_landmarks.landmarks(row, last, recipe.clips.landmarks),
-        *clip_landmarks.found_landmark(recipe, row, clip),
+        *measured_controls.landmarks(row, last, recipe.clips.landmarks),
+        *measured_controls.found_landmark(recipe, row, clip),
     )
     values = measured_controls.control_values(recipe, row, clip, marks)
-    spans = clip_landmarks.contact_spans(row, last, recipe.contacts.columns)
+    spans = measured_controls.contact_spans(row, last, recipe.contacts.columns)
     example = Example(
         row, clip, values, marks, jumps, facing=facing, captured=before, contacts=spans
     )
-    return _FoundExample(example, placement.largest_stretch(captured), captured.positions())
+    return _FoundExample(example, canonical.largest_stretch(captured), captured.positions())
 
 
 def clip_of_file(file: MotionFile, source: Source) -> Clip:
@@ -242,7 +244,7 @@ def clip_of_file(file: MotionFile, source: Source) -> Clip:
 
     By default position channels replace the root's OFFSET.
     """
-    return clip_conversion.to_clip(
+    return motion_file.to_clip(
         file,
         metres_per_unit=source.metres_per_unit,
         up=source.up,
@@ -265,3 +267,82 @@ def cut_frames(clip: Clip, row: ClipRow) -> tuple[Clip, int]:
     rotations, translations = clip.rotations[kept], clip.translations[kept]
     curves = clip.curves and replace(clip.curves, values=clip.curves.values[kept])
     return replace(clip, rotations=rotations, translations=translations, curves=curves), last
+
+
+BVH = "BVH"
+RIGID_TOLERANCE = 1e-4
+"""Bones that stretch by less than this are taken as rigid without a note, m."""
+
+
+def stretch_notes(rows: Sequence[ClipRow], stretches: Sequence[float]) -> list[str]:
+    """Return the note on bones that stretch, with the worst clip; none if all are rigid.
+
+    stretches: largest change of a bone's length in the clip of each row, m.
+    """
+    worst = int(np.argmax(stretches))
+    count = int(np.sum(np.asarray(stretches) > RIGID_TOLERANCE))
+    if not count:
+        return []
+    most = f"bones stretch by up to {stretches[worst]:.4f} m"
+    if count == 1:
+        return [f"{rows[worst].place}: {most}; their mean is kept"]
+    return [
+        f"{count} of {len(rows)} clips: {most}, the most in {rows[worst].place}; their mean is kept"
+    ]
+
+
+def offset_notes(files: Mapping[str, MotionFile]) -> list[str]:
+    """Return the note on the interpretation of root OFFSETs that are not zero; none if all are.
+
+    files: motion files by place; those of other formats than BVH have no OFFSET.
+    """
+    moved = {
+        place: tuple(file.skeleton.offsets[0].tolist())
+        for place, file in files.items()
+        if file.format == BVH and file.skeleton.offsets[0].any()
+    }
+    if not moved:
+        return []
+    place, offset = next(iter(moved.items()))
+    which = "" if len(moved) == 1 else f"{len(moved)} of {len(files)} files, the first of them "
+    return [
+        f"{which}{place}: the root's OFFSET is {offset} and has position channels, which were "
+        "taken to replace it; say so as source.root_offset"
+    ]
+
+
+def reader_notes(files: Mapping[str, MotionFile]) -> list[str]:
+    """Return the notes of readers on what they assumed, each of several files once.
+
+    files: motion files by place.
+    """
+    found: dict[str, list[str]] = {}
+    for place, file in files.items():
+        for note in file.notes:
+            found.setdefault(note, []).append(place)
+    return [
+        note if len(places) == 1 else f"{len(places)} of {len(files)} files: {note}"
+        for note, places in found.items()
+    ]
+
+
+def check_presets(recipe: Recipe, examples: Sequence[Example]) -> None:
+    """Raise TrainingError for a preset outside the sampled ranges or of an unknown label."""
+    points = np.stack([example.controls for example in examples])
+    least, most = points.min(axis=0), points.max(axis=0)
+    for name, preset in recipe.presets.items():
+        for index, control in enumerate(recipe.controls):
+            value, low, high = preset.values[control.name], least[index], most[index]
+            if not low <= value <= high:
+                raise TrainingError(
+                    f"presets.{name}.{control.name}: found {value:g}, expected {low:g} to "
+                    f"{high:g}, the sampled range"
+                )
+        for label_set, label in preset.labels.items():
+            known = sorted({example.row.labels[label_set] for example in examples})
+            if label not in known:
+                key = label_set if label_set == PERFORMER else f"labels.{label_set}"
+                raise TrainingError(
+                    f"presets.{name}.{key}: found {label!r}{did_you_mean(label, known)}, expected "
+                    f"one of {', '.join(known)}"
+                )

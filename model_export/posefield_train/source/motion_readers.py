@@ -11,7 +11,7 @@ from pathlib import Path, PurePosixPath
 from posefield.common.errors import AcclaimError, FileError, MotionFileError
 from posefield_train.source import acclaim, bvh, data_folder
 from posefield_train.source.data_folder import FileLocation
-from posefield_train.source.motion_files.motion_file import AS_STATED, MotionFile, ReadOptions
+from posefield_train.source.motion_file import AS_STATED, MotionFile, ReadOptions
 
 MAX_GLTF_BYTES = 1_000_000_000
 """Limit of a glTF file or buffer: the project's own take 0.5 MB for a minute."""
@@ -69,27 +69,27 @@ def _read_acclaim(place: FileLocation, options: ReadOptions) -> MotionFile:
 
 def _read_gltf(place: FileLocation, options: ReadOptions) -> MotionFile:
     # pygltflib takes 0.1 s to import, and most folders hold no glTF.
-    from posefield_train.source import gltf
+    from posefield_train.source import gltf_motion
 
     def beside(name: str) -> bytes:
         return data_folder.read(data_folder.beside(place, name), MAX_GLTF_BYTES, "a buffer")
 
     content = data_folder.read(place, MAX_GLTF_BYTES, "a glTF file")
-    return gltf.read(content, str(place), beside, options)
+    return gltf_motion.read(content, str(place), beside, options)
 
 
 def _read_usd(place: FileLocation, options: ReadOptions) -> MotionFile:
-    from posefield_train.source import usd_skel
+    from posefield_train.source import usd_motion
 
     if isinstance(place, Path):
         _check_readable(place)
-        return usd_skel.read(place, str(place), options)
+        return usd_motion.read(place, str(place), options)
     # USD opens files by name only; references to other files of the archive are not found.
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder, place.name)
         with place.open("rb") as packed, copy.open("wb") as plain:
             shutil.copyfileobj(packed, plain)
-        return usd_skel.read(copy, str(place), options)
+        return usd_motion.read(copy, str(place), options)
 
 
 def _check_readable(place: Path) -> None:

@@ -14,9 +14,8 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator, model
 
 from posefield.common.errors import RecipeError
 from posefield.motion.joint_roles import Role
-from posefield_train.source import data_folder
-from posefield_train.source.recipe_sections import recipe_checks, recipe_errors
-from posefield_train.source.recipe_sections.control_sources import (
+from posefield_train.source import data_folder, recipe_checks, recipe_errors
+from posefield_train.source.control_sources import (
     Auto,
     Control,
     ControlColumn,
@@ -27,19 +26,17 @@ from posefield_train.source.recipe_sections.control_sources import (
     RecipePart,
     Text,
 )
-from posefield_train.source.recipe_sections.data_sections import (
-    Clips,
-    Motion,
-    SkeletonSettings,
-    Source,
-)
-from posefield_train.source.recipe_sections.training_sections import (
+from posefield_train.source.recipe_sections import (
     Alignment,
+    Clips,
     Contacts,
     Event,
     Kriging,
+    Motion,
     Preset,
     Size,
+    SkeletonSettings,
+    Source,
 )
 
 

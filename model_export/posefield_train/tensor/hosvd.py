@@ -14,7 +14,7 @@ import numpy as np
 
 from posefield.common.errors import TrainingError
 from posefield.common.units import Floats
-from posefield_train.source.canonical import clip_blocks
+from posefield_train.source import canonical
 
 # Directions with less than this share of the first singular value are rounding errors.
 RELATIVE_ZERO = 1e-9
@@ -102,7 +102,7 @@ def decompose_in_passes(
     that no matrix of all clips by all clips is made. squared_error: that each of the three
     projections may add, summed over the tensor.
     """
-    blocks = clip_blocks.clip_blocks(tensor.shape[2])
+    blocks = canonical.clip_blocks(tensor.shape[2])
     bases = []
     for mode in (0, 1):
         gram = sum(_gram(unfold(tensor[:, :, own], mode)) for own in blocks)

@@ -14,8 +14,8 @@ from posefield.common.units import Booleans, Floats
 from posefield.motion.curves import Curve, distances
 from posefield.motion.rotation_charts import CHARTS
 from posefield_train.align.time_alignment import AlignedClips
-from posefield_train.source.canonical import clip_blocks, half_turns
-from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source import canonical
+from posefield_train.source.canonical import Finding
 from posefield_train.tensor import pose_metric
 from posefield_train.tensor import pose_vectors as chart
 from posefield_train.tensor.pose_vectors import PoseChart
@@ -59,8 +59,8 @@ def pose_vectors(
 
     offsets: bone offsets (N, J, 3) of each clip's performer, m.
     """
-    small = half_turns.small_joints(parents, offsets.mean(axis=0))
-    rotations, flipped = half_turns.remove_flips(aligned.rotations, small)
+    small = canonical.small_joints(parents, offsets.mean(axis=0))
+    rotations, flipped = canonical.remove_flips(aligned.rotations, small)
     own_chart, far = chart.fit_chart(rotations)
     numbers = own_chart.numbers(rotations, aligned.root_path)
     if aligned.curves is not None:
@@ -126,7 +126,7 @@ def _whiten(
     """Return the tensor (D', T, N) of pose vectors (N, T, D), transposed in small blocks."""
     samples, frames, _ = numbers.shape
     values = np.empty((len(whiten), frames, samples))
-    for rows in clip_blocks.clip_blocks(samples):
+    for rows in canonical.clip_blocks(samples):
         own = numbers[rows]
         flat = whiten @ own.reshape(len(own) * frames, -1).T
         flat -= (whiten @ mean)[:, None]

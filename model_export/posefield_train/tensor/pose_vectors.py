@@ -23,8 +23,8 @@ from posefield.common.units import Booleans, Floats
 from posefield.motion import quat, quat_planes
 from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield.motion.skeleton import POSES_PER_BLOCK
-from posefield_train.source.canonical import clip_blocks
-from posefield_train.source.canonical.half_turns import Finding
+from posefield_train.source import canonical
+from posefield_train.source.canonical import Finding
 
 # Angle from the mean, rad, above which a joint is reported: rotation vectors become ambiguous at π.
 REPORTED_ANGLE = 0.9 * np.pi
@@ -61,7 +61,7 @@ class PoseChart:
         """
         found = np.empty((*root_path.shape[:2], self.joint_numbers.stop))
         found[..., :3] = root_path
-        for rows in clip_blocks.clip_blocks(len(rotations)):
+        for rows in canonical.clip_blocks(len(rotations)):
             vectors = _unwrap(self.rotation_vectors(rotations[rows]))
             self._check_angles(vectors)
             own = CHARTS[self.chart].numbers(vectors)
@@ -98,7 +98,7 @@ class PoseChart:
         """Return the joints of rotations (N, T, J, 4) close to half a turn from their means."""
         return [
             own
-            for rows in clip_blocks.clip_blocks(len(rotations))
+            for rows in canonical.clip_blocks(len(rotations))
             for own in _far_joints(self.rotation_vectors(rotations[rows]), rows.start)
         ]
 
@@ -125,7 +125,7 @@ def fit_chart(rotations: ClipRotations) -> tuple[PoseChart, list[Finding]]:
     """
     plain = PoseChart(quat.mean(rotations.reshape(-1, *rotations.shape[2:])), "rotation_vector")
     farthest, far = 0.0, []
-    for rows in clip_blocks.clip_blocks(len(rotations)):
+    for rows in canonical.clip_blocks(len(rotations)):
         vectors = plain.rotation_vectors(rotations[rows])
         far += _far_joints(vectors, rows.start)
         farthest = max(farthest, float(np.linalg.norm(_unwrap(vectors), axis=-1).max()))

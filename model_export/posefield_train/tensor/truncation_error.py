@@ -16,7 +16,7 @@ from posefield.common.units import Floats
 from posefield.model_file.model_card import Event
 from posefield.motion import skeleton
 from posefield.motion.curves import distances
-from posefield_train.source.canonical import clip_blocks
+from posefield_train.source import canonical
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import hosvd
@@ -77,8 +77,7 @@ class TruncationReference:
 
     def _distances(self, reduced: TuckerTensor) -> "_Distances":
         parts = [
-            self._block_distances(reduced, rows)
-            for rows in clip_blocks.clip_blocks(len(self.whole))
+            self._block_distances(reduced, rows) for rows in canonical.clip_blocks(len(self.whole))
         ]
         distances = parts[0] if len(parts) == 1 else np.concatenate(parts)
         return _Distances(distances, self.weights, self.event_frame)
@@ -155,7 +154,7 @@ def _all_positions(
 ) -> Annotated[Floats, "clips frames points 3"]:
     """Return the joint positions (N, T, J, 3), m, of a tensor, block by block of clips."""
     values = own_tensor.values
-    blocks = clip_blocks.clip_blocks(values.shape[2])
+    blocks = canonical.clip_blocks(values.shape[2])
     found = (positions(own_tensor, values[:, :, own], parents, offsets[own]) for own in blocks)
     if len(blocks) == 1:
         return next(found)

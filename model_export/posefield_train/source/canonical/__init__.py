@@ -1,1 +1,0 @@
-"""Canonical clips: jumps, heading and origin removed, seams closed."""

@@ -1,0 +1,222 @@
+"""Motion of a file in its own unit and axes, its frame rate, and its conversion to a clip."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from posefield.common.array_shapes import Positions, Rotations
+from posefield.common.errors import MotionFileError
+from posefield.common.units import Floats, UpAxis
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+
+BROADCAST_RATES = tuple(1000.0 * base / 1001.0 for base in (24, 30, 60, 120))
+RATE_TOLERANCE = 1e-4
+"""Relative error of a frame time cut to few digits, such as .008333 or 0.0333333."""
+
+
+def snapped_rate(frame_time: float) -> float:
+    """Return frames per second: the nearest whole or broadcast rate within the tolerance.
+
+    Otherwise the inverse of the frame time.
+    """
+    rate = 1.0 / frame_time
+    nearest = min((max(1.0, float(round(rate))), *BROADCAST_RATES), key=lambda c: abs(c - rate))
+    return nearest if abs(nearest - rate) <= RATE_TOLERANCE * nearest else rate
+
+
+Vector = tuple[float, float, float]
+ORIGIN: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class MotionFile:
+    """One motion of one skeleton as a file holds it.
+
+    source: the file's name, for messages. format: such as "BVH". skeleton: at rest with identity
+    rotations. rotations (F, J, 4), translations (F, J, 3): local to the parent. rate: frames a
+    second; None if neither file nor recipe states it. evidence: how the rate is known.
+    metres_per_unit, up: as the file states them; None if it does not. added_offset: what
+    source.root_offset = "add" adds to the root's path; zero for other formats than BVH. notes: on
+    what the reader assumed.
+    """
+
+    source: str
+    format: str
+    skeleton: Skeleton
+    rotations: Rotations
+    translations: Positions
+    rate: float | None
+    evidence: str
+    metres_per_unit: float | None = None
+    up: UpAxis | None = None
+    added_offset: Vector = ORIGIN
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+    @property
+    def poses(self) -> int:
+        """Return the number of frames times joints."""
+        return len(self) * len(self.skeleton)
+
+    def error(self, message: str) -> MotionFileError:
+        """Return an error that names this file."""
+        return MotionFileError(self.source, message)
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """Settings of a recipe for reading a file; None for those that it does not have.
+
+    rate: source.rate, frames a second. animation: name of one of several in the file.
+    """
+
+    rate: float | None = None
+    animation: str | None = None
+
+
+AS_STATED = ReadOptions()
+"""Nothing told: a file is read by what it states."""
+
+
+LEAST_RATE = 10.0
+"""Frames a second below which even keys are poses of an animator rather than frames."""
+EVEN = 0.02
+"""Largest deviation of the spacing of even keys, as a share of it."""
+DROPPED = 0.1
+"""Largest share of frames without a key that are told as dropped frames."""
+WAY_OUT = "expected a key in every frame, or source.rate, at which the curves are sampled"
+
+
+@dataclass(frozen=True)
+class SampleTimes:
+    """Times at which an animation is sampled. times: (F,), s. rate: frames a second."""
+
+    times: Floats
+    rate: float
+    evidence: str
+
+
+class UnevenKeys(ValueError):
+    """Keys of an animation that are no frames of a constant rate."""
+
+
+def sample_times(keys: Floats, rate: float | None) -> SampleTimes:
+    """Return the times of the frames between the first key and the last.
+
+    keys: (K,) times of all keys, s, increasing. rate: of source.rate; None takes the keys as
+    frames. Raises UnevenKeys for fewer than two keys, and without a rate for keys that are uneven,
+    that lack frames, or that are rarer than LEAST_RATE.
+    """
+    if len(keys) < 2 or not keys[-1] > keys[0]:
+        raise UnevenKeys(f"found {len(keys)} key, a pose without motion, expected two or more")
+    if rate is not None:
+        count = int(np.floor((keys[-1] - keys[0]) * rate + EVEN)) + 1
+        times = np.minimum(keys[0] + np.arange(count) / rate, keys[-1])
+        return SampleTimes(times, rate, "curves sampled at source.rate")
+    _refuse_uneven(keys)
+    found = snapped_rate((keys[-1] - keys[0]) / (len(keys) - 1))
+    if found < LEAST_RATE:
+        raise UnevenKeys(f"found {len(keys)} keys at {found:g} a second, {WAY_OUT}")
+    return SampleTimes(keys, found, f"keys every {1.0 / found:g} s")
+
+
+def _refuse_uneven(keys: Floats) -> None:
+    """Raise UnevenKeys for keys that are uneven or lack frames."""
+    spacing = np.diff(keys)
+    step = float(np.median(spacing))
+    if np.all(np.abs(spacing - step) <= EVEN * step):
+        return
+    frames = np.rint(spacing / step)
+    lost = int(np.sum(frames - 1.0))
+    whole = np.all(np.abs(spacing - frames * step) <= EVEN * step * np.maximum(frames, 1.0))
+    if whole and frames.min() >= 1.0 and lost <= DROPPED * (len(keys) + lost):
+        first = float(keys[np.argmax(frames > 1.0)])
+        raise UnevenKeys(
+            f"found {lost} dropped frames of {len(keys) + lost} at {1.0 / step:.6g} a second, the "
+            f"first after {first:.6g} s, {WAY_OUT}"
+        )
+    raise UnevenKeys(
+        f"found keys at uneven times, {spacing.min():.4g} to {spacing.max():.4g} s apart, {WAY_OUT}"
+    )
+
+
+RootOffset = Literal["replace", "add"]
+
+SAME = 1e-4
+"""Largest relative difference of two numbers that state the same unit or rate."""
+
+
+def to_clip(
+    file: MotionFile,
+    *,
+    metres_per_unit: float,
+    up: UpAxis,
+    root_offset: RootOffset = "replace",
+    rate: float | None = None,
+) -> Clip:
+    """Return the file's motion in metres with Y up.
+
+    up="z" turns the basis of every offset and local rotation, (x, y, z) to (x, z, -y), so the rest
+    pose stands upright. root_offset="add" adds the root's OFFSET to its path, as three.js does.
+    rate: frames a second, needed for a file without one. Raises MotionFileError if the file states
+    otherwise, ValueError for an invalid argument.
+    """
+    if not (np.isfinite(metres_per_unit) and metres_per_unit > 0):
+        raise ValueError(f"metres_per_unit {metres_per_unit}, expected a positive number")
+    if up not in ("y", "z") or root_offset not in ("replace", "add"):
+        raise ValueError(
+            f"up {up!r}, root_offset {root_offset!r}; expected 'y' or 'z', 'replace' or 'add'"
+        )
+    check_stated(file, metres_per_unit, up, rate)
+    rotations, translations = file.rotations, file.translations
+    if root_offset == "add":
+        translations = translations.copy()
+        translations[:, 0] += np.array(file.added_offset)
+    if up != "y":
+        rotations = np.concatenate([rotations[..., :1], to_y_up(rotations[..., 1:], up)], axis=-1)
+    lengths = metres_per_unit * to_y_up(translations, up)
+    return Clip(_upright(file.skeleton, metres_per_unit, up), rotations, lengths, _rate(file, rate))
+
+
+def check_stated(file: MotionFile, metres_per_unit: float, up: UpAxis, rate: float | None) -> None:
+    """Raise MotionFileError if a file states another unit, up axis or rate than the recipe."""
+    stated = file.metres_per_unit
+    if stated is not None and abs(stated - metres_per_unit) > SAME * stated:
+        raise file.error(
+            f"states a unit of {stated:g} m, expected source.metres_per_unit {metres_per_unit:g}"
+        )
+    if file.up is not None and file.up != up:
+        raise file.error(f"states {file.up} as its up axis, expected source.up {up!r}")
+    if rate is not None and file.rate is not None and abs(file.rate - rate) > SAME * rate:
+        raise file.error(
+            f"has {file.rate:g} frames a second ({file.evidence}), expected source.rate {rate:g}"
+        )
+
+
+def _rate(file: MotionFile, rate: float | None) -> float:
+    found = rate if file.rate is None else file.rate
+    if found is None:
+        raise file.error(
+            f"{file.format} files state no frame rate, expected source.rate, frames a second"
+        )
+    return found
+
+
+def to_y_up(vectors: Floats, up: UpAxis) -> Floats:
+    """Return vectors (..., 3) with Y up; the last three components of a quaternion turn alike."""
+    return vectors if up == "y" else vectors[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
+
+
+def _upright(joints: Skeleton, metres_per_unit: float, up: UpAxis) -> Skeleton:
+    """Return a skeleton in the unit and axes of a file in metres with Y up."""
+    return Skeleton(
+        joints.names,
+        joints.parents,
+        metres_per_unit * to_y_up(joints.offsets, up),
+        joints.tip_joints,
+        metres_per_unit * to_y_up(joints.tip_offsets, up),
+    )

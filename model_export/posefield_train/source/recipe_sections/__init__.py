@@ -1,1 +1,0 @@
-"""Sections of a recipe, and checks between them."""

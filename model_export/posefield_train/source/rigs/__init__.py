@@ -1,1 +1,0 @@
-"""Checks and normalization of skeletons: dummy roots, rest poses, stretching bones, facing."""

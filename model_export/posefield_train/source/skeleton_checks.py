@@ -1,0 +1,314 @@
+"""Checks and normalization of skeletons: dummy roots, rest poses, stretching bones."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+
+from posefield.common.units import UP, Floats
+from posefield.motion import quat, skeleton
+from posefield.motion.clip import Clip
+from posefield.motion.skeleton import Skeleton
+from posefield_train.source import facing
+from posefield_train.source.facing import Facing, FacingError
+
+STATIC = 1e-6
+"""Largest change of a static joint: of its place, m, and of its quaternion's components."""
+RIGID = 1e-4
+"""Largest change of a translation that counts as rounding, m."""
+
+
+def count_dummies(clips: Sequence[Clip]) -> int:
+    """Return the number of dummy roots of a family's clips, which have one skeleton.
+
+    Each has one child, and is static or slides over the floor: upright and at one height. The
+    child of the last moves against it.
+    """
+    own = clips[0].skeleton
+    count = joint = 0
+    while own.parents.count(joint) == 1 and joint not in own.tip_joints:
+        if not all(_is_dummy(clip, joint) for clip in clips):
+            break
+        joint += 1
+        if any(np.ptp(clip.translations[:, joint], axis=0).max() > RIGID for clip in clips):
+            count = joint
+    return count
+
+
+def _is_dummy(clip: Clip, joint: int) -> bool:
+    """Return whether a joint is static, or slides over the floor upright and at one height."""
+    turns, place = clip.rotations[:, joint], clip.translations[:, joint]
+    if max(np.ptp(turns, axis=0).max(), np.ptp(place, axis=0).max()) < STATIC:
+        return True
+    upright = np.abs(turns[:, [1, 3]]).max() < STATIC
+    return bool(upright and np.ptp(place @ UP) < RIGID)
+
+
+def collapse_roots(clip: Clip, count: int) -> Clip:
+    """Return the clip without its first `count` joints; the next one moves in the world as before.
+
+    Each of these joints must have the next joint as its only child.
+    """
+    if not count:
+        return clip
+    own = clip.skeleton
+    chain = (-1, *range(count))
+    places, turns = skeleton.forward_kinematics(
+        chain, clip.rotations[:, : count + 1], clip.translations[:, : count + 1]
+    )
+    rest = own.offsets[count:].copy()
+    rest[0] = own.offsets[: count + 1].sum(axis=0)
+    smaller = Skeleton(
+        own.names[count:],
+        (-1, *(parent - count for parent in own.parents[count + 1 :])),
+        rest,
+        tuple(joint - count for joint in own.tip_joints),
+        own.tip_offsets,
+    )
+    rotations, translations = clip.rotations[:, count:].copy(), clip.translations[:, count:].copy()
+    rotations[:, 0], translations[:, 0] = turns[:, -1], places[:, -1]
+    return Clip(smaller, quat.normalize(rotations), translations, clip.rate, clip.curves)
+
+
+def describe_dummies(names: Sequence[str], count: int) -> str:
+    """Return the note on collapsed roots. names: of all joints before."""
+    dummies = " and ".join(map(repr, names[:count]))
+    verb = "is a dummy root" if count == 1 else "are dummy roots"
+    return f"{dummies} {verb} above {names[count]!r}, which moves on its own and became the root"
+
+
+STRETCH_SHARE = 0.006
+"""Largest stretch of a bone as a share of the body's size: 1 cm of an adult."""
+FEW_FRAMES = 0.1
+"""Share of frames below which a stretch counts as a jump of the solver."""
+MANY_BONES = 0.5
+"""Share of the bones above which the skeleton as a whole counts as elastic."""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Largest stretch of a family. clip: index of the clip. distance, limit: m."""
+
+    clip: int
+    joint: int
+    distance: float
+    limit: float
+    cause: str
+
+    def sentence(self, joints: Skeleton) -> str:
+        """Return the stretch in words, for an error."""
+        return (
+            f"bones stretch: joint {joints.names[self.joint]!r} moves by up to "
+            f"{100 * self.distance:.1f} cm against its parent "
+            f"{joints.names[joints.parents[self.joint]]!r}, expected at most "
+            f"{100 * self.limit:.2g} cm, because a model keeps each bone's mean length; "
+            f"{self.cause}, or say motion.bones = 'stretch' to keep the mean"
+        )
+
+
+def body_size(clip: Clip) -> float:
+    """Return the largest extent of the joints in any frame along an axis, m."""
+    return float(np.ptp(clip.positions(), axis=1).max())
+
+
+def find_stretch(clips: Sequence[Clip]) -> Stretch | None:
+    """Return the largest stretch of the clips of one skeleton; None if it is within the limit."""
+    apart = np.stack([_stretches(clip).max(axis=0) for clip in clips])
+    clip, joint = map(int, np.unravel_index(np.argmax(apart), apart.shape))
+    limit = STRETCH_SHARE * float(np.median([body_size(each) for each in clips]))
+    if apart[clip, joint] <= max(limit, 1e-4):
+        return None
+    cause = _likely_cause(clips[clip], joint, limit)
+    return Stretch(clip, joint, float(apart[clip, joint]), limit, cause)
+
+
+def _stretches(clip: Clip) -> Annotated[Floats, "frames joints"]:
+    """Return the distance (F, J), m, of each joint's offset from its mean; zero for the root."""
+    gaps = clip.translations - clip.translations.mean(axis=0)
+    gaps[:, 0] = 0.0
+    return np.asarray(np.linalg.norm(gaps, axis=-1))
+
+
+def _likely_cause(clip: Clip, joint: int, limit: float) -> str:
+    """Return the likely cause of a joint's stretch, and what to do about it."""
+    apart = _stretches(clip)
+    own = clip.skeleton
+    beyond = apart.max(axis=0) > limit
+    if np.mean(apart[:, joint] > limit) < FEW_FRAMES:
+        return "it does so in few frames, as after a marker was lost: repair them or cut them off"
+    if np.mean(beyond[1:]) > MANY_BONES:
+        return "most bones do, as in a solve without a fixed skeleton: solve it with rigid bones"
+    if joint not in own.parents:
+        return (
+            "it has no children, as a prop or a target of inverse kinematics: leave it out with "
+            "motion.drop_joints"
+        )
+    if own.parents[joint] == 0:
+        others = [own.names[j] for j, p in enumerate(own.parents) if p == 0 and j != joint]
+        beside = f" besides {', '.join(others)}" if others else ""
+        return (
+            f"it looks like the body's own root{beside}: leave the others out with "
+            "motion.drop_joints, so that it becomes the root"
+        )
+    return "its position channels carry motion: bake it into rotations"
+
+
+SMALLEST = 1e-6
+"""Total length of bones below which all joints lie in one point, m."""
+OTHER_BODY = 0.05
+"""Root mean square difference of two bodies' bones, as a share of the bones' own."""
+
+
+def is_degenerate(offsets: Floats) -> bool:
+    """Return whether a skeleton of several joints with bone offsets (J, 3), m, is a point."""
+    return len(offsets) > 1 and float(np.linalg.norm(offsets[1:], axis=-1).sum()) < SMALLEST
+
+
+@dataclass(frozen=True)
+class TwoBodies:
+    """Clips of one performer with two different bodies.
+
+    first, second: indices of a clip of each. counts: number of clips of each. apart: root mean
+    square difference of their bone offsets, m.
+    """
+
+    performer: str
+    first: int
+    second: int
+    counts: tuple[int, int]
+    apart: float
+
+    def sentence(self, names: Sequence[str]) -> str:
+        """Return the finding in words, for an error. names: of the clips' files."""
+        several, few = self.counts
+        return (
+            f"two performers under the name {self.performer!r}: the bones of {few} clips, such as "
+            f"{names[self.second]}, differ by {100 * self.apart:.1f} cm from those of {several}, "
+            f"such as {names[self.first]}; expected one body for each name"
+        )
+
+
+def find_two_bodies(offsets: Floats, performers: Sequence[str]) -> TwoBodies | None:
+    """Return the first performer with two bodies; None if each has one.
+
+    offsets: of the bones (N, J, 3), m. performers: names (N,), "" for none. A single clip that
+    differs from the others is no second body: the detection of outliers tells of it.
+    """
+    for performer in sorted(set(performers) - {""}):
+        own = np.flatnonzero(np.array(performers) == performer)
+        found = _split(offsets[own])
+        if found:
+            first, second, counts, apart = found
+            return TwoBodies(performer, int(own[first]), int(own[second]), counts, apart)
+    return None
+
+
+def _split(offsets: Floats) -> tuple[int, int, tuple[int, int], float] | None:
+    """Return a clip of each body, the clips of each, and their difference, m; None for one body.
+
+    The clips that are like one of them are compared with those that are not.
+    """
+    usual = float(np.sqrt(np.mean(np.sum(np.square(offsets), axis=-1))))
+    apart = np.stack([_distances(offsets, one) for one in offsets])
+    alike = apart <= OTHER_BODY * usual
+    first = int(np.argmax(alike.sum(axis=1)))
+    others = np.flatnonzero(~alike[first])
+    if len(others) < 2:
+        return None
+    second = int(others[np.argmax(alike[others].sum(axis=1))])
+    count = int(alike[second].sum())
+    if count < 2:
+        return None
+    return first, second, (int(alike[first].sum()), count), float(apart[first, second])
+
+
+def _distances(offsets: Floats, one: Floats) -> Floats:
+    """Return the root mean square distances (N,), m, of offsets (N, J, 3) from one's (J, 3)."""
+    return np.asarray(np.sqrt(np.mean(np.sum(np.square(offsets - one), axis=-1), axis=-1)))
+
+
+@dataclass(frozen=True)
+class RigSettings:
+    """Settings of a recipe.
+
+    stretches: bones may stretch. directed: controls depend on the facing. named: joints that the
+    recipe names.
+    """
+
+    facing: Facing | None
+    stretches: bool
+    cyclic: bool
+    directed: bool
+    roles: Mapping[str, str]
+    named: frozenset[str]
+
+
+class RigError(ValueError):
+    """A skeleton that cannot be trained; clip: index of a clip that shows it."""
+
+    def __init__(self, message: str, clip: int = 0) -> None:
+        super().__init__(message)
+        self.clip = clip
+
+
+@dataclass(frozen=True)
+class RiggedClips:
+    """Clips in the basis of their facing, without dummy roots.
+
+    facing: degrees to the left of the root's +z; None for a family without a facing.
+    """
+
+    clips: tuple[Clip, ...]
+    facing: float | None
+    notes: tuple[str, ...]
+
+
+def normalize(
+    clips: Sequence[Clip], performers: Sequence[str], files: Sequence[str], settings: RigSettings
+) -> RiggedClips:
+    """Return the clips of one skeleton, normalized.
+
+    performers, files: names by clip. Raises RigError for a rest pose without extent, bones that
+    stretch, two bodies under one name, and a facing that the motion contradicts.
+    """
+    names = clips[0].skeleton.names
+    count = count_dummies(clips)
+    gone = settings.named & set(names[:count])
+    if gone:
+        raise RigError(
+            f"the recipe names {', '.join(map(repr, sorted(gone)))}, but "
+            f"{describe_dummies(names, count)}: name {names[count]!r} instead"
+        )
+    notes = [describe_dummies(names, count)] if count else []
+    clips = [collapse_roots(clip, count) for clip in clips]
+    _check_bones(clips, performers, files, settings.stretches)
+    try:
+        found = facing.find_facing(clips, settings.facing, settings.roles, settings.cyclic)
+    except FacingError as fault:
+        raise RigError(str(fault), fault.clip) from fault
+    turned = tuple(facing.turn_basis(clip, found.degrees or 0.0) for clip in clips)
+    if settings.facing or settings.directed:
+        notes += found.notes
+    return RiggedClips(turned, found.degrees, tuple(notes))
+
+
+def _check_bones(
+    clips: Sequence[Clip], performers: Sequence[str], files: Sequence[str], stretches: bool
+) -> None:
+    """Raise RigError for degenerate rest poses, stretch, and two bodies under one name."""
+    offsets = np.stack([clip.translations.mean(axis=0) for clip in clips])
+    offsets[:, 0] = 0.0
+    for index, own in enumerate(offsets):
+        if is_degenerate(own):
+            raise RigError(
+                f"the rest pose is degenerate: all {len(own)} joints lie in one point, expected "
+                "bones with a length",
+                index,
+            )
+    stretch = None if stretches else find_stretch(clips)
+    if stretch:
+        raise RigError(stretch.sentence(clips[0].skeleton), stretch.clip)
+    bodies = find_two_bodies(offsets, performers)
+    if bodies:
+        raise RigError(bodies.sentence(files), bodies.second)
