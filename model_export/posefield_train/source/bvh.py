@@ -194,6 +194,8 @@ def _header(text: _TextCursor, pattern: re.Pattern[str], expected: str) -> str:
 
 # Python's float also accepts nan, inf and 1_000, which other characters give away.
 NOT_IN_NUMBERS = bytes(set(range(256)) - set(b"0123456789+-.eE \t\n\r\v\f"))
+# One list for all blank lines, of which a file can have millions.
+EMPTY_ROW: list[bytes] = []
 
 
 def _values(text: _TextCursor, frames: int, channels: int, joints: int) -> Floats:
@@ -211,7 +213,7 @@ def _values(text: _TextCursor, frames: int, channels: int, joints: int) -> Float
     lines = _LineCounter(frames, channels, text.line)
     for piece in text.blocks():
         block = piece.encode("latin-1")
-        rows = [row.split() for row in block.split(b"\n")]
+        rows = [row.split() or EMPTY_ROW for row in block.split(b"\n")]
         numbers = _parse_numbers(block, rows)
         if numbers is None:
             raise _wrong_word(text, rows, expected - total)

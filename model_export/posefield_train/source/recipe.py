@@ -181,7 +181,8 @@ def read(path: Path) -> Recipe:
         raise RecipeError(path, TOO_DEEP) from fault
     except ValueError as fault:
         # ValueError covers TOMLDecodeError and int's error for a number of thousands of digits.
-        raise _syntax_error(path, str(fault)) from fault
+        line = re.search(r"at line (\d+)", str(fault))
+        raise RecipeError(path, f"not TOML: {fault}", int(line[1]) if line else None) from fault
     if _nesting_depth(found) > MAX_DEPTH:
         raise RecipeError(path, TOO_DEEP)
     try:
@@ -214,17 +215,6 @@ def _nesting_depth(found: dict[str, Any]) -> int:
         parts = (one.values() if isinstance(one, dict) else one for one in inside)
         inside = [one for part in parts for one in part if isinstance(one, dict | list)]
     return MAX_DEPTH + 1
-
-
-PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
-"""End of a message of tomllib."""
-
-
-def _syntax_error(path: Path, message: str) -> RecipeError:
-    """Return the error of a message of tomllib; an error at the end of the text has no place."""
-    place = PLACE.search(message)
-    where = map(int, place.groups()) if place else ()
-    return RecipeError(path, f"not TOML: {PLACE.sub('', message)}", *where)
 
 
 def json_schema() -> str:

@@ -32,25 +32,17 @@ class MotionError(Exception):
 
 
 class FileError(MotionError):
-    """A file that cannot be used; `path`, `line` and `column` (from 1) locate the error."""
+    """A file that cannot be used; `path` and `line` (from 1) locate the error."""
 
-    def __init__(
-        self,
-        path: str | Path,
-        message: str,
-        line: int | None = None,
-        column: int | None = None,
-    ) -> None:
-        place = [str(part) for part in (path, line, column) if part is not None]
-        super().__init__(f"{':'.join(place)}: {message}")
+    def __init__(self, path: str | Path, message: str, line: int | None = None) -> None:
+        super().__init__(f"{path}: {message}" if line is None else f"{path}:{line}: {message}")
         self.path = str(path)
         self.line = line
-        self.column = column
         self.message = message
 
-    def __reduce__(self) -> tuple[type["FileError"], tuple[str, str, int | None, int | None]]:
+    def __reduce__(self) -> tuple[type["FileError"], tuple[str, str, int | None]]:
         # Errors of worker processes are pickled with their fields.
-        return type(self), (self.path, self.message, self.line, self.column)
+        return type(self), (self.path, self.message, self.line)
 
 
 class MotionFileError(FileError):
