@@ -42,9 +42,9 @@ def _converted(
     """Return a clip as BVH; sources: its skeleton and its motion."""
     skeleton = acclaim.read_asf(sources[0])
     motion = acclaim.read_amc(sources[1], skeleton)
-    if len(motion) != int(row["frames"]):
+    if len(motion.root) != int(row["frames"]):
         expected = f"expected {row['frames']} as in the table of clips"
-        raise FileError(sources[1], f"found {len(motion)} frames, {expected}")
+        raise FileError(sources[1], f"found {len(motion.root)} frames, {expected}")
     clip = acclaim.to_clip(skeleton, motion, metres_per_unit=METRES_PER_UNIT, rate=RATE)
     content = bvh_writer.dumps(clip, metres_per_unit=METRES_PER_UNIT)
     return FetchedFile(row["file"], sources, content, _remark(row, sources, content, hashes))
