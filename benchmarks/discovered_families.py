@@ -20,10 +20,10 @@ from hand_cuts import HandCut
 from rows import Row
 
 from posefield_train.discover import take_reading
-from posefield_train.discover.joined_features import Span
+from posefield_train.discover.motion_features import Span
 from posefield_train.discover.take_reading import Take
-from posefield_train.families import family_table
-from posefield_train.families.family_table import FamilyRow
+from posefield_train.families import found_families
+from posefield_train.families.found_families import FamilyRow
 
 COMMAND = Path(sys.executable).with_name("posefield")
 LICENCE = "CC BY-SA 3.0, HDM05 (Universit\u00e4t Bonn)"
@@ -77,7 +77,7 @@ def _seconds() -> float:
 def judge(recipe: Path, takes: Sequence[Take], cuts: Sequence[HandCut]) -> JudgedFamily:
     """Return an offered family with its action and its right clips."""
     files = {take.file: (at, take.rate) for at, take in enumerate(takes)}
-    rows = family_table.read(recipe.with_suffix(".csv"))
+    rows = found_families.read(recipe.with_suffix(".csv"))
     spans = []
     for row in rows:
         at, rate = files[row.file]

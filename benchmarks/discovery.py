@@ -15,13 +15,8 @@ import hand_cuts
 import numpy as np
 from rows import Row, record, table
 
-from posefield_train.discover import (
-    example_search,
-    motion_features,
-    stride_detection,
-    take_reading,
-)
-from posefield_train.discover.joined_features import Span
+from posefield_train.discover import family_search, motion_features, stride_detection, take_reading
+from posefield_train.discover.motion_features import Span
 
 ROOT = Path(__file__).resolve().parents[1]
 ACCEPTED, REJECTED = 3, 2
@@ -74,13 +69,13 @@ def examples(folder: Path) -> list[Row]:
     rounds: dict[str, list[float]] = {"first": [], "least sure": []}
     for action, example in truth:
         others = [span for own, span in truth if own == action and span != example]
-        found = _spans(example_search.find_like(corpus, [example], len(others)))
+        found = _spans(family_search.find_like(corpus, [example], len(others)))
         right = [one for one in found if hand_cuts.is_right(one, others)]
         precisions[action].append(len(right) / len(others))
         wrong = [one for one in found if one not in right][:REJECTED]
         for name, accepted in (("first", right[:ACCEPTED]), ("least sure", right[-ACCEPTED:])):
             most = len(others) - len(accepted)
-            again = example_search.find_like(corpus, [example, *accepted], most, wrong)
+            again = family_search.find_like(corpus, [example, *accepted], most, wrong)
             several = [*accepted, *_spans(again)]
             rounds[name].append(
                 sum(hand_cuts.is_right(one, others) for one in several) / len(others)
@@ -110,7 +105,7 @@ def _missed(precisions: Sequence[float]) -> float:
     return 100.0 * (1.0 - float(np.mean(precisions)))
 
 
-def _spans(matches: Sequence[example_search.Match]) -> list[Span]:
+def _spans(matches: Sequence[family_search.Match]) -> list[Span]:
     return [match.span for match in matches]
 
 

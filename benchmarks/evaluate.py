@@ -21,7 +21,7 @@ from posefield_train.evaluate import protocol as held_out
 from posefield_train.evaluate import summary
 from posefield_train.parallel.finished_jobs import FinishedJobs
 from posefield_train.parallel.jobs import Jobs
-from posefield_train.source import ingest, recipe, shipped_recipes
+from posefield_train.source import data_folder, ingest, recipe
 
 KEPT = Path(__file__).parents[1] / "build/evaluation"
 
@@ -47,7 +47,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="folder of the motion data")
     parser.add_argument("--json", type=Path, help="file for the figures")
     given = parser.parse_args()
-    file = shipped_recipes.file_of(given.recipe, given.data)
+    file = data_folder.recipe_file(given.recipe, given.data)
     with executors.jobs(None, None) as processes:
         figures = measure(file, given.data or file.parent, FinishedJobs(processes, KEPT))
     if given.json:

@@ -18,8 +18,8 @@ from rows import Row, record, table
 
 from posefield_train.evaluate import compared_motion, motion_errors, predictions
 from posefield_train.evaluate.predictions import Queries
-from posefield_train.families import family_recipe, family_table
-from posefield_train.families.family_table import FamilyRow
+from posefield_train.families import found_families, recipe_folder
+from posefield_train.families.found_families import FamilyRow
 from posefield_train.source import ingest, recipe
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
@@ -72,11 +72,11 @@ def _read(
     family: JudgedFamily, rows: Sequence[FamilyRow], data: Path
 ) -> tuple[Recipe, list[Example]]:
     """Return the recipe of a family and the examples of a table's rows."""
-    text = family_recipe.with_accepted(family.recipe.read_text(encoding="utf-8"), True)
+    text = recipe_folder.with_accepted(family.recipe.read_text(encoding="utf-8"), True)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / family.recipe.name
         path.write_text(text, encoding="utf-8")
-        path.with_suffix(".csv").write_bytes(family_table.table(rows))
+        path.with_suffix(".csv").write_bytes(found_families.table(rows))
         own = recipe.read(path)
         examples, _ = ingest.ingest(own, data)
     return own, list(examples)

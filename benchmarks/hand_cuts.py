@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from posefield_train.discover.joined_features import Span
+from posefield_train.discover.motion_features import Span
 from posefield_train.discover.take_reading import Take
 
 SAME_MOTION = 0.5

@@ -20,9 +20,8 @@ from posefield.motion.rotation_charts import CHARTS, ChartName
 from posefield_train.align import time_alignment
 from posefield_train.kriging import kriging_graph, variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
-from posefield_train.onnx_graph.level_tables import LevelTables
-from posefield_train.tensor import quaternion_graph
+from posefield_train.onnx_graph.graph_builder import GraphBuilder, LevelTables
+from posefield_train.tensor import decoder_graph
 
 VECTORS: ChartName = "rotation_vector"
 """Chart of the paper, which naive kriging has but where it is said."""
@@ -35,7 +34,7 @@ def numbers(made: Family, chart: ChartName) -> Floats:
     own = replace(made.trained.tensor.chart, chart=chart)
     aligned = made.trained.aligned
     vectors = own.numbers(aligned.rotations, aligned.root_path)
-    rows = quaternion_graph.mean_products(own, vectors[..., 3:])
+    rows = decoder_graph.mean_products(own, vectors[..., 3:])
     if chart == "stereographic":
         rows += own.means.ravel()
     return np.concatenate([vectors[..., :3], rows], axis=-1)
@@ -202,8 +201,8 @@ class Contents:
         rows = net("Transpose", turned, perm=[1, 0])
         innermost = net.weights("naive_means", means[:, :, None])
         shape = net.indices(len(means), 1, -1)
-        found = quaternion_graph.quaternions(net, self.chart, rows, innermost, shape)
-        return quaternion_graph.rows_of_poses(net, found, len(means))
+        found = decoder_graph.quaternions(net, self.chart, rows, innermost, shape)
+        return decoder_graph.rows_of_poses(net, found, len(means))
 
 
 def fitted(made: Family, chart: ChartName) -> Contents:

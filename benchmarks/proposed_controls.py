@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from rows import Row, record, table
 
-from posefield_train.discover import control_proposals, take_prediction
-from posefield_train.discover.control_proposals import FamilyClips
-from posefield_train.discover.take_prediction import TakePrediction
+from posefield_train.discover import control_proposals
+from posefield_train.discover.control_proposals import FamilyClips, TakePrediction
 from posefield_train.source import data_folder, ingest, measured_controls, recipe
 
 RESULTS = Path(__file__).resolve().parents[1] / "docs/results"
@@ -61,7 +60,7 @@ def propose(name: str, data: Path) -> Proposed:
     }
     values = np.array([one.controls for one in examples])
     given = list(((values - values.mean(axis=0)) / values.std(axis=0)).T)
-    prediction = TakePrediction(take_prediction.motion_coefficients(motions), performers, takes)
+    prediction = TakePrediction(control_proposals.motion_coefficients(motions), performers, takes)
     lacking = tuple(control for control, measure in wanted.items() if measure not in known)
     return Proposed(name, tuple(wanted), lacking, found.remaining[-1], prediction.remaining(given))
 

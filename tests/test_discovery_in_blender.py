@@ -13,7 +13,7 @@ import user_rigs
 from decided_page import decide
 
 from posefield.inference import session
-from posefield_train.families import family_table
+from posefield_train.families import found_families
 
 pytestmark = pytest.mark.system
 
@@ -119,7 +119,7 @@ def test_the_page_and_its_command_make_the_same_bytes(posefield, found, reviewed
     changed = {key for key in before if before[key] != both[0][key]}
     own = {f"family_{number:02d}.toml", f"family_{number:02d}.csv"}
     assert changed == own | {"discover.json"}
-    rows = family_table.read(decided / f"family_{number:02d}.csv")
+    rows = found_families.read(decided / f"family_{number:02d}.csv")
     assert [row.accepted for row in rows].count(False) == 1
 
 

@@ -21,7 +21,7 @@ from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
 from posefield_train.align import time_alignment
-from posefield_train.graph import onnx_export, parity_check
+from posefield_train.graph import onnx_export
 from posefield_train.kriging import sample_points
 from posefield_train.source import canonical, data_folder, ingest, recipe
 
@@ -63,7 +63,7 @@ def middle(model):
 def test_a_recipe_trains_and_passes_the_gate(made):
     own, examples, trained, exported = made
     assert len(examples) == exported.card.samples == CLIPS[own.name]
-    assert 0.0 < exported.parity < parity_check.PARITY_LIMIT
+    assert 0.0 < exported.parity < onnx_export.PARITY_LIMIT
     assert len(exported.content) < 135_000
     budget = 0.01 * own.size.rms_budget_cm
     limit = min(budget, np.sqrt(trained.left_out_errors.mean()) / 6)

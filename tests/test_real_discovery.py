@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 
 from posefield_train.discover import (
-    example_search,
-    family_quality,
     family_search,
-    joined_features,
+    found_clips,
     motion_features,
     stride_detection,
     take_reading,
 )
-from posefield_train.discover.joined_features import Span
+from posefield_train.discover.motion_features import Span
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
@@ -91,7 +89,7 @@ def test_one_example_finds_the_motions_of_its_action(unpacked):
     precisions = []
     for action, example in truth[::4]:
         others = [span for own, span in truth if own == action and span != example]
-        found = example_search.find_like(corpus, [example], counts[action] - 1)
+        found = family_search.find_like(corpus, [example], counts[action] - 1)
         right = sum(any(shared(match.span, one) >= 0.5 for one in others) for match in found)
         precisions.append(right / len(others))
     assert len(truth) == 288 and np.mean(precisions) >= 0.88
@@ -101,7 +99,7 @@ def test_families_are_the_actions_of_long_takes(unpacked):
     """Precision and recall of the clips of families that are offered, against cuts by hand."""
     folder = unpacked("hdm05_long")
     corpus = motion_features.build_corpus(take_reading.read_takes(folder / "bvh").takes)
-    joined = joined_features.join_features(corpus)
+    joined = motion_features.join_features(corpus)
     files = [take.file for take in corpus.takes]
     truth = []
     for row in table(folder / "truth.csv"):
@@ -110,7 +108,7 @@ def test_families_are_the_actions_of_long_takes(unpacked):
         truth.append((row["action"], Span(take, *(at / corpus.takes[take].rate for at in frames))))
     clips, right, hits = 0, 0, set()
     for family in family_search.find_families(corpus):
-        if family_quality.assess(joined, family).reasons:
+        if found_clips.assess(joined, family).reasons:
             continue
         own = [
             [at for at, (_, span) in enumerate(truth) if shared(span, member.span) >= 0.5]

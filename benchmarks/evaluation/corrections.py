@@ -30,7 +30,7 @@ from posefield_train.kriging import sample_points
 from posefield_train.report.drawing.significant_digits import round_number
 from posefield_train.source.recipe import Recipe
 from posefield_train.tensor import truncation_error
-from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
+from posefield_train.tensor.motion_tensor import UNIFORM_SHARES
 
 # Distances beyond the captured position, away from the root, m: possibly and certainly unreachable.
 BEYOND_DISTANCES, FAR = (0.1, 0.2, 0.3), 1.0

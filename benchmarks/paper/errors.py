@@ -16,9 +16,8 @@ from paper import precomputation
 from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
 from posefield.motion import skeleton
-from posefield_train.graph import ranks
-from posefield_train.graph.ranks import ParetoFront, RankTriple
-from posefield_train.graph.truncation_cost import RankCost
+from posefield_train.graph import truncation_cost
+from posefield_train.graph.truncation_cost import ParetoFront, RankCost, RankTriple
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor.decoder import Decoder
@@ -111,7 +110,7 @@ def smallest(errors: Errors, threshold: float) -> RankTriple:
     some = replace(errors, points=errors.points[:SOME])
     places = made.trained.tensor.values[0].size * len(made.parents)
     own = _front(errors)
-    found = ranks.cheapest_within(
+    found = truncation_cost.cheapest_within(
         own,
         lambda triple: some.truncation(full.truncated(triple)) / threshold,
         (threshold / (made.vectors.shape[1] * len(made.parents))) ** 2 * places,
@@ -131,4 +130,4 @@ def _front(errors: Errors) -> ParetoFront:
     full = errors.made.trained.full
     predicted = errors.field(full).predict(errors.points)
     used = np.mean(np.square(predicted), axis=0) * len(errors.made.samples)
-    return ranks.pareto_front(full.core * np.sqrt(used), RankCost((0, 0, 0)))
+    return truncation_cost.pareto_front(full.core * np.sqrt(used), RankCost((0, 0, 0)))

@@ -18,7 +18,7 @@ from paper.errors import Errors
 from paper.naive_kriging import NaiveKriging
 from posefield.common.units import Floats
 from posefield_train.graph import truncation_cost
-from posefield_train.graph.ranks import RankTriple
+from posefield_train.graph.truncation_cost import RankTriple
 
 # The paper states no unit for its thresholds: summed distances in m, under two assumptions.
 THRESHOLDS = {"500 cm": 5.0, "750 cm": 7.5, "1000 cm": 10.0, "500 mm": 0.5}

@@ -12,28 +12,25 @@ from posefield.common.units import Floats
 from posefield.motion.curves import Curve
 from posefield.motion.skeleton import Skeleton
 from posefield_train.align import phase_alignment, time_alignment, travel
-from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.time_alignment import AlignedClips, Refinement
 from posefield_train.align.travel import Travel
-from posefield_train.align.warp import WarpBasis
+from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.contacts import contact_model
 from posefield_train.contacts.contact_model import FittedContacts
-from posefield_train.graph import ranks, truncation_cost, warped_errors
+from posefield_train.graph import truncation_cost, warped_errors
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import (
     coefficient_models,
-    event_kriging,
+    kriging_bank,
     kriging_tuning,
-    power_law,
     sample_kriging,
     sample_points,
     universal_kriging,
 )
 from posefield_train.kriging.coefficient_models import FittedModel
-from posefield_train.kriging.kriging_bank import KrigingBank
+from posefield_train.kriging.kriging_bank import KrigingBank, PowerLaw
 from posefield_train.kriging.kriging_tuning import TunedKriging
-from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.sample_points import LabelNames, SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.outliers import family_check, outlier_detection
@@ -43,16 +40,9 @@ from posefield_train.source import canonical
 from posefield_train.source.canonical import Finding
 from posefield_train.source.ingest import Example
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import (
-    event_blend,
-    event_jacobian,
-    hosvd,
-    motion_tensor,
-    truncation_error,
-)
+from posefield_train.tensor import event_blend, hosvd, motion_tensor, truncation_error
 from posefield_train.tensor.decoder import Decoder, Proportions
-from posefield_train.tensor.event_blend import EventBlend
-from posefield_train.tensor.event_jacobian import COEFFICIENTS
+from posefield_train.tensor.event_blend import COEFFICIENTS, EventBlend
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.motion_tensor import MotionTensor
 from posefield_train.tensor.truncation_error import TruncationReference
@@ -218,12 +208,12 @@ def _fit_models(
     proportions, bones = coefficient_models.fit_proportions(moved.offsets)
     durations = np.log(moved.aligned.durations)[:, None]
     beside = {**moved.travels, "offsets": bones, "duration": durations, "warp": moved.aligned.logs}
-    effector = event_jacobian.effector_weights(judge, full)
+    effector = event_blend.effector_weights(judge, full)
     pose = coefficient_models.choose_covariance(recipe.kriging, laid, full.motions, effector, jobs)
     fitted = {
         k: coefficient_models.fit(recipe.kriging, pose.hyper, laid, v) for k, v in beside.items()
     }
-    law = power_law.fit_power_law(
+    law = kriging_bank.fit_power_law(
         pose.hyper, laid, moved.controls, durations, fitted["duration"].residuals
     )
     found_law = law.law if law else None
@@ -266,8 +256,10 @@ def _fit_event(
     """
     if effector is None or judge.event_frame is None or recipe.kriging.fixed_degree is not None:
         return None
-    second = event_kriging.tune_event(recipe.kriging.nugget, pose, laid, full.motions, effector)
-    errors = event_kriging.compare_models(judge, full, judge.event_frame, (pose, second))
+    second = coefficient_models.tune_event(
+        recipe.kriging.nugget, pose, laid, full.motions, effector
+    )
+    errors = coefficient_models.compare_models(judge, full, judge.event_frame, (pose, second))
     return second if errors.is_used else None
 
 
@@ -286,7 +278,7 @@ def _truncation_limits(
     limits = {"rms": max(ALL_JOINTS_SHARE * rms, SMALLEST_LIMIT)}
     if judge.event_frame is not None:
         residuals = (fits.event or fits.pose).residuals
-        missed = event_jacobian.event_distances(judge, full, judge.event_frame, residuals)
+        missed = event_blend.event_distances(judge, full, judge.event_frame, residuals)
         effector = float(np.sqrt(np.mean(np.square(missed))))
         share = EVENT_SHARE if fits.event else EFFECTOR_SHARE
         limits["effector"] = max(share * effector, SMALLEST_LIMIT)
@@ -355,7 +347,7 @@ def _fit_and_truncate(
     controls = np.stack([example.controls for example in examples])
     price = truncation_cost.RANK_COSTS[recipe.size.cost](own_tensor, controls.shape[1])
     limits = _truncation_limits(judge, full, fits)
-    reduced = full.truncated(ranks.choose_ranks(recipe.size, full, price, judge, limits))
+    reduced = full.truncated(truncation_cost.choose_ranks(recipe.size, full, price, judge, limits))
     explained = {name: found.explained for name, found in fits.beside.items()}
     residuals = {name: found.residuals for name, found in fits.beside.items()}
     model = _assemble(recipe, controls, moved, judge, fits, reduced)

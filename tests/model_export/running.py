@@ -8,8 +8,7 @@ import onnxruntime
 from posefield.common.units import Floats
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_bank import KrigingBank
-from posefield_train.onnx_graph.graph_builder import GraphBuilder
-from posefield_train.onnx_graph.level_tables import LevelTables
+from posefield_train.onnx_graph.graph_builder import GraphBuilder, LevelTables
 
 
 def bank_values(

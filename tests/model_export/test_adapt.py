@@ -23,8 +23,7 @@ from posefield_train.evaluate.predictions import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import ConstantModel
-from posefield_train.source import ingest
-from posefield_train.source.canonical import placement
+from posefield_train.source import canonical, ingest
 from posefield_train.tensor import hosvd
 
 SHOWN, ASKED = (2.0, 7.0, 12.0), (4.0, 9.5)

@@ -13,7 +13,7 @@ from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
-from posefield_train.graph import onnx_export, parity_check
+from posefield_train.graph import onnx_export
 from posefield_train.source import canonical, ingest
 from posefield_train.source.recipe import Recipe
 
@@ -66,7 +66,7 @@ def test_the_new_file_says_who_it_knows_and_where_that_comes_from(base, adapted)
         f"adapted from tiny@{checked_file.digest(base.read_bytes())} to 'cy' by 3 clips"
         in (new.diagnostics["notes"][-1])
     )
-    assert 0.0 < facts["parity_m"] < parity_check.PARITY_LIMIT
+    assert 0.0 < facts["parity_m"] < onnx_export.PARITY_LIMIT
 
 
 def test_the_same_clips_give_the_same_bytes(posefield, adapted, base, table, tmp_path):

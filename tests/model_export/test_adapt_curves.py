@@ -22,10 +22,9 @@ from posefield_train.adapt import (
     new_curves,
 )
 from posefield_train.align import phase_alignment
-from posefield_train.graph import onnx_export, parity_check
+from posefield_train.graph import onnx_export
 from posefield_train.kriging import sample_points
-from posefield_train.source import ingest
-from posefield_train.source.rigs import dummy_roots
+from posefield_train.source import ingest, skeleton_checks
 
 SHOWN = [(0.2, 0.3), (0.5, 0.8), (0.85, 0.4)]
 ASKED = {"smile": 0.6, "openness": 0.5}
@@ -115,7 +114,7 @@ def test_every_level_has_the_newcomers_curves(adapted):
     path, facts = adapted
     card = session.load(path).card
     assert [curve.name for curve in card.curves] == list(face_motion.CURVE_NAMES)
-    assert 0.0 < facts["parity_m"] < parity_check.PARITY_LIMIT
+    assert 0.0 < facts["parity_m"] < onnx_export.PARITY_LIMIT
     for number, level in enumerate(card.levels):
         # A level's error is in metres, as which a unit of a curve counts 0.02, over all curves.
         own = error(path, "cy", "cy", number)

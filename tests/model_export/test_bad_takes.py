@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import rigid_takes
 
-from posefield_train.discover import take_copies, take_reading
+from posefield_train.discover import take_reading
 from posefield_train.probe import probe_report
 from posefield_train.source import frame_faults, motion_readers
 
@@ -194,8 +194,8 @@ def test_takes_of_two_performances_are_no_copies():
     times = np.arange(240) / discover_takes.RATE
     one = discover_takes.body(times, speed=1.0, swing=0.6)
     other = discover_takes.body(times, speed=1.02, swing=0.61)
-    assert not take_copies.find_copies(["a", "b"], [one, other])
-    found = take_copies.find_copies(["a", "b"], [one, one])
+    assert not take_reading.find_copies(["a", "b"], [one, other])
+    found = take_reading.find_copies(["a", "b"], [one, one])
     assert found["b"].recording == "a" and "shares frames with" in found["b"].note
 
 

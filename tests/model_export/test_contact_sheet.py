@@ -11,7 +11,7 @@ import pytest
 import rigid_takes
 from decided_page import decide
 
-from posefield_train.families import clip_sticks, decisions
+from posefield_train.families import contact_sheet, review
 
 WORDS = ("--licence", "ours", "--candidates", "60")
 
@@ -74,7 +74,7 @@ select.value = "1"; select.dispatchEvent(new Event("change", { bubbles: true }))
 def test_choices_become_decisions_and_their_command(page, tmp_path):
     decided = decide(page, CLICKS, tmp_path)
     (tmp_path / "decisions.json").write_text(decided.saved)
-    read = decisions.read(tmp_path / "decisions.json")
+    read = review.read(tmp_path / "decisions.json")
     assert (read.accept, read.reject, read.merge) == ((1,), (), ((1, 2),)) and len(read.drop) == 1
     words = ["posefield", "review", str(page.parent), "--accept", "1", "--merge", "1,2", "--drop"]
     assert decided.command[:-1] == words
@@ -83,11 +83,11 @@ def test_choices_become_decisions_and_their_command(page, tmp_path):
 
 def test_figures_keep_the_proportions_of_the_body():
     take = discover_takes.take("a.bvh", 3.0, hands=np.zeros((181, 3)))
-    strip = clip_sticks.draw(take, 0, 90)
-    assert strip.body.count("M") == clip_sticks.INSTANTS * 9
-    assert strip.right.count("M") == clip_sticks.INSTANTS * 7
+    strip = contact_sheet.draw(take, 0, 90)
+    assert strip.body.count("M") == contact_sheet.INSTANTS * 9
+    assert strip.right.count("M") == contact_sheet.INSTANTS * 7
     numbers = [float(word) for word in re.findall(r"-?\d+", strip.body + strip.right)]
     assert min(numbers) >= 0.0 and max(numbers[1::2]) <= strip.height + 1.0
     # The body stands 1.65 legs high, from its toes to its head.
     ys = numbers[1::2]
-    assert max(ys) - min(ys) == pytest.approx(1.65 * clip_sticks.UNIT, abs=2.0)
+    assert max(ys) - min(ys) == pytest.approx(1.65 * contact_sheet.UNIT, abs=2.0)

@@ -12,7 +12,7 @@ from posefield.inference import graph_ports, session
 from posefield.inference.graph_ports import CONTACTS
 from posefield.model_file import model_card, subgraph
 from posefield_train.contacts import contact_labels, contact_model, contact_table
-from posefield_train.graph import parity_check
+from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
 from posefield_train.report.provenance import Provenance
 
@@ -217,7 +217,7 @@ def test_the_parity_check_refuses_wrong_contacts(walk_exported):
     content = model.onnx(model_card.dump(card), {})
     wrong = replace(model.contacts, values=1.01 * model.contacts.values)
     with pytest.raises(ExportRefused, match="probability of a contact"):
-        parity_check.check_parity(replace(model, contacts=wrong), content, card)
+        onnx_export.check_parity(replace(model, contacts=wrong), content, card)
 
 
 @pytest.mark.parametrize(

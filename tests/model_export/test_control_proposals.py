@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from posefield.motion.measures import MeasuredMotion
-from posefield_train.discover import control_proposals, take_prediction
-from posefield_train.discover.control_proposals import FamilyClips, ProposedControl
-from posefield_train.discover.take_prediction import TakePrediction
+from posefield_train.discover import control_proposals
+from posefield_train.discover.control_proposals import FamilyClips, ProposedControl, TakePrediction
 
 ROLES = ("hips", "head", "leftHand", "rightHand", "leftToes", "rightToes")
 REST = np.array(
@@ -127,7 +126,7 @@ def test_motions_are_compared_at_equal_steps_of_time():
         share = (at - before)[:, None, None]
         places = motion.positions[before] * (1 - share) + motion.positions[before + 1] * share
         slower.append(MeasuredMotion(places, 2.6, motion.travel, motion.parents, motion.offsets))
-    one, other = (take_prediction.motion_coefficients(each) for each in (own.motions, slower))
+    one, other = (control_proposals.motion_coefficients(each) for each in (own.motions, slower))
     apart = [np.linalg.norm(each[:, None] - each, axis=-1) for each in (one, other)]
     np.testing.assert_allclose(apart[0], apart[1], atol=0.05)
     assert apart[0].max() > 0.5

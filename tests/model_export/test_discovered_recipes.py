@@ -12,8 +12,8 @@ import rigid_takes
 
 from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer
-from posefield_train.families import body_kinds, family_recipe, family_table
-from posefield_train.families.family_table import FamilyRow
+from posefield_train.families import found_families, recipe_folder
+from posefield_train.families.found_families import FamilyRow
 from posefield_train.probe import recipe_draft
 from posefield_train.source import clip_table, ingest, recipe
 
@@ -72,7 +72,7 @@ def test_no_model_is_made_of_a_recipe_that_nobody_accepted(posefield, made, take
     assert code == 3 and "accepted = false: look at its clips, then accept it with" in err
     assert f"posefield review {made} --accept NUMBER" in err
     text = (made / "family_01.toml").read_text()
-    (made / "family_01.toml").write_text(family_recipe.with_accepted(text, True))
+    (made / "family_01.toml").write_text(recipe_folder.with_accepted(text, True))
     assert recipe.read_accepted(made / "family_01.toml").accepted
 
 
@@ -144,16 +144,16 @@ def test_outputs_that_do_not_fit_are_refused(posefield, takes, words, said):
 def test_performers_are_told_by_bones_and_named_by_files():
     one, other = np.array([0.4, 0.3]), np.array([0.4, 0.3008])
     files = ["day/ann_1.bvh", "day/bob_1.bvh", "day/ann_2.bvh"]
-    assert body_kinds.name_performers(files, [one, other, one + 0.0004]) == [
+    assert found_families.name_performers(files, [one, other, one + 0.0004]) == [
         "ann",
         "bob",
         "ann",
     ]
     # Within the tolerance all are one, whom no word tells from others.
-    assert set(body_kinds.name_performers(files, [one, one, one])) == {"performer_1"}
+    assert set(found_families.name_performers(files, [one, one, one])) == {"performer_1"}
     # A name on files of two bodies tells neither of them.
     mixed = ["ann_1.bvh", "ann_2.bvh", "bob_1.bvh"]
-    assert body_kinds.name_performers(mixed, [one, other, one]) == [
+    assert found_families.name_performers(mixed, [one, other, one]) == [
         "performer_1",
         "performer_2",
         "performer_1",
@@ -163,11 +163,11 @@ def test_performers_are_told_by_bones_and_named_by_files():
 def test_a_table_is_read_as_it_was_written(tmp_path):
     rows = [FamilyRow("a/b.bvh", 3, 90, "ann", "a/b", 0.25), FamilyRow("c.bvh", 0, 9, "x", "c")]
     path = tmp_path / "t.csv"
-    path.write_bytes(family_table.table(rows))
-    assert family_table.read(path) == rows
+    path.write_bytes(found_families.table(rows))
+    assert found_families.read(path) == rows
     path.write_text(path.read_text().replace("true", "yes", 1))
     with pytest.raises(RecipeError, match="column 'accepted': 'yes', expected true or false"):
-        family_table.read(path)
+        found_families.read(path)
 
 
 def test_a_table_beside_the_recipe_counts_if_the_data_folder_has_none(made, takes, tmp_path):
@@ -184,8 +184,8 @@ def test_a_rate_is_written_where_it_is_stated(takes):
     files = sorted(path.name for path in takes.iterdir())
 
     def source(rate):
-        stated = body_kinds.FileStatements(None, None, {}, rate)
-        return recipe_draft.source_lines(body_kinds.find_kinds(takes, files, stated)[0].report)
+        stated = found_families.FileStatements(None, None, {}, rate)
+        return recipe_draft.source_lines(found_families.find_kinds(takes, files, stated)[0].report)
 
     assert f"rate = {rigid_takes.RATE}" in source(rigid_takes.RATE)
     # Files that state their rate need none.

@@ -9,7 +9,7 @@ from posefield.common.units import UP
 from posefield.motion import quat
 from posefield_train.evaluate import compared_motion, motion_errors
 from posefield_train.evaluate.compared_motion import ComparedMotion
-from posefield_train.tensor.uniform_motion import FRAMES
+from posefield_train.tensor.motion_tensor import FRAMES
 
 ROUNDING = 1e-9
 FEET = (1,)

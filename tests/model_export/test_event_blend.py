@@ -9,7 +9,7 @@ from posefield.inference import reduced_motion
 from posefield.model_file import subgraph
 from posefield_train.adapt import model_reconstruction
 from posefield_train.graph import onnx_export
-from posefield_train.kriging import event_kriging, universal_kriging
+from posefield_train.kriging import coefficient_models, universal_kriging
 from posefield_train.kriging.kriging_bank import POSE
 from posefield_train.tensor import event_blend, truncation_error
 from posefield_train.tensor.event_blend import LOST_SHARE, WIDTH
@@ -87,10 +87,10 @@ def test_the_graph_and_the_service_read_the_same_blend(blended, small_recipe, ex
 
 def test_the_second_model_is_used_where_it_is_clearly_better(judge, trained, small_recipe):
     full, pose = trained.full, trained.pose
-    same = event_kriging.compare_models(judge, full, judge.event_frame, (pose, pose))
+    same = coefficient_models.compare_models(judge, full, judge.event_frame, (pose, pose))
     assert same.pose == same.event and not same.is_used
     perfect = replace(pose, residuals=0.0 * pose.residuals)
-    better = event_kriging.compare_models(judge, full, judge.event_frame, (pose, perfect))
+    better = coefficient_models.compare_models(judge, full, judge.event_frame, (pose, perfect))
     assert better.event < 0.7 * better.pose == 0.7 * same.pose and better.is_used
-    swapped = event_kriging.compare_models(judge, full, judge.event_frame, (perfect, pose))
+    swapped = coefficient_models.compare_models(judge, full, judge.event_frame, (perfect, pose))
     assert not swapped.is_used

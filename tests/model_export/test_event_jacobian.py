@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield_train.tensor import event_jacobian, truncation_error
-from posefield_train.tensor.event_jacobian import COEFFICIENTS
+from posefield_train.tensor import event_blend, truncation_error
+from posefield_train.tensor.event_blend import COEFFICIENTS
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def at_event(judge, full, motions):
 
 def test_jacobian_is_that_of_central_differences_of_forward_kinematics(judge, trained):
     full, event = trained.full, judge.event_frame
-    found = event_jacobian.event_jacobians(judge, full, event)
+    found = event_blend.event_jacobians(judge, full, event)
     assert found.shape == (len(trained.examples), 3, COEFFICIENTS)
     step = 1e-3 * full.motions[:, 0].std()
     for column in (0, 3, COEFFICIENTS - 1):
@@ -41,21 +41,21 @@ def test_jacobian_is_that_of_central_differences_of_forward_kinematics(judge, tr
 
 def test_errors_are_the_way_that_residuals_move_the_joint(judge, trained):
     full, residuals = trained.full, trained.pose.residuals
-    found = event_jacobian.event_distances(judge, full, judge.event_frame, residuals)
+    found = event_blend.event_distances(judge, full, judge.event_frame, residuals)
     there, predicted = (at_event(judge, full, full.motions - r) for r in (0.0, residuals))
     assert np.abs(found - np.linalg.norm(there - predicted, axis=1)).max() < 1e-9
-    assert not event_jacobian.event_distances(judge, full, judge.event_frame, 0.0 * residuals).any()
+    assert not event_blend.event_distances(judge, full, judge.event_frame, 0.0 * residuals).any()
     # To first order the leading coefficients tell most of it.
-    jacobian = event_jacobian.event_jacobians(judge, full, judge.event_frame)
+    jacobian = event_blend.event_jacobians(judge, full, judge.event_frame)
     linear = np.einsum("nkm,nm->nk", jacobian, residuals[:, :COEFFICIENTS])
     gaps = np.linalg.norm(linear, axis=1) - found
     assert np.sqrt(np.mean(gaps**2)) < 0.5 * np.sqrt(np.mean(found**2))
 
 
 def test_without_an_event_no_joint_is_weighted(judge, trained):
-    assert event_jacobian.effector_weights(replace(judge, event_frame=None), trained.full) is None
-    weights = event_jacobian.effector_weights(judge, trained.full)
-    plain = event_jacobian.event_jacobians(judge, trained.full, judge.event_frame)
+    assert event_blend.effector_weights(replace(judge, event_frame=None), trained.full) is None
+    weights = event_blend.effector_weights(judge, trained.full)
+    plain = event_blend.event_jacobians(judge, trained.full, judge.event_frame)
     # Half of the weight of all joints in forty frames.
     ratio = weights / plain
     assert np.abs(ratio**2 / (0.5 * 40 * trained.tensor.weight) - 1.0).max() < 1e-9

@@ -4,8 +4,8 @@ import discover_takes
 import numpy as np
 import pytest
 
-from posefield_train.discover import example_search, motion_features, subsequence_dtw
-from posefield_train.discover.joined_features import Span
+from posefield_train.discover import family_search, motion_features
+from posefield_train.discover.motion_features import Span
 from posefield_train.discover.take_reading import Take
 
 PLANTED = ((0, 4.0, 2.0), (0, 12.0, 1.6), (1, 5.0, 2.4), (1, 15.0, 2.0), (2, 9.0, 1.8))
@@ -43,7 +43,7 @@ def corpus():
 @pytest.mark.parametrize("query", range(len(PLANTED)))
 def test_planted_motions_come_first(corpus, query):
     take, begin, duration = PLANTED[query]
-    found = example_search.find_like(corpus, [Span(take, begin, begin + duration)], 8)
+    found = family_search.find_like(corpus, [Span(take, begin, begin + duration)], 8)
     expected = {one for one in PLANTED if one != PLANTED[query]}
     best = [match.span for match in found[:4]]
     for other, start, seconds in expected:
@@ -55,15 +55,15 @@ def test_planted_motions_come_first(corpus, query):
 
 def test_further_examples_and_rejections_change_the_list(corpus):
     first, second = (Span(take, begin, begin + length) for take, begin, length in PLANTED[:2])
-    alone = example_search.find_like(corpus, [first], 6)
-    assert example_search.find_like(corpus, [first, first], 6) == [
-        example_search.Match(match.span, pytest.approx(match.cost)) for match in alone
+    alone = family_search.find_like(corpus, [first], 6)
+    assert family_search.find_like(corpus, [first, first], 6) == [
+        family_search.Match(match.span, pytest.approx(match.cost)) for match in alone
     ]
-    both = example_search.find_like(corpus, [first, second], 6)
+    both = family_search.find_like(corpus, [first, second], 6)
     assert all(match.span.overlap(second) <= 0.2 for match in both)
     assert len({match.span for match in both[:3]}) == 3
     rejected = alone[0].span
-    left = example_search.find_like(corpus, [first], 6, [rejected])
+    left = family_search.find_like(corpus, [first], 6, [rejected])
     assert all(match.span.overlap(rejected) <= 0.5 for match in left)
     assert any(match.span.overlap(rejected) > 0.5 for match in alone)
 
@@ -78,7 +78,7 @@ def shared(one, other):
 
 def test_matches_do_not_overlap(corpus):
     example = Span(0, 4.0, 6.0)
-    spans = [example, *(match.span for match in example_search.find_like(corpus, [example], 30))]
+    spans = [example, *(match.span for match in family_search.find_like(corpus, [example], 30))]
     for at, span in enumerate(spans):
         assert all(span.overlap(other) <= 0.2 for other in spans[:at])
         assert 0.9 <= span.end - span.start <= 4.1
@@ -129,7 +129,7 @@ def brute_force(apart):
 def test_matches_are_those_of_the_recursion(seed):
     apart = np.random.default_rng(seed).uniform(0.1, 1.0, (7, 40))
     apart[:, 20:22] = np.inf
-    found = subsequence_dtw.match_ends(apart)
+    found = motion_features.match_ends(apart)
     expected = brute_force(apart)
     np.testing.assert_allclose(found.costs, [cost / 7 for cost, _ in expected], rtol=1e-12)
     finite = np.isfinite(found.costs)
@@ -141,7 +141,7 @@ def test_matches_are_those_of_the_recursion(seed):
 def test_no_match_leads_from_one_take_to_the_next():
     apart = np.ones((9, 60))
     apart[:, 30:32] = np.inf
-    found = subsequence_dtw.match_ends(apart)
+    found = motion_features.match_ends(apart)
     ends = np.flatnonzero(np.isfinite(found.costs))
     assert np.all((ends < 30) == (found.starts[ends] < 30))
 
@@ -150,7 +150,7 @@ def test_distances_are_euclidean_and_infinite_between_takes():
     rng = np.random.default_rng(3)
     query, known = rng.normal(size=(4, 3)), rng.normal(size=(6, 3))
     known[2] = np.nan
-    found = subsequence_dtw.distances(query, subsequence_dtw.searched_frames(known))
+    found = motion_features.distances(query, motion_features.searched_frames(known))
     expected = np.linalg.norm(query[:, None] - known, axis=-1)
     assert np.all(np.isinf(found[:, 2]))
     np.testing.assert_allclose(np.delete(found, 2, 1), np.delete(expected, 2, 1), atol=1e-7)
@@ -168,5 +168,5 @@ def test_components_keep_most_of_the_variance():
 def test_an_example_may_end_with_its_take(corpus):
     seconds = (len(corpus.takes[0]) - 1) / corpus.takes[0].rate
     for end in (seconds, seconds + 0.04):
-        found = example_search.find_like(corpus, [Span(0, seconds - 2.0, end)], 3)
+        found = family_search.find_like(corpus, [Span(0, seconds - 2.0, end)], 3)
         assert len(found) == 3 and np.isfinite([match.cost for match in found]).all()

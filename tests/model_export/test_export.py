@@ -19,7 +19,7 @@ from posefield.inference.graph_ports import OUTPUTS
 from posefield.model_file import subgraph
 from posefield.motion import quat
 from posefield_train import train
-from posefield_train.graph import onnx_export, parity_check
+from posefield_train.graph import onnx_export
 from posefield_train.graph.float_model import ModelOutputs
 from posefield_train.source import ingest, recipe
 
@@ -161,8 +161,8 @@ def test_the_card_says_what_the_motion_is_for(full_family):
 
 
 def test_graph_and_reference_agree_at_ten_thousand_points(exported, model_path, opened):
-    assert parity_check.POINTS == 10_000 and parity_check.PARITY_LIMIT == GATE
-    worst = parity_check.check_parity(exported.model, model_path.read_bytes(), opened.card)
+    assert onnx_export.POINTS == 10_000 and onnx_export.PARITY_LIMIT == GATE
+    worst = onnx_export.check_parity(exported.model, model_path.read_bytes(), opened.card)
     assert 0.0 < worst < GATE
     assert opened.card.diagnostics["parity_m"] == float(f"{worst:.1e}")
 
@@ -203,7 +203,7 @@ def test_the_gate_refuses_a_bent_joint_and_names_what_it_moves(exported, model_p
     for joint, parent in enumerate(parents):
         hanging |= {joint} if parent in hanging else set()
     with pytest.raises(ExportRefused) as caught:
-        parity_check.check_parity(bent(exported, arm, 0.01), model_path.read_bytes(), opened.card)
+        onnx_export.check_parity(bent(exported, arm, 0.01), model_path.read_bytes(), opened.card)
     found = re.match(r"the graph puts (\w+) ([0-9.]+) cm from", str(caught.value))
     assert names.index(found[1]) in hanging - {arm}
     # A forearm with its hand is some 0.4 m long: a hundredth of a radian moves its end by 0.4 cm.
@@ -221,9 +221,9 @@ def test_the_gate_lies_where_it_says(exported, model_path, opened, metres, refus
     moved = replace(exported.model, decoder=replace(decoder, mean=mean))
     if refused:
         with pytest.raises(ExportRefused, match=r"0\.02\d\d cm from where"):
-            parity_check.check_parity(moved, model_path.read_bytes(), opened.card)
+            onnx_export.check_parity(moved, model_path.read_bytes(), opened.card)
     else:
-        worst = parity_check.check_parity(moved, model_path.read_bytes(), opened.card)
+        worst = onnx_export.check_parity(moved, model_path.read_bytes(), opened.card)
         assert metres * 0.5 < worst < GATE
 
 
@@ -233,7 +233,7 @@ def test_the_gate_refuses_damaged_weights_of_the_field(exported, model_path, ope
     dual[7] *= 1.01
     damaged = replace(bank, pose=replace(bank.pose, dual=dual))
     with pytest.raises(ExportRefused, match=r"cm from where the reference does"):
-        parity_check.check_parity(
+        onnx_export.check_parity(
             replace(exported.model, bank=damaged), model_path.read_bytes(), opened.card
         )
 
@@ -245,7 +245,7 @@ def test_the_gate_refuses_a_wrong_duration(exported, model_path, opened):
     others = bank.others | {"duration": slower}
     with pytest.raises(ExportRefused):
         model = replace(exported.model, bank=replace(bank, others=others))
-        parity_check.check_parity(model, model_path.read_bytes(), opened.card)
+        onnx_export.check_parity(model, model_path.read_bytes(), opened.card)
 
 
 @pytest.fixture(scope="module")

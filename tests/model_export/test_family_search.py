@@ -4,16 +4,10 @@ import discover_takes
 import numpy as np
 import pytest
 
-from posefield_train.discover import (
-    family_quality,
-    family_search,
-    joined_features,
-    motion_features,
-    subsequence_dtw,
-)
-from posefield_train.discover.family_quality import FamilyQuality
+from posefield_train.discover import family_search, found_clips, motion_features
 from posefield_train.discover.family_search import Family
-from posefield_train.discover.joined_features import Match, Span
+from posefield_train.discover.found_clips import FamilyQuality
+from posefield_train.discover.motion_features import Match, Span
 
 SECONDS, TAKES = 24.0, 3
 ORDERS = ("RCCRRC", "CRRRCC", "CCRCRR")
@@ -73,9 +67,9 @@ def kinds(span):
 
 
 def offered(corpus):
-    joined = joined_features.join_features(corpus)
+    joined = motion_features.join_features(corpus)
     found = family_search.find_families(corpus)
-    return [one for one in found if not family_quality.assess(joined, one).reasons]
+    return [one for one in found if not found_clips.assess(joined, one).reasons]
 
 
 def test_planted_motions_are_found_as_families_of_their_own(corpus):
@@ -111,7 +105,7 @@ def test_rests_are_not_searched(corpus):
     searched = []
     families = family_search.find_families(corpus, 10_000, searched.append)
     assert 0 < len(searched) < len(family_search.candidates(corpus))
-    joined = joined_features.join_features(corpus)
+    joined = motion_features.join_features(corpus)
     for family in families:
         motion = joined.clip(family.example).var(axis=0).sum()
         assert motion > family_search.LEAST_MOTION * joined.variance
@@ -137,10 +131,10 @@ def test_the_search_reports_each_candidate_and_is_repeated_exactly(corpus):
 
 
 def test_equal_clips_differ_by_nothing_and_others_do(corpus):
-    joined = joined_features.join_features(corpus)
+    joined = motion_features.join_features(corpus)
 
     def quality(spans):
-        return family_quality.assess(joined, Family(spans[0], tuple(Match(s, 0.1) for s in spans)))
+        return found_clips.assess(joined, Family(spans[0], tuple(Match(s, 0.1) for s in spans)))
 
     raises = [Span(take, begin, begin + seconds) for take, begin, seconds in RAISES]
     circles = [Span(take, begin, begin + seconds) for take, begin, seconds in CIRCLES]
@@ -168,7 +162,7 @@ def paths(length, frames):
     if length == 1:
         return [[0]] if frames == 1 else []
     found = []
-    for rows, columns in subsequence_dtw.STEPS:
+    for rows, columns in motion_features.STEPS:
         if length > rows and frames > columns:
             found += [own + [frames - 1] * rows for own in paths(length - rows, frames - columns)]
     return found
@@ -179,7 +173,7 @@ def test_the_alignment_is_the_best_of_all(length, frames):
     apart = np.random.default_rng(length * frames).uniform(0.1, 1.0, (length, frames))
     every = {tuple(path) for path in paths(length, frames)}
     costs = {path: apart[np.arange(length), list(path)].sum() for path in every}
-    found = tuple(subsequence_dtw.align(apart).tolist())
+    found = tuple(motion_features.align(apart).tolist())
     assert costs[found] == pytest.approx(min(costs.values()), rel=1e-12)
     assert len(every) == 1 or max(costs.values()) > costs[found]
 
@@ -188,4 +182,4 @@ def test_the_alignment_is_the_best_of_all(length, frames):
 def test_a_clip_of_another_duration_is_not_aligned(length, frames):
     assert not paths(length, frames)
     with pytest.raises(ValueError, match=f"{frames} frames, expected"):
-        subsequence_dtw.align(np.ones((length, frames)))
+        motion_features.align(np.ones((length, frames)))

@@ -16,7 +16,7 @@ from posefield.inference import session
 from posefield.inference.graph_ports import OUTPUTS
 from posefield.model_file import model_card
 from posefield.model_file.model_card import LabelSet
-from posefield_train.graph import onnx_export, parity_check
+from posefield_train.graph import onnx_export
 from posefield_train.graph.float_model import ModelOutputs
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
@@ -173,10 +173,10 @@ def test_every_output_of_a_labelled_model_agrees_with_the_reference(
     def away(answer):
         return np.abs(answer.positions(parents) - found.positions(parents)).max()
 
-    assert away(expected) < parity_check.PARITY_LIMIT
+    assert away(expected) < onnx_export.PARITY_LIMIT
     assert np.abs(found.sigma / expected.sigma - 1.0).max() < 1e-3
     assert np.abs(found.duration / expected.duration - 1.0).max() < 1e-5
-    assert away(labelled_exported.model.evaluate(points, times)) > 10 * parity_check.PARITY_LIMIT
+    assert away(labelled_exported.model.evaluate(points, times)) > 10 * onnx_export.PARITY_LIMIT
     # Of somebody who was seen more is known, as a rule, than of anybody.
     nobody = ModelOutputs(*opened.run(points, times, *OUTPUTS))
     seen = labels.any(axis=1)
@@ -188,8 +188,8 @@ def test_the_gate_asks_for_performers(labelled_exported, labelled_path, opened):
     content = labelled_path.read_bytes()
     assert (
         0.0
-        < parity_check.check_parity(labelled_exported.model, content, opened.card)
-        < parity_check.PARITY_LIMIT
+        < onnx_export.check_parity(labelled_exported.model, content, opened.card)
+        < onnx_export.PARITY_LIMIT
     )
     bank = labelled_exported.model.bank
     # Two performers change places: nobody would notice who asks for controls alone.
@@ -201,7 +201,7 @@ def test_the_gate_asks_for_performers(labelled_exported, labelled_path, opened):
     before, after = (m.evaluate(points, times).rotations for m in (labelled_exported.model, model))
     assert np.array_equal(before, after)
     with pytest.raises(ExportRefused, match=r"at (middle|short), \{'stature': "):
-        parity_check.check_parity(model, content, opened.card)
+        onnx_export.check_parity(model, content, opened.card)
 
 
 def question_of_nobody(opened):

@@ -14,7 +14,7 @@ from posefield.inference.graph_ports import OUTPUTS
 from posefield.kriging import kriging_model
 from posefield.model_file import subgraph
 from posefield.motion import skeleton
-from posefield_train.graph import level_errors, levels
+from posefield_train.graph import levels
 from posefield_train.kriging import thinning
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.source.recipe_sections import Detail
@@ -28,7 +28,7 @@ def with_levels(recipe, *details):
 
 @pytest.fixture(scope="module")
 def exam(small_recipe, trained):
-    return level_errors.level_test(small_recipe, trained, 2_000)
+    return levels.level_test(small_recipe, trained, 2_000)
 
 
 @pytest.fixture(scope="module")
@@ -258,4 +258,4 @@ def test_the_worst_pose_is_off_by_no_more_than_some_times_the_rest(exported, sma
     budget = small_recipe.size.budgets["rms"]
     for times, level in zip((2, 4, 8), exported.card.levels[1:], strict=True):
         # Others than it was tried with may be somewhat worse.
-        assert level.rms < level.pose < 1.3 * level_errors.TAIL_RATIO * times * budget
+        assert level.rms < level.pose < 1.3 * levels.TAIL_RATIO * times * budget

@@ -5,7 +5,7 @@ import pytest
 
 from posefield.motion import quat, skeleton
 from posefield.motion.rotation_charts import CHARTS
-from posefield_train.tensor import pose_metric
+from posefield_train.tensor import motion_tensor
 
 PARENTS = (-1, 0, 1, 2, 1, 4)
 JOINTS, POSES = 6, 5
@@ -40,7 +40,7 @@ def skin(chart, means, numbers, bones):
     rotations = quat.mul(means, chart.quaternions(numbers[3:].reshape(-1, 3)))
     translations = np.vstack([numbers[:3], bones[1:]])
     positions, orientations = skeleton.forward_kinematics(PARENTS, rotations, translations)
-    axes = pose_metric.SHELL_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
+    axes = motion_tensor.SHELL_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
     return (positions[:, None] + quat.rotate(orientations[:, None], axes)).reshape(-1, 3)
 
 
@@ -64,7 +64,7 @@ def by_differences(chart, means, vectors, translations, weights):
 def gram(chart, means, vectors, translations, weights):
     rotations = quat.mul(means, chart.quaternions(vectors))
     jacobians = chart.right_jacobian(vectors)
-    return pose_metric.gram(PARENTS, rotations, jacobians, translations, weights)
+    return motion_tensor.gram(PARENTS, rotations, jacobians, translations, weights)
 
 
 def test_gram_matrix_is_that_of_finite_differences(family, weights):
@@ -74,7 +74,7 @@ def test_gram_matrix_is_that_of_finite_differences(family, weights):
     assert np.max(np.abs(gram(*family, np.ones(JOINTS)) - expected)) > 1e-2 * scale
     chart, means, vectors, translations = family
     flat = np.tile(np.eye(3), (POSES, JOINTS, 1, 1))
-    no_curvature = pose_metric.gram(
+    no_curvature = motion_tensor.gram(
         PARENTS, quat.mul(means, chart.quaternions(vectors)), flat, translations, weights
     )
     assert np.max(np.abs(no_curvature - expected)) > 1e-2 * scale
@@ -83,8 +83,8 @@ def test_gram_matrix_is_that_of_finite_differences(family, weights):
 def test_turn_about_a_bone_counts_by_the_skin():
     """A lone joint: only its own sphere moves, by two thirds of its squared radius."""
     still, jacobians = np.zeros((1, 1, 3)), np.eye(3)[None, None]
-    found = pose_metric.gram((-1,), quat.exp(still), jacobians, still, np.array([2.0]))
-    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * pose_metric.SHELL_RADIUS**2] * 3)
+    found = motion_tensor.gram((-1,), quat.exp(still), jacobians, still, np.array([2.0]))
+    expected = np.diag([2.0] * 3 + [2.0 * 2.0 / 3.0 * motion_tensor.SHELL_RADIUS**2] * 3)
     assert np.max(np.abs(found - expected)) < 1e-15
 
 
@@ -125,8 +125,8 @@ def test_root_moves_the_whole_mass(family, weights):
 
 def test_whitening_is_the_square_root_and_its_inverse(family, weights):
     found = gram(*family, weights)
-    root, inverse = pose_metric.whitening(found)
-    assert np.linalg.eigvalsh(found)[0] > pose_metric.FLOOR * np.linalg.eigvalsh(found)[-1]
+    root, inverse = motion_tensor.whitening(found)
+    assert np.linalg.eigvalsh(found)[0] > motion_tensor.FLOOR * np.linalg.eigvalsh(found)[-1]
     assert np.max(np.abs(root @ root.T - found)) < 1e-12 * np.max(found)
     assert np.max(np.abs(root @ inverse - np.eye(len(found)))) < 1e-10
     assert np.max(np.abs(root - root.T)) < 1e-12 * np.max(root)
@@ -135,7 +135,7 @@ def test_whitening_is_the_square_root_and_its_inverse(family, weights):
 
 def test_direction_that_moves_nothing_is_held_at_the_floor(rng):
     basis = np.linalg.qr(rng.normal(size=(4, 4)))[0]
-    root, inverse = pose_metric.whitening((basis * [4.0, 1.0, 1e-9, 0.0]) @ basis.T)
+    root, inverse = motion_tensor.whitening((basis * [4.0, 1.0, 1e-9, 0.0]) @ basis.T)
     values = np.sort(np.linalg.eigvalsh(root))
     assert np.allclose(values, [2e-3, 2e-3, 1.0, 2.0], rtol=1e-9)
     assert np.max(np.abs(root @ inverse - np.eye(4))) < 1e-10

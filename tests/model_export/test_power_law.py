@@ -7,8 +7,8 @@ import pytest
 from running import bank_values, outputs
 from test_graph_labels import HIGH, LOW, asked, labelled_bank, mixed
 
-from posefield_train.kriging import power_law, thinning
-from posefield_train.kriging.power_law import PowerLaw
+from posefield_train.kriging import kriging_bank, thinning
+from posefield_train.kriging.kriging_bank import PowerLaw
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 
@@ -31,7 +31,7 @@ def laid(controls):
 def fitted(controls, logs):
     """Fit of logarithms (N, 1), beside residuals of their mean."""
     samples = laid(controls)
-    return power_law.fit_power_law(POSE, samples, controls, logs, samples.from_mean(logs))
+    return kriging_bank.fit_power_law(POSE, samples, controls, logs, samples.from_mean(logs))
 
 
 def test_length_over_speed_comes_back_exactly(controls, rng):
@@ -53,7 +53,7 @@ def test_noise_and_what_kriging_predicts_as_well_are_no_powers(controls, rng):
     noisy = logs + 0.1 * rng.normal(size=(40, 1))
     found = fitted(controls, noisy)
     assert found is not None
-    as_good = power_law.fit_power_law(POSE, samples, controls, noisy, 1.2 * found.residuals)
+    as_good = kriging_bank.fit_power_law(POSE, samples, controls, noisy, 1.2 * found.residuals)
     assert as_good is None
 
 
@@ -71,7 +71,7 @@ def test_a_law_that_hangs_on_one_take_is_not_fitted(controls):
     lonely[:, 1] = controls[:, 1]
     samples = SamplePoints(np.zeros((40, 3)), 3, np.arange(40))
     logs = np.log(lonely[:, 2:])
-    assert power_law.fit_power_law(POSE, samples, lonely, logs, logs) is None
+    assert kriging_bank.fit_power_law(POSE, samples, lonely, logs, logs) is None
 
 
 def test_below_the_floor_controls_count_as_the_floor():

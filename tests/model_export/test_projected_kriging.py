@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from posefield.kriging import kriging_model, leave_one_out
-from posefield_train.graph import training_notes
+from posefield_train.graph import trained_card
 from posefield_train.kriging import (
     coefficient_models,
     kriging_tuning,
     sample_kriging,
+    sample_points,
     universal_kriging,
 )
-from posefield_train.kriging.projected import inducing_clips
-from posefield_train.kriging.projected.projected_kriging import ProjectedProcess
+from posefield_train.kriging.sample_kriging import ProjectedProcess
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
 from posefield_train.kriging.universal_kriging import Hyper
@@ -145,15 +145,15 @@ def family(rng):
 
 
 def test_families_below_300_clips_have_no_inducing_clips(family):
-    assert inducing_clips.choose_inducing(family[:299], 3, (2,)) is None
-    assert len(inducing_clips.choose_inducing(family[:300], 3, (2,))) == inducing_clips.INDUCING
+    assert sample_points.choose_inducing(family[:299], 3, (2,)) is None
+    assert len(sample_points.choose_inducing(family[:300], 3, (2,))) == sample_points.INDUCING
 
 
 def test_ends_values_and_names_are_inducing(family):
     # One performer of the first name alone.
     family[:, 3:] = [0.0, 1.0]
     family[77, 3:] = [1.0, 0.0]
-    chosen = inducing_clips.choose_inducing(family, 3, (2,))
+    chosen = sample_points.choose_inducing(family, 3, (2,))
     assert {77, int(np.argmin(family[:, 0])), int(np.argmax(family[:, 0]))} <= {*chosen.tolist()}
     assert set(family[chosen, 2]) == {-1.0, 0.0, 1.0}
     assert (np.diff(chosen) > 0).all()
@@ -161,14 +161,14 @@ def test_ends_values_and_names_are_inducing(family):
 
 def test_clips_of_equal_controls_are_inducing_once(family):
     repeated = np.repeat(family[:40], 10, axis=0)
-    chosen = inducing_clips.choose_inducing(repeated, 3, (2,))
+    chosen = sample_points.choose_inducing(repeated, 3, (2,))
     assert len(np.unique(repeated[chosen], axis=0)) == len(chosen)
     assert 38 <= len(chosen) <= 40
 
 
 def test_inducing_clips_lie_apart(family):
     """The largest distance to the nearest of them is less than that of as many random clips."""
-    chosen = inducing_clips.choose_inducing(family, 3, (2,))
+    chosen = sample_points.choose_inducing(family, 3, (2,))
 
     def gap(own):
         apart = np.linalg.norm(family[:, None] - family[own], axis=-1)
@@ -180,21 +180,21 @@ def test_inducing_clips_lie_apart(family):
 
 
 def test_two_draws_for_tuning_share_no_clip(family):
-    assert inducing_clips.choose_tuned(family[:500], 3, (2,), 0).tolist() == list(range(500))
-    draws = [inducing_clips.choose_tuned(family, 3, (2,), draw) for draw in (0, 1)]
+    assert sample_points.choose_tuned(family[:500], 3, (2,), 0).tolist() == list(range(500))
+    draws = [sample_points.choose_tuned(family, 3, (2,), draw) for draw in (0, 1)]
     assert not {*draws[0].tolist()} & {*draws[1].tolist()}
     large_family = np.vstack([family, family + 0.01, family - 0.01])
-    assert len(inducing_clips.choose_tuned(large_family, 3, (2,), 0)) == 500
+    assert len(sample_points.choose_tuned(large_family, 3, (2,), 0)) == 500
     for points in (family[:500], family[:601], family, large_family):
-        count = inducing_clips.tuned_count(len(points))
-        assert len(inducing_clips.choose_tuned(points, 3, (2,), 0)) == count
+        count = sample_points.tuned_count(len(points))
+        assert len(sample_points.choose_tuned(points, 3, (2,), 0)) == count
 
 
 def test_a_draw_keeps_inner_products_and_the_coordinates_of_the_effector(family, rng):
     samples = SamplePoints(family, 3, np.arange(700), (2,))
     values, effector = rng.normal(size=(700, 900)), rng.normal(size=(700, 3, 15))
     drawn = TuningProblem(samples, values, None, effector).drawn(1)
-    rows = inducing_clips.choose_tuned(family, 3, (2,), 1)
+    rows = sample_points.choose_tuned(family, 3, (2,), 1)
     assert drawn.values.shape == (len(rows), 15 + len(rows))
     assert (drawn.values[:, :15] == values[rows, :15]).all()
     assert (drawn.effector == effector[rows]).all()
@@ -208,7 +208,7 @@ def test_parameters_of_a_large_family_are_tuned_twice(rng):
     """On draws without a common clip, which agree where clips abound, and not of pure noise."""
     points = rng.uniform(-1.0, 1.0, (520, 2))
     smooth = np.sin(points @ rng.normal(size=(2, 3))) + 0.05 * rng.normal(size=(520, 3))
-    inducing = inducing_clips.choose_inducing(points, 2, ())
+    inducing = sample_points.choose_inducing(points, 2, ())
     settings = Kriging(covariance="matern52")
     family = large(points, inducing)
     tuned = coefficient_models.choose_covariance(settings, family, smooth)
@@ -228,7 +228,7 @@ def _mean_square(residuals):
 def test_a_large_family_has_the_longest_ranges_within_a_standard_error(rng):
     points = rng.uniform(-1.0, 1.0, (320, 2))
     values = np.sin(3.0 * points @ rng.normal(size=(2, 3))) + 0.1 * rng.normal(size=(320, 3))
-    samples = large(points, inducing_clips.choose_inducing(points, 2, ()))
+    samples = large(points, sample_points.choose_inducing(points, 2, ()))
     settings = Kriging(covariance="matern52")
     tuned = kriging_tuning.tune(TuningProblem(samples, values), "matern52", None)
     chosen = coefficient_models.choose_covariance(settings, samples, values)
@@ -254,7 +254,7 @@ def test_a_large_family_has_the_longest_ranges_within_a_standard_error(rng):
 def test_tunings_that_disagree_are_noted(trained):
     def notes(apart):
         pose = replace(trained.pose, disagreement=apart)
-        return training_notes.disagreement_notes(replace(trained, pose=pose))
+        return trained_card.disagreement_notes(replace(trained, pose=pose))
 
     assert notes(None) == notes(0.02) == []
     (said,) = notes(0.031)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import TrainingError
-from posefield_train.graph import ranks
+from posefield_train.graph import truncation_cost
 from posefield_train.graph.truncation_cost import RankCost
 from posefield_train.tensor import hosvd
 
@@ -28,13 +28,16 @@ def stored(triple, per_rank=PER_RANK):
 
 def smallest(core, allowed, per_rank=PER_RANK):
     """Ranks of least cost whose squared error is at most `allowed`."""
-    front, errors = ranks.pareto_front(core, RankCost(per_rank)), hosvd.squared_errors(core)
+    front, errors = (
+        truncation_cost.pareto_front(core, RankCost(per_rank)),
+        hosvd.squared_errors(core),
+    )
 
     def strain(triple):
         error = errors[tuple(rank - 1 for rank in triple)]
         return np.sqrt(error / allowed) if allowed else float(error > 1e-12 * np.sum(core**2)) * 2
 
-    return ranks.cheapest_within(front, strain, allowed)
+    return truncation_cost.cheapest_within(front, strain, allowed)
 
 
 def truncation(full, triple):
@@ -85,7 +88,7 @@ def test_larger_budget_never_stores_more(full):
 
 def test_front_holds_every_triple_to_which_nothing_cheaper_is_as_good(full):
     front, errors = (
-        ranks.pareto_front(full.core, RankCost(PER_RANK)),
+        truncation_cost.pareto_front(full.core, RankCost(PER_RANK)),
         hosvd.squared_errors(full.core),
     )
     triples = list(product(*(range(1, size + 1) for size in full.core.shape)))
@@ -119,10 +122,10 @@ def strained(front, bend):
 
 @pytest.mark.parametrize("bend", [0.2, 0.7, 1.0, 1.4, 5.0])
 def test_budget_is_one_on_true_errors_whatever_the_metric_says(full, bend):
-    front = ranks.pareto_front(full.core, RankCost(PER_RANK))
+    front = truncation_cost.pareto_front(full.core, RankCost(PER_RANK))
     strain = strained(front, bend)
     aim = front.errors[len(front.errors) // 3]
-    found = ranks.cheapest_within(front, strain, aim)
+    found = truncation_cost.cheapest_within(front, strain, aim)
     asked = len(strain.asked)
     meets = [i for i in range(len(front.errors)) if strain(front[i]) <= 1.0]
     assert found == front[meets[0]]
@@ -134,23 +137,23 @@ def test_budget_is_one_on_true_errors_whatever_the_metric_says(full, bend):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_what_is_returned_keeps_the_budget_even_where_true_errors_do_not_fall(full, seed):
-    front = ranks.pareto_front(full.core, RankCost(PER_RANK))
+    front = truncation_cost.pareto_front(full.core, RankCost(PER_RANK))
     noise = np.random.Generator(np.random.PCG64(seed)).uniform(0.5, 2.0, len(front.errors))
     middle = front.errors[len(front.errors) // 2]
     strains = noise * np.sqrt(front.errors / middle)
     by_triple = {front[i]: float(strain) for i, strain in enumerate(strains)}
-    assert by_triple[ranks.cheapest_within(front, by_triple.__getitem__, middle)] <= 1.0
+    assert by_triple[truncation_cost.cheapest_within(front, by_triple.__getitem__, middle)] <= 1.0
     assert np.any(np.diff(strains) > 0.0), "negative control: they do not fall"
 
 
 def test_given_ranks_are_kept(full):
-    assert ranks.recipe_ranks(full.core, [6, 1, 3]) == (6, 1, 3)
+    assert truncation_cost.recipe_ranks(full.core, [6, 1, 3]) == (6, 1, 3)
 
 
 @pytest.mark.parametrize("wanted", [[7, 5, 7], [6, 6, 7], [1, 1, 8]])
 def test_ranks_beyond_the_tensor_are_refused(full, wanted):
     with pytest.raises(TrainingError) as refusal:
-        ranks.recipe_ranks(full.core, wanted)
+        truncation_cost.recipe_ranks(full.core, wanted)
     assert str(refusal.value) == (
         f"size.ranks {wanted}, expected at most [6, 5, 7]: degrees of freedom, frames and "
         "samples of the tensor"

@@ -6,7 +6,7 @@ import shutil
 import pytest
 import rigid_takes
 
-from posefield_train.families import family_table
+from posefield_train.families import found_families
 from posefield_train.source import recipe
 
 
@@ -21,7 +21,7 @@ def statuses(folder):
 
 def middle(folder, number, at=0):
     """A clip of a family as the option --drop names it."""
-    row = family_table.read(folder / f"family_{number:02d}.csv")[at]
+    row = found_families.read(folder / f"family_{number:02d}.csv")[at]
     seconds = (row.first_frame + row.last_frame) / 2.0 / rigid_takes.RATE
     return f"{number}:{row.file}@{seconds:.2f}"
 
@@ -38,17 +38,17 @@ def test_families_are_accepted_and_rejected(posefield, made):
 
 def test_a_dropped_clip_is_no_longer_trained_from(posefield, made):
     assert posefield("review", made, "--drop", middle(made, 1, 2))[0] == 0
-    rows = family_table.read(made / "family_01.csv")
+    rows = found_families.read(made / "family_01.csv")
     assert [at for at, row in enumerate(rows) if not row.accepted] == [2]
     assert (made / "family_01.toml").read_text().count("accepted = false") == 1
 
 
 def test_merged_families_are_one_with_proposals_of_its_own(posefield, made):
-    before = {n: family_table.read(made / f"family_0{n}.csv") for n in (1, 2)}
+    before = {n: found_families.read(made / f"family_0{n}.csv") for n in (1, 2)}
     text = (made / "family_01.toml").read_text().replace("rms_budget_cm = 1.0", "rms_budget_cm = 2")
     (made / "family_01.toml").write_text(text)
     assert posefield("review", made, "--merge", "1,2", "--accept", "1")[0] == 0
-    assert family_table.read(made / "family_01.csv") == before[1] + before[2]
+    assert found_families.read(made / "family_01.csv") == before[1] + before[2]
     assert not (made / "family_02.toml").exists() and not (made / "family_02.csv").exists()
     own = recipe.read(made / "family_01.toml")
     facts = json.loads((made / "discover.json").read_text())

@@ -9,15 +9,14 @@ from running import bank_values, outputs
 
 from posefield.motion import quat
 from posefield.motion.rotation_charts import CHARTS
-from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
-from posefield_train.align.warp import WarpBasis
+from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.kriging import thinning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import VARIANCE, ConstantModel, KrigingBank
 from posefield_train.kriging.universal_kriging import Hyper
-from posefield_train.onnx_graph.level_tables import LevelTables
-from posefield_train.tensor import decoder_graph, hosvd, quaternion_graph
+from posefield_train.onnx_graph.graph_builder import LevelTables
+from posefield_train.tensor import decoder_graph, hosvd
 from posefield_train.tensor.decoder import BLOCK_NUMBERS, Decoder, LevelSize, Proportions
 from posefield_train.tensor.hosvd import TuckerTensor
 from posefield_train.tensor.pose_vectors import PoseChart
@@ -178,7 +177,7 @@ def decoded(stage, coefficients, place, level=None):
     def build(net, coefficients, place):
         ends = LevelTables(decoder_graph.entries(stage)).onnx(net)
         rows = decoder_graph.onnx(stage, net, coefficients, place, ends)
-        return quaternion_graph.rows_of_poses(net, rows.planes, joints), rows.root
+        return decoder_graph.rows_of_poses(net, rows.planes, joints), rows.root
 
     rotations, root = outputs(build, (2, 2), level, coefficients=coefficients, place=place)
     return [rotations.reshape(*place.shape, joints, 4), root.reshape(*place.shape, 3)]

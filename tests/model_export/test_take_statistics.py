@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield_train.graph import take_statistics
+from posefield_train.graph import onnx_export
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def smooth(stroll):
 
 
 def test_the_joint_root_has_the_covariance_of_duration_and_travel(stroll, models_trained):
-    rows = np.array(take_statistics.take_root(stroll))
+    rows = np.array(onnx_export.take_root(stroll))
     card = models_trained.exported("stroll").card
     beside = np.array(card.beside)
     assert rows.shape == (4, card.levels[0].ranks[2] + 4)
@@ -32,31 +32,31 @@ def test_the_joint_root_has_the_covariance_of_duration_and_travel(stroll, models
     assert np.allclose(rows @ rows.T, expected, rtol=0.0, atol=2e-3 * np.trace(expected))
     alone = rows[:, -4:]
     assert np.trace(alone @ alone.T) < 0.9 * np.trace(expected)
-    assert card.making.take_root == take_statistics.take_root(stroll)
+    assert card.making.take_root == onnx_export.take_root(stroll)
 
 
 def test_detail_restores_the_acceleration_that_left_out_predictions_lack(smooth):
-    found = take_statistics.fit_detail(smooth)
+    found = onnx_export.fit_detail(smooth)
     assert found is not None
     assert found.without < 0.99 and found.sampled == pytest.approx(1.0, abs=0.003)
     assert found.deviations.shape == (19, 12) and (found.deviations >= 0.0).all()
 
 
 def test_no_detail_is_stored_where_none_is_missing(stroll, models_trained):
-    assert take_statistics.fit_detail(stroll) is None
+    assert onnx_export.fit_detail(stroll) is None
     assert models_trained.exported("stroll").card.making.detail == b""
 
 
 def test_motions_without_cycle_have_no_statistics_of_takes(trained, models_trained):
-    found = take_statistics.estimate(trained)
-    assert found == take_statistics.TakeStatistics()
+    found = onnx_export.estimate(trained)
+    assert found == onnx_export.TakeStatistics()
     card = models_trained.exported("reaching").card
     assert found.on_card(card) == card
     assert "detail" not in card.diagnostics
 
 
 def test_the_card_says_what_is_sampled(smooth, models_trained):
-    card = take_statistics.estimate(smooth).on_card(models_trained.exported("stroll").card)
+    card = onnx_export.estimate(smooth).on_card(models_trained.exported("stroll").card)
     facts = card.diagnostics["detail"]
     assert (facts["harmonics"], facts["directions"]) == (19, 12)
     assert facts["acceleration"] < facts["sampled"]

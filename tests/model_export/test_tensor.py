@@ -8,7 +8,7 @@ import pytest
 from posefield.motion import quat, skeleton
 from posefield_train.align import time_alignment
 from posefield_train.align.time_alignment import AlignedClips
-from posefield_train.tensor import motion_tensor, pose_metric, pose_vectors
+from posefield_train.tensor import motion_tensor, pose_vectors
 
 PARENTS = (-1, 0, 1, 2, 1)
 BONES = np.array([[0, 0, 0], [0, 0.5, 0], [0.3, 0, 0], [0.25, 0, 0], [0, 0.2, 0.05]])
@@ -48,7 +48,7 @@ def skin(aligned, offsets):
     translations = np.repeat(offsets[:, None], FRAMES, axis=1)
     translations[:, :, 0] = aligned.root_path
     positions, turns = skeleton.forward_kinematics(PARENTS, aligned.rotations, translations)
-    axes = pose_metric.SHELL_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
+    axes = motion_tensor.SHELL_RADIUS * np.vstack([np.eye(3), -np.eye(3)])
     return positions[..., None, :] + quat.rotate(turns[..., None, :], axes)
 
 
@@ -109,7 +109,7 @@ def test_order_of_clips_is_the_order_of_slices(small, offsets, rng):
     order = rng.permutation(CLIPS)
     # So few frames that the metric is an average over all poses, not over some of them.
     few = replace(small, rotations=small.rotations[:, ::6], root_path=small.root_path[:, ::6])
-    assert CLIPS * len(few.root_path[0]) <= pose_metric.SAMPLED_POSES
+    assert CLIPS * len(few.root_path[0]) <= motion_tensor.SAMPLED_POSES
     shuffled = replace(few, rotations=few.rotations[order], root_path=few.root_path[order])
     first, second = build(few, offsets), build(shuffled, offsets[order])
     assert np.max(np.abs(second.values - first.values[..., order])) < 1e-9

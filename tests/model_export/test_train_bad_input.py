@@ -12,7 +12,7 @@ from posefield.common.errors import BvhError, RecipeError, TrainingError
 from posefield.motion import quat
 from posefield.motion.clip import assemble
 from posefield_train import train
-from posefield_train.graph import onnx_export, training_notes
+from posefield_train.graph import onnx_export, trained_card
 from posefield_train.graph.trained_model import Outlier
 from posefield_train.source import ingest, recipe
 from posefield_train.source.canonical import Finding
@@ -379,7 +379,7 @@ def test_what_is_the_same_in_many_clips_is_one_note_and_the_worst_come_first(mod
     kinds = ("duration", "size", *["far"] * 7)
     against = tuple(Outlier(i % 8, kind, f"{kind} {i}") for i, kind in enumerate(kinds))
     noisy = replace(trained, findings=found, examples=shifted, outliers=against)
-    own = training_notes.training_notes(recipe_with(), noisy, ["of the files"])
+    own = trained_card.training_notes(recipe_with(), noisy, ["of the files"])
     rows = [example.row.named for example in shifted]
     assert own == [
         f"{rows[1]}: size 1",
@@ -395,4 +395,4 @@ def test_what_is_the_same_in_many_clips_is_one_note_and_the_worst_come_first(mod
         "begun 17% of its cycle later than it was cut",
     ]
     few = replace(noisy, findings=jumps[:3], outliers=(), examples=trained.examples)
-    assert len(training_notes.training_notes(recipe_with(), few, [])) == 3
+    assert len(trained_card.training_notes(recipe_with(), few, [])) == 3

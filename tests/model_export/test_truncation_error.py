@@ -8,7 +8,7 @@ import pytest
 from posefield.common.errors import TrainingError
 from posefield_train import train
 from posefield_train.align import time_alignment
-from posefield_train.graph import ranks, truncation_cost
+from posefield_train.graph import truncation_cost
 from posefield_train.source.recipe_sections import Event
 from posefield_train.tensor import truncation_error
 
@@ -108,7 +108,7 @@ def chosen(own, trained, judge, limits=None, **size):
     empty = {"rms_budget_cm": None, "p99_budget_cm": None, "effector_budget_cm": None}
     asked = own.size.model_copy(update={**empty, **size})
     price = truncation_cost.RANK_COSTS[asked.cost](trained.tensor, 4)
-    found = ranks.choose_ranks(asked, trained.full, price, judge, limits or {})
+    found = truncation_cost.choose_ranks(asked, trained.full, price, judge, limits or {})
     return judge.evaluate(trained.full.truncated(found)), price.evaluate(*found), found
 
 
@@ -153,7 +153,9 @@ def test_cost_decides_which_ranks_are_the_cheapest(small_recipe, trained, judge)
     numbers, operations = (
         price(trained.tensor, 4) for price in truncation_cost.RANK_COSTS.values()
     )
-    fronts = [ranks.pareto_front(trained.full.core, price) for price in (numbers, operations)]
+    fronts = [
+        truncation_cost.pareto_front(trained.full.core, price) for price in (numbers, operations)
+    ]
     pairs = []
     for error in np.geomspace(1e-4, 0.1, 12) * np.sum(trained.full.core**2):
         stored, done = (front[front.near(error, -1, len(front.errors))] for front in fronts)

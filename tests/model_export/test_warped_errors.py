@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefield_train.graph import warped_errors
-from posefield_train.tensor.uniform_motion import FRAMES, UNIFORM_SHARES
+from posefield_train.tensor.motion_tensor import FRAMES, UNIFORM_SHARES
 
 
 def swing(times, size=0.4):

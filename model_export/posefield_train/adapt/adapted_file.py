@@ -16,15 +16,8 @@ from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelC
 from posefield_train.adapt import adaptation, canonical_clips, contact_extension, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
-from posefield_train.graph import (
-    level_errors,
-    onnx_export,
-    trained_card,
-    training_notes,
-    truncation_cost,
-)
-from posefield_train.graph.level_errors import LevelTest
-from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, ModelLevels
+from posefield_train.graph import levels, onnx_export, trained_card, truncation_cost
+from posefield_train.graph.levels import FINALS, TEST_INPUTS, LevelBuilder, LevelTest, ModelLevels
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_card import MAX_LISTED_VALUES
 from posefield_train.kriging import sample_points, thinning
@@ -144,10 +137,10 @@ def _level_builder(reopened: ReconstructedModel, adapted: AdaptedModel) -> Level
     pose = adapted.model.bank.pose.samples
     labels = tuple(map(len, adapted.model.bank.labels.values()))
     samples = SamplePoints(pose, len(adapted.model.bank.low), np.arange(len(pose)), labels)
-    uncut = level_errors.untruncated(adapted.model, extended.full, samples)
+    uncut = levels.untruncated(adapted.model, extended.full, samples)
 
     def exam(questions: int) -> LevelTest:
-        return level_errors.level_test_against(uncut, parents, moment, questions)
+        return levels.level_test_against(uncut, parents, moment, questions)
 
     weights = np.append(known.joint_weights, np.ones(len(extended.tensor.curves)))
     return LevelBuilder(
@@ -286,7 +279,7 @@ def _notes(
     return [
         adapting,
         *newcomer.notes,
-        *training_notes.finding_notes(moved.findings, moved.examples, names),
+        *trained_card.finding_notes(moved.findings, moved.examples, names),
         *contact_extension.contact_notes(reopened.known, adapted.contacts),
     ]
 

@@ -19,9 +19,8 @@ from posefield.kriging import kriging_model
 from posefield.model_file import checked_file, subgraph
 from posefield.model_file.model_card import ModelCard, TrainingParameters
 from posefield_train.adapt.canonical_clips import AdaptableModel
-from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
-from posefield_train.align.warp import WarpBasis
+from posefield_train.align.warp import CanonicalTiming, WarpBasis
 from posefield_train.contacts.contact_table import ContactTable
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
@@ -31,8 +30,8 @@ from posefield_train.kriging.kriging_bank import (
     CoefficientModel,
     ConstantModel,
     KrigingBank,
+    PowerLaw,
 )
-from posefield_train.kriging.power_law import PowerLaw
 from posefield_train.kriging.universal_kriging import Hyper, UniversalKriging
 from posefield_train.tensor import event_blend
 from posefield_train.tensor.decoder import Decoder, Proportions

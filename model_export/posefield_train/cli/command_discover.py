@@ -135,7 +135,7 @@ def _write_recipes(
     folder: Path, output: Path, stated: StatementOptions, wanted: FamilyOptions, json: bool
 ) -> None:
     from posefield.console.progress import ProgressBar
-    from posefield_train.families import body_kinds, contact_sheet, found_families, recipe_folder
+    from posefield_train.families import contact_sheet, found_families, recipe_folder
     from posefield_train.source.motion_readers import MotionFiles
 
     if output.suffix in (".csv", ".toml", ".json"):
@@ -144,9 +144,9 @@ def _write_recipes(
     files = MotionFiles(KEPT_POSES)
     read = _read(folder, stated, files)
     names = [take.file for take in read.takes]
-    statements = body_kinds.FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
+    statements = found_families.FileStatements(wanted.unit, stated.up, _roles(stated), stated.rate)
     with ProgressBar("bodies", len(names)) as bar:
-        kinds = body_kinds.find_kinds(folder, names, statements, bar.update, read.figures)
+        kinds = found_families.find_kinds(folder, names, statements, bar.update, read.figures)
     with ProgressBar("candidates", wanted.candidates) as bar:
         listed = found_families.find_families(read.takes, kinds, wanted.candidates, bar.update)
     found = recipe_folder.offer(listed, folder, wanted.licence, files)
@@ -162,10 +162,10 @@ def _write_recipes(
 
 def _tell_families(found: "FoundFamilies", output: Path, takes: int) -> None:
     """Print each family that is offered, and how to accept it."""
-    from posefield_train.families import family_recipe, recipe_folder
+    from posefield_train.families import recipe_folder
 
     for one in found.offered:
-        controls = ", ".join(map(family_recipe.control_name, one.proposal.controls))
+        controls = ", ".join(map(recipe_folder.control_name, one.proposal.controls))
         typer.echo(
             f"{output / one.name}.toml: {len(one.family.rows)} {one.family.kind}, "
             f"{one.family.seconds:.1f} s; controls {controls}"

@@ -98,7 +98,7 @@ def evaluate(
     A Gaussian process and the mean motion are measured on the same motions. Each fold fits the
     whole model again without the held-out clips.
     """
-    recipe_file = shipped_recipes.file_of(recipe, data)
+    recipe_file = data_folder.recipe_file(recipe, data)
     _evaluate(recipe_file, data or recipe_file.parent, wanted)
 
 

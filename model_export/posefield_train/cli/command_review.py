@@ -61,7 +61,7 @@ def review(
 
     posefield train takes the recipes that are accepted. The same decisions again change nothing.
     """
-    from posefield_train.families import decisions as family_decisions
+    from posefield_train.families import review as family_decisions
     from posefield_train.families import review as family_review
 
     if (decisions is None) == (given == DecisionOptions()):

@@ -2,11 +2,127 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from posefield.common.units import Floats
+from posefield.common.units import Booleans, Floats, Indices
 from posefield_train.discover.take_reading import Take
+
+STEPS = ((1, 1), (1, 2), (2, 1))
+"""Frames of query and corpus by which a match advances."""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Best match for each last frame of the corpus.
+
+    costs (F,): mean distance over the frames of the query; inf without a match. starts (F,): first
+    frame of the match.
+    """
+
+    costs: Floats
+    starts: Indices
+
+
+@dataclass(frozen=True)
+class SearchedFrames:
+    """Features of a corpus as every search needs them.
+
+    values (F, k): zero where frames stand between two takes. squares (F,): of their lengths.
+    between (F,): whether a frame stands between two takes.
+    """
+
+    values: Floats
+    squares: Floats
+    between: Booleans
+
+
+def searched_frames(corpus: Floats) -> SearchedFrames:
+    """Return the features (F, k) of a corpus for searches; NaN stands between two takes."""
+    known = np.nan_to_num(corpus)
+    return SearchedFrames(known, np.sum(np.square(known), axis=1), np.isnan(corpus[:, 0]))
+
+
+def distances(query: Floats, corpus: SearchedFrames) -> Floats:
+    """Return the distances (L, F) of features (L, k) of a query from those of a corpus.
+
+    The distance of a frame between two takes is inf.
+    """
+    found = np.sum(np.square(query), axis=1)[:, None] + corpus.squares
+    found -= 2.0 * query @ corpus.values.T
+    np.sqrt(np.maximum(found, 0.0, out=found), out=found)
+    found[:, corpus.between] = np.inf
+    return found
+
+
+def match_ends(apart: Floats) -> Ends:
+    """Return the best match that ends at each frame of the corpus.
+
+    apart (L, F): distances of the query's frames from the corpus's; inf between two takes.
+    """
+    length, frames = apart.shape
+    starts = np.arange(frames)
+    before: tuple[Floats, Indices] | None = None
+    last = apart[0], starts
+    for at in range(1, length):
+        own = apart[at]
+        costs = np.full(frames, np.inf)
+        costs[1:] = last[0][:-1] + own[1:]
+        origin = np.zeros(frames, dtype=np.int64)
+        origin[1:] = last[1][:-1]
+        _take_better((costs, origin), last, 2, own)
+        if before is not None:
+            _take_better((costs, origin), before, 1, own + apart[at - 1])
+        before, last = last, (costs, origin)
+    costs, starts = last
+    return Ends(costs / length, starts)
+
+
+def _take_better(
+    best: tuple[Floats, Indices], row: tuple[Floats, Indices], step: int, added: Floats
+) -> None:
+    """Replace the best costs and starts where those of a row, `step` frames later, cost less."""
+    costs = row[0][:-step] + added[step:]
+    better = costs < best[0][step:]
+    np.copyto(best[0][step:], costs, where=better)
+    np.copyto(best[1][step:], row[1][:-step], where=better)
+
+
+def align(apart: Floats) -> Indices:
+    """Return for each frame of the query (L,) the frame of a clip (F,) that is most like it.
+
+    apart (L, F): distances. The first frames are alike, and the last ones; steps are those of a
+    match. A frame of the query that a step leaves out shares the frame after. Raises ValueError
+    for a clip that lasts less than half as long as the query, or more than twice.
+    """
+    length, frames = apart.shape
+    costs = np.full((length, frames), np.inf)
+    steps = np.zeros((length, frames), dtype=np.int64)
+    costs[0, 0] = apart[0, 0]
+    for at in range(1, length):
+        choices = np.full((len(STEPS), frames), np.inf)
+        choices[0, 1:] = costs[at - 1, :-1]
+        choices[1, 2:] = costs[at - 1, :-2]
+        if at > 1:
+            choices[2, 1:] = costs[at - 2, :-1] + apart[at - 1, 1:]
+        steps[at] = np.argmin(choices, axis=0)
+        costs[at] = choices.min(axis=0) + apart[at]
+    if not np.isfinite(costs[-1, -1]):
+        raise ValueError(f"{frames} frames, expected {length // 2 + 1} to {2 * length - 1}")
+    return _path(steps)
+
+
+def _path(steps: Indices) -> Indices:
+    """Return the frames (L,) of the best path, from the step (L, F) that led to each place."""
+    row, column = steps.shape[0] - 1, steps.shape[1] - 1
+    found = np.zeros(row + 1, dtype=np.int64)
+    while row > 0:
+        rows, columns = STEPS[steps[row, column]]
+        found[row - rows + 1 : row + 1] = column
+        row, column = row - rows, column - columns
+    return found
+
 
 RATE = 30.0
 """Frames a second at which features are measured."""
@@ -131,3 +247,98 @@ def _velocity(values: Floats) -> Floats:
     half = round(VELOCITY_SPAN * RATE)
     padded = np.pad(values, ((half, half), (0, 0)), mode="edge")
     return np.asarray((padded[2 * half :] - padded[: -2 * half]) * RATE / (2 * half))
+
+
+GAP = 2
+"""Frames between two takes, so that no match leads from one to the next."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Part of a take. take: index. start, end: s."""
+
+    take: int
+    start: float
+    end: float
+
+    @property
+    def seconds(self) -> float:
+        """Return the duration, s."""
+        return self.end - self.start
+
+    def overlap(self, other: "Span") -> float:
+        """Return the common time as a share of the shorter one."""
+        if self.take != other.take:
+            return 0.0
+        common = min(self.end, other.end) - max(self.start, other.start)
+        return max(common, 0.0) / min(self.seconds, other.seconds)
+
+
+@dataclass(frozen=True)
+class Match:
+    """A clip that is like another one. cost: distance as a share of that of any clip."""
+
+    span: Span
+    cost: float
+
+
+@dataclass(frozen=True)
+class JoinedFeatures:
+    """Features of takes in a row.
+
+    values (F, k): NaN in the gaps between takes. owners (F,): take of each frame, -1 in gaps.
+    offsets: first frame of each take.
+    """
+
+    values: Floats
+    owners: Indices
+    offsets: tuple[int, ...]
+
+    @cached_property
+    def variance(self) -> float:
+        """Variance of all features, summed over the directions."""
+        return float(self.values[self.owners >= 0].var(axis=0).sum())
+
+    @cached_property
+    def _searched(self) -> SearchedFrames:
+        return searched_frames(self.values)
+
+    def frames(self, span: Span) -> slice:
+        """Return the frames of a part of a take; its end may lie beyond the last one."""
+        offset = self.offsets[span.take]
+        first, last = (offset + round(time * SEARCH_RATE) for time in (span.start, span.end))
+        ends = (
+            len(self.owners) if span.take + 1 == len(self.offsets) else self.offsets[span.take + 1]
+        )
+        return slice(first, min(last + 1, ends - GAP))
+
+    def clip(self, span: Span) -> Floats:
+        """Return the features (L, k) of a part of a take."""
+        return self.values[self.frames(span)]
+
+    def span(self, first: int, last: int) -> Span:
+        """Return the part of a take between two frames, both included."""
+        take = int(self.owners[last])
+        start, end = ((frame - self.offsets[take]) / SEARCH_RATE for frame in (first, last))
+        return Span(take, float(start), float(end))
+
+    def ends(self, span: Span) -> Ends:
+        """Return the best match of a clip for each last frame, with relative costs.
+
+        Costs are shares of the median over all places where a clip may end.
+        """
+        apart = distances(self.clip(span), self._searched)
+        found = match_ends(apart)
+        usual = float(np.median(found.costs[np.isfinite(found.costs)]))
+        return Ends(found.costs / usual, found.starts)
+
+
+def join_features(corpus: Corpus) -> JoinedFeatures:
+    """Return the features of all takes with gaps between them."""
+    pieces, owners, offsets, count = [], [], [], 0
+    for take, own in enumerate(corpus.features):
+        offsets.append(count)
+        pieces += [own, np.full((GAP, own.shape[1]), np.nan)]
+        owners += [np.full(len(own), take), np.full(GAP, -1)]
+        count += len(own) + GAP
+    return JoinedFeatures(np.concatenate(pieces), np.concatenate(owners), tuple(offsets))

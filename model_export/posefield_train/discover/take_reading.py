@@ -9,19 +9,81 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from posefield.common.array_shapes import Positions
 from posefield.common.errors import FileError
 from posefield.common.units import Floats, UpAxis
 from posefield.motion import skeleton
 from posefield.rigs.rig_roles import NEEDED
 from posefield.roles.joint_recognition import RoleGuess
-from posefield_train.discover import take_copies
-from posefield_train.probe import figure, proposals
-from posefield_train.probe.figure import ADULT_LEG, MOST_WHOLE, OTHER_UNIT
-from posefield_train.probe.proposals import Proposal
-from posefield_train.source import frame_faults, motion_file, motion_readers
+from posefield_train.probe import proposals
+from posefield_train.probe.proposals import ADULT_LEG, MOST_WHOLE, OTHER_UNIT, Proposal
+from posefield_train.source import frame_faults, motion_file, motion_readers, take_groups
 from posefield_train.source.frame_faults import NO_FAULTS, FrameFaults
 from posefield_train.source.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
+
+COMPARED = (
+    "hips",
+    "head",
+    "leftLowerLeg",
+    "rightLowerLeg",
+    "leftFoot",
+    "rightFoot",
+    "leftLowerArm",
+    "rightLowerArm",
+    "leftHand",
+    "rightHand",
+)
+"""Roles whose places are compared, as far as all takes have them."""
+
+
+@dataclass(frozen=True)
+class TakeCopy:
+    """A take of a recording that another file begins. recording: the first file. note: why."""
+
+    recording: str
+    note: str
+
+
+def find_copies(
+    files: Sequence[str], places: Sequence[Mapping[str, Floats]]
+) -> dict[str, TakeCopy]:
+    """Return the takes that are copies, by file.
+
+    files: of the takes. places: positions (F, 3) by role of each, leg lengths, Y up.
+    """
+    if len(files) < 2:
+        return {}
+    known = [role for role in COMPARED if all(role in own for own in places)]
+    roles = [role for role in known if _counterpart(role) in known]
+    motions = [_motion(own, roles) for own in places]
+    swapped = tuple(roles.index(_counterpart(role)) for role in roles)
+    pairs = take_groups.find_pairs(motions, swapped)
+    recordings = take_groups.connected(files, pairs)
+    notes: dict[str, str] = {}
+    # Relations to the recording itself come first.
+    named = {files.index(file) for file in recordings}
+    for pair in sorted(pairs, key=lambda own: not {own.first, own.second} & named):
+        said = f"{files[pair.second]} {pair.relation} {files[pair.first]}"
+        for at in (pair.first, pair.second):
+            if files[at] != recordings[at]:
+                notes.setdefault(files[at], f"{said}: both are one take")
+    copies = dict(zip(files, recordings, strict=True))
+    return {file: TakeCopy(copies[file], note) for file, note in notes.items()}
+
+
+def _motion(places: Mapping[str, Floats], roles: Sequence[str]) -> Positions:
+    """Return positions (F, J, 3) of an adult of the usual size, m."""
+    return np.stack([ADULT_LEG * places[role] for role in roles], axis=1)
+
+
+def _counterpart(role: str) -> str:
+    """Return the role on the other side; the role itself in the middle of the body."""
+    for side, other in (("left", "right"), ("right", "left")):
+        if role.startswith(side):
+            return other + role.removeprefix(side)
+    return role
+
 
 LEG = ("UpperLeg", "LowerLeg", "Foot")
 SEARCHED = frozenset(
@@ -97,7 +159,7 @@ class ReadTakes:
     takes: tuple[Take, ...]
     refused: dict[str, str]
     notes: dict[str, list[str]]
-    figures: dict[str, figure.Figure]
+    figures: dict[str, proposals.Figure]
 
 
 @dataclass(frozen=True)
@@ -173,7 +235,7 @@ class Body:
 
     take: Take
     joints: tuple[str, ...]
-    figure: figure.Figure
+    figure: proposals.Figure
     leg: float
     up: Proposal
 
@@ -187,7 +249,7 @@ def _body(name: str, file: MotionFile, stated: Stated) -> Body:
         raise UnusableTake(f"found {len(file)} frame, expected a motion")
     if file.rate is None:
         raise UnusableTake(f"{file.format} states no frame rate: say it with --rate")
-    measured = _with_roles(figure.measure(file), stated.roles)
+    measured = _with_roles(proposals.measure(file), stated.roles)
     lacking = _lacking(measured)
     if lacking:
         raise UnusableTake(
@@ -245,7 +307,7 @@ def _groups_of_legs(bodies: Sequence[Body]) -> list[list[Body]]:
 def _recordings(takes: Sequence[Take]) -> tuple[list[Take], dict[str, list[str]]]:
     """Return the takes with the recordings of which they are copies, and notes by file."""
     files = [take.file for take in takes]
-    copies = take_copies.find_copies(files, [take.places for take in takes])
+    copies = find_copies(files, [take.places for take in takes])
     found, notes = [], {}
     for take in takes:
         joints = list(take.places)
@@ -291,7 +353,7 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
     return found
 
 
-def _with_roles(measured: figure.Figure, roles: Mapping[str, str]) -> figure.Figure:
+def _with_roles(measured: proposals.Figure, roles: Mapping[str, str]) -> proposals.Figure:
     """Return the figure with stated roles in place of those that were recognised."""
     unknown = sorted(set(roles.values()) - set(measured.names))
     if unknown:
@@ -301,7 +363,7 @@ def _with_roles(measured: figure.Figure, roles: Mapping[str, str]) -> figure.Fig
     return replace(measured, guesses=others | certain)
 
 
-def _lacking(measured: figure.Figure) -> list[str]:
+def _lacking(measured: proposals.Figure) -> list[str]:
     """Return each role of hips and legs without a joint that is sure, with the reason."""
     found = []
     for role in NEEDED:

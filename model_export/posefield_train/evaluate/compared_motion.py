@@ -10,8 +10,8 @@ from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.curves import Curve, CurveValues
 from posefield_train.align import time_alignment
-from posefield_train.tensor import uniform_motion
-from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
+from posefield_train.tensor import motion_tensor
+from posefield_train.tensor.motion_tensor import UNIFORM_SHARES
 
 # Distance of three points at right angles from a joint, m, as in the Animation Compression Library.
 SHELL_RADIUS = 0.03
@@ -51,7 +51,7 @@ class MotionEvent:
 
 def motion_of_clip(clip: Clip, event: MotionEvent | None) -> ComparedMotion:
     """Return the motion of a captured clip on its own skeleton."""
-    poses = uniform_motion.captured_poses(clip)
+    poses = motion_tensor.captured_poses(clip)
     own = motion_of_poses(clip.skeleton.parents, *poses, clip.duration, event)
     if clip.curves is None:
         return own

@@ -10,7 +10,7 @@ from posefield.common.units import Floats
 from posefield.motion import curves, foot_skate
 from posefield_train.align import dtw, time_alignment
 from posefield_train.evaluate.compared_motion import ComparedMotion
-from posefield_train.tensor.uniform_motion import FRAMES
+from posefield_train.tensor.motion_tensor import FRAMES
 
 
 @dataclass(frozen=True)

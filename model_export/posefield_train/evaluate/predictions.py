@@ -13,9 +13,9 @@ from posefield_train.graph.trained_model import TrainedModel
 from posefield_train.kriging import sample_points
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.source.recipe import Recipe
-from posefield_train.tensor import truncation_error, uniform_motion
+from posefield_train.tensor import motion_tensor, truncation_error
+from posefield_train.tensor.motion_tensor import UNIFORM_SHARES
 from posefield_train.tensor.truncation_error import EventFrame
-from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
 
 OURS, GP, MEAN = "posefield", "gp", "mean"
 DEFINITIONS = {
@@ -140,7 +140,7 @@ def motions_of_values(
     event, model = truncation_error.event_frame(recipe, trained.examples), trained.model
     names = next(iter(peers.values()))
     values = {name: np.concatenate([known[name] for known in peers.values()]) for name in names}
-    poses = uniform_motion.predicted_poses(
+    poses = motion_tensor.predicted_poses(
         model.timing, trained.tensor, values["pose"], values["warp"], values.get("travel")
     )
     offsets = model.proportions.numpy(values["offsets"])

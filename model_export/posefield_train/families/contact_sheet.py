@@ -4,13 +4,96 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from posefield.common.units import UP, Floats
 from posefield_train.discover.take_reading import Take
-from posefield_train.families import clip_sticks, family_recipe
-from posefield_train.families.clip_sticks import StickStrip
-from posefield_train.families.family_table import FamilyRow
+from posefield_train.families import recipe_folder
+from posefield_train.families.found_families import FamilyRow
 from posefield_train.families.recipe_folder import FoundFamilies, OfferedFamily
+
+INSTANTS = 6
+GAP = 0.35
+"""Distance between two figures, leg lengths."""
+UNIT = 40.0
+"""Length of a leg in the picture."""
+VIEW_TURN = np.radians(25.0)
+"""Angle of the view from that which shows most of the motion, rad."""
+BONES = (
+    ("hips", "neck"),
+    ("neck", "head"),
+    *(
+        bone
+        for side in ("left", "right")
+        for bone in (
+            ("hips", f"{side}UpperLeg"),
+            (f"{side}UpperLeg", f"{side}LowerLeg"),
+            (f"{side}LowerLeg", f"{side}Foot"),
+            (f"{side}Foot", f"{side}Toes"),
+            ("neck", f"{side}UpperArm"),
+            (f"{side}UpperArm", f"{side}LowerArm"),
+            (f"{side}LowerArm", f"{side}Hand"),
+        )
+    ),
+)
+
+
+@dataclass(frozen=True)
+class StickStrip:
+    """Figures of a clip side by side.
+
+    body, right: paths of SVG, of the trunk with the left limbs, and of the right limbs. width,
+    height: of the picture.
+    """
+
+    body: str
+    right: str
+    width: float
+    height: float
+
+
+def draw(take: Take, first: int, last: int) -> StickStrip:
+    """Return the figures of a part of a take at INSTANTS times, seen from where most moves."""
+    frames = np.linspace(first, last, INSTANTS).round().astype(int)
+    bones = [bone for bone in BONES if set(bone) <= take.places.keys()]
+    hips = take.places["hips"][frames] * (1.0 - UP)
+    ends = [[take.places[role][frames] - hips for role in bone] for bone in bones]
+    points = np.array(ends).transpose(2, 0, 1, 3)
+    across = points @ _direction(points)
+    floor, top = points[..., 1].min(), points[..., 1].max()
+    step = across.max() - across.min() + GAP
+    x = across - across.min() + 0.5 * GAP + step * np.arange(INSTANTS)[:, None, None]
+    flat = UNIT * np.stack([x, top - points[..., 1] + 0.1], axis=-1)
+    is_right = np.array([any(role.startswith("right") for role in bone) for bone in bones])
+    return StickStrip(
+        _path(flat[:, ~is_right]),
+        _path(flat[:, is_right]),
+        round(float(UNIT * step * INSTANTS), 1),
+        round(float(UNIT * (top - floor + 0.2)), 1),
+    )
+
+
+def _direction(points: Floats) -> Floats:
+    """Return the horizontal direction (3,) along which the ends of bones move most, turned a bit.
+
+    From exactly there one side of the body would hide the other.
+    """
+    moved = (points - points.mean(axis=0)).reshape(-1, 3) * (1.0 - UP)
+    spread = (points - points.mean(axis=(1, 2), keepdims=True)).reshape(-1, 3) * (1.0 - UP)
+    # A body that does not move is seen from where it is widest.
+    _, vectors = np.linalg.eigh(moved.T @ moved + 0.01 * spread.T @ spread)
+    found = vectors[:, -1]
+    found = found if found[2] + 1e-3 * found[0] >= 0.0 else -found
+    aside = np.array([found[2], 0.0, -found[0]])
+    return np.asarray(np.cos(VIEW_TURN) * found + np.sin(VIEW_TURN) * aside)
+
+
+def _path(bones: Floats) -> str:
+    """Return the path of bones (F, B, 2, 2)."""
+    lines = bones.reshape(-1, 4)
+    return "".join(f"M{x:.0f} {y:.0f}L{u:.0f} {v:.0f}" for x, y, u, v in lines)
+
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
 BEST, WORST = 5, 3
@@ -83,7 +166,7 @@ def _shown(one: OfferedFamily, takes: Mapping[str, Take]) -> ShownFamily:
     return ShownFamily(
         one.number,
         f"{len(rows)} {one.family.kind}",
-        clip_sticks.draw(takes[example.file], example.first_frame, example.last_frame),
+        draw(takes[example.file], example.first_frame, example.last_frame),
         tuple(_clip(one.number, row, takes) for row in best),
         tuple(_clip(one.number, row, takes) for row in worst),
         HEADINGS[one.family.kind],
@@ -98,13 +181,13 @@ def _clip(number: int, row: FamilyRow, takes: Mapping[str, Take]) -> ShownClip:
         f"{number}:{row.file}@{0.5 * (start + end):.2f}",
         f"{row.file}, {start:.1f} to {end:.1f}{NO_BREAK}s",
         row.cost,
-        clip_sticks.draw(take, row.first_frame, row.last_frame),
+        draw(take, row.first_frame, row.last_frame),
     )
 
 
 def _facts(one: OfferedFamily) -> tuple[tuple[str, str], ...]:
     family, proposal = one.family, one.proposal
-    names = ", ".join(family_recipe.control_name(own) for own in proposal.controls)
+    names = ", ".join(recipe_folder.control_name(own) for own in proposal.controls)
     said = f"explain {1.0 - proposal.remaining[-1]:.0%} of the variance of takes left out"
     facts = [
         ("Performers", ", ".join(sorted({row.performer for row in family.rows}))),

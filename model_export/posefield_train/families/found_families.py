@@ -1,23 +1,285 @@
 """Families of a folder's takes: similar motions and strides, as rows of tables."""
 
+import csv
+import io
+import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
 
-from posefield_train.discover import (
-    family_quality,
-    family_search,
-    joined_features,
-    motion_features,
-    stride_detection,
-)
-from posefield_train.discover.family_quality import FamilyQuality
+import numpy as np
+
+from posefield.common.errors import InvalidField, RecipeError
+from posefield.common.units import Floats, UpAxis
+from posefield.motion.skeleton import Skeleton
+from posefield.roles.joint_recognition import RoleGuess
+from posefield_train.discover import family_search, found_clips, motion_features, stride_detection
 from posefield_train.discover.family_search import FEWEST
+from posefield_train.discover.found_clips import FamilyQuality
 from posefield_train.discover.motion_features import Corpus
 from posefield_train.discover.take_reading import Take
-from posefield_train.families import mixed_bodies
-from posefield_train.families.body_kinds import BodyKind
-from posefield_train.families.family_table import FamilyRow
+from posefield_train.probe import probe_report, proposals, recipe_draft
+from posefield_train.probe.probe_report import ProbeReport
+from posefield_train.probe.proposals import Figure, Proposal
+from posefield_train.source import clip_table, common_topology, motion_readers
+from posefield_train.source.common_topology import RoleJoints, TopologyError
+from posefield_train.source.motion_file import ReadOptions
+
+SAME_BONE = 0.0005
+"""Largest difference of a bone's length between files of one performer, m."""
+STATED = ("stated by an option of posefield discover",)
+
+
+@dataclass(frozen=True)
+class FileStatements:
+    """Statements about all files, which count more than what is proposed.
+
+    metres_per_unit, up: None for what the files or bodies tell. roles: joints by role. rate: frames
+    a second of files that state none.
+    """
+
+    metres_per_unit: float | None
+    up: UpAxis | None
+    roles: Mapping[str, str]
+    rate: float | None = None
+
+
+@dataclass(frozen=True)
+class BodyKind:
+    """Takes with the same joints in the same order.
+
+    report: proposals, with statements in place of guesses. performers: by file. skeleton: of the
+    first file. stated: joints by role that were stated.
+    """
+
+    joints: tuple[str, ...]
+    report: ProbeReport
+    performers: Mapping[str, str]
+    skeleton: Skeleton
+    stated: Mapping[str, str]
+
+
+def find_kinds(
+    folder: Path,
+    files: Sequence[str],
+    stated: FileStatements,
+    report: Callable[[int], None] = lambda _: None,
+    figures: Mapping[str, Figure] | None = None,
+) -> list[BodyKind]:
+    """Return the kinds of bodies of a folder's files, in the order of their first files.
+
+    figures: of files that were read before. Raises InvalidField for files whose unit or up axis is
+    neither stated nor told by the bodies.
+    """
+    groups: dict[tuple[str, ...], list[tuple[str, Figure]]] = {}
+    for count, file in enumerate(files, 1):
+        own = figures[file] if figures else _measured(folder / file, stated.rate)
+        groups.setdefault(tuple(own.names), []).append((file, own))
+        report(count)
+    return [_kind(folder, joints, group, stated) for joints, group in groups.items()]
+
+
+def _measured(path: Path, rate: float | None) -> Figure:
+    return proposals.measure(motion_readers.read(path, ReadOptions(rate=rate))).without_frames()
+
+
+def _kind(
+    folder: Path,
+    joints: tuple[str, ...],
+    group: Sequence[tuple[str, Figure]],
+    stated: FileStatements,
+) -> BodyKind:
+    files, figures = [file for file, _ in group], [own for _, own in group]
+    found = _stated(probe_report.report_of([folder / file for file in files], figures), stated)
+    for name, key in (("metres_per_unit", "unit"), ("up", "up")):
+        if found.proposed[name].value is None:
+            said = "; ".join(found.proposed[name].evidence)
+            raise InvalidField(key, f"not told by {files[0]} ({said}), expected a statement")
+    unit = float(found.proposed["metres_per_unit"].value)
+    names = name_performers(files, [unit * own.bones[1:] for own in figures])
+    own = {role: joint for role, joint in stated.roles.items() if joint in joints}
+    performers = dict(zip(files, names, strict=True))
+    return BodyKind(joints, found, performers, figures[0].file.skeleton, own)
+
+
+def _stated(found: ProbeReport, stated: FileStatements) -> ProbeReport:
+    """Return the report with statements in place of proposals and guesses."""
+    values = {"metres_per_unit": stated.metres_per_unit, "up": stated.up, "rate": stated.rate}
+    proposed = {
+        name: Proposal(value, "certain", STATED)
+        for name, value in values.items()
+        if value is not None
+    }
+    roles = {
+        role: RoleGuess(joint, 1.0) for role, joint in stated.roles.items() if joint in found.joints
+    }
+    others = {r: g for r, g in found.guesses.items() if g.joint not in stated.roles.values()}
+    return replace(found, proposed=found.proposed | proposed, guesses=others | roles)
+
+
+def name_performers(files: Sequence[str], bones: Sequence[Floats]) -> list[str]:
+    """Return the performer of each file.
+
+    bones: lengths (J - 1,), m, of each file's bones below the root. Files whose lengths agree are
+    of one performer, who is named by a word that these files' names share and no other file's has,
+    else performer_1 and so on, in the files' order.
+    """
+    groups = _groups(bones)
+    words = [_words(file) for file in files]
+    found = [""] * len(files)
+    for number, group in enumerate(groups, 1):
+        shared = set(words[group[0]]).intersection(*(words[at] for at in group))
+        others = {word for at, own in enumerate(words) if at not in group for word in own}
+        own = [word for word in words[group[0]] if word in shared - others]
+        is_told = len(groups) > 1 and own
+        for at in group:
+            found[at] = own[0] if is_told else f"performer_{number}"
+    return found
+
+
+def _groups(bones: Sequence[Floats]) -> list[list[int]]:
+    """Return the indices of files with equal bones, in the order of their first files."""
+    groups: list[list[int]] = []
+    for at, own in enumerate(bones):
+        for group in groups:
+            other = bones[group[0]]
+            if own.shape == other.shape and np.abs(own - other).max(initial=0.0) <= SAME_BONE:
+                group.append(at)
+                break
+        else:
+            groups.append([at])
+    return groups
+
+
+def _words(file: str) -> list[str]:
+    """Return the words of a file's path with a letter, the name's before those of its folders."""
+    path = PurePosixPath(file)
+    texts = [path.stem, *reversed(path.parent.parts)]
+    words = [word for text in texts for word in re.split(r"[^a-z0-9]+", text.lower())]
+    return [word for word in words if re.search("[a-z]", word)]
+
+
+SAME_UNIT = 1e-4
+"""Largest relative difference of two numbers that state the same unit."""
+
+
+def can_share(kinds: Sequence[BodyKind]) -> bool:
+    """Return whether bodies have all roles of a common topology, and one unit and up axis."""
+    units, axes = (
+        [own.report.proposed[key].value for own in kinds] for key in ("metres_per_unit", "up")
+    )
+    if max(units) - min(units) > SAME_UNIT * max(units) or len(set(axes)) > 1:
+        return False
+    try:
+        _bodies(kinds)
+    except TopologyError:
+        return False
+    return True
+
+
+def _bodies(kinds: Sequence[BodyKind]) -> list[RoleJoints]:
+    return [
+        common_topology.role_joints(
+            own.skeleton, {role: [joint] for role, joint in own.stated.items()}
+        )
+        for own in kinds
+    ]
+
+
+def shared_report(report: ProbeReport, kinds: Sequence[BodyKind]) -> ProbeReport:
+    """Return a report on bodies of which a recipe makes one topology.
+
+    report: on those of the most common kind, whose joints become those of the topology.
+    """
+    names = common_topology.common_topology(_bodies(kinds)).names
+    guesses = {
+        role: RoleGuess(joint, 1.0) for role, joint in common_topology.model_roles(names).items()
+    }
+    by_joint = {joint: role for role, joint in report.roles.items()}
+    feet = report.proposed["feet"]
+    named = [by_joint[joint] for joint in feet.value if by_joint.get(joint) in names]
+    proposed = report.proposed | {
+        "feet": replace(feet, value=named),
+        "facing": Proposal(0.0, "certain", ("bodies on the topology of roles face +z",)),
+    }
+    return replace(report, joints=names, guesses=guesses, proposed=proposed)
+
+
+def skeleton_lines(kinds: Sequence[BodyKind]) -> list[str]:
+    """Return the section [skeleton] of a family's recipe, with its evidence as comments."""
+    counts = ", ".join(str(len(own.joints)) for own in kinds)
+    lines = [
+        f"# The files have {len(kinds)} kinds of skeletons, of {counts} joints: clips get the",
+        "# joints of the roles that all have, named by their roles.",
+        "[skeleton]",
+        'topology = "roles"',
+    ]
+    stated: dict[str, list[str]] = {}
+    for own in kinds:
+        for role, joint in own.stated.items():
+            known = stated.setdefault(role, [])
+            known += [] if joint in known else [joint]
+    if stated:
+        lines += ["", f"# {STATED[0]}", "[skeleton.roles]"]
+        lines += [f"{role} = {recipe_draft.names(joints)}" for role, joints in stated.items()]
+    return [*lines, ""]
+
+
+COLUMNS = ("file", "first_frame", "last_frame", "performer", "take", "cost", "accepted")
+
+
+@dataclass(frozen=True)
+class FamilyRow:
+    """A clip of a family.
+
+    file: below the folder of the takes. first_frame, last_frame: inclusive. take: clips of one are
+    left out together. cost: of the match with the example, None for a stride. accepted: whether it
+    is trained from.
+    """
+
+    file: str
+    first_frame: int
+    last_frame: int
+    performer: str
+    take: str
+    cost: float | None = None
+    accepted: bool = True
+
+    @property
+    def frames(self) -> tuple[str, int, int]:
+        """Return the file with the first and the last frame."""
+        return self.file, self.first_frame, self.last_frame
+
+
+def table(rows: Sequence[FamilyRow]) -> bytes:
+    """Return the table as CSV."""
+    lines = io.StringIO(newline="")
+    writer = csv.writer(lines, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for row in rows:
+        cost = "" if row.cost is None else f"{row.cost:.4f}"
+        told = (row.performer, row.take, cost, str(row.accepted).lower())
+        writer.writerow([*row.frames, *told])
+    return lines.getvalue().encode()
+
+
+def read(path: Path) -> list[FamilyRow]:
+    """Return the rows of a table; RecipeError names a cell that cannot be read."""
+    cells = clip_table.open_table(path)
+    cells.require(dict.fromkeys(COLUMNS, "the table of a family"))
+    rows = []
+    for line, record in cells.records:
+        if record["accepted"] not in ("true", "false"):
+            said = f"column 'accepted': {record['accepted']!r}, expected true or false"
+            raise RecipeError(path, said, line)
+        first, last = (cells.frame(line, record, key) for key in ("first_frame", "last_frame"))
+        cost = cells.number(line, record, "cost") if record["cost"] else None
+        accepted = record["accepted"] == "true"
+        told = (record["file"], first, last, record["performer"], record["take"])
+        rows.append(FamilyRow(*told, cost, accepted))
+    return rows
+
 
 STRIDE_CLIPS = 5
 """Fewest strides of a family."""
@@ -54,10 +316,10 @@ def find_families(
     count, report: as in `family_search.find_families`.
     """
     corpus = motion_features.build_corpus(takes)
-    joined = joined_features.join_features(corpus)
+    joined = motion_features.join_features(corpus)
     found = []
     for family in family_search.find_families(corpus, count, report):
-        quality = family_quality.assess(joined, family)
+        quality = found_clips.assess(joined, family)
         rows = [_row(corpus, member.span, member.cost, kinds) for member in family.members]
         example = _row(corpus, family.example, 0.0, kinds)
         own = FoundFamily(
@@ -69,7 +331,7 @@ def find_families(
 
 
 def _row(
-    corpus: Corpus, span: joined_features.Span, cost: float, kinds: Sequence[BodyKind]
+    corpus: Corpus, span: motion_features.Span, cost: float, kinds: Sequence[BodyKind]
 ) -> FamilyRow:
     first, last = corpus.frame(span.take, span.start), corpus.frame(span.take, span.end)
     return _clip(corpus.takes[span.take], first, last, cost, kinds)
@@ -108,7 +370,7 @@ def _of_one_topology(
     by_file = {take.file: take for take in takes}
     counts = Counter(numbers[row.file] for row in family.rows)
     common = [at for at, _ in counts.most_common()]
-    if len(common) > 1 and not mixed_bodies.can_share([kinds[at] for at in common]):
+    if len(common) > 1 and not can_share([kinds[at] for at in common]):
         common = common[:1]
     kept, left_out = [], {}
     for row in family.rows:

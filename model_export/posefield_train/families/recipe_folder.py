@@ -2,27 +2,228 @@
 
 import json
 import re
+import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import posefield
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, MotionError
-from posefield_train.discover import family_quality, family_search
-from posefield_train.discover.control_proposals import ControlProposal
+from posefield_train.discover import control_proposals, family_search, found_clips
+from posefield_train.discover.control_proposals import ControlProposal, FamilyClips, ProposedControl
 from posefield_train.discover.take_reading import ReadTakes
-from posefield_train.families import (
-    family_controls,
-    family_recipe,
-    family_table,
-    mixed_bodies,
-)
-from posefield_train.families.body_kinds import BodyKind
-from posefield_train.families.family_recipe import RecipeFacts
-from posefield_train.families.found_families import FoundFamily
+from posefield_train.families import found_families
+from posefield_train.families.found_families import BodyKind, FamilyRow, FoundFamily
+from posefield_train.probe import recipe_draft
+from posefield_train.probe.probe_report import ProbeReport
+from posefield_train.source import common_topology, ingest, measured_controls, recipe
 from posefield_train.source.motion_readers import MotionFiles
+from posefield_train.source.recipe import Recipe
+
+
+def propose(
+    text: str,
+    name: str,
+    rows: Sequence[FamilyRow],
+    data: Path,
+    known: MotionFiles | None = None,
+) -> ControlProposal:
+    """Return the proposed controls of a family.
+
+    text: of a recipe with any control. name: of its table without the ending. data: folder of the
+    takes. known: files that were read before. Raises RecipeError, BvhError or TrainingError for
+    clips that cannot be read as one family, and ValueError for those that no control can be
+    proposed for.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(folder)
+        (place / f"{name}.csv").write_bytes(found_families.table(rows))
+        (place / f"{name}.toml").write_text(text, encoding="utf-8")
+        own = recipe.read(place / f"{name}.toml")
+        examples, _ = ingest.ingest(own, data, known)
+    found = control_proposals.propose_controls(_family_clips(own, examples))
+    if not found.controls:
+        raise ValueError("no measure of the clips predicts those of takes that are left out")
+    return found
+
+
+def _family_clips(own: Recipe, examples: Sequence[ingest.Example]) -> FamilyClips:
+    names = examples[0].clip.skeleton.names
+    roles = {str(role): joint for role, joint in own.roles.items()}
+    if own.skeleton.is_unified:
+        roles = common_topology.model_roles(names)
+    joints: Mapping[str, int] = {
+        role: names.index(joint) for role, joint in roles.items() if joint in names
+    }
+    return FamilyClips(
+        tuple(measured_controls.measured_quantities(one.clip) for one in examples),
+        joints,
+        tuple(one.row.performer for one in examples),
+        tuple(one.take for one in examples),
+        own.motion.cyclic,
+    )
+
+
+BEGIN = "# Proposed event and controls; posefield review --merge writes them again:"
+END = "# End of the proposals."
+PLACEHOLDER = ControlProposal((ProposedControl("height", "hips", "end"),), None, ())
+"""Proposal that any family can follow, to read its clips before there is another."""
+GAIT = {
+    "speed": "Mean speed over the stride",
+    "turn": "Change of heading over the stride, positive to the left",
+    "stride_length": "Ground covered by one full stride, two steps",
+}
+DIRECTIONS = {
+    "height": "Height of {} {}",
+    "forward": "How far in front of the first pose's root {} is {}",
+    "left": "How far to the left of the first pose's root {} is {}",
+}
+MOMENTS = {
+    "start": "at the start",
+    "end": "at the end",
+    "highest": "when it is highest",
+    "lowest": "when it is lowest",
+    "farthest": "when it is farthest from the root",
+}
+
+
+@dataclass(frozen=True)
+class RecipeFacts:
+    """Facts of a family's recipe besides its controls.
+
+    name: of the files. description: of the motions. licence: empty for one that has to be written.
+    report: on the motion files. cyclic: of strides. labelled: whether performers are told apart.
+    evidence: comment lines. skeleton: lines of the section [skeleton]; empty for equal joints.
+    """
+
+    name: str
+    description: str
+    licence: str
+    report: ProbeReport
+    cyclic: bool = False
+    labelled: bool = True
+    evidence: tuple[str, ...] = field(default=())
+    skeleton: tuple[str, ...] = ()
+
+
+def recipe_text(facts: RecipeFacts, proposal: ControlProposal, accepted: bool = False) -> str:
+    """Return the recipe of a family."""
+    quote = recipe_draft.quote
+    licence = [f"licence = {quote(facts.licence)}"]
+    if not facts.licence:
+        licence.insert(0, "# TODO licence of the motions with its attribution, without which no")
+        licence.insert(1, "# model is trained; motion files state none.")
+    return "\n".join(
+        [
+            "# Found by posefield discover: look at its clips in index.html, then accept it.",
+            *(f"# {said}" for said in facts.evidence),
+            "schema = 1",
+            f"name = {quote(facts.name)}",
+            f"description = {quote(facts.description)}",
+            *licence,
+            f"accepted = {str(accepted).lower()}",
+            "",
+            *recipe_draft.source_lines(facts.report),
+            *_clips(facts.name),
+            *proposal_lines(proposal, facts.report.roles),
+            "",
+            *facts.skeleton,
+            *recipe_draft.motion_lines(facts.report, facts.cyclic),
+            *([] if facts.skeleton else recipe_draft.role_lines(facts.report)),
+            *(["[kriging]", 'label = "performer"', ""] if facts.labelled else []),
+            "[size]",
+            "rms_budget_cm = 1.0",
+            "",
+        ]
+    )
+
+
+def with_proposal(text: str, lines: Sequence[str]) -> str:
+    """Return a recipe with other proposals, and the rest of it as it is."""
+    block = re.compile(f"^{re.escape(BEGIN)}$.*?^{re.escape(END)}$", re.DOTALL | re.MULTILINE)
+    return block.sub(lambda _: "\n".join(lines), text, count=1)
+
+
+def clips_text(clips: int, performers: int, seconds: float) -> str:
+    """Return the evidence on a family's clips. seconds: their median duration."""
+    return f"{clips} clips of {performers} performers, {seconds:.1f} s long in the median."
+
+
+def with_merged(text: str, clips: str, merged: str) -> str:
+    """Return a recipe with the evidence on the clips of a family that was merged into it.
+
+    clips: evidence on all clips, in place of that on the family's own. merged: on those merged.
+    """
+    counted = r"^# \d+ clips of \d+ performers, [\d.]+ s long in the median\.$"
+    found = re.sub(counted, lambda _: f"# {clips}", text, count=1, flags=re.M)
+    return re.sub(r"^schema = ", lambda own: f"# {merged}\n{own[0]}", found, count=1, flags=re.M)
+
+
+def with_accepted(text: str, accepted: bool) -> str:
+    """Return a recipe that is accepted or not, and the rest of it as it is."""
+    line = re.compile(r"^accepted = (true|false)$", re.MULTILINE)
+    return line.sub(f"accepted = {str(accepted).lower()}", text, count=1)
+
+
+def with_licence(text: str, licence: str) -> str:
+    """Return a recipe with a licence if it has none, and the rest of it as it is."""
+    line = re.compile(r'^licence = ""$', re.MULTILINE)
+    return line.sub(lambda _: f"licence = {recipe_draft.quote(licence)}", text, count=1)
+
+
+def proposal_lines(proposal: ControlProposal, roles: dict[str, str]) -> list[str]:
+    """Return the event and the controls of a recipe, with what they explain as comments."""
+    quote = recipe_draft.quote
+    lines = [BEGIN, *_evidence(proposal)]
+    for control in proposal.controls:
+        lines += ["[[controls]]", f"name = {quote(control_name(control))}"]
+        at = f', joint = {quote(roles[control.role])}, at = "{control.at}"' if control.role else ""
+        lines.append(f'auto = {{ quantity = "{control.quantity}"{at} }}')
+        lines += [f"description = {quote(_description(control))}", ""]
+    if proposal.event is not None:
+        role, moment = proposal.event
+        lines += ["[event]", f"joint = {quote(roles[role])}", f'at = "{moment}"', ""]
+    return [*lines[:-1], END]
+
+
+def control_name(control: ProposedControl) -> str:
+    """Return the name of a control, such as right_hand_height_end."""
+    parts = [control.role, control.quantity, control.at]
+    return "_".join(re.sub(r"([A-Z])", r"_\1", part).lower() for part in parts if part)
+
+
+def _clips(name: str) -> list[str]:
+    return [
+        "[clips]",
+        f'table = "{name}.csv"',
+        'file = "file"',
+        'performer = "performer"',
+        'take = "take"',
+        'first_frame = "first_frame"',
+        'last_frame = "last_frame"',
+        'where = { accepted = { among = ["true"] } }',
+        "",
+    ]
+
+
+def _evidence(proposal: ControlProposal) -> list[str]:
+    """Return how much of the variance of left-out takes remains with the controls."""
+    single = len(proposal.controls) - len(proposal.remaining) + 1
+    lines = []
+    for at, left in enumerate(proposal.remaining):
+        named = ", ".join(control_name(one) for one in proposal.controls[: single + at])
+        lines.append(f"# {left:.0%} of the variance of takes left out remains with {named}")
+    return lines
+
+
+def _description(control: ProposedControl) -> str:
+    if control.role is None or control.at is None:
+        return GAIT[control.quantity]
+    words = re.sub(r"([A-Z])", r" \1", control.role).lower()
+    return DIRECTIONS[control.quantity].format(f"the {words}", MOMENTS[control.at])
+
 
 SUMMARY, PAGE = "discover.json", "index.html"
 OWN_FILES = re.compile(r"family_\d{2,}\.(toml|csv)|discover\.json|index\.html|decisions\.json")
@@ -69,13 +270,13 @@ def offer(
             continue
         facts = _facts(family, len(offered) + 1, licence)
         draft = replace(facts, licence="not stated yet")
-        text = family_recipe.recipe_text(draft, family_recipe.PLACEHOLDER)
+        text = recipe_text(draft, PLACEHOLDER)
         try:
-            proposal = family_controls.propose(text, facts.name, family.rows, data, known)
+            proposal = propose(text, facts.name, family.rows, data, known)
         except (MotionError, ValueError) as fault:
             refused.append(replace(family, reasons=(str(fault),)))
             continue
-        told = family_recipe.recipe_text(facts, proposal)
+        told = recipe_text(facts, proposal)
         offered.append(OfferedFamily(len(offered) + 1, family, facts, proposal, told))
     return FoundFamilies(tuple(offered), tuple(refused))
 
@@ -85,7 +286,7 @@ def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
     is_mixed = len(own) > 1
     performers = {row.performer for row in family.rows}
     what = "Strides" if family.kind == "strides" else "Similar motions"
-    evidence = [family_recipe.clips_text(len(family.rows), len(performers), family.seconds)]
+    evidence = [clips_text(len(family.rows), len(performers), family.seconds)]
     if family.quality is not None:
         evidence.append(
             f"The clips differ by {family.quality.within:.1%} of all motion; "
@@ -95,11 +296,11 @@ def _facts(family: FoundFamily, number: int, licence: str) -> RecipeFacts:
         family_name(number),
         f"{what} found in long takes, family {number}",
         licence,
-        mixed_bodies.shared_report(kind.report, own) if is_mixed else kind.report,
+        found_families.shared_report(kind.report, own) if is_mixed else kind.report,
         family.kind == "strides",
         len(performers) > 1,
         tuple(evidence),
-        tuple(mixed_bodies.skeleton_lines(own)) if is_mixed else (),
+        tuple(found_families.skeleton_lines(own)) if is_mixed else (),
     )
 
 
@@ -115,8 +316,8 @@ def summary(
             "candidates": count,
             "largest_cost": family_search.LARGEST_COST,
             "fewest_clips": family_search.FEWEST,
-            "most_within": family_quality.MOST_WITHIN,
-            "least_shared": family_quality.LEAST_SHARED,
+            "most_within": found_clips.MOST_WITHIN,
+            "least_shared": found_clips.LEAST_SHARED,
         },
         "takes": {
             take.file: {"rate": take.rate, "frames": len(take), "performer": performers[take.file]}
@@ -142,7 +343,7 @@ def _offered_facts(one: OfferedFamily) -> dict[str, Any]:
 def proposal_facts(proposal: ControlProposal) -> dict[str, Any]:
     """Return the proposed event and controls as JSON values."""
     return {
-        "controls": [family_recipe.control_name(own) for own in proposal.controls],
+        "controls": [control_name(own) for own in proposal.controls],
         "event": proposal.event,
         "remaining": [round(left, 4) for left in proposal.remaining],
     }
@@ -172,7 +373,7 @@ def contents(found: FoundFamilies, facts: Mapping[str, Any]) -> dict[str, bytes]
     files = {SUMMARY: json_bytes(facts)}
     for one in found.offered:
         files[f"{one.name}.toml"] = one.text.encode()
-        files[f"{one.name}.csv"] = family_table.table(one.family.rows)
+        files[f"{one.name}.csv"] = found_families.table(one.family.rows)
     return files
 
 

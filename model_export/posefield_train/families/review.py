@@ -1,8 +1,9 @@
 """Review of a folder of recipes: decisions are applied to its recipes, tables and summary."""
 
 import json
+import re
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,17 +11,117 @@ from typing import Any
 from posefield.common import atomic_files
 from posefield.common.errors import FileError, InvalidField, MotionError
 from posefield_train.discover.control_proposals import ControlProposal
-from posefield_train.families import (
-    family_controls,
-    family_recipe,
-    family_table,
-    recipe_folder,
-)
-from posefield_train.families.decisions import Decisions, DroppedClip
-from posefield_train.families.family_table import FamilyRow
+from posefield_train.families import found_families, recipe_folder
+from posefield_train.families.found_families import FamilyRow
 from posefield_train.source import data_folder
 
-MOST_BYTES = 16_000_000
+DROP = re.compile(r"(\d+):(.+)@(\d+(?:\.\d+)?)")
+MAX_DECISIONS_BYTES = 1_000_000
+
+
+@dataclass(frozen=True)
+class DroppedClip:
+    """A clip of a family that is not trained from. at: a time within it, s."""
+
+    family: int
+    file: str
+    at: float
+
+    def __str__(self) -> str:
+        return f"{self.family}:{self.file}@{self.at:g}"
+
+
+@dataclass(frozen=True)
+class Decisions:
+    """Decisions by the numbers of families. merge: pairs, the second into the first."""
+
+    accept: tuple[int, ...] = ()
+    reject: tuple[int, ...] = ()
+    merge: tuple[tuple[int, int], ...] = ()
+    drop: tuple[DroppedClip, ...] = ()
+
+    def numbers(self) -> Iterator[tuple[str, int]]:
+        """Yield each number of a family with the decision that names it."""
+        yield from (("accept", number) for number in self.accept)
+        yield from (("reject", number) for number in self.reject)
+        yield from (("merge", number) for pair in self.merge for number in pair)
+        yield from (("drop", clip.family) for clip in self.drop)
+
+
+def of_texts(
+    accept: str | None, reject: str | None, merge: Sequence[str], drop: Sequence[str]
+) -> Decisions:
+    """Return the decisions of a command's options.
+
+    accept, reject: numbers such as "1,2". merge: pairs such as "4,5". drop: clips such as
+    "2:bd_1.bvh@33.2". Raises InvalidField for a text that is none, and for contradictions.
+    """
+    pairs = [_numbers("merge", text) for text in merge]
+    if odd := next((text for text, own in zip(merge, pairs, strict=True) if len(own) != 2), None):
+        raise InvalidField("merge", f"{odd!r}, expected two numbers of families, such as 4,5")
+    return _checked(
+        Decisions(
+            _numbers("accept", accept) if accept else (),
+            _numbers("reject", reject) if reject else (),
+            tuple((own[0], own[1]) for own in pairs),
+            tuple(_dropped(text) for text in drop),
+        )
+    )
+
+
+def read(path: Path) -> Decisions:
+    """Return the decisions of a JSON file, which the page saves; FileError for another file."""
+    try:
+        found = json.loads(data_folder.read(path, MAX_DECISIONS_BYTES, "decisions"))
+    except (ValueError, RecursionError) as fault:
+        raise FileError(path, f"not JSON: {fault}") from fault
+    if not isinstance(found, dict) or not set(found) <= {"accept", "reject", "merge", "drop"}:
+        raise FileError(path, "expected an object of accept, reject, merge and drop")
+    lists = {key: found.get(key, []) for key in ("accept", "reject", "merge", "drop")}
+    if not all(isinstance(own, list) for own in lists.values()):
+        raise FileError(path, "expected a list for each decision")
+    return of_texts(
+        ",".join(map(str, lists["accept"])),
+        ",".join(map(str, lists["reject"])),
+        [_pair_text(pair) for pair in lists["merge"]],
+        [str(clip) for clip in lists["drop"]],
+    )
+
+
+def _pair_text(pair: Any) -> str:
+    return ",".join(map(str, pair)) if isinstance(pair, list) else str(pair)
+
+
+def _numbers(field: str, text: str) -> tuple[int, ...]:
+    if not re.fullmatch(r"\d{1,6}(\s*,\s*\d{1,6})*", text):
+        raise InvalidField(field, f"{text!r}, expected numbers of families, such as 1,2")
+    return tuple(dict.fromkeys(int(word) for word in text.split(",")))
+
+
+def _dropped(text: str) -> DroppedClip:
+    parts = DROP.fullmatch(text)
+    if parts is None:
+        said = "expected FAMILY:FILE@SECONDS, such as 2:bd_1.bvh@33.2"
+        raise InvalidField("drop", f"{text!r}, {said}")
+    return DroppedClip(int(parts[1]), parts[2], float(parts[3]))
+
+
+def _checked(found: Decisions) -> Decisions:
+    """Return decisions that do not contradict each other."""
+    both = sorted(set(found.accept) & set(found.reject))
+    if both:
+        raise InvalidField("reject", f"{both[0]} is accepted too, expected one of both")
+    seconds = [second for _, second in found.merge]
+    for first, second in found.merge:
+        if first == second or first in seconds or seconds.count(second) > 1:
+            raise InvalidField("merge", f"{first},{second}: expected each family merged once")
+        if second in found.accept or second in found.reject:
+            said = f"{second} goes into {first}, expected no other decision on it"
+            raise InvalidField("merge", said)
+    return found
+
+
+MAX_FAMILIES_BYTES = 16_000_000
 
 
 @dataclass(frozen=True)
@@ -57,7 +158,7 @@ def apply(folder: Path, decisions: Decisions, data: Path | None = None) -> dict[
     for numbers, status in ((decisions.accept, "accepted"), (decisions.reject, "rejected")):
         for number in numbers:
             own.family(number)["status"] = status
-            own.texts[number] = family_recipe.with_accepted(own.texts[number], status == "accepted")
+            own.texts[number] = recipe_folder.with_accepted(own.texts[number], status == "accepted")
     _write(folder, own)
     return own.facts
 
@@ -67,16 +168,16 @@ def _read(folder: Path, data: Path | None) -> ReviewedFolder:
     if not path.is_file():
         raise FileError(folder, f"no {path.name}, expected a folder that posefield discover wrote")
     try:
-        facts = json.loads(data_folder.read(path, MOST_BYTES, "a summary of families"))
+        facts = json.loads(data_folder.read(path, MAX_FAMILIES_BYTES, "a summary of families"))
         numbers = [one["number"] for one in facts["families"] if one["status"] != "merged"]
     except (ValueError, KeyError, TypeError, RecursionError) as fault:
         raise FileError(path, f"not a summary of posefield discover: {fault}") from fault
     texts, rows = {}, {}
     for number in numbers:
         name = recipe_folder.family_name(number)
-        found = data_folder.read(folder / f"{name}.toml", MOST_BYTES, "a recipe")
+        found = data_folder.read(folder / f"{name}.toml", MAX_FAMILIES_BYTES, "a recipe")
         texts[number] = found.decode(errors="strict")
-        rows[number] = family_table.read(folder / f"{name}.csv")
+        rows[number] = found_families.read(folder / f"{name}.csv")
     return ReviewedFolder(data or Path(facts["folder"]), facts, texts, rows)
 
 
@@ -124,14 +225,14 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
     into["performers"] = sorted({row.performer for row in own.rows[first]})
     into["seconds"] = _median_seconds(own, first)
     into["left_out"] |= gone["left_out"]
-    text = family_recipe.with_merged(
+    text = recipe_folder.with_merged(
         own.texts[first],
-        family_recipe.clips_text(len(own.rows[first]), len(into["performers"]), into["seconds"]),
+        recipe_folder.clips_text(len(own.rows[first]), len(into["performers"]), into["seconds"]),
         _merged_text(gone),
     )
     found = _propose(own, first, text)
-    own.texts[first] = family_recipe.with_proposal(
-        text, family_recipe.proposal_lines(found, into["roles"])
+    own.texts[first] = recipe_folder.with_proposal(
+        text, recipe_folder.proposal_lines(found, into["roles"])
     )
     into |= recipe_folder.proposal_facts(found)
     into["clips"] = len(own.rows[first])
@@ -158,9 +259,9 @@ def _merged_text(gone: Mapping[str, Any]) -> str:
 def _propose(own: ReviewedFolder, number: int, text: str) -> ControlProposal:
     name = recipe_folder.family_name(number)
     rows: Sequence[FamilyRow] = own.rows[number]
-    draft = family_recipe.with_licence(text, "not stated yet")
+    draft = recipe_folder.with_licence(text, "not stated yet")
     try:
-        return family_controls.propose(draft, name, rows, own.data)
+        return recipe_folder.propose(draft, name, rows, own.data)
     except (MotionError, ValueError) as fault:
         said = f"the clips of {number} and those merged into it make no family: {fault}"
         raise InvalidField("merge", said) from fault
@@ -170,7 +271,7 @@ def _write(folder: Path, own: ReviewedFolder) -> None:
     for number, text in own.texts.items():
         name = recipe_folder.family_name(number)
         atomic_files.write(text.encode(), folder / f"{name}.toml")
-        atomic_files.write(family_table.table(own.rows[number]), folder / f"{name}.csv")
+        atomic_files.write(found_families.table(own.rows[number]), folder / f"{name}.csv")
     for one in own.facts["families"]:
         if one["status"] == "merged":
             for ending in ("toml", "csv"):

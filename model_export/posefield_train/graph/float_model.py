@@ -10,14 +10,13 @@ from posefield.model_file import checksum
 from posefield.model_file.row_values import ROW_VALUES
 from posefield.motion import skeleton
 from posefield.motion.curves import Curve, as_points
-from posefield_train.align.canonical_timing import CanonicalTiming
 from posefield_train.align.travel import Travel
+from posefield_train.align.warp import CanonicalTiming
 from posefield_train.contacts.contact_table import ContactTable
 from posefield_train.kriging import kriging_graph
 from posefield_train.kriging.kriging_bank import POSE, VARIANCE, KrigingBank
-from posefield_train.onnx_graph.graph_builder import GraphBuilder, Shapes
-from posefield_train.onnx_graph.level_tables import LevelTables
-from posefield_train.tensor import decoder_graph, quaternion_graph
+from posefield_train.onnx_graph.graph_builder import GraphBuilder, LevelTables, Shapes
+from posefield_train.tensor import decoder_graph
 from posefield_train.tensor.decoder import Decoder, Proportions
 
 
@@ -151,7 +150,7 @@ class FloatModel:
             planes, root, gone = self.travel.onnx(net, planes, root, way, place)
         joints = len(self.decoder.means)
         rows = {
-            "rotations": quaternion_graph.rows_of_poses(net, planes, joints),
+            "rotations": decoder_graph.rows_of_poses(net, planes, joints),
             "root_position": root,
             "bone_offsets": self.proportions.onnx(net, fields["offsets"]),
             "duration": duration,

@@ -1,22 +1,267 @@
 """Export of a trained model to one file, after a parity check."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from posefield import __version__
+from posefield.common.array_shapes import ClipPositions, PerClip
+from posefield.common.errors import ExportRefused
+from posefield.common.units import Floats
+from posefield.inference import graph_ports, motion_detail, session
+from posefield.inference.motion_detail import Deviations
+from posefield.inference.session import Session
 from posefield.model_file import model_card
-from posefield.model_file.model_card import ModelCard
-from posefield_train.graph import (
-    levels,
-    parity_check,
-    take_statistics,
-    trained_card,
-    training_notes,
-)
-from posefield_train.graph.float_model import FloatModel
+from posefield.model_file.model_card import ModelCard, rounded
+from posefield_train.graph import levels, trained_card
+from posefield_train.graph.float_model import FloatModel, ModelOutputs
 from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.kriging import sample_kriging, thinning
 from posefield_train.parallel import single_thread
 from posefield_train.source.recipe import Recipe
+from posefield_train.tensor import truncation_error
+from posefield_train.tensor.hosvd import TuckerTensor
+
+POINTS, BATCH = 10_000, 1_000
+# Largest distance of a joint of the graph from the reference's, m.
+PARITY_LIMIT = 1e-4
+# Largest difference of the probability of a contact.
+CONTACT_LIMIT = 2e-3
+
+
+def check_parity(model: FloatModel, content: bytes, own_card: ModelCard) -> float:
+    """Return the largest joint distance, m, between file and reference at random inputs.
+
+    Every level is checked. Raises ExportRefused, naming the joint and the input, if the distance
+    exceeds PARITY_LIMIT.
+    """
+    opened = session.open_bytes(content, f"{own_card.name}.onnx")
+    rng = np.random.Generator(np.random.PCG64(10_000))
+    worst = 0.0
+    for question in range(POINTS // BATCH):
+        asked = _draw_inputs(rng, model, own_card, question % len(own_card.levels))
+        gaps = _joint_distances(model, opened, asked)
+        _check_contacts(model, opened, asked)
+        at = np.unravel_index(int(np.argmax(gaps)), gaps.shape)
+        worst = max(worst, float(gaps[at]))
+        if worst > PARITY_LIMIT:
+            named = [*own_card.skeleton.names, *(curve.name for curve in own_card.curves)]
+            raise ExportRefused(
+                f"the graph puts {named[at[2]]} {100 * worst:.4f} cm from where "
+                f"the reference does, expected at most {100 * PARITY_LIMIT:g} cm; at "
+                f"{asked.said(own_card, int(at[0]))}. Fewer controls, or a larger nugget, "
+                "condition it better"
+            )
+    return worst
+
+
+@dataclass(frozen=True)
+class _ParityInputs:
+    """Inputs of the parity check.
+
+    points: controls (B, d) in their own units. times: (B, 1), s. labels: (B, p). level: of detail.
+    All are float32 values, the only ones that the graph can receive.
+    """
+
+    points: Floats
+    times: Floats
+    labels: Floats
+    level: int
+
+    def said(self, own_card: ModelCard, row: int) -> str:
+        """Describe one of the inputs in words."""
+        controls = (control.name for control in own_card.controls)
+        point = dict(zip(controls, self.points[row].tolist(), strict=True))
+        names = [name for own in own_card.labels for name in own.names]
+        who = "".join(f"{names[i]}, " for i in np.flatnonzero(self.labels[row]))
+        return f"{who}{point}, {self.times[row, 0]:.3f} s, level {self.level}"
+
+
+def _draw_inputs(
+    rng: np.random.Generator, model: FloatModel, own_card: ModelCard, level: int
+) -> _ParityInputs:
+    """Draw random controls, labels and times of their clips.
+
+    In each label set no name is as likely as each of the names.
+    """
+    low, high = ([getattr(c, end) for c in own_card.controls] for end in ("minimum", "maximum"))
+    points = rng.uniform(low, high, (BATCH, len(low))).astype(np.float32).astype(np.float64)
+    drawn = thinning.random_labels(rng, model.bank.labels, BATCH)
+    labels = np.hstack([np.zeros((BATCH, 0)), *drawn])
+    durations = model.durations(points, labels)
+    times = rng.uniform(0.0, 1.0, (BATCH, 1)) * durations[:, None]
+    return _ParityInputs(points, times.astype(np.float32).astype(np.float64), labels, level)
+
+
+def _joint_distances(model: FloatModel, opened: Session, asked: _ParityInputs) -> Floats:
+    """Return distances (B, 1, J + C), m, between joints and curves of graph and reference."""
+    question, card = (asked.points, asked.times), opened.card
+    parents, names = card.skeleton.parents, graph_ports.outputs(card)
+    expected = model.evaluate(*question, asked.labels, asked.level).points(parents, card.curves)
+    answers = opened.run(*question, *names, labels=asked.labels, level=asked.level)
+    found = ModelOutputs(*answers).points(parents, card.curves)
+    return np.asarray(np.linalg.norm(found - expected, axis=-1))
+
+
+def _check_contacts(model: FloatModel, opened: Session, asked: _ParityInputs) -> None:
+    """Raise ExportRefused where the graph's contacts differ from the reference's."""
+    question, level = (asked.points, asked.times), asked.level
+    expected = model.evaluate(*question, asked.labels, level).contacts
+    if expected is None:
+        return
+    (found,) = opened.run(*question, graph_ports.CONTACTS, labels=asked.labels, level=level)
+    gaps = np.abs(found - expected)
+    if gaps.max() > CONTACT_LIMIT:
+        row = int(np.unravel_index(int(np.argmax(gaps)), gaps.shape)[0])
+        raise ExportRefused(
+            f"the graph's probability of a contact is {gaps.max():.5f} off the reference's, "
+            f"expected at most {CONTACT_LIMIT:g}; at {asked.said(opened.card, row)}"
+        )
+
+
+MAX_HARMONICS = 30
+"""Harmonics of the detail. Thirty reach 97 % of a walk's acceleration."""
+DRAWS, ROUNDS = 2, 3
+"""Draws of each clip and rounds of the search for the gain."""
+JITTER = 1e-9
+"""Added to a covariance that clips of one duration or without turns make singular."""
+
+
+@dataclass(frozen=True)
+class DetailFit:
+    """Detail of a cycle.
+
+    deviations: of the harmonics, with the gain. without, sampled: acceleration of left-out
+    predictions over that of captured clips, without detail and with it.
+    """
+
+    deviations: Deviations
+    without: float
+    sampled: float
+
+    @property
+    def facts(self) -> dict[str, float]:
+        """Return the facts of the model card."""
+        harmonics, directions = self.deviations.shape
+        sizes = {"harmonics": harmonics, "directions": directions}
+        return sizes | {"acceleration": rounded(self.without), "sampled": rounded(self.sampled)}
+
+
+@dataclass(frozen=True)
+class TakeStatistics:
+    """Statistics of the takes of a model. root: `take_root`. detail: None for none."""
+
+    root: tuple[tuple[float, ...], ...] = ()
+    detail: DetailFit | None = None
+
+    def on_card(self, card: ModelCard) -> ModelCard:
+        """Return the card with the statistics; unchanged for a motion without cycle."""
+        if not self.root:
+            return card
+        stored = motion_detail.to_bytes(self.detail.deviations) if self.detail else b""
+        facts = {"detail": self.detail.facts} if self.detail else {}
+        return replace(
+            card,
+            making=replace(card.making, take_root=self.root, detail=stored),
+            diagnostics={**card.diagnostics, **facts},
+        )
+
+
+def estimate(trained: TrainedModel) -> TakeStatistics:
+    """Return the statistics of a trained model."""
+    return TakeStatistics(take_root(trained), fit_detail(trained))
+
+
+def take_root(trained: TrainedModel) -> tuple[tuple[float, ...], ...]:
+    """Return the last rows (4, r3 + 4) of a root of the covariance of residuals.
+
+    The residuals are those of the coefficients, then of log duration and travel, scaled to a sigma
+    of one metre. Empty for motions without cycle. With it a take's steps and its travel agree.
+    """
+    if "travel" not in trained.residuals:
+        return ()
+    beside = np.hstack([trained.residuals["duration"], trained.residuals["travel"]])
+    strays = np.hstack([_left_out(trained) @ trained.model.decoder.reduced.bases[2], beside])
+    standard = strays / np.sqrt(trained.model.bank.sill * trained.pose.variances)[:, None]
+    covariance = standard.T @ standard / len(standard)
+    sizes = np.sqrt(np.diagonal(covariance)) + JITTER
+    root = np.linalg.cholesky(covariance / np.outer(sizes, sizes) + JITTER * np.eye(len(sizes)))
+    rows = (sizes[:, None] * root)[-beside.shape[1] :]
+    return tuple(tuple(map(rounded, row)) for row in rows)
+
+
+def fit_detail(trained: TrainedModel) -> DetailFit | None:
+    """Return the detail of a cycle; None for other motions, and where none is missing.
+
+    Its gain makes the acceleration of left-out predictions that of the captured clips.
+    """
+    if "travel" not in trained.residuals:
+        return None
+    found = _harmonic_deviations(trained)
+    captured = _accelerations(trained, trained.tensor.values).mean()
+    predicted = _predictions(trained)
+    without = _accelerations(trained, predicted).mean() / captured
+    gain = reached = 1.0
+    for _ in range(ROUNDS):
+        drawn = [_sampled(trained, predicted, gain * found, draw) for draw in range(DRAWS)]
+        reached = float(np.mean([_accelerations(trained, own).mean() for own in drawn])) / captured
+        if without >= 1.0 or reached <= without:
+            return None
+        last, gain = gain, gain * np.sqrt((1.0 - without**2) / (reached**2 - without**2))
+    return DetailFit(last * found, float(without), reached)
+
+
+def _left_out(trained: TrainedModel) -> Floats:
+    """Return the matrix (N, N) from sample values to leave-one-out residuals."""
+    return sample_kriging.leave_out(trained.pose.hyper, trained.samples)
+
+
+def _predictions(trained: TrainedModel) -> Floats:
+    """Return the left-out predictions (D', T, N) of the finest level."""
+    first, times, samples = trained.model.decoder.reduced.bases
+    predicted = samples - _left_out(trained) @ samples
+    return TuckerTensor(trained.model.decoder.reduced.core, (first, times, predicted)).restored()
+
+
+def _harmonic_deviations(trained: TrainedModel) -> Deviations:
+    """Return standard deviations (H, r1) of the residuals' harmonics, pooled over all clips.
+
+    Of the part alone that the time functions cannot follow: takes vary the rest.
+    """
+    first, times, _ = trained.model.decoder.reduced.bases
+    missed = np.tensordot(first.T, trained.full.slices(trained.pose.residuals), axes=1)
+    missed = missed - np.einsum("dtn,tk,sk->dsn", missed, times, times)
+    # The last frame is the first one of the next cycle.
+    period = missed.shape[1] - 1
+    harmonics = min(MAX_HARMONICS, (period - 1) // 2)
+    waves = motion_detail.waves(period + 1, harmonics)[:-1]
+    parts = 2.0 / period * np.einsum("dtn,tw->wdn", missed[:, :-1], waves)
+    powers = np.mean(np.square(parts), axis=2).reshape(2, harmonics, -1)
+    return np.asarray(np.sqrt(powers.mean(axis=0)))
+
+
+def _sampled(trained: TrainedModel, predicted: Floats, found: Deviations, draw: int) -> Floats:
+    """Return predictions (D', T, N) with detail, a seed of its own for each clip and draw."""
+    frames, clips = predicted.shape[1:]
+    seeds = 1 + draw * clips + np.arange(clips)
+    detail = [motion_detail.sample(found, frames, int(seed)) for seed in seeds]
+    first = trained.model.decoder.reduced.bases[0]
+    return predicted + np.tensordot(first, np.stack(detail, axis=2), axes=(1, 1))
+
+
+def _accelerations(trained: TrainedModel, values: Floats) -> PerClip:
+    """Return the mean acceleration (N,), m/s², of the joints relative to the root.
+
+    values: whitened, on canonical time (D', T, N), which is taken as even time.
+    """
+    parents = trained.skeleton.parents
+    offsets = np.stack([example.offsets for example in trained.examples])
+    points = truncation_error.positions(trained.tensor, values, parents, offsets)
+    joints: ClipPositions = points[:, :, : len(parents)]
+    second = np.diff(joints - joints[:, :, :1], 2, axis=1)
+    rates = (values.shape[1] - 1) / trained.aligned.durations
+    return np.asarray(np.mean(np.linalg.norm(second, axis=-1), axis=(1, 2)) * rates**2)
 
 
 @dataclass(frozen=True)
@@ -40,9 +285,9 @@ def export_model(recipe: Recipe, trained: TrainedModel, notes: list[str]) -> Exp
     Raises TrainingError for levels of detail that cannot be made, and ExportRefused if the parity
     check fails.
     """
-    notes = training_notes.training_notes(recipe, trained, notes)
+    notes = trained_card.training_notes(recipe, trained, notes)
     laddered = levels.build_levels(recipe, trained)
-    takes = take_statistics.estimate(trained)
+    takes = estimate(trained)
     found = laddered.levels
 
     def own_card(parity: float) -> ModelCard:
@@ -60,7 +305,7 @@ def check_and_export(model: FloatModel, own_card: Callable[[float], ModelCard]) 
     about = _producer()
     # The card contains the parity error, so the weights are checked with a draft of the card.
     draft = own_card(0.0)
-    parity = parity_check.check_parity(model, model.onnx(model_card.dump(draft), about), draft)
+    parity = check_parity(model, model.onnx(model_card.dump(draft), about), draft)
     written = own_card(parity)
     return ExportedModel(model, model.onnx(model_card.dump(written), about), written, parity)
 
@@ -73,7 +318,7 @@ def export_finest(recipe: Recipe, trained: TrainedModel) -> bytes:
     alone = recipe.model_copy(update={"size": size, "presets": {}})
     laddered = levels.build_levels(alone, trained)
     own_card = trained_card.build_card(alone, trained, laddered.levels, [], parity=0.0)
-    own_card = take_statistics.estimate(trained).on_card(own_card)
+    own_card = estimate(trained).on_card(own_card)
     return laddered.model.onnx(model_card.dump(own_card), _producer())
 
 

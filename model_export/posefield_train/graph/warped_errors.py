@@ -12,12 +12,11 @@ from posefield.common.units import Floats
 from posefield.motion import curves, skeleton
 from posefield.motion.curves import Curve
 from posefield_train.align import dtw, time_alignment
-from posefield_train.align.canonical_timing import CanonicalTiming
+from posefield_train.align.warp import CanonicalTiming
 from posefield_train.source.ingest import Example
-from posefield_train.tensor import uniform_motion
+from posefield_train.tensor import motion_tensor
 from posefield_train.tensor.decoder import Proportions
-from posefield_train.tensor.motion_tensor import MotionTensor
-from posefield_train.tensor.uniform_motion import UNIFORM_SHARES
+from posefield_train.tensor.motion_tensor import UNIFORM_SHARES, MotionTensor
 
 
 def mean_squared_errors(captured: Floats, predicted: Floats, curve_count: int = 0) -> Floats:
@@ -48,7 +47,7 @@ def captured_positions(examples: Sequence[Example]) -> Floats:
     """
     found = []
     for example in examples:
-        poses = uniform_motion.captured_poses(example.clip)
+        poses = motion_tensor.captured_poses(example.clip)
         own = skeleton.positions(example.clip.skeleton.parents, *poses)
         found.append(_with_curves(own, *_uniform_curves(example)))
     return np.stack(found)
@@ -78,7 +77,7 @@ def predicted_positions(
     slices: of the whitened tensor (D', T, N). values: of the other quantities by name. Points of
     the curves follow those of the joints.
     """
-    found = uniform_motion.predicted_poses(
+    found = motion_tensor.predicted_poses(
         timing, tensor, tensor.numbers(slices), values["warp"], values.get("travel")
     )
     translations = skeleton.translations(proportions.numpy(values["offsets"]), found.path)

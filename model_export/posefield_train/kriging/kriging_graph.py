@@ -17,8 +17,7 @@ from posefield_train.kriging.kriging_bank import (
     KrigingBank,
 )
 from posefield_train.kriging.universal_kriging import UniversalKriging
-from posefield_train.onnx_graph.graph_builder import SLICE_END, GraphBuilder
-from posefield_train.onnx_graph.level_tables import Integers
+from posefield_train.onnx_graph.graph_builder import SLICE_END, GraphBuilder, Integers
 
 
 def entries(bank: KrigingBank, ranks: list[int]) -> dict[str, list[Integers]]:

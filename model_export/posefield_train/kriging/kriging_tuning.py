@@ -9,8 +9,7 @@ from scipy.optimize import minimize
 from posefield.common.array_shapes import PerSample, SampleValues
 from posefield.common.units import Floats
 from posefield.kriging.kriging_model import LabelKernel
-from posefield_train.kriging import sample_kriging, universal_kriging
-from posefield_train.kriging.projected import inducing_clips
+from posefield_train.kriging import sample_kriging, sample_points, universal_kriging
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import (
     PRIORS,
@@ -54,7 +53,7 @@ def evaluate_fixed(hyper: Hyper, samples: SamplePoints, values: SampleValues) ->
     left_out = sample_kriging.leave_out(hyper, samples)
     variances = universal_kriging.left_out_variances(hyper, samples.points, left_out)
     residuals, total = left_out @ values, _total(samples, values)
-    if len(values) <= inducing_clips.LARGEST_DENSE:
+    if len(values) <= sample_points.LARGEST_DENSE:
         squares = np.sum(np.square(residuals), axis=1)
         whole = float(np.sum(np.square(residuals)))
     else:
@@ -74,7 +73,7 @@ def _total(samples: SamplePoints, values: SampleValues) -> float:
     """Return the squared sum of the differences of values (n, m) from the mean of all others."""
     width = values.shape[1]
     # Whole motions of many clips are gigabytes in some copies.
-    step = width if len(values) <= inducing_clips.LARGEST_DENSE else COLUMNS_TOGETHER
+    step = width if len(values) <= sample_points.LARGEST_DENSE else COLUMNS_TOGETHER
     return sum(
         float(np.sum(np.square(samples.from_mean(values[:, start : start + step]))))
         for start in range(0, width, step)

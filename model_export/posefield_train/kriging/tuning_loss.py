@@ -17,9 +17,8 @@ from posefield.common.array_shapes import SampleMatrix, SampleValues
 from posefield.common.units import Booleans, Floats, Indices
 from posefield.kriging import kriging_model, leave_one_out
 from posefield.kriging.kriging_model import LabelKernel
-from posefield_train.kriging import universal_kriging
+from posefield_train.kriging import sample_points, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
-from posefield_train.kriging.projected import inducing_clips
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.universal_kriging import Hyper
 
@@ -100,9 +99,9 @@ class TuningProblem:
         moves.
         """
         own = self.samples
-        if len(own.points) <= inducing_clips.LARGEST_TUNED:
+        if len(own.points) <= sample_points.LARGEST_TUNED:
             return self
-        rows = inducing_clips.choose_tuned(own.points, own.controls, own.labels, draw)
+        rows = sample_points.choose_tuned(own.points, own.controls, own.labels, draw)
         effector = None if self.effector is None else self.effector[rows]
         first = 0 if effector is None else effector.shape[2]
         some = self.values[rows]

@@ -1,5 +1,8 @@
 """Thin builder over onnx.helper: operators as calls that return the name of their value."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -119,3 +122,31 @@ class GraphBuilder:
             model.metadata_props.add(key=key, value=metadata[key])
         onnx.checker.check_model(model, full_check=True)
         return bytes(model.SerializeToString(deterministic=True))
+
+
+Integers = Sequence[int]
+
+
+@dataclass(frozen=True)
+class LevelTables:
+    """Lists of integers by name, one list per level, the finest first.
+
+    They are slice ends and shapes: every weight of a coarser level is a leading part of the finest
+    one's, except for the thinned kriging weights.
+    """
+
+    entries: dict[str, list[Integers]]
+
+    def onnx(self, net: GraphBuilder) -> dict[str, str]:
+        """Build the chosen level's lists by name.
+
+        `level` is an optional input of the graph; its default is zero, the finest level.
+        """
+        level = net.weights("level", np.array(0))
+        rows = [list(chain(*lists)) for lists in zip(*self.entries.values(), strict=True)]
+        table = net.weights("ladder", np.array(rows))
+        sizes = [len(lists[0]) for lists in self.entries.values()]
+        parts = net.multi_output(
+            "Split", len(sizes), net("Gather", table, level), net.indices(*sizes)
+        )
+        return dict(zip(self.entries, parts, strict=True))

@@ -11,9 +11,8 @@ import numpy as np
 from posefield.common.errors import FileError
 from posefield.roles import joint_recognition
 from posefield.roles.joint_recognition import RoleGuess
-from posefield_train.probe import figure, proposals
-from posefield_train.probe.figure import Figure
-from posefield_train.probe.proposals import Proposal
+from posefield_train.probe import proposals
+from posefield_train.probe.proposals import Figure, Proposal
 from posefield_train.source import motion_readers
 
 LICENCE = Proposal(None, "none", ("motion files state no licence: ask their author",))
@@ -101,15 +100,15 @@ def probe(paths: Sequence[Path], report: Callable[[int], None] = lambda _: None)
     faulty: list[str] = []
     for count, path in enumerate(paths, 1):
         try:
-            own = figure.measure(motion_readers.read(path))
+            own = proposals.measure(motion_readers.read(path))
         except FileError as fault:
             faults[path] = fault
             report(count)
             continue
-        faulty += [f"{path}: {said}" for said in figure.faults(own)]
+        faulty += [f"{path}: {said}" for said in proposals.faults(own)]
         own = own.without_frames()
         measured[tuple(own.names)] += 1
-        whole = measured[tuple(own.names)] <= figure.MOST_WHOLE
+        whole = measured[tuple(own.names)] <= proposals.MOST_WHOLE
         figures[path] = own if whole else own.with_few_frames()
         report(count)
     if not figures:
@@ -187,7 +186,7 @@ def _mixed_settings(usual: Sequence[Figure]) -> list[str]:
     found = []
     legs = {each.file.source: leg for each in usual if (leg := each.leg_length())}
     middle = float(np.median(list(legs.values()))) if legs else 0.0
-    least = figure.OTHER_UNIT
+    least = proposals.OTHER_UNIT
     odd = [own for own, leg in legs.items() if max(leg, middle) > least * min(leg, middle)]
     if odd:
         found.append(

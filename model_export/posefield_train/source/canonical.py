@@ -2,7 +2,7 @@
 
 import ctypes
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -12,7 +12,7 @@ from posefield.common.array_shapes import Vector
 from posefield.common.units import UP, Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
-from posefield.motion.curves import CurveValues, clamp
+from posefield.motion.curves import clamp
 
 CLIPS_TOGETHER = 300
 """Clips of a block; temporary arrays of the motions of more would take gigabytes."""
@@ -75,7 +75,7 @@ def small_joints(parents: tuple[int, ...], offsets: Floats) -> Floats:
 def remove_jumps(clip: Clip, index: int) -> tuple[Clip, list[Finding]]:
     """Return the clip with jumps of twists and of small joints removed, and the corrections."""
     clip, findings = move_twists(clip, index)
-    turned = _step_angles(clip.rotations)
+    turned = np.linalg.norm(quat.log(_steps(clip.rotations)), axis=-1)
     small = small_joints(clip.skeleton.parents, clip.translations[0])
     rotations = clip.rotations.copy()
     for joint in np.flatnonzero(small & (turned.max(axis=0, initial=0.0) > JUMP_ANGLE)):
@@ -132,10 +132,6 @@ def _steps(rotations: Annotated[Floats, "*frames 4"]) -> Annotated[Floats, "*ste
     return quat.mul(quat.conj(rotations[:-1]), rotations[1:])
 
 
-def _step_angles(rotations: Floats) -> Floats:
-    return np.asarray(np.linalg.norm(quat.log(_steps(rotations)), axis=-1))
-
-
 def remove_flips(rotations: Floats, small: Floats) -> tuple[Floats, list[Finding]]:
     """Return aligned rotations (N, T, J, 4) with flips of small joints removed, and findings.
 
@@ -150,7 +146,15 @@ def remove_flips_about(
 ) -> tuple[Floats, list[Finding]]:
     """Return the result of `remove_flips` relative to given means (J, 4)."""
     blocks = clip_blocks(len(rotations))
-    least = np.concatenate([_least_angles(means, rotations[rows]) for rows in blocks])
+    # Least angle (N, J) of each joint from its mean.
+    least = np.concatenate(
+        [
+            np.linalg.norm(quat.log(quat.mul(quat.conj(means), rotations[rows])), axis=-1).min(
+                axis=1
+            )
+            for rows in blocks
+        ]
+    )
     flips = np.argwhere((least > FLIP_ANGLE) & small.astype(bool))
     clean, findings = rotations.copy() if len(flips) else rotations, []
     for clip, joint in flips:
@@ -162,12 +166,6 @@ def remove_flips_about(
         angle = float(np.linalg.norm(quat.log(offset)))
         findings.append(Finding("flip", int(joint), int(clip), angle))
     return clean, findings
-
-
-def _least_angles(means: Floats, rotations: Floats) -> Floats:
-    """Return the least angle (N, J) of aligned rotations (N, T, J, 4) from their means, rad."""
-    away = quat.mul(quat.conj(means), rotations)
-    return np.asarray(np.linalg.norm(quat.log(away), axis=-1).min(axis=1))
 
 
 FADE = 0.2
@@ -186,54 +184,34 @@ def close_cycle(clip: Clip, heading: Floats) -> Clip:
     walking = quat.from_axis_angle(UP, line(frames))
     rotations = clip.rotations.copy()
     rotations[:, 0] = quat.mul(quat.conj(walking), rotations[:, 0])
-    rotations = quat.mul(rotations, quat.exp(_rotation_offsets(rotations)))
+    gap, rates = _log_between(rotations[0], rotations[-1]), _rate_gap(rotations, _log_between)
+    rotations = quat.mul(rotations, quat.exp(_offsets(gap, rates, len(clip))))
     rotations[:, 0] = quat.mul(walking, rotations[:, 0])
     translations = clip.translations.copy()
     height = clip.root_path @ UP
-    rise = _offsets(height[-1] - height[0], _height_rate_gap(height), len(clip))
+    rise = _offsets(height[-1] - height[0], _rate_gap(height), len(clip))
     translations[:, 0] += rise[:, None] * UP
-    closed = replace(clip, rotations=rotations, translations=translations)
-    return closed if clip.curves is None else replace(closed, curves=_close_curves(clip.curves))
+    curves = clip.curves
+    if curves is not None:
+        values = curves.values
+        offsets = _offsets(values[-1] - values[0], _rate_gap(values), len(values))
+        curves = replace(curves, values=clamp(curves.curves, values + offsets))
+    return replace(clip, rotations=rotations, translations=translations, curves=curves)
 
 
-def _close_curves(own: CurveValues) -> CurveValues:
-    """Close the curves of a cycle as its poses are closed, within their limits."""
-    gap, step = own.values[-1] - own.values[0], _rate_step(len(own.values))
-    begin = [own.values[step * k] - own.values[0] for k in (1, 2)]
-    end = [own.values[-1 - step * k] - own.values[-1] for k in (1, 2)]
-    rates = _rate_gap(begin, end, step / (len(own.values) - 1))
-    return replace(
-        own, values=clamp(own.curves, own.values + _offsets(gap, rates, len(own.values)))
-    )
+def _rate_gap(
+    values: Floats, change: Callable[[Floats, Floats], Floats] = lambda first, last: last - first
+) -> Floats:
+    """Return the rate of change of values (F, ...) at the end less that at the start, per cycle.
 
-
-def _rotation_offsets(rotations: Floats) -> Floats:
-    """Return rotation vectors (F, J, 3) that close rotations (F, J, 4), each after its frame."""
-    step = _rate_step(len(rotations))
-    gap = _log_between(rotations[0], rotations[-1])
-    begin = [_log_between(rotations[0], rotations[step * k]) for k in (1, 2)]
-    end = [_log_between(rotations[-1], rotations[-1 - step * k]) for k in (1, 2)]
-    return _offsets(gap, _rate_gap(begin, end, step / (len(rotations) - 1)), len(rotations))
-
-
-def _height_rate_gap(height: Floats) -> Floats:
-    step = _rate_step(len(height))
-    begin = [height[step * k] - height[0] for k in (1, 2)]
-    end = [height[-1 - step * k] - height[-1] for k in (1, 2)]
-    return _rate_gap(begin, end, step / (len(height) - 1))
-
-
-def _rate_step(frames: int) -> int:
-    """Return the frames between the three places at which a rate of change is measured."""
-    return max(min(round(RATE_SPAN * (frames - 1)), (frames - 1) // 2), 1)
-
-
-def _rate_gap(begin: list[Floats], end: list[Floats], share: float) -> Floats:
-    """Return the rate of change at the end less that at the beginning, per cycle.
-
-    begin, end: changes over one and two steps into the cycle from either end. share: of the cycle
-    in a step. One-sided differences of second order, because limbs may turn back there.
+    change: from one value to another. One-sided differences of second order, because limbs may turn
+    back at the seam.
     """
+    frames = len(values)
+    step = max(min(round(RATE_SPAN * (frames - 1)), (frames - 1) // 2), 1)
+    begin = [change(values[0], values[step * k]) for k in (1, 2)]
+    end = [change(values[-1], values[-1 - step * k]) for k in (1, 2)]
+    share = step / (frames - 1)
     first, last = ((4.0 * one - two) / (2.0 * share) for one, two in (begin, end))
     return np.asarray(-last - first)
 
@@ -274,7 +252,10 @@ def without_jumps(clip: Clip, cyclic: bool, has_facing: bool) -> tuple[Clip, tup
     Closing a cycle would spread a jump over all frames.
     """
     mended, jumps = remove_jumps(clip, 0)
-    return _from_origin(mended, cyclic, has_facing), tuple(jumps)
+    if cyclic and has_facing:
+        return straighten_gait(mended), tuple(jumps)
+    turn = heading(mended)[0] if has_facing else np.zeros(())
+    return place(mended, _horizontal(mended.root_path[0]), turn), tuple(jumps)
 
 
 def closed(clip: Clip, cyclic: bool, in_place: bool) -> Clip:
@@ -286,12 +267,6 @@ def closed(clip: Clip, cyclic: bool, in_place: bool) -> Clip:
 def largest_stretch(clip: Clip) -> float:
     """Return the largest change of a component of a bone's offset, m."""
     return float(np.ptp(clip.translations[:, 1:], axis=0).max(initial=0.0))
-
-
-def _from_origin(clip: Clip, cyclic: bool, has_facing: bool) -> Clip:
-    if not has_facing:
-        return place(clip, _horizontal(clip.root_path[0]), np.zeros(()))
-    return straighten_gait(clip) if cyclic else _start_at_origin(clip)
 
 
 def place(clip: Clip, origin: Floats, heading: Floats) -> Clip:
@@ -310,10 +285,6 @@ def heading(clip: Clip) -> Floats:
 
 def _horizontal(position: Floats) -> Floats:
     return position * (1.0 - UP)
-
-
-def _start_at_origin(clip: Clip) -> Clip:
-    return place(clip, _horizontal(clip.root_path[0]), heading(clip)[0])
 
 
 def straighten_gait(clip: Clip) -> Clip:

@@ -40,15 +40,6 @@ class JointMotion:
     turns: Floats
 
 
-def align_rest(topology: Topology, motion: JointMotion) -> Floats:
-    """Return the turn (J, 4) from each joint's frame in the files to its canonical frame."""
-    found = np.zeros((len(topology.names), 4))
-    found[:, 0] = 1.0
-    for joint in range(len(topology.names)):
-        found[joint] = _RestAlignment(topology, motion, found).turn(joint)
-    return found
-
-
 @dataclass(frozen=True)
 class _RestAlignment:
     """Alignment of one joint after another, parents first. found (J, 4): turns so far."""
@@ -68,9 +59,10 @@ class _RestAlignment:
             return _turn_between((self.above(joint), Y), self.of_parent(joint, X))
         child, direction = limb_bone(name)
         if child not in self.topology.names:
-            return self.as_parent(joint)
+            return _turn_between(self.of_parent(joint, X), self.of_parent(joint, Y))
         bone = self.towards(joint, self.topology.index(child)), direction
-        return _turn_between(bone, self.hinge(joint) or self.of_parent(joint, _other(direction)))
+        beside = Y if abs(direction[0]) > 0.5 else X
+        return _turn_between(bone, self.hinge(joint) or self.of_parent(joint, beside))
 
     def local(self, joint: int, vectors: Floats) -> Floats:
         """Return the mean (3,) of world vectors (F, 3) in the frame of a joint."""
@@ -97,18 +89,11 @@ class _RestAlignment:
         ]
         return next((v for v in vectors if np.linalg.norm(v) > SHORTEST), vectors[-1])
 
-    def parent_turns(self, joint: int) -> Floats:
-        """Return the orientations (F, 4) of the canonical frame of a joint's parent."""
-        parent = self.topology.parents[joint]
-        return quat.mul(self.motion.turns[:, parent], quat.conj(self.found[parent]))
-
     def of_parent(self, joint: int, axis: Floats) -> tuple[Floats, Floats]:
         """Return the mean of a canonical axis of the parent in a joint's frame, and the axis."""
-        return self.local(joint, quat.rotate(self.parent_turns(joint), axis)), axis
-
-    def as_parent(self, joint: int) -> Floats:
-        """Return the turn with which a joint's mean orientation is its parent's."""
-        return _turn_between(self.of_parent(joint, X), self.of_parent(joint, Y))
+        parent = self.topology.parents[joint]
+        turns = quat.mul(self.motion.turns[:, parent], quat.conj(self.found[parent]))
+        return self.local(joint, quat.rotate(turns, axis)), axis
 
     def hinge(self, joint: int) -> tuple[Floats, Floats] | None:
         """Return the mean hinge axis of an elbow or knee in a joint's frame, and its direction.
@@ -147,11 +132,6 @@ def limb_bone(name: str) -> tuple[str, Floats]:
         "Foot": ("Toes", FOOT),
     }.get(name.removeprefix(side), ("", X))
     return side + end if end else "", direction
-
-
-def _other(direction: Floats) -> Floats:
-    """Return the axis that tells the twist about a direction."""
-    return Y if abs(direction[0]) > 0.5 else X
 
 
 def _units(vectors: Floats) -> Floats:
@@ -194,9 +174,13 @@ def smallest_turns(a: Floats, b: Floats) -> Floats:
 
 
 def mean_turns(topology: Topology, motions: Sequence[JointMotion]) -> Floats:
-    """Return the turns (J, 4) of a body from the poses of its clips."""
+    """Return the turns (J, 4) from a body's frames in the files to its canonical ones."""
     whole = JointMotion(
         np.concatenate([one.positions for one in motions]),
         np.concatenate([one.turns for one in motions]),
     )
-    return align_rest(topology, whole)
+    turns = np.zeros((len(topology.names), 4))
+    turns[:, 0] = 1.0
+    for joint in range(len(topology.names)):
+        turns[joint] = _RestAlignment(topology, whole, turns).turn(joint)
+    return turns

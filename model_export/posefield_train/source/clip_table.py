@@ -15,7 +15,7 @@ from posefield.common.units import Floats
 from posefield_train.source import data_folder
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.recipe_sections import PERFORMER, Clips, Condition
+from posefield_train.source.recipe_sections import PERFORMER, Condition
 
 LABEL_FORM = (
     "a name of printable characters, without commas and colons, and without blanks at its ends"
@@ -36,14 +36,20 @@ MAX_BYTES, MOST_ROWS, MOST_COLUMNS = 16_000_000, 100_000, 1_000
 """Limits of a table: a hundred times the size of the largest published families of motions."""
 
 
-def _records(place: FileLocation) -> list[tuple[int, dict[str, str]]]:
+def open_table(place: FileLocation) -> "ClipTable":
+    """Return the table of a CSV file; RecipeError if it is invalid."""
     try:
         text = data_folder.read(place, MAX_BYTES, "a table").decode("utf-8-sig")
     except UnicodeDecodeError as fault:
         raise RecipeError(str(place), f"not UTF-8 text: {fault}") from fault
     reader = csv.DictReader(io.StringIO(text, newline=None), strict=True)
     try:
-        _refuse_columns(place, reader.fieldnames or [])
+        names = reader.fieldnames or []
+        if len(names) > MOST_COLUMNS:
+            message = f"found {len(names)} columns, expected at most {MOST_COLUMNS}"
+            raise RecipeError(str(place), message, 1)
+        if twins := sorted({name for name in names if names.count(name) > 1}):
+            raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
         records = [(reader.line_num, record) for record in islice(reader, MOST_ROWS)]
         further = next(reader, None)
     except csv.Error as fault:
@@ -53,24 +59,8 @@ def _records(place: FileLocation) -> list[tuple[int, dict[str, str]]]:
         raise RecipeError(str(place), message, reader.line_num)
     for line, record in records:
         if None in record or None in record.values():
-            columns = len(reader.fieldnames or [])
-            raise RecipeError(str(place), f"not the {columns} cells of the heading", line)
-    return records
-
-
-def _refuse_columns(place: FileLocation, names: Sequence[str]) -> None:
-    """Raise RecipeError for too many columns, and for two of one name."""
-    if len(names) > MOST_COLUMNS:
-        message = f"found {len(names)} columns, expected at most {MOST_COLUMNS}"
-        raise RecipeError(str(place), message, 1)
-    twins = sorted({name for name in names if names.count(name) > 1})
-    if twins:
-        raise RecipeError(str(place), f"columns {twins} are in the heading twice", 1)
-
-
-def open_table(place: FileLocation) -> "ClipTable":
-    """Return the table of a CSV file; RecipeError if it is invalid."""
-    return ClipTable(str(place), _records(place))
+            raise RecipeError(str(place), f"not the {len(names)} cells of the heading", line)
+    return ClipTable(str(place), records)
 
 
 @dataclass(frozen=True)
@@ -283,78 +273,54 @@ def _row(
     last = cells.frame(line, record, clips.last_frame) if clips.last_frame else None
     if last is not None and last <= first:
         raise RecipeError(cells.name, f"frames {first} to {last}, expected at least two", line)
-    find = _FileFinder(folder, clips, cells.name, line)
+
+    def find(column: str, cell: str) -> FileLocation:
+        """Return the file that a cell names; RecipeError names the column."""
+        beside = clips.table.rpartition("/")[0]
+        try:
+            return data_folder.find(folder, f"{beside}/{cell}" if beside else cell)
+        except RecipeError as fault:
+            text = f"column {column!r}: {fault.message}"
+            raise RecipeError(cells.name, text, line) from fault
+
+    place = find(clips.file, record[clips.file])
+    performer = record[clips.performer] if clips.performer else ""
+    if clips.performer and PERFORMER in recipe.kriging.label:
+        # A label of that set makes the performer a name of requests.
+        performer = cells.name_of(line, record, clips.performer)
+    controls = np.array([cells.number(line, record, c.column) for c in recipe.column_controls])
+    landmarks = tuple(cells.frame(line, record, column) for column in clips.landmarks)
+    labels = {name: cells.name_of(line, record, column) for name, column in clips.labels.items()}
+    take = record[clips.take].strip() if clips.take else None
+    if take == "":
+        message = f"column {clips.take!r}: nothing, expected the name of a take"
+        raise RecipeError(cells.name, message, line)
+    curves = recipe.curves
+    curve_place = None
+    if curves and curves.column and not curves.alone:
+        curve_place = find(curves.column, record[curves.column])
+    elif curves and not curves.alone:
+        # Beside the motion file.
+        beside, slash, name = record[clips.file].rpartition("/")
+        stem = name.rpartition(".")[0] or name
+        curve_place = find(clips.file, f"{beside}{slash}{stem}{curves.suffix}")
     return ClipRow(
-        place=find(clips.file, record[clips.file]),
+        place=place,
         table=cells.name,
         line=line,
-        performer=_performer(recipe, cells, line, record),
+        performer=performer,
         first_frame=first,
         last_frame=last,
-        controls=np.array([cells.number(line, record, c.column) for c in recipe.column_controls]),
-        landmarks=tuple(cells.frame(line, record, column) for column in clips.landmarks),
-        other_labels={
-            name: cells.name_of(line, record, column) for name, column in clips.labels.items()
-        },
-        take=_take(clips, cells, line, record),
-        curve_place=_curve_place(recipe, find, record),
+        controls=controls,
+        landmarks=landmarks,
+        other_labels=labels,
+        take=take,
+        curve_place=curve_place,
         contacts={
             column: cells.spans(line, record, column) for column in recipe.contacts.columns.values()
         },
         animation=(record[clips.animation].strip() or None) if clips.animation else None,
     )
-
-
-def _performer(recipe: Recipe, cells: ClipTable, line: int, record: dict[str, str]) -> str:
-    """Return the performer of a row, which a label of that set makes a name of requests."""
-    column = recipe.clips.performer
-    if column is None:
-        return ""
-    labelled = PERFORMER in recipe.kriging.label
-    return cells.name_of(line, record, column) if labelled else record[column]
-
-
-def _take(clips: Clips, cells: ClipTable, line: int, record: dict[str, str]) -> str | None:
-    if clips.take is None:
-        return None
-    name = record[clips.take].strip()
-    if not name:
-        raise RecipeError(
-            cells.name, f"column {clips.take!r}: nothing, expected the name of a take", line
-        )
-    return name
-
-
-@dataclass(frozen=True)
-class _FileFinder:
-    """Finder of the files that a line of the table names."""
-
-    folder: Path
-    clips: Clips
-    table: str
-    line: int
-
-    def __call__(self, column: str, cell: str) -> FileLocation:
-        """Return the file that a cell names; RecipeError names the column."""
-        beside = self.clips.table.rpartition("/")[0]
-        name = f"{beside}/{cell}" if beside else cell
-        try:
-            return data_folder.find(self.folder, name)
-        except RecipeError as fault:
-            text = f"column {column!r}: {fault.message}"
-            raise RecipeError(self.table, text, self.line) from fault
-
-
-def _curve_place(recipe: Recipe, find: _FileFinder, record: dict[str, str]) -> FileLocation | None:
-    """Return the file of a clip's curves beside its motion file; None if there is none."""
-    keys, column = recipe.curves, recipe.clips.file
-    if keys is None or keys.alone:
-        return None
-    if keys.column:
-        return find(keys.column, record[keys.column])
-    folder, slash, name = record[column].rpartition("/")
-    stem = name.rpartition(".")[0] or name
-    return find(column, f"{folder}{slash}{stem}{keys.suffix}")
 
 
 def refuse_repeats(rows: Sequence[ClipRow]) -> None:

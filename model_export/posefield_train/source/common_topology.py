@@ -80,7 +80,15 @@ def role_joints(own: Skeleton, stated: StatedRoles) -> RoleJoints:
             f"{own.names[head]!r} (head), expected one or more"
         )
     _expect_order(own, hips, limbs)
-    spine, neck = (_without_repeats(own, part) for part in (between[:split], between[split:]))
+    # Without joints at the position of the next one, whose turns that one has too.
+    repeats = {
+        a
+        for part in (between[:split], between[split:])
+        for a, b in pairwise(part)
+        if own.parents[b] == a and not own.offsets[b].any()
+    }
+    spine = tuple(joint for joint in between[:split] if joint not in repeats)
+    neck = tuple(joint for joint in between[split:] if joint not in repeats)
     return RoleJoints(limbs, hips, spine, neck, head)
 
 
@@ -121,12 +129,6 @@ def _spine_length(own: Skeleton, between: Sequence[int], found: Mapping[str, int
     arms = [found.get(side + "Shoulder", found[side + "UpperArm"]) for side in SIDES]
     paths = [set(skeleton.joint_chain(own.parents, arm)) for arm in arms]
     return sum(joint in paths[0] & paths[1] for joint in between)
-
-
-def _without_repeats(own: Skeleton, chain: Sequence[int]) -> tuple[int, ...]:
-    """Return a chain without joints at the place of the next one, whose turns that one has too."""
-    same = {a for a, b in pairwise(chain) if own.parents[b] == a and not own.offsets[b].any()}
-    return tuple(joint for joint in chain if joint not in same)
 
 
 def _expect_order(own: Skeleton, hips: int, limbs: Mapping[str, int]) -> None:
@@ -181,7 +183,7 @@ def numbered(name: str, count: int) -> tuple[str, ...]:
 
 def common_topology(bodies: Sequence[RoleJoints]) -> Topology:
     """Return the topology of roles that all bodies have, with the longest common chains."""
-    spine, neck = (min(len(part(body)) for body in bodies) for part in (_spine, _neck))
+    spine, neck = (min(len(getattr(body, part)) for body in bodies) for part in ("spine", "neck"))
     shared = set.intersection(*(set(body.limbs) for body in bodies))
     links: list[tuple[str, str]] = [("hips", "")]
     for side in SIDES:
@@ -194,14 +196,6 @@ def common_topology(bodies: Sequence[RoleJoints]) -> Topology:
     names = tuple(name for name, _ in links)
     parents = tuple(names.index(parent) if parent else -1 for _, parent in links)
     return Topology(names, parents, spine, neck)
-
-
-def _spine(body: RoleJoints) -> tuple[int, ...]:
-    return body.spine
-
-
-def _neck(body: RoleJoints) -> tuple[int, ...]:
-    return body.neck
 
 
 def _links(first: str, names: Sequence[str]) -> list[tuple[str, str]]:

@@ -69,7 +69,9 @@ def unify(clips: Sequence[Clip], stated: StatedRoles) -> UnifiedClips:
     and for a stated joint that no file has.
     """
     kinds = _find_kinds(clips, stated)
-    lengths = [_bone_lengths(clips[kind.clips[0]]) for kind in kinds]
+    lengths = [
+        np.linalg.norm(clips[kind.clips[0]].translations.mean(axis=0), axis=-1) for kind in kinds
+    ]
     bodies = [kind.joints for kind in kinds]
     topology = common_topology.common_topology(bodies)
     points = common_topology.joint_points(bodies, lengths, topology)
@@ -78,7 +80,14 @@ def unify(clips: Sequence[Clip], stated: StatedRoles) -> UnifiedClips:
         motions = {at: joint_motion(clips[at], places) for at in kind.clips}
         aimed = _aimed_bones(kind.skeleton, topology, places)
         for group in _bodies(clips, kind.clips):
-            turns = _body_turns(topology, [motions[at] for at in group])
+            # The axes of a body from poses spread over its clips.
+            poses = []
+            for motion in (motions[at] for at in group):
+                count = len(motion.positions)
+                frames = np.linspace(0, count - 1, min(count, MOST_POSES)).round().astype(int)
+                picked = np.unique(frames)
+                poses.append(JointMotion(motion.positions[picked], motion.turns[picked]))
+            turns = canonical_rest.mean_turns(topology, poses)
             for at in group:
                 found[at] = _unified(clips[at], topology, motions[at], turns, aimed)
     ordered = tuple(found[at] for at in range(len(clips)))
@@ -104,10 +113,6 @@ def _find_kinds(clips: Sequence[Clip], stated: StatedRoles) -> list[SkeletonKind
         except TopologyError as fault:
             raise TopologyError(str(fault), own[0]) from fault
     return found
-
-
-def _bone_lengths(clip: Clip) -> Floats:
-    return np.asarray(np.linalg.norm(clip.translations.mean(axis=0), axis=-1))
 
 
 def _bodies(clips: Sequence[Clip], own: Sequence[int]) -> list[list[int]]:
@@ -136,29 +141,10 @@ def joint_motion(clip: Clip, places: Mapping[str, JointPoint]) -> JointMotion:
     return JointMotion(placed, turns[:, joints])
 
 
-def _body_turns(topology: Topology, motions: Sequence[JointMotion]) -> Floats:
-    """Return the turns (J, 4) of a body to the T-pose, from poses spread over its clips."""
-    picked = []
-    for motion in motions:
-        count = len(motion.positions)
-        frames = np.unique(np.linspace(0, count - 1, min(count, MOST_POSES)).round().astype(int))
-        picked.append(JointMotion(motion.positions[frames], motion.turns[frames]))
-    return canonical_rest.mean_turns(topology, picked)
-
-
-@dataclass(frozen=True)
-class _AimedBone:
-    """A bone on which a joint was left out: joints at its ends, and its direction at rest (3,)."""
-
-    joint: int
-    end: int
-    direction: Floats
-
-
 def _aimed_bones(
     own: Skeleton, topology: Topology, places: Mapping[str, JointPoint]
-) -> list[_AimedBone]:
-    """Return the bones whose ends move in the frames of the files' joints.
+) -> list[tuple[int, int, Floats]]:
+    """Return the bones on which a joint was left out: their ends, and direction (3,) at rest.
 
     The hips and the last joint of the spine carry several bones, and keep their orientation.
     """
@@ -170,7 +156,7 @@ def _aimed_bones(
     limbs = [(name, *canonical_rest.limb_bone(name)) for name in topology.names]
     bones += [bone for bone in limbs if bone[1] in topology.names]
     return [
-        _AimedBone(topology.index(name), topology.index(end), direction)
+        (topology.index(name), topology.index(end), direction)
         for name, end, direction in bones
         if not is_rigid(own, places[name], places[end])
     ]
@@ -187,16 +173,15 @@ def _unified(
     topology: Topology,
     motion: JointMotion,
     turns: Floats,
-    aimed: Sequence[_AimedBone],
+    aimed: Sequence[tuple[int, int, Floats]],
 ) -> Clip:
     """Return a clip on a topology. turns (J, 4): from the files' frames to the canonical ones."""
     frames = quat.mul(motion.turns, quat.conj(turns))
     places = motion.positions
-    for bone in aimed:
-        ahead = places[:, bone.end] - places[:, bone.joint]
-        own = quat.rotate(frames[:, bone.joint], bone.direction)
-        swings = canonical_rest.smallest_turns(own, ahead)
-        frames[:, bone.joint] = quat.mul(swings, frames[:, bone.joint])
+    for joint, end, direction in aimed:
+        ahead = places[:, end] - places[:, joint]
+        swings = canonical_rest.smallest_turns(quat.rotate(frames[:, joint], direction), ahead)
+        frames[:, joint] = quat.mul(swings, frames[:, joint])
     rotations, translations = frames.copy(), places.copy()
     for joint, parent in list(enumerate(topology.parents))[1:]:
         back = quat.conj(frames[:, parent])
