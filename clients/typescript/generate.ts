@@ -13,10 +13,8 @@ const HEAD =
 /** Documents whose keys are looked at before they are taken for what they should be. */
 const LOOKED_AT = [
   "CharacterList",
-  "ManifestEntry",
   "ModelCard",
   "ModelList",
-  "PerformanceEntry",
   "PerformanceReport",
   "Problem",
   "Readiness",
@@ -26,34 +24,8 @@ const LOOKED_AT = [
   "Trust",
 ];
 
-/** Questions whose keys are checked before they are sent. */
-const QUESTIONS = [
-  "PoseQuestion",
-  "ClipQuestion",
-  "NamedClipQuestion",
-  "CrowdQuestion",
-  "SigmaQuestion",
-  "WhyQuestion",
-  "Target",
-  "Floor",
-  "NamedScript",
-  "PerformanceQuestion",
-  "Walk",
-  "Act",
-  "Hold",
-  "Join",
-  "PlacedTarget",
-];
-
-/** Questions whose keys are the query parameters of an operation, by its path. */
-const QUERIES = {
-  WalkQuestion: "/v1/models/{model}/crowd.{format}",
-  SuggestQuestion: "/v1/models/{model}/suggestions",
-};
-
 interface Contract {
   readonly info: { readonly version: string };
-  readonly paths: Record<string, { readonly get: { readonly parameters: readonly Parameter[] } }>;
   readonly components: {
     readonly schemas: Record<string, Schema>;
     readonly parameters: Record<string, Parameter>;
@@ -61,9 +33,6 @@ interface Contract {
 }
 
 interface Parameter {
-  readonly $ref?: string;
-  readonly name?: string;
-  readonly in?: string;
   readonly "x-media-types"?: object;
 }
 
@@ -91,34 +60,12 @@ export const REQUIRED = ${text(Object.fromEntries(required))} as const;
 /** Which of them are lists. */
 export const LISTS = ${text(Object.fromEntries(lists))} as const;
 
-/** Keys that each question may have. */
-export const KEYS = ${text(keys(contract))} as const;
-
 /** What files of each format are sent as. */
 export const MEDIA_TYPES = ${text(mediaTypes(contract))} as const;
 
 /** Everything that may be wrong. */
 export const PROBLEM_TYPES = ${text(components.schemas["Problem"]?.properties?.["type"]?.enum)} as const;
 `;
-}
-
-function keys(contract: Contract): object {
-  const { schemas } = contract.components;
-  const bodies = QUESTIONS.map((name) => [name, Object.keys(schemas[name]?.properties ?? {})]);
-  const queries = Object.entries(QUERIES).map(([name, path]) => [name, queryOf(contract, path)]);
-  return Object.fromEntries([...bodies, ...queries]) as object;
-}
-
-/** Names of the query parameters of a path's GET. */
-function queryOf({ paths, components }: Contract, path: string): readonly unknown[] {
-  const listed = paths[path]?.get.parameters ?? [];
-  const given = listed.map((each) => {
-    const name = each.$ref?.split("/").at(-1);
-    return name === undefined ? each : components.parameters[name];
-  });
-  // In a URL each label set is a parameter of its own; in a question they are one field.
-  const plural = (name?: string) => (name === "label" ? "labels" : name);
-  return given.filter((each) => each?.in === "query").map((each) => plural(each?.name));
 }
 
 function listsOf({ required = [], properties = {} }: Schema): readonly string[] {

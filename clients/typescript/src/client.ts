@@ -1,26 +1,13 @@
 /** Questions to a service, as promises. */
 
-import { END, expectEnd, opened } from "./archives.ts";
-import {
-  type ArchiveOptions,
-  addressOf,
-  type ClientOptions,
-  checkArchive,
-  checkClientOptions,
-  checkTransferOptions,
-  printable,
-} from "./client-options.ts";
 import { checked, json, read } from "./documents.ts";
-import { Unexpected } from "./errors.ts";
-import type { Whole } from "./memory.ts";
+import { Unexpected, WrongQuestion } from "./errors.ts";
 import { named } from "./named.ts";
 import { crowd, motion, performance, poses } from "./numbers.ts";
-import { checkQuestion, type QuestionKind } from "./option-names.ts";
 import { asFile, get, link, post, type Request, request, under } from "./questions.ts";
 import { type Script, scriptQuestion } from "./scripts.ts";
-import { streamed } from "./streams.ts";
 import type {
-  Archive,
+  ArchiveOptions,
   CharacterList,
   ClipFormat,
   ClipQuestion,
@@ -33,7 +20,6 @@ import type {
   Motion,
   NamedClipQuestion,
   NamedScript,
-  PerformanceArchive,
   PerformanceArchiveOptions,
   PerformanceFileOptions,
   PerformanceMotion,
@@ -46,12 +32,26 @@ import type {
   SigmaGrid,
   SigmaQuestion,
   Suggestions,
-  Transfer,
   TransferOptions,
   WalkQuestion,
   WhyQuestion,
 } from "./types.ts";
-import { Wire } from "./wire.ts";
+import { type Whole, Wire } from "./wire.ts";
+
+export interface ClientOptions {
+  /** API key or token, sent as `Authorization: Bearer`. */
+  readonly key?: string;
+  /** Milliseconds without a byte after which a question ends with TimedOut; 30,000. */
+  readonly timeout?: number;
+  /** Number of attempts after the first one, where a fault may pass; 3. */
+  readonly retries?: number;
+  /** Milliseconds before the second attempt, doubled for each one after it; 200. */
+  readonly pause?: number;
+  /** Characters up to which a question is a link (GET), beyond them a body (POST); 2,000. */
+  readonly longestLink?: number;
+  /** In place of the platform's own, such as one with a cache. */
+  readonly fetch?: typeof fetch;
+}
 
 type Content = Uint8Array<ArrayBuffer>;
 
@@ -65,7 +65,6 @@ export class Client {
    * where that is no address, or the key none that a header can hold.
    */
   constructor(base = "", options: ClientOptions = {}) {
-    checkClientOptions(options);
     this.base = addressOf(base).replace(/\/+$/, "");
     this.#longest = options.longestLink ?? 2000;
     this.#wire = new Wire({
@@ -74,8 +73,7 @@ export class Client {
       timeout: options.timeout ?? 30_000,
       retries: options.retries ?? 3,
       pause: options.pause ?? 200,
-      cacheBytes: options.cacheBytes ?? 0,
-      // Called as a method of anything else, a browser's own refuses.
+      // A browser's own refuses to be called as a method.
       fetch: options.fetch ?? ((...words) => fetch(...words)),
     });
   }
@@ -100,31 +98,30 @@ export class Client {
   }
 
   async pose(model: string, question: PoseQuestion, signal?: AbortSignal): Promise<Poses> {
-    const asked = this.#request(model, "/pose.msgpack", "PoseQuestion", question);
+    const asked = this.#request(model, "/pose.msgpack", question);
     return this.#read(asked, poses, signal);
   }
 
   /** A clip as numbers. */
   async clip(model: string, question: ClipQuestion, signal?: AbortSignal): Promise<Motion> {
-    const asked = this.#request(model, "/clip.msgpack", "ClipQuestion", question);
+    const asked = this.#request(model, "/clip.msgpack", question);
     return this.#read(asked, motion, signal);
   }
 
   /** One pose of each of many characters. */
   async crowd(model: string, question: CrowdQuestion, signal?: AbortSignal): Promise<CrowdPoses> {
-    checkQuestion("CrowdQuestion", question);
     return this.#read(post(under(model, "/crowd.msgpack"), question), crowd, signal);
   }
 
   /** Sigma over two controls. */
   async sigma(model: string, question: SigmaQuestion, signal?: AbortSignal): Promise<SigmaGrid> {
-    const asked = this.#request(model, "/sigma.json", "SigmaQuestion", question);
+    const asked = this.#request(model, "/sigma.json", question);
     return this.#read(asked, (found) => read("SigmaGrid", found), signal);
   }
 
   /** Which captured clips an answer is made of. */
   async why(model: string, question: WhyQuestion, signal?: AbortSignal): Promise<Reasons> {
-    const asked = this.#request(model, "/why", "WhyQuestion", question);
+    const asked = this.#request(model, "/why", question);
     return this.#read(asked, (found) => read("Reasons", found), signal);
   }
 
@@ -137,7 +134,7 @@ export class Client {
     } = {},
     signal?: AbortSignal,
   ): Promise<Suggestions> {
-    const wanted = this.#request(model, "/suggestions", "SuggestQuestion", asked);
+    const wanted = this.#request(model, "/suggestions", asked);
     return this.#read(wanted, (found) => read("Suggestions", found), signal);
   }
 
@@ -148,7 +145,7 @@ export class Client {
     question: ClipQuestion,
     signal?: AbortSignal,
   ): Promise<Download> {
-    const asked = this.#request(model, `/clip.${format}`, "ClipQuestion", question);
+    const asked = this.#request(model, `/clip.${format}`, question);
     return this.#file(asFile(asked, format), `${model}.${format}`, { signal });
   }
 
@@ -159,8 +156,6 @@ export class Client {
     question: WalkQuestion,
     options: TransferOptions = {},
   ): Promise<Download> {
-    checkQuestion("WalkQuestion", question);
-    checkTransferOptions(options);
     const asked = asFile(get(link(under(model, `/crowd.${format}`), question)), format);
     return this.#file(asked, `${model}.${format}`, options);
   }
@@ -180,28 +175,20 @@ export class Client {
     script: Script | PerformanceQuestion,
     { layout, character, ...options }: PerformanceFileOptions = {},
   ): Promise<Download> {
-    checkTransferOptions(options);
     const path = link(`/v1/performances.${format}`, { layout, character });
     const asked = asFile(post(path, scriptQuestion(script)), format);
     return this.#file(asked, `performance.${format}`, options);
   }
 
-  /** Many performances in one file, looked through: all are there, and as long as they should be. */
+  /** Many performances in one file, the last of which is a manifest of the others. */
   async performanceArchive(
     format: ClipFormat,
     scripts: readonly (Script | NamedScript)[],
     { as = "zip", layout, character, ...options }: PerformanceArchiveOptions = {},
-  ): Promise<PerformanceArchive> {
-    checkTransferOptions(options);
-    const question = {
-      format,
-      layout,
-      character,
-      scripts: scripts.map((script) => scriptQuestion(script, "NamedScript")),
-    };
+  ): Promise<Download> {
+    const question = { format, layout, character, scripts: scripts.map(scriptQuestion) };
     const asked = asFile(post(`/v1/performances/batch.${as}`, question), as);
-    const download = await this.#file(asked, `performances.${as}`, options);
-    return this.#explained(async () => opened(download, as, scripts.length, "PerformanceEntry"));
+    return this.#file(asked, `performances.${as}`, options);
   }
 
   /** Timeline, joins and warnings of a performance, without its poses. */
@@ -213,72 +200,40 @@ export class Client {
     return this.#read(asked, (found) => checked("PerformanceReport", trustOf(found)), signal);
   }
 
-  /** Many clips in one file, looked through: all are there, and as long as they should be. */
+  /** Many clips in one file, the last of which is a manifest of the others. */
   async archive(
     model: string,
     format: ClipFormat,
     clips: readonly NamedClipQuestion[],
     { as = "zip", ...options }: ArchiveOptions = {},
-  ): Promise<Archive> {
-    checkArchive(clips, options);
+  ): Promise<Download> {
     const asked = asFile(post(under(model, `/clips.${as}`), { format, clips }), as);
-    const download = await this.#file(asked, `${model}.${as}`, options);
-    return this.#explained(async () => opened(download, as, clips.length, "ManifestEntry"));
-  }
-
-  /** The same while it comes, for what is too large to be held. */
-  async stream(
-    model: string,
-    format: ClipFormat,
-    clips: readonly NamedClipQuestion[],
-    { as = "zip", ...options }: ArchiveOptions = {},
-  ): Promise<Transfer> {
-    checkArchive(clips, options);
-    const { signal, onProgress } = options;
-    const asked = asFile(post(under(model, `/clips.${as}`), { format, clips }), as);
-    return this.#explained(async () => {
-      const begun = await this.#wire.begin(asked, signal);
-      try {
-        const head = named(begun.answer.headers, `${model}.${as}`);
-        return {
-          ...head,
-          body: streamed(begun, END, (...end) => expectEnd(as, ...end), onProgress),
-        };
-      } catch (fault) {
-        begun.patience.leave();
-        throw fault;
-      }
-    });
+    return this.#file(asked, `${model}.${as}`, options);
   }
 
   /** The link to a clip's file, to be sent on. */
   url(model: string, format: ClipFormat, question: ClipQuestion): string {
-    checkQuestion("ClipQuestion", question);
     const path = link(under(model, `/clip.${format}`), question);
     return (this.base || (globalThis.location?.origin ?? "")) + path;
   }
 
-  /** What the service says before it is sent questions; a Problem of kind not-ready, if it is not. */
+  /** Loaded models; a Problem of kind not-ready, if the service is not ready. */
   async ready(signal?: AbortSignal): Promise<Readiness> {
     return this.#explained(async () => {
-      const { content } = await this.#wire.once(get("/readyz"), signal);
+      const { content } = await this.#wire.once(get("/readyz"), { signal });
       return read("Readiness", content);
     });
   }
 
   /** Version of the contract that the service speaks. */
   async contract(signal?: AbortSignal): Promise<string> {
-    const { content } = await this.#wire.once(get("/livez"), signal);
+    const { content } = await this.#wire.once(get("/livez"), { signal });
     const live = json(content) as { readonly contract?: unknown } | null;
     if (typeof live?.contract === "string") return live.contract;
-    const whole = await this.#wire.once(get("/openapi.json"), signal);
-    const said = json(whole.content) as { readonly info?: { readonly version?: unknown } } | null;
-    if (typeof said?.info?.version === "string") return said.info.version;
-    throw new Unexpected("the service does not say which version of the contract it speaks");
+    throw new Unexpected("the service does not report the version of its contract");
   }
 
-  #request(model: string, rest: string, kind: QuestionKind, question: object): Request {
-    checkQuestion(kind, question);
+  #request(model: string, rest: string, question: object): Request {
     return request(under(model, rest), question, this.#longest);
   }
 
@@ -310,4 +265,16 @@ export class Client {
 
 function trustOf(content: Content): unknown {
   return (json(content) as { readonly trust?: unknown } | null)?.trust;
+}
+
+/** The address of a service; WrongQuestion for another text. */
+function addressOf(base: string): string {
+  if (base === "" || (/^https?:\/\/[^?#@\s]+$/i.test(base) && URL.canParse(base))) return base;
+  throw new WrongQuestion("the address: expected http://host:port or https://host:port");
+}
+
+/** A key that a header can hold; the error does not contain it. */
+function printable(key: string): string {
+  if (/^[\x21-\x7e]+$/.test(key)) return key;
+  throw new WrongQuestion("the key: expected printable ASCII without blanks");
 }

@@ -11,13 +11,6 @@ export function read<Of extends Name>(of: Of, content: Uint8Array): Document<Of>
   return checked(of, json(content));
 }
 
-/** The documents in an answer of JSON Lines. */
-export function lines<Of extends Name>(of: Of, content: Uint8Array): Document<Of>[] {
-  const text = new TextDecoder().decode(content);
-  const found = text.split("\n").filter((line) => line !== "");
-  return found.map((line) => checked(of, parsed(line)));
-}
-
 export function json(content: Uint8Array): unknown {
   return parsed(new TextDecoder().decode(content));
 }
@@ -33,17 +26,8 @@ export function checked<Of extends Name>(of: Of, value: unknown): Document<Of> {
   return value as Document<Of>;
 }
 
-export function isMap(value: unknown): value is Readonly<Record<string, unknown>> {
+function isMap(value: unknown): value is Readonly<Record<string, unknown>> {
   return typeof value === "object" && value !== null;
-}
-
-/** Whether something is a list of texts; what Array.isArray alone says is a list of anything. */
-export function isTexts(value: unknown): value is readonly string[] {
-  return isList(value) && value.every((each) => typeof each === "string");
-}
-
-export function isList(value: unknown): value is readonly unknown[] {
-  return Array.isArray(value);
 }
 
 /** A text of JSON; Unexpected where it is none. */

@@ -1,7 +1,6 @@
 /** Client of a posefield service: what the contract says, as types, promises and typed arrays. */
 
-export { Client } from "./client.ts";
-export type { ArchiveOptions, ClientOptions } from "./client-options.ts";
+export { Client, type ClientOptions } from "./client.ts";
 export {
   Broken,
   type Place,
@@ -23,8 +22,8 @@ export {
 } from "./scripts.ts";
 export type {
   ActSegment,
-  Archive,
   ArchiveFormat,
+  ArchiveOptions,
   CharacterList,
   ClipFormat,
   ClipQuestion,
@@ -43,7 +42,6 @@ export type {
   NamedClipQuestion,
   NamedScript,
   OnProgress,
-  PerformanceArchive,
   PerformanceArchiveOptions,
   PerformanceEntry,
   PerformanceFileOptions,
@@ -60,7 +58,6 @@ export type {
   SigmaQuestion,
   Suggestions,
   Target,
-  Transfer,
   TransferOptions,
   Trust,
   WalkQuestion,

@@ -8,7 +8,7 @@
 
 import { decode } from "@msgpack/msgpack";
 
-import { checked, isList, isTexts } from "./documents.ts";
+import { checked } from "./documents.ts";
 import { Unexpected } from "./errors.ts";
 import type { CrowdPoses, Motion, PerformanceMotion, Poses } from "./types.ts";
 
@@ -158,7 +158,7 @@ function number(found: Packed, name: string): number {
 
 function strings(found: Packed, name: string): readonly string[] {
   const value = found[name];
-  if (isTexts(value)) return value;
+  if (isList(value) && value.every((text) => typeof text === "string")) return value;
   throw unlike(name, value, "a list of texts");
 }
 
@@ -167,6 +167,10 @@ function integers(found: Packed, name: string, length: number): readonly number[
   if (!isIntegers(value)) throw unlike(name, value, "a list of whole numbers");
   expectLength(name, value.length, length);
   return value;
+}
+
+function isList(value: unknown): value is readonly unknown[] {
+  return Array.isArray(value);
 }
 
 function isIntegers(value: unknown): value is readonly number[] {

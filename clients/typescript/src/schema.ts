@@ -4925,21 +4925,6 @@ export const REQUIRED = {
     "characters",
     "faults"
   ],
-  "ManifestEntry": [
-    "name",
-    "file",
-    "bytes",
-    "sha256",
-    "frames",
-    "fps",
-    "model",
-    "controls",
-    "performer",
-    "level",
-    "duration",
-    "sigma",
-    "warnings"
-  ],
   "ModelCard": [
     "identity",
     "name",
@@ -4967,21 +4952,6 @@ export const REQUIRED = {
   ],
   "ModelList": [
     "models"
-  ],
-  "PerformanceEntry": [
-    "name",
-    "file",
-    "bytes",
-    "sha256",
-    "models",
-    "character",
-    "duration",
-    "frames",
-    "sigma",
-    "supported",
-    "segments",
-    "joins",
-    "warnings"
   ],
   "PerformanceReport": [
     "models",
@@ -5050,9 +5020,6 @@ export const LISTS = {
     "characters",
     "faults"
   ],
-  "ManifestEntry": [
-    "warnings"
-  ],
   "ModelCard": [
     "controls",
     "levels",
@@ -5066,12 +5033,6 @@ export const LISTS = {
   ],
   "ModelList": [
     "models"
-  ],
-  "PerformanceEntry": [
-    "models",
-    "segments",
-    "joins",
-    "warnings"
   ],
   "PerformanceReport": [
     "models",
@@ -5100,225 +5061,6 @@ export const LISTS = {
   ],
   "Trust": [
     "warnings"
-  ]
-} as const;
-
-/** Keys that each question may have. */
-export const KEYS = {
-  "PoseQuestion": [
-    "controls",
-    "times",
-    "extrapolate",
-    "performer",
-    "labels",
-    "level",
-    "joint_sigma",
-    "exact",
-    "targets",
-    "take",
-    "variety",
-    "detail"
-  ],
-  "ClipQuestion": [
-    "controls",
-    "fps",
-    "start",
-    "end",
-    "extrapolate",
-    "performer",
-    "labels",
-    "level",
-    "joint_sigma",
-    "names",
-    "root",
-    "loop",
-    "exact",
-    "targets",
-    "feet",
-    "floor",
-    "take",
-    "variety",
-    "detail",
-    "unit",
-    "up",
-    "body",
-    "character"
-  ],
-  "NamedClipQuestion": [
-    "name",
-    "controls",
-    "fps",
-    "start",
-    "end",
-    "extrapolate",
-    "performer",
-    "labels",
-    "level",
-    "joint_sigma",
-    "names",
-    "root",
-    "loop",
-    "exact",
-    "targets",
-    "feet",
-    "floor",
-    "take",
-    "variety",
-    "detail"
-  ],
-  "CrowdQuestion": [
-    "controls",
-    "time",
-    "position",
-    "heading",
-    "performer",
-    "labels",
-    "level",
-    "previous_level",
-    "from_level",
-    "blend",
-    "camera",
-    "pixels",
-    "budget_ms",
-    "root",
-    "extrapolate",
-    "take",
-    "variety",
-    "detail"
-  ],
-  "SigmaQuestion": [
-    "across",
-    "along",
-    "columns",
-    "rows",
-    "margin",
-    "controls",
-    "performer",
-    "labels"
-  ],
-  "WhyQuestion": [
-    "controls",
-    "nearest",
-    "extrapolate",
-    "performer",
-    "labels"
-  ],
-  "Target": [
-    "joint",
-    "position",
-    "time",
-    "at"
-  ],
-  "Floor": [
-    "height",
-    "slope_x",
-    "slope_z"
-  ],
-  "NamedScript": [
-    "name",
-    "segments",
-    "character",
-    "start",
-    "obstacles",
-    "fps",
-    "take",
-    "variety",
-    "detail",
-    "level",
-    "feet",
-    "extrapolate",
-    "names",
-    "unit",
-    "up",
-    "body"
-  ],
-  "PerformanceQuestion": [
-    "segments",
-    "character",
-    "start",
-    "obstacles",
-    "fps",
-    "take",
-    "variety",
-    "detail",
-    "level",
-    "feet",
-    "extrapolate",
-    "names",
-    "unit",
-    "up",
-    "body"
-  ],
-  "Walk": [
-    "kind",
-    "model",
-    "along",
-    "to",
-    "seconds",
-    "speed",
-    "speed_over",
-    "turn",
-    "controls",
-    "performer",
-    "labels",
-    "start",
-    "stop",
-    "join"
-  ],
-  "Act": [
-    "kind",
-    "model",
-    "controls",
-    "performer",
-    "labels",
-    "exact",
-    "targets",
-    "at",
-    "facing",
-    "join"
-  ],
-  "Hold": [
-    "kind",
-    "seconds",
-    "joint",
-    "look_at"
-  ],
-  "Join": [
-    "seconds",
-    "blend",
-    "cut",
-    "most"
-  ],
-  "PlacedTarget": [
-    "joint",
-    "position",
-    "time",
-    "at",
-    "frame"
-  ],
-  "WalkQuestion": [
-    "count",
-    "motions",
-    "seconds",
-    "fps",
-    "seed",
-    "labels",
-    "level",
-    "camera",
-    "fov",
-    "height",
-    "pixels",
-    "feet",
-    "take",
-    "variety",
-    "detail",
-    "instancing",
-    "body"
-  ],
-  "SuggestQuestion": [
-    "count",
-    "performer",
-    "labels"
   ]
 } as const;
 

@@ -1,8 +1,6 @@
-/** Scripts of performances, built segment by segment, and checked before they are sent. */
+/** Scripts of performances, built segment by segment. */
 
 import { WrongQuestion } from "./errors.ts";
-import { checkNames, checkQuestion } from "./option-names.ts";
-import { KEYS } from "./schema.ts";
 import type {
   ActSegment,
   HoldSegment,
@@ -15,10 +13,8 @@ import type {
 export type WalkOptions = Omit<WalkSegment, "kind" | "model">;
 export type ActOptions = Omit<ActSegment, "kind" | "model">;
 export type HoldOptions = Omit<HoldSegment, "kind" | "seconds">;
-/** What may be said of a performance besides its segments. */
+/** Options of a performance besides its segments. */
 export type PerformanceOptions = Omit<PerformanceQuestion, "segments">;
-
-const QUESTIONS = { walk: "Walk", act: "Act", hold: "Hold" } as const;
 
 /**
  * Segments of a performance, in order; every method returns a longer script.
@@ -59,46 +55,17 @@ export class Script {
   }
 
   #with(segment: Segment): Script {
-    checkSegment(segment, this.segments.length);
     return new Script([...this.segments, segment]);
   }
 
   #walker(): string {
-    const walk = this.segments.filter((each) => each.kind === "walk").at(-1);
+    const walk = this.segments.filter((segment) => segment.kind === "walk").at(-1);
     if (walk) return walk.model;
     throw new WrongQuestion("a walk without a model, expected one in the first walk");
   }
 }
 
-/** The question of a script; WrongQuestion for one that the contract does not have. */
-export function scriptQuestion(
-  script: Script | NamedScript,
-  kind: "PerformanceQuestion" | "NamedScript" = "PerformanceQuestion",
-): NamedScript {
-  const question = script instanceof Script ? script.question() : script;
-  checkQuestion(kind, question);
-  if (!Array.isArray(question.segments) || question.segments.length === 0) {
-    throw new WrongQuestion("a script without segments, expected at least one");
-  }
-  question.segments.forEach(checkSegment);
-  return question;
-}
-
-function checkSegment(segment: Segment, place: number): void {
-  const found: string = segment.kind;
-  if (!Object.hasOwn(QUESTIONS, found)) {
-    throw new WrongQuestion(
-      `segment ${place}: found the kind ${found}, expected walk, act or hold`,
-    );
-  }
-  const kind = QUESTIONS[segment.kind];
-  checkNames(`segment ${place}, ${kind}`, KEYS[kind], segment);
-  if ("join" in segment) checkNames(`segment ${place}, Join`, KEYS.Join, segment.join ?? {});
-  if (segment.kind !== "act") return;
-  for (const target of segment.targets ?? []) {
-    checkNames(`segment ${place}, PlacedTarget`, KEYS.PlacedTarget, target);
-    if ((target.time === undefined) === (target.at === undefined)) {
-      throw new WrongQuestion(`segment ${place}: expected one of time and at in each target`);
-    }
-  }
+/** The question of a script. */
+export function scriptQuestion(script: Script | NamedScript): NamedScript {
+  return script instanceof Script ? script.question() : script;
 }

@@ -159,23 +159,6 @@ export interface Download extends Named {
   readonly content: Uint8Array<ArrayBuffer>;
 }
 
-/** Many clips, all there: what an archive's manifest says of each, and its files by their paths. */
-export interface Archive extends Download {
-  readonly entries: readonly ManifestEntry[];
-  readonly files: ReadonlyMap<string, Uint8Array<ArrayBuffer>>;
-}
-
-/** Many performances, all there: what an archive's manifest says of each, and its files. */
-export interface PerformanceArchive extends Download {
-  readonly entries: readonly PerformanceEntry[];
-  readonly files: ReadonlyMap<string, Uint8Array<ArrayBuffer>>;
-}
-
-/** A file that is still coming. It ends with an error where it does not come whole. */
-export interface Transfer extends Named {
-  readonly body: ReadableStream<Uint8Array<ArrayBuffer>>;
-}
-
 /** Bytes that have come, and how many there will be where the service has said so. */
 export interface Progress {
   readonly received: number;
@@ -197,7 +180,12 @@ export interface PerformanceFileOptions extends TransferOptions {
   readonly character?: Schemas["CharacterName"] | undefined;
 }
 
-/** What may be said of an archive of performances; `as` zip, unless another is said. */
+/** Options of an archive; `as` is its format, zip by default. */
+export interface ArchiveOptions extends TransferOptions {
+  readonly as?: ArchiveFormat;
+}
+
+/** Options of an archive of performances. */
 export interface PerformanceArchiveOptions extends PerformanceFileOptions {
   readonly as?: ArchiveFormat;
 }

@@ -3,15 +3,7 @@
 import assert from "node:assert/strict";
 import { before, test } from "node:test";
 
-import {
-  Client,
-  CONTRACT,
-  type PoseQuestion,
-  Problem,
-  type Target,
-  Unexpected,
-} from "../src/index.ts";
-import { named } from "../src/named.ts";
+import { Client, CONTRACT, type PoseQuestion, Problem, Script, type Target } from "../src/index.ts";
 import { defaults, observed, URL_OF_SERVICE } from "./service.ts";
 
 const client = new Client(URL_OF_SERVICE);
@@ -88,19 +80,6 @@ test("a crowd has a pose for each character, and errors in pixels where there is
   assert.equal(seen.rotations.length, 5 * seen.names.length * 4);
 });
 
-test("a crowd that walks comes as a file, with progress", async () => {
-  const steps: number[] = [];
-  const onProgress = ({ received }: { received: number }) => steps.push(received);
-  const asked = { count: 3, seconds: 0.5, camera: [1e-7, 1.7, -60] as const };
-  const { client, sent } = observed();
-  const found = await client.crowdFile("walk", "usdc", asked, { onProgress });
-  // The contract knows no exponents in a place.
-  assert.match(decodeURIComponent(sent[0]!.path), /camera=0\.0000001[0-9]*,1\.7,-60$/);
-  assert.equal(found.name, "walk.usdc");
-  assert.equal(steps.at(-1), found.content.length);
-  assert.equal(new TextDecoder().decode(found.content.subarray(0, 8)), "PXR-USDC");
-});
-
 test("a file says how far it may be trusted", async () => {
   const [first = ""] = Object.keys(question.controls);
   const far = { ...question.controls, [first]: question.controls[first]! * 1.5 };
@@ -136,18 +115,6 @@ test("a file says what was chosen for it, and what it misses", async () => {
   assert.deepEqual([plain.inferred, plain.missed], [{}, []]);
 });
 
-test("heads that cannot be read are no answer", () => {
-  const heads = [
-    ["Posefield-Inferred", '{"turn": "left"}'],
-    ["Posefield-Inferred", "7"],
-    ["Posefield-Inferred", "[7]"],
-    ["Posefield-Missed", '{"what": "hand"}'],
-    ["Posefield-Missed", "hand"],
-  ] as const;
-  for (const [name, text] of heads)
-    assert.throws(() => named(new Headers([[name, text]]), "clip"), Unexpected);
-});
-
 test("a link gives the same file", async () => {
   const { controls } = question;
   const asked = { controls, fps: 60, performer: "tall", loop: false, end: null };
@@ -156,15 +123,6 @@ test("a link gives the same file", async () => {
   assert.equal(answer.status, 200);
   const { content } = await client.file("reach", "glb", asked);
   assert.deepEqual(new Uint8Array(await answer.arrayBuffer()), content);
-});
-
-test("a long question is a body, and has the same answer", async () => {
-  const times = Array.from({ length: 300 }, (_, index) => index / 1000);
-  const { client: short, sent } = observed();
-  const long = observed(undefined, { longestLink: 7000 });
-  const asked = { ...question, times };
-  assert.deepEqual(await short.pose("reach", asked), await long.client.pose("reach", asked));
-  assert.deepEqual([sent[0]?.method, long.sent[0]?.method], ["POST", "GET"]);
 });
 
 test("the service is ready, and speaks this client's version", async () => {
@@ -194,16 +152,37 @@ test("a body's fault is pointed at", async () => {
   });
 });
 
-test("a model that is not there is told by its kind", async () => {
-  for (const name of ["gone", "reach@0123456789abcdef"]) {
-    await assert.rejects(client.card(name), (fault: unknown) => {
-      return fault instanceof Problem && fault.kind === "unknown-model";
-    });
+test("a performance has the timeline of its plan, as numbers and as a file", async () => {
+  const script = new Script().walk("walk", { to: [0, 2] }).walk({ seconds: 1, turn: 0.3 });
+  const found = await client.performance(script.question({ fps: 24 }));
+  const planned = await client.plan(script.question({ fps: 24 }));
+  assert.equal(found.frames, planned.frames);
+  assert.deepEqual(found.trust.segments, planned.segments);
+  const file = await client.performanceFile("usdc", script, { layout: "segments" });
+  assert.equal(text(file, 8), "PXR-USDC");
+  const wrong = new Script().walk("walk", { seconds: 1 }).act("reech");
+  await assert.rejects(client.performanceArchive("bvh", [script, wrong]), (fault) => {
+    assert.ok(fault instanceof Problem);
+    return fault.places[0]?.pointer === "/scripts/1/segments/1/model";
+  });
+});
+
+test("archives and crowds come as files, with progress", async () => {
+  const { controls } = question;
+  const script = new Script().walk("walk", { seconds: 1 });
+  const steps: number[] = [];
+  const onProgress = ({ received }: { received: number }) => steps.push(received);
+  for (const [asked, name, head] of [
+    [client.archive("reach", "bvh", [{ controls }], { onProgress }), "reach.zip", "PK"],
+    [client.performanceArchive("bvh", [script], { onProgress }), "performances.zip", "PK"],
+    [client.crowdFile("walk", "usdc", { count: 3 }, { onProgress }), "walk.usdc", "PXR-USDC"],
+  ] as const) {
+    const found = await asked;
+    assert.deepEqual([found.name, text(found, head.length)], [name, head]);
+    assert.ok(steps.includes(found.content.length));
   }
 });
 
-test("a name is one part of a path, whatever is in it", async () => {
-  const { client, sent } = observed(undefined, { retries: 0 });
-  await assert.rejects(client.card("walk/../reach?x#y"));
-  assert.equal(sent[0]?.path, "/v1/models/walk%2F..%2Freach%3Fx%23y");
-});
+function text({ content }: { content: Uint8Array }, length: number): string {
+  return new TextDecoder().decode(content.subarray(0, length));
+}

@@ -4,7 +4,6 @@ import assert from "node:assert/strict";
 import type { ServerResponse } from "node:http";
 import { test } from "node:test";
 import { gzipSync } from "node:zlib";
-import { encode } from "@msgpack/msgpack";
 
 import {
   Broken,
@@ -110,13 +109,6 @@ for (const [what, fail] of Object.entries(PASSING)) {
       assert.equal(asked.length, 3);
     });
   });
-
-  test(`a service that ${what}, and stays so, is given up`, async () => {
-    await serving(failing(9, fail), async (base, asked) => {
-      await faultOf(PosefieldError, new Client(base, { ...QUICK, retries: 1 }).models());
-      assert.equal(asked.length, 2);
-    });
-  });
 }
 
 test("nothing is asked again that will not change", async () => {
@@ -183,23 +175,6 @@ test("a clip that stops coming has its time, once", async () => {
   });
 });
 
-test("a clip that comes slowly is waited for", async () => {
-  const trickle: Handler = (_, answer) => {
-    let left = 12;
-    file(answer);
-    const timer = setInterval(() => {
-      if (left-- > 0) return answer.write("x");
-      clearInterval(timer);
-      return answer.end();
-    }, 100);
-  };
-  await serving(trickle, async (base) => {
-    const client = new Client(base, { ...QUICK, timeout: 1000 });
-    const { content } = await client.file("reach", "bvh", CLIP);
-    assert.equal(content.length, 12);
-  });
-});
-
 for (const framed of ["by its length", "in chunks"]) {
   test(`a clip that is cut in the middle, sent ${framed}, is broken`, async () => {
     const cut: Handler = (_, answer) => {
@@ -216,19 +191,6 @@ for (const framed of ["by its length", "in chunks"]) {
   });
 }
 
-test("a model that disappears is told as such", async () => {
-  const gone = (answer: ServerResponse) => refuse(answer, "unknown-model", 404);
-  await serving(
-    (_, answer, count) => (count ? gone(answer) : json(answer, MODELS)),
-    async (base) => {
-      const client = new Client(base, QUICK);
-      await client.models();
-      const found = await faultOf(Problem, client.card("reach"));
-      assert.equal(found.kind, "unknown-model");
-    },
-  );
-});
-
 test("a newer service may say what this client has no word for", async () => {
   const fail = (answer: ServerResponse) => refuse(answer, "full-moon", 409);
   await serving(failing(9, fail), async (base) => {
@@ -237,14 +199,10 @@ test("a newer service may say what this client has no word for", async () => {
   });
 });
 
-/** A service of another version, which says so in one of two places. */
-function other(first: (answer: ServerResponse) => void, at: "/livez" | "/openapi.json"): Handler {
-  return ({ url }, answer) => {
-    if (url === "/livez" && at === url) return json(answer, '{"status":"live","contract":"9.1.0"}');
-    if (url === "/livez") return json(answer, '{"status":"live"}');
-    if (url === "/openapi.json") return json(answer, '{"info":{"version":"9.1.0"}}');
-    return first(answer);
-  };
+/** A service of another version. */
+function other(first: (answer: ServerResponse) => void): Handler {
+  return ({ url }, answer) =>
+    url === "/livez" ? json(answer, '{"status":"live","contract":"9.1.0"}') : first(answer);
 }
 
 const STRANGE: Record<string, (answer: ServerResponse) => void> = {
@@ -253,52 +211,22 @@ const STRANGE: Record<string, (answer: ServerResponse) => void> = {
   "a number for a list": (answer) => json(answer, '{"models":5}'),
   "no path of the contract": (answer) => refuse(answer, "no-such-path", 404),
   "a status without a word": (answer) => answer.writeHead(418).end(),
+  "an answer elsewhere": (answer) => answer.writeHead(307, { Location: "/elsewhere" }).end(),
 };
 
-const ASKED: Record<string, (client: Client) => Promise<unknown>> = {
-  models: (client) => client.models(),
-  file: (client) => client.file("reach", "bvh", CLIP),
-  crowdFile: (client) => client.crowdFile("walk", "usda", {}),
-  archive: (client) => client.archive("reach", "bvh", [CLIP]),
-  stream: (client) => client.stream("reach", "bvh", [CLIP]),
-};
-
-for (const [name, ask] of Object.entries(ASKED)) {
-  for (const [what, first] of Object.entries(STRANGE)) {
-    for (const at of ["/livez", "/openapi.json"] as const) {
-      test(`${name}: an answer that is ${what} is told with both versions, by ${at}`, async () => {
-        await serving(other(first, at), async (base) => {
-          const found = await faultOf(Unexpected, ask(new Client(base, QUICK)));
-          assert.deepEqual([found.service, found.client], ["9.1.0", CONTRACT]);
-          assert.match(found.message, /speaks version 9\.1\.0 of the contract, this client /);
-        });
-      });
-    }
-  }
-
-  test(`${name}: who is sent elsewhere does not go there`, async () => {
-    await serving(
-      (_, answer) => answer.writeHead(307, { Location: "/elsewhere" }).end(),
-      async (base, asked) => {
-        const found = await faultOf(Unexpected, ask(new Client(base, { ...QUICK, key: "k" })));
-        assert.match(found.message, /elsewhere: \/elsewhere/);
-        assert.ok(!asked.includes("/elsewhere"));
-      },
-    );
+for (const [what, first] of Object.entries(STRANGE)) {
+  test(`an answer that is ${what} is told with both versions`, async () => {
+    await serving(other(first), async (base, asked) => {
+      const client = new Client(base, QUICK);
+      for (const ask of [() => client.models(), () => client.file("reach", "bvh", CLIP)]) {
+        const found = await faultOf(Unexpected, ask());
+        assert.deepEqual([found.service, found.client], ["9.1.0", CONTRACT]);
+        assert.match(found.message, /speaks version 9\.1\.0 of the contract, this client /);
+      }
+      assert.ok(!asked.includes("/elsewhere"));
+    });
   });
 }
-
-test("a browser does not say where it is sent", async () => {
-  const opaque: typeof fetch = async () =>
-    Object.create(new Response(null), {
-      type: { value: "opaqueredirect" },
-      status: { value: 0 },
-      ok: { value: false },
-      headers: { value: new Headers() },
-    });
-  const asked = new Client("", { ...QUICK, fetch: opaque }).models();
-  assert.match((await faultOf(Unexpected, asked)).message, /elsewhere$/);
-});
 
 test("versions are not spoken of where they agree, or cannot be asked", async () => {
   for (const said of [`{"status":"live","contract":"${CONTRACT}"}`, "no JSON"]) {
@@ -307,59 +235,6 @@ test("versions are not spoken of where they agree, or cannot be asked", async ()
       const found = await faultOf(Unexpected, new Client(base, QUICK).models());
       assert.doesNotMatch(found.message, /this client/);
     });
-  }
-});
-
-function array(dtype: string, shape: number[], bytes: number): object {
-  return { dtype, shape, data: new Uint8Array(bytes) };
-}
-
-const TRUST = {
-  model: "reach@0123456789abcdef",
-  controls: {},
-  performer: null,
-  level: 0,
-  duration: 1,
-  sigma: 0.01,
-  warnings: [],
-};
-
-const POSES = {
-  trust: TRUST,
-  times: array("<f8", [2], 16),
-  rotations: array("<f4", [2, 3, 4], 96),
-  root_position: array("<f4", [2, 3], 24),
-  bone_offsets: array("<f4", [3, 3], 36),
-};
-
-const { sigma: _, ...HALF } = TRUST;
-
-const MISMATCHED: Record<string, object> = {
-  "too few bytes": { rotations: array("<f4", [2, 3, 4], 92) },
-  "another shape": { root_position: array("<f4", [3, 2], 24) },
-  "another kind": { times: array("<f4", [2], 8) },
-  "no array": { bone_offsets: [1, 2, 3] },
-  nothing: { trust: null },
-  "half of the trust": { trust: HALF },
-  "a text for a list": { trust: { ...TRUST, warnings: "none" } },
-};
-
-test("poses are looked at before they are believed", async () => {
-  const ask = async (answer: object) => {
-    let found: unknown;
-    const body = encode(answer);
-    await serving(
-      ({ url }, to) => (url === "/livez" ? to.destroy() : to.end(body)),
-      async (base) => {
-        const client = new Client(base, QUICK);
-        found = await client.pose("reach", { ...CLIP, times: [0] }).catch((error) => error);
-      },
-    );
-    return found;
-  };
-  assert.ok(!((await ask(POSES)) instanceof Error));
-  for (const [what, part] of Object.entries(MISMATCHED)) {
-    assert.ok((await ask({ ...POSES, ...part })) instanceof Unexpected, what);
   }
 });
 
@@ -413,13 +288,6 @@ test("a question that is ended while it waits to be asked again is not asked aga
     const found = await fault(new Client(base, QUICK).models(signal));
     assert.equal(found, signal.reason);
     assert.equal(asked.length, 1);
-  });
-});
-
-test("a question that was ended before it began is not asked", async () => {
-  await serving(failing(0, refuse503), async (base, asked) => {
-    await assert.rejects(new Client(base, QUICK).models(AbortSignal.abort()));
-    assert.equal(asked.length, 0);
   });
 });
 

@@ -2,15 +2,7 @@
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import {
-  existsSync,
-  mkdirSync,
-  mkdtempSync,
-  readFileSync,
-  rmSync,
-  statSync,
-  writeFileSync,
-} from "node:fs";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
 
@@ -37,11 +29,9 @@ test("the examples of the README run", () => {
     const said = execFileSync(process.execPath, ["readme.mjs"], { cwd: folder, encoding: "utf8" });
     assert.match(said, /^\d+ frames of \d+ joints, sigma 0\.\d+ m$/m);
     assert.match(said, /^times? .*expected 0 to/m);
-    assert.match(said, /^turn-20\.usdc \d+ /m);
     assert.match(said, /^\d+ frames, 1 join$/m);
     assert.match(said, /^performance\.glb has \d+ bytes$/m);
     assert.ok(statSync(`${folder}/reach.tar`).size > 1024);
-    assert.ok(!existsSync(`${folder}/reach.tar.part`));
   } finally {
     rmSync(folder, { recursive: true });
   }
