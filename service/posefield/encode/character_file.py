@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from posefield.encode import glb_buffer, glb_character
+from posefield.encode import glb
 from posefield.encode.body.skinned_mesh import SkinnedMesh
 from posefield.encode.character import character
 from posefield.encode.character.character import CharacterRig
-from posefield.encode.glb_buffer import CORNERS, VERTICES, GlbBuffer
+from posefield.encode.glb import CORNERS, VERTICES, GlbBuffer
 from posefield.motion.skeleton import Skeleton
 
 
@@ -30,13 +30,13 @@ def _character_glb(rig: CharacterRig, identity: str) -> bytes:
     mesh, store = rig.body, GlbBuffer()
     assert mesh is not None
     resting = character.rest_pose(rig, rig.skeleton.offsets[None])
-    parts = glb_character.character_parts(store, resting)
+    parts = glb.character_parts(store, resting)
     (body,) = parts["meshes"]
     (primitive,) = body["primitives"]
     primitive["attributes"] |= _anchors(store, rig.skeleton, mesh)
     coarse = primitive | {"indices": _coarse_corners(store, mesh)}
     parts["meshes"].append({"name": "BodyCoarse", "primitives": [coarse]})
-    return glb_buffer.container({"asset": glb_buffer.asset({"model": identity}), **parts}, store)
+    return glb.container({"asset": glb.asset({"model": identity}), **parts}, store)
 
 
 def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[str, int]:
@@ -51,6 +51,6 @@ def _anchors(store: GlbBuffer, skeleton: Skeleton, mesh: SkinnedMesh) -> dict[st
 
 
 def _coarse_corners(store: GlbBuffer, mesh: SkinnedMesh) -> int:
-    kind = glb_buffer.smallest_index_type(len(mesh.points))
+    kind = glb.smallest_index_type(len(mesh.points))
     corners = mesh.coarse.reshape(-1).astype(kind)
     return store.add(corners, "SCALAR", target=CORNERS)

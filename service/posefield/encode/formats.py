@@ -12,15 +12,13 @@ from posefield.common import cancellation
 from posefield.common.errors import InvalidField
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode import glb
-from posefield.encode.files import axis_conversion
+from posefield.encode.files import file_convention
 from posefield.encode.files import file_convention as conventions
 from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention
 from posefield.encode.files.media_types import ARROW, JSON, MSGPACK, NPZ, Format, by_extension
 from posefield.encode.tables import clip_tables, crowd_tables, model_tables
 from posefield.encode.tables import table as tables
-from posefield.encode.tables.arrow import arrow_stream
-from posefield.encode.tables.npz import npz_table
-from posefield.encode.tables.table import Table
+from posefield.encode.tables.table import Table, arrow_stream, npz_table
 from posefield.encode.usd_crowd import STREAMS
 from posefield.motion import bvh_writer
 from posefield.motion.crowd_clip import CrowdClip, CrowdPoses
@@ -30,7 +28,7 @@ from posefield.question.results import ClipAnswer, PoseAnswer, SampledClip, Sigm
 
 def bvh(answer: SampledClip, convention: Convention) -> bytes:
     """Return a BVH file; the format cannot store provenance, unit or up axis."""
-    clip = axis_conversion.convert_clip(Convention(1.0, convention.up), answer.clip)
+    clip = file_convention.convert_clip(Convention(1.0, convention.up), answer.clip)
     return bvh_writer.dumps(clip, metres_per_unit=convention.metres_per_unit)
 
 

@@ -14,6 +14,16 @@ FACTS = {
 }
 
 
+LAYOUTS = [
+    ("usd", "references"),
+    ("usd", "scenegraph"),
+    ("usda", "flatten"),
+    ("usdc", "references"),
+    ("usdz", "scenegraph"),
+    ("usdz", "flatten"),
+]
+"""Extensions and instancings of crowds: each of them, each kind of file, and no more."""
+STREAMED = [layout for layout in LAYOUTS if layout[0] != "usd"]
 CURVES = ("jawOpen", "Sole Left", "眉")
 """Names of curves that USD does not allow for prims."""
 

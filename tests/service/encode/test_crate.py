@@ -7,7 +7,6 @@ import pytest
 from pxr import Sdf, Vt
 
 from posefield.encode.usd_layers import (
-    crate_samples,
     crate_sections,
     crate_template,
     layer_content,
@@ -137,8 +136,8 @@ def test_equal_samples_are_written_once_as_usd_does(repeat):
 
 def test_samples_of_equal_sums_are_told_apart():
     rows = np.array([[1, 2, 3], [3, 2, 1], [2, 2, 2], [1, 2, 3]], np.float32)[:, None]
-    assert crate_samples.repeated_rows(rows).tolist() == [0, 1, 2, 0]
-    assert crate_samples.repeated_rows(rows[:3]) is None
+    assert crate_sections.repeated_rows(rows).tolist() == [0, 1, 2, 0]
+    assert crate_sections.repeated_rows(rows[:3]) is None
 
 
 def test_samples_are_aligned():
@@ -202,10 +201,10 @@ def test_places_are_found_in_layers_of_one_sample_alone():
         parts = crate_sections.split_crate(layer_metadata.crate_bytes(Plain().layer(made)))
         rows = made.samples["rotations"][:1]
         values[frames] = parts.values
-        assert (crate_samples.find_place(parts.values, rows) is not None) == (frames == 1)
+        assert (crate_sections.find_place(parts.values, rows) is not None) == (frames == 1)
     rows = content(1, 1).samples["rotations"]
-    assert crate_samples.find_place(values[1], rows + 1) is None
-    place = crate_samples.find_place(values[1], rows)
+    assert crate_sections.find_place(values[1], rows + 1) is None
+    place = crate_sections.find_place(values[1], rows)
     moved = bytearray(values[1])
     moved[place.jump] += 1
-    assert crate_samples.find_place(bytes(moved), rows) is None
+    assert crate_sections.find_place(bytes(moved), rows) is None

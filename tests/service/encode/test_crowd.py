@@ -7,7 +7,6 @@ import pytest
 from pxr import Kind, Usd, UsdGeom, UsdSkel
 from usd_checks import defects
 
-from posefield.encode import usd_crowd
 from posefield.encode.character import joint_names
 from posefield.encode.usd_crowd import crowd_writer
 
@@ -29,14 +28,19 @@ def clip(made):
     return crowds.crowd(conftest.person(), made, MOTION)
 
 
-@pytest.fixture(scope="module", params=usd_crowd.INSTANCING)
-def instancing(request):
+@pytest.fixture(scope="module", params=crowds.LAYOUTS, ids="-".join)
+def layout(request):
     return request.param
 
 
-@pytest.fixture(scope="module", params=usd_crowd.FILES)
-def path(request, made, instancing, tmp_path_factory):
-    found = tmp_path_factory.mktemp(instancing) / f"crowd.{request.param}"
+@pytest.fixture(scope="module")
+def instancing(layout):
+    return layout[1]
+
+
+@pytest.fixture(scope="module")
+def path(layout, made, instancing, tmp_path_factory):
+    found = tmp_path_factory.mktemp(instancing) / f"crowd.{layout[0]}"
     crowd_writer.write(crowds.crowd(conftest.person(), made, MOTION), found, instancing)
     return found
 

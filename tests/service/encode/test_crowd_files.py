@@ -23,13 +23,13 @@ from posefield.common.errors import FileError, InvalidField
 from posefield.encode import usd_crowd
 from posefield.encode.character import character
 from posefield.encode.usd import character_prims
-from posefield.encode.usd_crowd import crowd_motions, crowd_package, crowd_writer
+from posefield.encode.usd_crowd import crowd_package, crowd_scene, crowd_writer
 from posefield.encode.usd_layers import layer_metadata
 from posefield.motion.skeleton import Skeleton
 
 FOLDER = Path(__file__).parent
 MOTION = [0, 1, 2, 3, 4, 2, 0, 1]
-LAYOUTS = [(e, i) for e in usd_crowd.FILES for i in usd_crowd.INSTANCING]
+LAYOUTS = crowds.LAYOUTS
 
 
 @pytest.fixture(scope="module")
@@ -107,8 +107,7 @@ def test_an_archive_is_stored_aligned_and_begins_with_what_is_opened(instancing,
         assert (info.compressionMethod, info.encrypted) == (0, False)
 
 
-@pytest.mark.parametrize("ending", usd_crowd.STREAMS)
-@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
+@pytest.mark.parametrize(("ending", "instancing"), crowds.STREAMED)
 def test_a_stream_has_the_bytes_of_the_file(ending, instancing, clip, made, tmp_path, temporary):
     path = tmp_path / f"crowd.{ending}"
     crowd_writer.write(clip, path, instancing)
@@ -236,8 +235,8 @@ def test_a_client_that_goes_away_leaves_no_file(ending, instancing, clip, tempor
 
 def motion_layers(clip):
     rig = character.rig(clip.skeleton)
-    each = crowd_motions.all_motions(clip, rig)
-    return [crowd_motions.motion_layer(clip, rig, motion.samples) for motion in each]
+    each = crowd_scene.all_motions(clip, rig)
+    return [crowd_scene.motion_layer(clip, rig, motion.samples) for motion in each]
 
 
 def test_motions_are_the_same_in_batches_of_any_size(clip, made):

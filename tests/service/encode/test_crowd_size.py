@@ -5,7 +5,7 @@ import crowds
 import pytest
 
 from posefield.encode.character import character
-from posefield.encode.usd_crowd import INSTANCING, STREAMS, crowd_size, crowd_writer
+from posefield.encode.usd_crowd import crowd_size, crowd_writer
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 
 # Characters, motions, frames.
@@ -13,8 +13,7 @@ SHAPES = [(1, 1, 2), (1, 1, 200), (40, 2, 2), (12, 12, 30)]
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("instancing", INSTANCING)
-@pytest.mark.parametrize("ending", STREAMS)
+@pytest.mark.parametrize(("ending", "instancing"), crowds.STREAMED)
 def test_a_file_is_no_larger_than_said(ending, instancing, shape):
     characters, motions, frames = shape
     person = conftest.person()

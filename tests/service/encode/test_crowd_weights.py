@@ -11,7 +11,7 @@ from pxr import Usd, UsdSkel
 from posefield.encode import usd_crowd
 from posefield.encode.character import character, joint_names
 from posefield.encode.tables import crowd_tables
-from posefield.encode.usd_crowd import STREAMS, crowd_package, crowd_size, crowd_writer
+from posefield.encode.usd_crowd import crowd_package, crowd_size, crowd_writer
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 
 MOTION, FRAMES = [0, 1, 2, 0], 7
@@ -48,8 +48,7 @@ def weights(query):
     return np.array([query.ComputeBlendShapeWeights(frame) for frame in range(FRAMES)])
 
 
-@pytest.mark.parametrize("ending", usd_crowd.FILES)
-@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
+@pytest.mark.parametrize(("ending", "instancing"), crowds.LAYOUTS)
 def test_usd_skel_reads_the_weights_of_every_character(made, ending, instancing, tmp_path):
     _kept, found = skinned(written(made, tmp_path / f"crowd.{ending}", instancing))
     assert len(found) == len(MOTION)
@@ -105,8 +104,7 @@ def test_npz_has_the_curves_of_every_character(made, tmp_path):
         assert not [name for name in found.files if "curve" in name]
 
 
-@pytest.mark.parametrize("instancing", usd_crowd.INSTANCING)
-@pytest.mark.parametrize("ending", STREAMS)
+@pytest.mark.parametrize(("ending", "instancing"), crowds.STREAMED)
 def test_a_file_with_many_curves_is_no_larger_than_said(made, ending, instancing):
     person = conftest.person()
     for curves, characters, frames in ((52, 3, 200), (52, 40, 2)):

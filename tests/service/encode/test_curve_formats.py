@@ -48,8 +48,9 @@ def stage(content, path):
     return Usd.Stage.Open(str(path))
 
 
-@pytest.mark.parametrize("ending", ["usda", "usdc", "usdz"])
-@pytest.mark.parametrize("body", ["mannequin", "bones", "none"])
+@pytest.mark.parametrize(
+    ("ending", "body"), [("usda", "mannequin"), ("usdc", "bones"), ("usdz", "none")]
+)
 def test_usd_skel_reads_the_weights_of_every_frame(face, ending, body, tmp_path):
     said = replace(METRES, body=body)
     opened = stage(CLIP_ENCODERS[ending].encode(face, said), tmp_path / f"face.{ending}")
@@ -80,8 +81,13 @@ SPARSE = 0.9
 """Share of the frames whose curves rest at zero, as a face's do."""
 
 
-@pytest.mark.parametrize("count", [1, 3, 4, 11, 15, 16, 52])
-@pytest.mark.parametrize("kind", ["busy", "resting", "tiny", "few"])
+@pytest.mark.parametrize(
+    ("count", "kind"),
+    [
+        *((count, "busy") for count in (1, 3, 4, 15, 16)),
+        *((52, kind) for kind in ("resting", "tiny", "few")),
+    ],
+)
 def test_templates_write_the_weights_as_usd_core_does(walk, count, kind):
     for seed in range(4):
         own = curves(count, len(walk.clip), seed)

@@ -6,7 +6,7 @@ import numpy as np
 import orjson
 import pytest
 
-from posefield.encode.files import axis_conversion, file_convention
+from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import CENTIMETRES, METRES, Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.motion import skeleton
@@ -144,7 +144,7 @@ def test_bvh_with_z_up_is_read_back_as_the_same_clip(walk, unit):
 
 def test_at_rest_a_character_stands_whichever_axis_is_up(walk):
     """Its front is -Y where Z is up."""
-    found = axis_conversion.convert_clip(STAGE, walk.clip).skeleton
+    found = file_convention.convert_clip(STAGE, walk.clip).skeleton
     meant = on_stage(walk.clip.skeleton.offsets)
     np.testing.assert_allclose(found.offsets, meant, atol=1e-12)
     np.testing.assert_allclose(

@@ -16,9 +16,7 @@ from posefield.common import cancellation
 from posefield.common.cancellation import Cancellation, Cancelled
 from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.encode.tables import table as tables
-from posefield.encode.tables.arrow import arrow_stream
-from posefield.encode.tables.npz import npz_archive, npz_table
-from posefield.encode.tables.table import Table
+from posefield.encode.tables.table import Table, arrow_stream, npz_archive, npz_table
 from posefield.question.results import PoseAnswer
 
 ROWS = ("times", "rotations", "root_position")

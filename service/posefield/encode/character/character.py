@@ -12,11 +12,10 @@ from posefield.common.units import Floats, Singles
 from posefield.encode.body.bone_boxes import bones_body
 from posefield.encode.body.mannequin import mannequin
 from posefield.encode.body.skinned_mesh import SkinnedMesh
-from posefield.encode.character import body_bounds, joint_names
+from posefield.encode.character import extent, joint_names
 from posefield.encode.character import extent as reach
-from posefield.encode.character.body_bounds import BodyBounds
-from posefield.encode.character.extent import PointTree
-from posefield.encode.files import axis_conversion
+from posefield.encode.character.extent import BodyBounds, PointTree
+from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.motion.skeleton import Skeleton
 from posefield.question.body_kind import DEFAULT_BODY, BodyKind
@@ -75,7 +74,7 @@ def _cached_rig(key: _SkeletonKey, kind: BodyKind) -> CharacterRig:
     joints = key.skeleton
     paths = joint_names.joint_paths(joint_names.legal_names(joints.names), joints.parents)
     body = _mesh(joints, kind)
-    bounds = body_bounds.bounds(joints, body)
+    bounds = extent.bounds(joints, body)
     return CharacterRig(joints, joints.names, paths, reach.tree(joints), body, bounds)
 
 
@@ -118,7 +117,7 @@ def character_arrays(rest: RestPose, convention: Convention) -> dict[str, npt.ND
     local = _translation_matrices(convention, rest.offsets)
     made: dict[str, npt.NDArray[Any]] = {"bind": bind, "rest": local}
     if rest.rig.body is not None:
-        points = axis_conversion.convert_positions(convention, rest.points)
+        points = file_convention.convert_positions(convention, rest.points)
         made["points"] = points
     return made
 
@@ -138,7 +137,7 @@ def _translation_matrices(convention: Convention, metres: Floats) -> Floats:
     """Return translation matrices (..., 4, 4) for row vectors, as in USD."""
     made = np.zeros((*metres.shape[:-1], 4, 4))
     made[...] = np.eye(4)
-    made[..., 3, :3] = axis_conversion.rounded_lengths(
-        convention, axis_conversion.convert_positions(convention, metres)
+    made[..., 3, :3] = file_convention.rounded_lengths(
+        convention, file_convention.convert_positions(convention, metres)
     )
     return made

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from posefield.common.units import Floats
-from posefield.encode.files import axis_conversion
+from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.tables import table as tables
 from posefield.encode.tables.table import Table
@@ -32,7 +32,7 @@ def clip_json(answer: SampledClip, convention: Convention) -> bytes:
     Numbers are rounded, unlike those of `table`, since the time to write JSON grows with its
     digits.
     """
-    clip = axis_conversion.convert_clip(convention, answer.clip)
+    clip = file_convention.convert_clip(convention, answer.clip)
     content = {
         "units": unit_names(convention),
         "names": clip.skeleton.names,
@@ -49,7 +49,7 @@ def clip_json(answer: SampledClip, convention: Convention) -> bytes:
 
 def table(answer: SampledClip, convention: Convention) -> Table:
     """Return the clip as a table of one row per frame; bone offsets are one array for all."""
-    clip = axis_conversion.convert_clip(convention, answer.clip)
+    clip = file_convention.convert_clip(convention, answer.clip)
     numbers = {name: tables.as_float32(values) for name, values in motion_arrays(clip).items()}
     fixed = {"bone_offsets": numbers.pop("bone_offsets")}
     facts = {

@@ -13,7 +13,7 @@ from posefield.encode.body import skinned_mesh
 from posefield.encode.body.skinned_mesh import FULL_WEIGHT, SkinnedMesh
 from posefield.encode.character import joint_names
 from posefield.encode.character.character import CharacterArrays, CharacterRig
-from posefield.encode.files import axis_conversion
+from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.usd_layers import prim_specs
 from posefield.encode.usd_layers.layer_content import WEIGHTS
@@ -64,7 +64,7 @@ def _mesh_arrays(rig: CharacterRig, convention: Convention) -> _MeshArrays | Non
 
 
 def _normals(mesh: SkinnedMesh, convention: Convention) -> Singles:
-    return np.ascontiguousarray(axis_conversion.convert_directions(convention, mesh.normals))
+    return np.ascontiguousarray(file_convention.convert_directions(convention, mesh.normals))
 
 
 def root(parent: Any, name: str, rig: CharacterRig, convention: Convention = METRES) -> Any:

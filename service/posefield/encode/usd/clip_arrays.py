@@ -12,7 +12,7 @@ from posefield.common.units import Singles
 from posefield.encode.character import animation_samples, character, extent
 from posefield.encode.character.animation_samples import AnimationSamples
 from posefield.encode.character.character import CharacterRig
-from posefield.encode.files import axis_conversion
+from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd_layers.layer_content import WEIGHTS, Array, LayerContent, Samples
 from posefield.motion.clip import Clip
@@ -43,7 +43,7 @@ def arrays_with_character(
         rest = character.rest_pose(rig, made.offsets)
         boxes = extent.bounding_boxes(rig.tree, made, rest.radii)
         values = character.character_arrays(rest, convention)
-        values["extent"] = axis_conversion.convert_box(convention, boxes).astype(np.float32)
+        values["extent"] = file_convention.convert_box(convention, boxes).astype(np.float32)
         for index, samples in enumerate(_samples(made, some, convention)):
             own = {name: array[index] for name, array in values.items()}
             yield _clip_arrays(rig, some[index], samples, own)
@@ -99,8 +99,8 @@ def _clip_arrays(
 def _samples(
     made: AnimationSamples, answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[Samples]:
-    translations = axis_conversion.convert_positions(convention, made.translations)
-    rotations = axis_conversion.convert_rotations(convention, made.rotations)
+    translations = file_convention.convert_positions(convention, made.translations)
+    rotations = file_convention.convert_rotations(convention, made.rotations)
     for answer, (first, last) in zip(answers, pairwise(made.starts), strict=True):
         own = {"translations": translations[first:last], "rotations": rotations[first:last]}
         yield own | _weights(answer.clip)

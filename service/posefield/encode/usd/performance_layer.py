@@ -23,7 +23,7 @@ from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import character_prims, clip_arrays, usd_clip
 from posefield.encode.usd.clip_arrays import ClipArrays
 from posefield.encode.usd.usd_clip import ClipLayerBuilder
-from posefield.encode.usd_layers import custom_data, layer_metadata, prim_specs
+from posefield.encode.usd_layers import layer_metadata, prim_specs
 from posefield.encode.usd_layers.prim_specs import ValueTypes
 from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 
@@ -78,7 +78,7 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
         scope = prim_specs.prim(made, PERFORMANCE.name, "Scope")
         facts = answer.trust.facts()
         segments = facts.pop("segments")
-        scope.customData = {layer_metadata.FACTS: custom_data.usd_dictionary(facts)}
+        scope.customData = {layer_metadata.FACTS: layer_metadata.usd_dictionary(facts)}
         group = prim_specs.prim(scope, SEGMENTS.name, "Scope")
         for index, own in enumerate(segments):
             _add_segment(group, index, own, arrays)
@@ -89,7 +89,7 @@ def _layer(answer: PerformanceAnswer, convention: Convention) -> Any:
 def _add_segment(group: Any, index: int, facts: dict[str, Any], arrays: ClipArrays) -> None:
     paths = arrays.rig.paths
     prim = character_prims.animation(group, segment_name(index), paths, arrays.curves)
-    prim.customData = {layer_metadata.FACTS: custom_data.usd_dictionary(facts)}
+    prim.customData = {layer_metadata.FACTS: layer_metadata.usd_dictionary(facts)}
     frames = segment_frames(facts["begins"], facts["ends"], arrays.rate, arrays.content.frames)
     rows = slice(frames.start, frames.stop)
     samples = {name: whole[rows] for name, whole in arrays.content.samples.items()}

@@ -21,7 +21,7 @@ from pxr import Sdf
 from posefield.common.units import Floats
 from posefield.encode.character import character, joint_names
 from posefield.encode.character import extent as reach
-from posefield.encode.files import axis_conversion
+from posefield.encode.files import file_convention
 from posefield.encode.files.file_convention import Convention
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_layers import layer_metadata, prim_specs
@@ -116,5 +116,5 @@ def _asset_path(file: str) -> str:
 def _library_box(rest: Floats, entries: Sequence[LibraryEntry], convention: Convention) -> Floats:
     """Return the lowest and highest corner (2, 3) of the rest pose and all clips."""
     boxes = np.array([(each.low, each.high) for each in entries]).reshape(-1, 2, 3)
-    every = np.concatenate([rest[None], axis_conversion.convert_box(convention, boxes)])
+    every = np.concatenate([rest[None], file_convention.convert_box(convention, boxes)])
     return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Scene hierarchy of a crowd: prototype, characters and their placement, without the motions.
+"""Scene hierarchy of a crowd: prototype, characters and their placement, motions and extents.
 
     /Crowd                      assembly, the default prim
       Prototype                 class, the one character that all others refer to
@@ -7,21 +7,132 @@
       Characters                group
         c00000                  component: refers to the prototype, is placed, bound to a motion
 
-USD never frees a name, so names are few and constant.
+USD never frees a name, so names are few and constant. Extents and levels of detail are written
+after all motions are computed, as opinions, so that they may be in a layer of their own.
+
+All characters share one body mesh, made for the model's own bones, while each has its own bone
+offsets.
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
 from pxr import Sdf, Vt
 
 from posefield.common import cancellation
-from posefield.common.units import Indices
-from posefield.encode.usd_layers import custom_data, layer_metadata, prim_specs
+from posefield.common.units import Floats, Indices, Singles
+from posefield.encode.character import animation_samples, extent
+from posefield.encode.character.animation_samples import AnimationSamples
+from posefield.encode.character.character import CharacterRig
+from posefield.encode.files.file_convention import METRES
+from posefield.encode.usd.usd_animation import AnimationLayerBuilder
+from posefield.encode.usd_layers import crate_template, layer_metadata, prim_specs
+from posefield.encode.usd_layers.layer_content import WEIGHTS, LayerContent, Samples
 from posefield.encode.usd_layers.prim_specs import ValueTypes
 from posefield.motion import quat
-from posefield.motion.crowd_clip import CrowdClip, Placement
+from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
+
+CORNERS = np.array(list(product((False, True), repeat=3)))
+
+
+def motion_boxes(rig: CharacterRig, made: AnimationSamples) -> Floats:
+    """Return the lowest and highest corner (M, 2, 3) of each motion in its own frame, m."""
+    return extent.bounding_boxes(rig.tree, made, rig.bounds.radii_of_others(made.offsets))
+
+
+def placed_box(placement: Placement, boxes: Floats) -> Floats:
+    """Return a box (2, 3) in the world, m, around boxes (N, 2, 3) of placed characters."""
+    low, high = boxes[:, 0], boxes[:, 1]
+    corners = np.where(CORNERS, high[:, None], low[:, None])
+    moved = quat.rotate(placement.turns[:, None], corners) + placement.positions[:, None]
+    return extent.enlarged_box(moved.min(axis=(0, 1)), moved.max(axis=(0, 1)))
+
+
+@dataclass(frozen=True)
+class MotionSummary:
+    """Facts of a motion that are kept after it is written.
+
+    box (2, 3): lowest and highest corner, m. levels: level of detail by the first frame at which it
+    applies.
+    """
+
+    box: Floats
+    levels: dict[int, int]
+
+
+@dataclass(frozen=True)
+class MotionSamples:
+    """Samples of one motion and its note.
+
+    samples: translations (F, J, 3), rotations (F, J, 4), real part last, and weights of the curves
+    (F, C) where the crowd has some.
+    """
+
+    samples: Samples
+    summary: MotionSummary
+
+
+def motion_count(crowd: CrowdClip) -> int:
+    """Return the number of motions that the characters play."""
+    return int(crowd.motion.max()) + 1
+
+
+def all_motions(crowd: CrowdClip, rig: CharacterRig) -> Iterator[MotionSamples]:
+    """Yield the motions in order; at most one batch is in memory at a time.
+
+    Raises ValueError for a number of motions other than the characters play, and for other shapes.
+    """
+    made = 0
+    # The variable of a for loop would keep each batch in memory while the next is computed.
+    for motion in chain.from_iterable(map(partial(_batch_motions, crowd, rig), crowd.batches)):
+        made += 1
+        yield motion
+    if made != motion_count(crowd):
+        raise ValueError(f"{made} motions, expected {motion_count(crowd)}")
+
+
+def motion_layer(crowd: CrowdClip, rig: CharacterRig, samples: Samples) -> bytes:
+    """Return the binary layer of one motion of a crowd."""
+    author = AnimationLayerBuilder(crowd.rate, METRES, rig.paths, crowd.curves)
+    return crate_template.usdc(author, LayerContent(samples, {}, {}))
+
+
+def _batch_motions(crowd: CrowdClip, rig: CharacterRig, batch: Motions) -> Iterator[MotionSamples]:
+    expected = (crowd.frames, len(crowd.skeleton), 4)
+    if batch.rotations.shape[1:] != expected:
+        raise ValueError(f"motions of {batch.rotations.shape[1:]}, expected {expected}")
+    weights = _weights(crowd, batch)
+    made = animation_samples.from_motions(batch)
+    boxes = motion_boxes(rig, made)
+    for index, (part, box) in enumerate(zip(made.parts(1), boxes, strict=True)):
+        samples = {"translations": part.translations, "rotations": part.rotations}
+        if weights is not None:
+            samples[WEIGHTS] = weights[index]
+        yield MotionSamples(samples, MotionSummary(box, _level_changes(batch.levels[index])))
+
+
+def _weights(crowd: CrowdClip, batch: Motions) -> Singles | None:
+    """Return the weights (M, F, C) of the curves of a batch; None for a crowd without curves.
+
+    Raises ValueError for other curves than the crowd names.
+    """
+    found = () if batch.curves is None else batch.curves.shape
+    expected = (len(batch), crowd.frames, len(crowd.curves)) if crowd.curves else ()
+    if found != expected:
+        raise ValueError(f"curves of {found}, expected {expected}")
+    # USD's deduplication does not distinguish -0 from 0.
+    return None if batch.curves is None else batch.curves + np.float32(0.0)
+
+
+def _level_changes(levels: Indices) -> dict[int, int]:
+    """Return the level by frame, for the first frame and each frame at which it changes."""
+    changed = np.flatnonzero(np.diff(levels, prepend=levels[0] - 1))
+    return {int(frame): int(levels[frame]) for frame in changed}
+
 
 ROOT = Sdf.Path("/Crowd")
 PROTOTYPE = ROOT.AppendChild("Prototype")
@@ -55,7 +166,7 @@ def new_layer(crowd: CrowdClip, form: str) -> Any:
     """
     made = Sdf.Layer.CreateAnonymous(f"crowd.{form}")
     layer_metadata.set_layer_metadata(made, ROOT.name, crowd.frames, crowd.rate)
-    made.customLayerData = {layer_metadata.FACTS: custom_data.usd_dictionary(crowd.facts)}
+    made.customLayerData = {layer_metadata.FACTS: layer_metadata.usd_dictionary(crowd.facts)}
     prim_specs.prim(made, ROOT.name, "Xform", MODEL_SCHEMAS).kind = "assembly"
     return made
 
@@ -117,3 +228,63 @@ def _matrices(placement: Placement) -> Any:
     matrices[:, :3, :3] = quat.rotate(placement.turns[:, None], np.eye(3))
     matrices[:, 3, :3] = placement.positions
     return Vt.Matrix4dArray.FromNumpy(matrices)
+
+
+LEVEL_ATTRIBUTE = "posefield:level"
+"""Level of detail of a motion's frames, with a time sample at each change."""
+
+
+def add_to_references(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+    """Add extents to a crowd of references to one prototype, and levels to its motions."""
+    _placed_boxes(made, crowd, notes)
+    every = _enlarged_float32([note.box for note in notes])
+    with Sdf.ChangeBlock():
+        for path in (PROTOTYPE, PROTOTYPE.AppendChild("Body")):
+            _set_extent(made, path, every)
+        for index, note in enumerate(notes):
+            _set_levels(made, MOTIONS.AppendChild(motion_name(index)), note)
+
+
+def add_to_flat(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+    """Add extents and levels to a crowd in which each character has its own body and motion."""
+    _placed_boxes(made, crowd, notes)
+    for some in character_blocks(crowd):
+        with Sdf.ChangeBlock():
+            for index, played in zip(some, crowd.motion[some], strict=True):
+                path = character_path(index)
+                _set_extent(made, path.AppendChild("Body"), notes[played].box)
+                _set_levels(made, path.AppendChild(character_name(index)), notes[played])
+
+
+def _placed_boxes(made: Any, crowd: CrowdClip, notes: Sequence[MotionSummary]) -> None:
+    own = np.array([notes[played].box for played in crowd.motion])
+    for some in character_blocks(crowd):
+        with Sdf.ChangeBlock():
+            for index in some:
+                _set_extent(made, character_path(index), own[index])
+    whole = prim_specs.float3_array(placed_box(crowd.placement, own))
+    for path in (ROOT, CHARACTERS):
+        _attribute(made, path.AppendProperty("extentsHint"), ValueTypes.Float3Array).default = whole
+
+
+def _enlarged_float32(boxes: Sequence[Floats]) -> Floats:
+    corners = np.array(boxes)
+    return np.stack([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
+
+
+def _set_extent(made: Any, prim: Any, box: Floats) -> None:
+    _attribute(
+        made, prim.AppendProperty("extent"), ValueTypes.Float3Array
+    ).default = prim_specs.float3_array(box)
+
+
+def _set_levels(made: Any, prim: Any, note: MotionSummary) -> None:
+    path = prim.AppendProperty(LEVEL_ATTRIBUTE)
+    _attribute(made, path, ValueTypes.Int).custom = True
+    for frame, level in note.levels.items():
+        made.SetTimeSample(path, frame, level)
+
+
+def _attribute(made: Any, path: Any, kind: Any) -> Any:
+    found = made.GetAttributeAtPath(path)
+    return found or Sdf.CreatePrimAttributeInLayer(made, path, kind)

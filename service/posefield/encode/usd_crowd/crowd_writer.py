@@ -15,11 +15,10 @@ from posefield.encode.usd_crowd import (
     FILES,
     INSTANCING,
     STREAMS,
-    crowd_motions,
     crowd_package,
+    crowd_scene,
     crowd_size,
     encoding_process,
-    single_layer,
 )
 from posefield.encode.usd_crowd.crowd_size import CrowdCounts
 from posefield.encode.usd_layers import layer_metadata
@@ -70,7 +69,7 @@ def stream(
     counts = CrowdCounts(
         len(crowd.skeleton),
         len(crowd.motion),
-        crowd_motions.motion_count(crowd),
+        crowd_scene.motion_count(crowd),
         crowd.frames,
         character.body_size(crowd.skeleton, body),
         len(crowd.curves),
@@ -109,8 +108,8 @@ def _form(ending: str) -> str:
 
 def _layer(crowd: CrowdClip, form: str, instancing: str, body: BodyKind) -> Any:
     if instancing == "flatten":
-        return single_layer.flat_layer(crowd, form, body)
-    return single_layer.referencing_layer(crowd, form, instancing == "scenegraph", body)
+        return crowd_package.flat_layer(crowd, form, body)
+    return crowd_package.referencing_layer(crowd, form, instancing == "scenegraph", body)
 
 
 def _single_file(crowd: CrowdClip, ending: str, instancing: str, body: BodyKind) -> Iterator[bytes]:
@@ -130,7 +129,7 @@ def _usdz(crowd: CrowdClip, instancing: str, body: BodyKind) -> Iterator[bytes]:
 def _flat_usdz(crowd: CrowdClip, body: BodyKind) -> Iterator[bytes]:
     with TemporaryDirectory() as name:
         path = Path(name, "crowd.usdc")
-        layer_metadata.export_layer(single_layer.flat_layer(crowd, "usdc", body), path)
+        layer_metadata.export_layer(crowd_package.flat_layer(crowd, "usdc", body), path)
         yield from zip_archive.zip_chunks([zip_archive.member_of_file(path.name, path)])
 
 

@@ -13,9 +13,8 @@ from ctypes import c_float
 from dataclasses import dataclass
 from typing import Any
 
-from posefield.encode.usd_layers import custom_data
-from posefield.encode.usd_layers.crate_sections import CrateParts, CrateSection
-from posefield.encode.usd_layers.crate_values import (
+from posefield.encode.usd_layers import layer_metadata
+from posefield.encode.usd_layers.crate_sections import (
     ALIGNMENT,
     ARRAY,
     COUNT,
@@ -26,8 +25,10 @@ from posefield.encode.usd_layers.crate_values import (
     JUMP,
     LONG_INTEGER,
     TYPES,
+    CrateParts,
+    CrateSection,
 )
-from posefield.encode.usd_layers.custom_data import FactList
+from posefield.encode.usd_layers.layer_metadata import FactList
 
 MARK = 1.2345678901234567e-300
 """The number that usd-core writes in place of the facts; float32 does not hold it."""
@@ -124,7 +125,7 @@ class _FactWriter:
         for name in names:
             fact, index = facts[name], self._string(name)
             if type(fact) not in PLAIN:
-                fact = custom_data.plain_fact(fact)
+                fact = layer_metadata.plain_fact(fact)
             if type(fact) is str:
                 self.values += INLINE_FACT.pack(index, JUMP.size, TEXT | self._string(fact))
             elif type(fact) is float:

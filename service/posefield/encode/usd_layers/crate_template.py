@@ -12,17 +12,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from posefield.encode.usd_layers import (
-    crate_facts,
-    crate_samples,
-    crate_sections,
-    layer_content,
-    layer_metadata,
-)
+from posefield.encode.usd_layers import crate_facts, crate_sections, layer_content, layer_metadata
 from posefield.encode.usd_layers.crate_facts import FactPlace
-from posefield.encode.usd_layers.crate_samples import SamplesPlace
-from posefield.encode.usd_layers.crate_sections import CrateParts
-from posefield.encode.usd_layers.crate_values import DOUBLE
+from posefield.encode.usd_layers.crate_sections import DOUBLE, CrateParts, SamplesPlace
 from posefield.encode.usd_layers.layer_content import LayerBuilder, LayerContent, LayerPattern
 
 MARKED_RATE, MARKED_END = 1.2345678901234567e-301, 1.2345678901234567e-302
@@ -56,7 +48,7 @@ class CrateTemplate:
         for name, at in self.values.items():
             value = content.values[name].tobytes()
             made[at : at + len(value)] = value
-        times = crate_samples.add_times(made, content.frames)
+        times = crate_sections.add_times(made, content.frames)
         for name, place in self.samples.items():
             place.add(made, times, content.samples[name])
         sections = self.parts.sections
@@ -111,7 +103,7 @@ def _located(parts: CrateParts, marks: LayerContent, facts: bool) -> CrateTempla
     values = parts.values
     rate, end = (values.find(DOUBLE.pack(mark)) for mark in (MARKED_RATE, MARKED_END))
     places = {name: values.find(value.tobytes()) for name, value in marks.values.items()}
-    samples = {n: crate_samples.find_place(values, row) for n, row in marks.samples.items()}
+    samples = {n: crate_sections.find_place(values, row) for n, row in marks.samples.items()}
     place = crate_facts.find_place(parts) if facts else None
     if min(rate, end, *places.values()) < 0 or (facts and place is None):
         return None

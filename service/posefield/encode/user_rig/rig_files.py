@@ -58,9 +58,9 @@ class RigTarget:
         if rig.format != "USD":
             return cls(rig, path.name, reference, None)
         # usd-core takes 0.12 CPU seconds to import.
-        from posefield.encode.user_rig import rig_stage_reader
+        from posefield.encode.user_rig import rig_layer
 
-        stage = rig_stage_reader.read_stage(path, rig.skeleton_path, rig.joint_paths)
+        stage = rig_layer.read_stage(path, rig.skeleton_path, rig.joint_paths)
         return cls(rig, path.name, reference, stage)
 
     def check(self, question: ClipQuestion | PerformanceQuestion) -> None:

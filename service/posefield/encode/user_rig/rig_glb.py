@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from posefield.common.units import Floats, Singles
-from posefield.encode import glb_buffer
-from posefield.encode.glb_buffer import GlbBuffer
+from posefield.encode import glb
+from posefield.encode.glb import GlbBuffer
 from posefield.motion import quat
 from posefield.question.results import SampledClip
 from posefield.rigs.joints.rest_joints import RestJoints
@@ -28,12 +28,12 @@ def animation_glb(answer: SampledClip, rest: RestJoints) -> bytes:
     """
     store = GlbBuffer()
     document = {
-        "asset": glb_buffer.asset(answer.trust.facts()),
+        "asset": glb.asset(answer.trust.facts()),
         "scene": 0,
         **_nodes(rest),
         "animations": [_animation(store, answer, rest)],
     }
-    return glb_buffer.container(document, store)
+    return glb.container(document, store)
 
 
 def _nodes(rest: RestJoints) -> dict[str, Any]:
