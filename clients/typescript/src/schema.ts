@@ -858,7 +858,7 @@ export interface components {
          */
         Up: "y" | "z" | null;
         /**
-         * @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone; null for `mannequin`. Formats without a body refuse it.
+         * @description Body in USD and glTF files. `mannequin` is a person fitted to joints with the roles of one and `bones` on others, `bones` one box for each bone, `none` the skeleton alone; null for `mannequin`. Formats without a body refuse it.
          * @default null
          * @enum {string|null}
          */
@@ -2948,14 +2948,14 @@ export interface components {
         unit: "m" | "cm";
         /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
         up: "y" | "z";
-        /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
+        /** @description Body in USD and glTF files. `mannequin` is a person fitted to joints with the roles of one and `bones` on others, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
         body: "none" | "mannequin" | "bones";
         /**
          * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
          * @example hero
          */
         character: components["schemas"]["CharacterName"];
-        /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
+        /** @description Body of all characters: `mannequin` is a person fitted to joints with the roles of one and `bones` on others, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
         crowdBody: "none" | "mannequin" | "bones";
         /** @description Policy for controls without similar captured clips and for targets out of reach: respond, respond with warnings, or refuse. */
         extrapolate: components["schemas"]["Extrapolate"];
@@ -3640,7 +3640,7 @@ export interface operations {
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
                 up?: components["parameters"]["up"];
-                /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
+                /** @description Body in USD and glTF files. `mannequin` is a person fitted to joints with the roles of one and `bones` on others, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
                 body?: components["parameters"]["body"];
                 /**
                  * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
@@ -3799,7 +3799,7 @@ export interface operations {
                 unit?: components["parameters"]["unit"];
                 /** @description Up axis of the file. Default: the format's usual axis. With `z`, a character that faces straight ahead faces -Y. glTF accepts only `y`. */
                 up?: components["parameters"]["up"];
-                /** @description Body in USD and glTF files. `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
+                /** @description Body in USD and glTF files. `mannequin` is a person fitted to joints with the roles of one and `bones` on others, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. Formats without a body refuse it. */
                 body?: components["parameters"]["body"];
                 /**
                  * @description Character of a user that moves, one of `/v1/characters`. USD files refer to its file by a reference and copy neither bind pose nor skin; glTF files have the animation of its nodes alone; other formats have its skeleton. Default: the character of the model. Since 4.3.0.
@@ -3992,7 +3992,7 @@ export interface operations {
                 detail?: components["parameters"]["walkDetail"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
-                /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
+                /** @description Body of all characters: `mannequin` is a person fitted to joints with the roles of one and `bones` on others, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
                 body?: components["parameters"]["crowdBody"];
             };
             header?: {
@@ -4104,7 +4104,7 @@ export interface operations {
                 detail?: components["parameters"]["walkDetail"];
                 /** @description Sharing of data between characters. `references` opens in every application that composes layers. `scenegraph` is the cheapest to draw, but Blender imports it as one character at rest. `flatten` writes one layer for readers without composition, such as three.js. */
                 instancing?: components["parameters"]["instancing"];
-                /** @description Body of all characters: `mannequin` is a figure made from the skeleton's proportions, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
+                /** @description Body of all characters: `mannequin` is a person fitted to joints with the roles of one and `bones` on others, `bones` one box for each bone, `none` the skeleton alone. Default: `mannequin`. */
                 body?: components["parameters"]["crowdBody"];
             };
             header?: {

@@ -1,1 +1,1 @@
-"""Body that a skeleton without a mesh wears: one skinned mesh, made from its own proportions."""
+"""Body that a skeleton without a mesh wears: one skinned mesh, fitted to its bones."""
