@@ -26,10 +26,7 @@ from posefield.batch import chunks, layouts, manifest, process_pool, run
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.process_pool import Runner
-from posefield.batch.rows import row_sources
-from posefield.batch.rows.row_query import RowSource
-from posefield.batch.rows.row_sources import SourceOptions
-from posefield.batch.rows.row_validation import Defaults
+from posefield.batch.rows import Defaults, RowSource, SourceOptions, open_source
 from posefield.batch.target import open_target
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.registry import model_loading
@@ -56,7 +53,7 @@ class Bench:
         """Clips at points sampled from a model's controls."""
         content = model.read_bytes()
         opened = model_loading.open_model(model.stem, model, content)
-        source = row_sources.open_source(SourceOptions(sample=clips), Defaults(form), opened)
+        source = open_source(SourceOptions(sample=clips), Defaults(form), opened)
         digest = hashlib.sha256(content).hexdigest()
         job = ExportJob(opened.identity, digest, source.digest, "folder", 1)
         return cls(WorkerInput(job, content, ""), source)
@@ -184,8 +181,9 @@ def _stages(bench: Bench, form: str) -> dict[str, float]:
             "file system": lambda: target.write(named),
         }
         taken = {name: _median(stage) / STAGED for name, stage in stages.items()}
-    reading = _median(lambda: (bench.source.survey(), sum(1 for _ in bench.source.rows())))
-    return {"queries, looked at and read": reading / bench.source.survey().total, **taken}
+    source = bench.source
+    reading = _median(lambda: (run.check_rows(source, False), sum(1 for _ in source.rows())))
+    return {"queries, looked at and read": reading / sum(1 for _ in source.rows()), **taken}
 
 
 def _entries(asked: list, answers: list, files: list[bytes]) -> list[bytes]:

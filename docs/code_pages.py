@@ -13,7 +13,7 @@ from data_pages import contract, schema_text
 from page_parts import choices, code, page, table
 
 from posefield import cli
-from posefield.batch.rows.columns import OPTION_KINDS
+from posefield.batch.tables import OPTION_COLUMNS
 from posefield.http.api.settings import PREFIX, Settings
 from posefield.http.pages import static_page
 from posefield.question import text_decoding
@@ -51,12 +51,12 @@ Errors are `application/problem+json` (RFC 9457). `type` is stable: `urn:posefie
 the name below. `detail` is for people, `errors` names each field at fault by `parameter` or
 `pointer`. A running service shows this page at `/problems`."""
 COLUMNS_INTRO = """\
-A table of queries for `posefield export` is CSV, JSON Lines or Parquet. It has one column for
-each control of the model, by the control's name, and may have one for each label set besides
+A table of queries for `posefield export` is CSV, JSON Lines or Parquet. It may have
+one column for each control of the model, by the control's name, one for each label set besides
 `performer`, by its name, such as `style`, and the columns below. A label is a name, or weights
-of several: `angry:0.7,happy:0.3`. A name of a control may state the unit: `speed [m/s]`. An
-empty cell takes the option of the command. The table of a training is described by its
-[recipe](../guide/recipes.md#the-table)."""
+of several: `angry:0.7,happy:0.3`. A name of a control may state the unit: `speed [m/s]`. A
+control without a value is left open, as over HTTP; any other empty cell takes the option of the
+command. The table of a training is described by its [recipe](../guide/recipes.md#the-table)."""
 MANIFEST_INTRO = """\
 Each line of `manifest.jsonl` is one clip. The fields from `model` on are those of the answer's
 [trust](../guide/answers.md)."""
@@ -191,7 +191,7 @@ def columns() -> str:
     """Return the page of the columns of tables, and of the fields of a manifest."""
     known = {each.field: each for each in text_decoding.parameters(NamedClipQuestion).values()}
     rows = []
-    for name in OPTION_KINDS:
+    for name in OPTION_COLUMNS:
         parameter = known.get(name)
         text = COLUMN_HELP.get(name) or (parameter.help if parameter else "")
         if not text:
@@ -199,7 +199,7 @@ def columns() -> str:
         rows.append((code(name), text))
     return page(
         "Table columns",
-        "service/posefield/batch/rows/columns.py and api/openapi.yaml",
+        "service/posefield/batch/tables.py and api/openapi.yaml",
         [COLUMNS_INTRO, table(("column", "meaning"), rows), "## Manifest", *_manifest_parts()],
     )
 

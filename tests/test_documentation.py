@@ -14,7 +14,7 @@ import yaml
 from document_pages import DOCS, ROOT
 
 from posefield import cli
-from posefield.batch.rows.columns import OPTION_KINDS
+from posefield.batch.tables import OPTION_COLUMNS
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api.problems import PROBLEM_KINDS
 from posefield.http.api.settings import PREFIX, Settings
@@ -177,7 +177,7 @@ def test_every_recipe_key_is_described():
 
 def test_every_table_column_is_described():
     text = page("reference/table-columns.md")
-    assert undescribed(OPTION_KINDS, text) == []
+    assert undescribed(OPTION_COLUMNS, text) == []
     contract = yaml.safe_load((ROOT / "api/openapi.yaml").read_text())
     entry = contract["components"]["schemas"]["ManifestEntry"]["properties"]
     assert undescribed(entry, text.partition("## Manifest")[2]) == []

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from posefield.batch import layouts
 from posefield.batch.job import WorkerInput
-from posefield.batch.rows.row_query import ClipQuery
+from posefield.batch.rows import ClipQuery
 from posefield.common.errors import InvalidField
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.model_file.model_card import ModelCard

@@ -14,7 +14,7 @@ import orjson
 
 from posefield.batch import layouts, manifest
 from posefield.batch.job import ExportJob, WorkerInput
-from posefield.batch.rows.row_query import RowFault
+from posefield.batch.rows import RowFault
 from posefield.batch.target import (
     STATE_FOLDER,
     ExportTarget,

@@ -12,7 +12,7 @@ from posefield.batch import character_clips, checkpoint, layouts, manifest
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.job import WorkerInput, open_model_of
 from posefield.batch.layouts import ClipFile, Layout, ManifestEntry, path
-from posefield.batch.rows.row_query import MAX_KEPT_FAULTS, ClipQuery, RowFault
+from posefield.batch.rows import ClipQuery, RowFault
 from posefield.batch.target import open_target
 from posefield.common.errors import InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
@@ -20,6 +20,8 @@ from posefield.question.results import ClipAnswer
 from posefield.synthesis import clips, frame_times
 from posefield.synthesis.synthesizer import Synthesizer
 
+MAX_KEPT_FAULTS = 20
+"""Number of invalid rows that a message names."""
 CLIPS, POSES = 128, 8192
 """Largest number of clips and poses in memory, except for a single longer clip: enough for files to
 share data.
@@ -68,10 +70,10 @@ def invalid_rows_error(count: int, faults: Sequence[RowFault]) -> InvalidField:
 
     count: their number. faults: the known ones, at least the first KEPT.
     """
-    said = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:MAX_KEPT_FAULTS])
+    listed = "".join(f"\n  {fault.place}: {fault.message}" for fault in faults[:MAX_KEPT_FAULTS])
     more = f"\n  and {count - MAX_KEPT_FAULTS} more" if count > MAX_KEPT_FAULTS else ""
     found = f"rows that cannot be answered: {count} (--skip-errors leaves them out)"
-    return InvalidField("queries", f"{found}:{said}{more}")
+    return InvalidField("queries", f"{found}:{listed}{more}")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from posefield.batch import manifest
-from posefield.batch.rows.row_query import ClipQuery
+from posefield.batch.rows import ClipQuery
 from posefield.characters.delivery import Delivery
 from posefield.common import cancellation
 from posefield.common.errors import QueryError

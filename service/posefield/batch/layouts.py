@@ -11,7 +11,7 @@ from typing import Any
 
 from posefield.batch import manifest
 from posefield.batch.job import ExportJob, WorkerInput, open_model_of
-from posefield.batch.rows.row_query import ClipQuery
+from posefield.batch.rows import ClipQuery
 from posefield.batch.target import ExportTarget, WrittenFile, put_file
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean

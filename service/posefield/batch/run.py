@@ -3,23 +3,18 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import Any, Protocol
 
 from posefield.batch import character_clips, checkpoint, chunks, layouts, process_pool
 from posefield.batch.checkpoint import ChunkResult
-from posefield.batch.chunks import ChunkTask
+from posefield.batch.chunks import MAX_KEPT_FAULTS, ChunkTask
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.process_pool import Runner
-from posefield.batch.rows.row_query import (
-    MAX_KEPT_FAULTS,
-    ClipQuery,
-    RowFault,
-    RowSource,
-    RowSurvey,
-)
+from posefield.batch.rows import ClipQuery, RowFault, RowSource
 from posefield.batch.target import STATE_FOLDER, ExportTarget, open_target
-from posefield.common.errors import FileError, InvalidField
+from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
 
 
@@ -106,7 +101,7 @@ def run(
         monitor.note(f"{work.target}/{path}: missing or damaged; the export is made again")
         checkpoint.reopen(target, work.job)
     source = _checked_source(work, source)
-    total = _row_count(source, work.skip)
+    total = check_rows(source, work.skip)
     return _resume(_ShardRun(work, source, target, shard, total, verify), monitor, runner)
 
 
@@ -173,17 +168,32 @@ def _resume(run: _ShardRun, monitor: RunMonitor, runner: Runner) -> RunOutcome:
     return RunOutcome(rows, done, None if done < rows else run.finish())
 
 
-def _row_count(source: RowSource, skip: bool) -> int:
-    """Return the number of rows.
+def check_rows(source: RowSource, skip: bool) -> int:
+    """Return the number of rows, each checked, without keeping any.
 
     Raises InvalidField for faults that are not skipped, or if all rows are faults.
     """
-    found = source.survey()
-    if found.faulty and not skip:
-        raise chunks.invalid_rows_error(found.faulty, found.faults)
-    if found.faulty == found.total:
+    total, faulty, faults = 0, 0, list[RowFault]()
+    for row in source.rows():
+        total += 1
+        fault = row if isinstance(row, RowFault) else _fault(source, row)
+        if fault is not None:
+            faulty += 1
+            faults += [fault] if faulty <= MAX_KEPT_FAULTS else []
+    if faulty and not skip:
+        raise chunks.invalid_rows_error(faulty, faults)
+    if faulty == total:
         raise InvalidField("queries", "no row that can be answered, expected at least one")
-    return found.total
+    return total
+
+
+def _fault(source: RowSource, query: ClipQuery) -> RowFault | None:
+    """Return the fault of a row without an answer, as far as it is known; None for another."""
+    try:
+        source.check(query)
+    except QueryError as fault:
+        return RowFault(query.place, str(fault))
+    return None
 
 
 def _checked_source(work: WorkerInput, source: RowSource) -> RowSource:
@@ -191,11 +201,11 @@ def _checked_source(work: WorkerInput, source: RowSource) -> RowSource:
     job = work.job
     if work.character is not None:
         character_clips.check_layout(job.layout)
-        return _CheckedSource(source, job, lambda job, query: character_clips.misfit(work, query))
+        return _CheckedSource(source, lambda query: character_clips.misfit(work, query))
     misfit = layouts.find_layout(job.layout).misfit
     if misfit is None and (job.unit or job.up or job.body):
         misfit = _convention_misfit
-    return source if misfit is None else _CheckedSource(source, job, misfit)
+    return source if misfit is None else _CheckedSource(source, partial(misfit, job))
 
 
 def _convention_misfit(job: ExportJob, query: ClipQuery) -> str | None:
@@ -212,8 +222,7 @@ class _CheckedSource:
     """Rows of a source; those for which `misfit` returns a reason are faults."""
 
     source: RowSource
-    job: ExportJob
-    misfit: Callable[[ExportJob, ClipQuery], str | None]
+    misfit: Callable[[ClipQuery], str | None]
 
     @property
     def digest(self) -> str:
@@ -222,14 +231,8 @@ class _CheckedSource:
 
     def rows(self) -> Iterator[ClipQuery | RowFault]:
         for row in self.source.rows():
-            why = self.misfit(self.job, row) if isinstance(row, ClipQuery) else None
+            why = self.misfit(row) if isinstance(row, ClipQuery) else None
             yield row if why is None else RowFault(row.place, why)
 
-    def survey(self) -> RowSurvey:
-        total, faulty, faults = 0, 0, []
-        for row in self.rows():
-            total += 1
-            if isinstance(row, RowFault):
-                faulty += 1
-                faults += [row] if faulty <= MAX_KEPT_FAULTS else []
-        return RowSurvey(total, faulty, tuple(faults))
+    def check(self, query: ClipQuery) -> None:
+        self.source.check(query)

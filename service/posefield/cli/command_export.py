@@ -14,13 +14,11 @@ import typer
 
 from posefield.batch import character_clips, layouts, process_pool, run, target
 from posefield.batch.checkpoint import ChunkResult
+from posefield.batch.chunks import MAX_KEPT_FAULTS
 from posefield.batch.job import ExportJob, WorkerInput
 from posefield.batch.layouts import LAYOUTS
 from posefield.batch.process_pool import Runner
-from posefield.batch.rows import row_sources
-from posefield.batch.rows.row_query import MAX_KEPT_FAULTS
-from posefield.batch.rows.row_sources import SourceOptions
-from posefield.batch.rows.row_validation import Defaults
+from posefield.batch.rows import Defaults, SourceOptions, open_source
 from posefield.batch.run import RunOutcome, Shard
 from posefield.common.errors import InvalidField
 from posefield.console.arguments import Json, ModelPath
@@ -116,7 +114,7 @@ def export(
     content = checked_file.read(model)
     opened = model_loading.open_model(model.stem, model, content)
     asked = SourceOptions(rows.table, tuple(rows.grid or ()), rows.sample, rows.method, rows.seed)
-    source = row_sources.open_source(asked, Defaults(rows.form, question), opened)
+    source = open_source(asked, Defaults(rows.form, question), opened)
     found = layouts.find_layout(execution.layout)
     character = _character(output, execution)
     if character is not None:

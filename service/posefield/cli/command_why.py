@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from posefield.batch.rows import row_sources
+from posefield.batch import rows
 from posefield.console.arguments import Json, ModelPath, open_model
 from posefield.console.late_progress import LateProgress
 from posefield.console.output import as_json, print_warnings
@@ -44,7 +44,7 @@ def suggest(
 ) -> None:
     """List the clips to capture next, the most useful first."""
     synthesizer = open_model(model)
-    given = row_sources.points(candidates, synthesizer) if candidates else None
+    given = rows.points(candidates, synthesizer) if candidates else None
     with LateProgress("points", question.count) as bar:
         found = find_suggestions(synthesizer, question, given, bar.update)
     as_text = model_tables.suggestions_text

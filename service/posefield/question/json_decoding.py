@@ -56,11 +56,19 @@ def _decode_plain(form: type[Question], content: bytes, fault: msgspec.Validatio
         # msgspec reports a wrong type before it parses the rest, which may be invalid JSON.
         raise _form_error(form, str(fault), None) from None
     if "out of range" not in said:
-        try:
-            return msgspec.convert(_with_whole_numbers(plain), form)
-        except msgspec.ValidationError as refused:
-            said = str(refused)
+        return convert_question(form, plain)
     raise _form_error(form, said, plain) from None
+
+
+def convert_question(form: type[Question], plain: Any) -> Question:
+    """Return the query of a body's plain value, in which 1.0 equals 1.
+
+    Raises FormError as `decode_question` does.
+    """
+    try:
+        return msgspec.convert(_with_whole_numbers(plain), form)
+    except msgspec.ValidationError as fault:
+        raise _form_error(form, str(fault), plain) from None
 
 
 def _form_error(form: Any, said: str, plain: Any) -> FormError:

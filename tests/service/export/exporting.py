@@ -6,7 +6,7 @@ from dataclasses import replace
 import orjson
 
 from posefield.batch.job import ExportJob, WorkerInput
-from posefield.batch.rows.row_query import MAX_KEPT_FAULTS, ClipQuery, RowFault, RowSurvey
+from posefield.batch.rows import ClipQuery
 from posefield.question.motion_question import ClipQuestion
 
 CONTROLS = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
@@ -19,12 +19,11 @@ class Listed:
         self.listed = list(rows)
         self.digest = hashlib.sha256(repr(self.listed).encode()).hexdigest()
 
-    def survey(self):
-        faults = tuple(row for row in self.listed if isinstance(row, RowFault))
-        return RowSurvey(len(self.listed), len(faults), faults[:MAX_KEPT_FAULTS])
-
     def rows(self):
         return iter(self.listed)
+
+    def check(self, query):
+        """Accept a query: errors are those of its synthesis."""
 
 
 class Recorder:

@@ -7,26 +7,20 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from posefield.batch.rows import row_sources
-from posefield.batch.rows.columns import OPTION_KINDS
-from posefield.batch.rows.row_query import ClipQuery, RowFault
-from posefield.batch.rows.row_sources import Defaults, SourceOptions
+from posefield.batch.rows import ClipQuery, Defaults, RowFault, SourceOptions, open_source
+from posefield.batch.tables import OPTION_COLUMNS
+from posefield.common.errors import QueryError
 
 POINT = {"stature": 1.7, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
-TYPES = {"level": pa.int32(), "name": pa.string(), "format": pa.string()}
-TYPES |= {"performer": pa.string(), "extrapolate": pa.string()}
-TYPES |= {"names": pa.string(), "root": pa.string(), "loop": pa.bool_()}
-TYPES |= {"exact": pa.string(), "targets": pa.string(), "feet": pa.string()}
-TYPES |= {"take": pa.int64(), "variety": pa.float64(), "detail": pa.bool_()}
+TYPES = {"level": pa.int32(), "take": pa.int64(), "loop": pa.bool_(), "detail": pa.bool_()}
+WORDS = ("name", "format", "performer", "extrapolate", "names", "root", "exact", "targets", "feet")
+TYPES |= dict.fromkeys(WORDS, pa.string())
 
 
 def columns(rows):
-    """Controls first, then whatever any row says, in the order of messages in JSON Lines."""
-    said = dict.fromkeys(key for row in rows for key in row)
-    return [
-        *(key for key in said if key not in OPTION_KINDS),
-        *(key for key in OPTION_KINDS if key in said),
-    ]
+    """Controls first, then whatever any row says."""
+    given = dict.fromkeys(key for row in rows for key in row)
+    return sorted(given, key=lambda title: title in OPTION_COLUMNS)
 
 
 def write_csv(path: Path, rows):
@@ -44,38 +38,47 @@ def write_jsonl(path: Path, rows):
 
 
 def write_parquet(path: Path, rows):
-    made = {
+    table = {
         c: pa.array([r.get(c) for r in rows], TYPES.get(c, pa.float64())) for c in columns(rows)
     }
-    pq.write_table(pa.table(made), path)
+    pq.write_table(pa.table(table), path)
     return path
 
 
 def text(path: Path, *lines, end="\n"):
-    """CSV of lines below a heading of the controls, or as they are if the first is a heading."""
+    """File of lines."""
     path.write_text(end.join([*lines, ""]), newline="")
     return path
 
 
 def source(model, path=None, usual=None, **asked):
-    return row_sources.open_source(SourceOptions(path, **asked), usual or Defaults("usdc"), model)
+    return open_source(SourceOptions(path, **asked), usual or Defaults("usdc"), model)
 
 
 def rows(model, path=None, usual=None, **asked):
-    return list(source(model, path, usual, **asked).rows())
+    """Return the rows of a source; a fault for each that the model cannot answer."""
+    opened = source(model, path, usual, **asked)
+    return [checked(opened, row) for row in opened.rows()]
+
+
+def checked(opened, row):
+    """Return a row, or its fault."""
+    try:
+        if isinstance(row, ClipQuery):
+            opened.check(row)
+    except QueryError as fault:
+        return RowFault(row.place, str(fault))
+    return row
 
 
 def faults(model, path, usual=None):
-    """Places, without the folder, and messages of the faults; the survey's must be the same."""
-    opened = source(model, path, usual)
-    found = [row for row in opened.rows() if isinstance(row, RowFault)]
-    survey = opened.survey()
-    assert (survey.faulty, survey.faults) == (len(found), tuple(found[:20]))
+    """Return places, without the folder, and messages of the faults."""
+    found = [row for row in rows(model, path, usual) if isinstance(row, RowFault)]
     return [(fault.place.removeprefix(f"{path.parent}/"), fault.message) for fault in found]
 
 
 def asked(found):
-    """Names, formats and questions of rows that are all queries."""
+    """Return names, formats and questions of rows that are all queries."""
     found = list(found)
     assert all(isinstance(row, ClipQuery) for row in found), found
     return [(row.name, row.format, row.question) for row in found]

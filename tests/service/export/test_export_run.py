@@ -9,7 +9,7 @@ import pytest
 
 from posefield.batch import process_pool, run
 from posefield.batch.layouts import path
-from posefield.batch.rows.row_query import ClipQuery, RowFault
+from posefield.batch.rows import ClipQuery, RowFault
 from posefield.batch.run import Shard
 from posefield.common.errors import FileError, InvalidField
 from posefield.encode.formats import CLIP_ENCODERS

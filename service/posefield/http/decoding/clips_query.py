@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 
+from posefield.batch import rows
 from posefield.batch.clip_archive import ArchiveOrder
-from posefield.batch.rows import clip_names
-from posefield.batch.rows.row_query import ClipQuery
+from posefield.batch.rows import ClipQuery
 from posefield.characters import delivery
 from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.characters.delivery import Delivery
@@ -86,13 +86,13 @@ def _check_delivery(model: Synthesizer, queries: Sequence[ClipQuery], order: Del
 
 def _clip_query(index: int, asked: NamedClipQuestion, extension: str) -> ClipQuery:
     cancellation.check()
-    name = clip_names.generated_name(index) if asked.name is None else asked.name
+    name = rows.generated_name(index) if asked.name is None else asked.name
     return ClipQuery(name, extension, asked, json_pointer("clips", str(index)))
 
 
 def _check_names(queries: Sequence[ClipQuery]) -> None:
     called = [each.name for each in queries]
-    for index in clip_names.UsedNames().find_repeated(called):
+    for index in rows.repeated_names(called):
         error = InvalidField("name", f"{called[index]!r}, {REPEATED_NAME}")
         raise problems.nested_error(error, queries[index].place)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-from posefield.batch.rows import clip_names
+from posefield.batch import rows
 from posefield.batch.scripts.performance_archive import ArchivedScript, PerformanceOrder
 from posefield.characters import delivery
 from posefield.characters.character_folder import EMPTY, CharacterFolder
@@ -102,7 +102,7 @@ def _names(scripts: Sequence[NamedScript]) -> list[str]:
         f"performance-{index:06d}" if script.name is None else script.name
         for index, script in enumerate(scripts)
     ]
-    for index in clip_names.UsedNames().find_repeated(names):
+    for index in rows.repeated_names(names):
         error = InvalidField("name", f"{names[index]!r}, {REPEATED_NAME}")
         raise problems.nested_error(error, json_pointer("scripts", str(index)))
     return names

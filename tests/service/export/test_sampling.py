@@ -15,8 +15,9 @@ from rowing import rows, source
 from scipy.optimize import linprog
 from scipy.stats import chisquare, qmc
 
-from posefield.batch.rows import sampled_rows
-from posefield.batch.rows.row_blocks import BLOCK_SIZE
+from posefield.batch import sampling
+from posefield.batch.rows import RowFault
+from posefield.batch.sampling import BLOCK_SIZE
 from posefield.registry import model_registry
 
 # Chance gives less once in a million times.
@@ -27,12 +28,12 @@ ROUNDING = 1e-12
 PRINTED = """
 import hashlib, sys
 from pathlib import Path
-from posefield.batch.rows import row_sources as queries
-from posefield.registry import model_registry as library
-model = library.load([Path(sys.argv[1])]).models["labelled"]
+from posefield.batch.rows import Defaults, SourceOptions, open_source
+from posefield.registry import model_registry
+model = model_registry.load([Path(sys.argv[1])]).models["labelled"]
 for method in ("latin", "hull"):
-    asked = queries.SourceOptions(sample=5000, method=method, seed=3)
-    source = queries.open_source(asked, queries.Defaults("usdc"), model)
+    asked = SourceOptions(sample=5000, method=method, seed=3)
+    source = open_source(asked, Defaults("usdc"), model)
     found = hashlib.sha256()
     for row in source.rows():
         found.update(repr(row).encode())
@@ -51,7 +52,7 @@ def card(model):
 
 
 def drawn(card, method, count, seed=0):
-    return np.concatenate(list(sampled_rows.METHODS[method](card, count, seed)))
+    return np.concatenate(list(sampling.METHODS[method](card, count, seed)))
 
 
 def unit(card, points):
@@ -76,20 +77,20 @@ def strata_hit_once(points):
 @given(count=st.integers(1, 3000), seed=st.integers(0, 2**63))
 @settings(max_examples=60, deadline=None)
 def test_a_permutation_sends_every_place_to_another(count, seed):
-    sent = sampled_rows.permute(np.arange(count, dtype=np.uint64), count, (seed,))
+    sent = sampling.permute(np.arange(count, dtype=np.uint64), count, (seed,))
     assert sorted(sent.tolist()) == list(range(count))
 
 
 def test_a_permutation_is_the_same_whatever_is_asked_together():
     places = np.arange(1000, dtype=np.uint64)
-    whole = sampled_rows.permute(places, 1000, (5,))
-    parts = [sampled_rows.permute(part, 1000, (5,)) for part in np.array_split(places, 7)]
+    whole = sampling.permute(places, 1000, (5,))
+    parts = [sampling.permute(part, 1000, (5,)) for part in np.array_split(places, 7)]
     assert np.concatenate(parts).tolist() == whole.tolist()
 
 
 def test_permutations_of_four_are_all_equally_likely():
     places = np.arange(4, dtype=np.uint64)
-    found = Counter(tuple(sampled_rows.permute(places, 4, (s,)).tolist()) for s in range(4800))
+    found = Counter(tuple(sampling.permute(places, 4, (s,)).tolist()) for s in range(4800))
     assert chisquare([found[order] for order in permutations(range(4))]).pvalue > UNLIKELY
 
 
@@ -167,18 +168,18 @@ def test_weights_are_even_in_the_simplex(card):
     assert points.sum(1) == pytest.approx(np.ones(50_000), abs=ROUNDING)
 
 
-@pytest.mark.parametrize("method", sampled_rows.METHODS)
+@pytest.mark.parametrize("method", sampling.METHODS)
 def test_every_point_can_be_asked_for_where_it_was_sampled(model, method):
     usual = source(model, sample=1).usual
     strict = replace(usual, question=structs.replace(usual.question, extrapolate="refuse"))
-    survey = source(model, usual=strict, sample=10_000, method=method).survey()
-    assert survey.total == 10_000
+    found = rows(model, usual=strict, sample=10_000, method=method)
+    faults = [row for row in found if isinstance(row, RowFault)]
     # What was sampled has gaps, in which a box's points fall more often than those of the hull.
-    assert all("in a gap" in fault.message for fault in survey.faults)
-    assert survey.faulty < {"latin": 3_000, "hull": 300}[method]
+    assert all("in a gap" in fault.message for fault in faults)
+    assert len(faults) < {"latin": 3_000, "hull": 300}[method]
 
 
-@pytest.mark.parametrize("method", sampled_rows.METHODS)
+@pytest.mark.parametrize("method", sampling.METHODS)
 def test_seeds_differ_and_are_kept_to(card, method):
     assert np.array_equal(drawn(card, method, 100, 1), drawn(card, method, 100, 1))
     assert not np.array_equal(drawn(card, method, 100, 1), drawn(card, method, 100, 2))
@@ -206,7 +207,7 @@ def test_numbers_of_a_seed_are_those_of_ever(card):
     plain = [replace(c, minimum=0.0, maximum=1.0, values=()) for c in card.controls[:2]]
     square = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
     plain_card = replace(card, controls=tuple(plain), examples=square)
-    sent = sampled_rows.permute(np.arange(10, dtype=np.uint64), 10, (0,))
+    sent = sampling.permute(np.arange(10, dtype=np.uint64), 10, (0,))
     assert sent.tolist() == [4, 6, 8, 9, 0, 2, 5, 7, 3, 1]
     assert drawn(plain_card, "latin", 2, 7).tolist() == LATIN
     assert drawn(plain_card, "hull", 2, 7).tolist() == HULL

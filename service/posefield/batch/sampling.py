@@ -1,23 +1,21 @@
-"""Queries at random points: `--sample N --method latin --seed S`, or `--method hull`.
+"""Random points of a model's controls: `--sample N --method latin --seed S`, or `--method hull`.
 
 Equal seeds give equal points on every machine: only sums, products, sorts and NumPy's guaranteed
 random streams are used.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posefield.batch.rows.columns import Column
-from posefield.batch.rows.row_blocks import BLOCK_SIZE, RowBlock
 from posefield.common.errors import InvalidField
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
 from posefield.model_file.model_card import Control, ModelCard
 
+BLOCK_SIZE = 4096
+"""Points of a block; larger blocks are no faster."""
 MAX_POINTS = 10**9
 """Largest number of points; a greater one is considered a typing error."""
 
@@ -25,34 +23,6 @@ ROUNDS = 8
 """Rounds of the Feistel network. Four suffice for large numbers (Luby and Rackoff 1988)."""
 
 Positions = NDArray[np.uint64]
-
-
-@dataclass(frozen=True)
-class SampledPoints:
-    """Random points of a model's controls. method: a key of METHODS."""
-
-    columns: tuple[Column, ...]
-    card: ModelCard
-    method: str
-    count: int
-    seed: int
-
-    def place(self, point: int) -> str:
-        """Return the name of a point for messages."""
-        return f"sample {point}"
-
-    def spec(self) -> dict[str, Any]:
-        """Return all parameters that determine the points except the model, as plain values."""
-        return {"method": self.method, "count": self.count, "seed": self.seed}
-
-    def blocks(self) -> Iterator[RowBlock]:
-        """Yield the points in blocks, in order."""
-        readers = [column.kind.values for column in self.columns]
-        first = 0
-        for points in METHODS[self.method](self.card, self.count, self.seed):
-            numbers = range(first + 1, first + 1 + len(points))
-            yield RowBlock(first, numbers, self.columns, readers, points.T.tolist())
-            first += len(points)
 
 
 def check_sampling(method: str, count: int, seed: int) -> None:

@@ -1,0 +1,333 @@
+"""Rows of an export: clips that a table, a grid or a sampling asks for.
+
+A row is the question that its cells ask over HTTP: text is decoded as the parameters of a URL, and
+values of JSON and Parquet as a body. It leaves open the controls without a value; other fields
+without one have the defaults of the command. A table is CSV, JSON Lines or Parquet, by its ending,
+and is read anew at each pass, a few rows at a time.
+
+    source = open_source(SourceOptions(path), Defaults("usdc"), model)
+    for row in source.rows(): ...
+"""
+
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import chain, product
+from math import prod
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import orjson
+from msgspec import structs, to_builtins
+
+from posefield.batch import sampling, tables
+from posefield.batch.tables import TABLES, Column, Columns, RawRow, RawRows, shortened_text
+from posefield.common.errors import InvalidField, QueryError, UnknownFormat
+from posefield.common.name_suggestion import did_you_mean
+from posefield.common.units import Floats
+from posefield.encode.formats import CLIP_ENCODERS
+from posefield.question import json_decoding, text_decoding
+from posefield.question.motion_question import LEGAL_NAME, ClipQuestion
+from posefield.synthesis import clips
+from posefield.synthesis.synthesizer import Synthesizer
+
+MAX_POINTS = 10**9
+"""Points of the largest grid; a greater number is considered a typing error."""
+MAX_STEPS = 10**6
+"""Values of one axis of a grid, which are held in memory."""
+METHOD, SEED = "latin", 0
+REPEATED_NAME = "expected a name of its own: an earlier row has it, capitals count for nothing"
+TEXT_FIELDS = ("exact", "floor", "targets", "labels")
+"""Fields that JSON and Parquet may have as text, too."""
+
+
+@dataclass(frozen=True)
+class ClipQuery:
+    """A clip to be made.
+
+    name: of the clip. format: of its file. question: its question. place: origin in the source,
+    such as "line 7".
+    """
+
+    name: str
+    format: str
+    question: ClipQuestion
+    place: str
+
+
+@dataclass(frozen=True)
+class RowFault:
+    """An invalid row: its origin in the source, and the reason."""
+
+    place: str
+    message: str
+
+
+class RowSource(Protocol):
+    """Source of rows: the same rows in the same order at each pass."""
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all parameters and data that determine the queries, except the model."""
+
+    def rows(self) -> Iterator[ClipQuery | RowFault]:
+        """Yield the rows, decoded; FileError if the rest cannot be read or has changed."""
+
+    def check(self, query: ClipQuery) -> None:
+        """Raise the QueryError of a row without an answer, as far as it is known at once."""
+
+
+@dataclass(frozen=True)
+class SourceOptions:
+    """Source options of the command line: exactly one of path, grid and sample.
+
+    path: of a file. grid: NAME=VALUES texts. sample: number of points. method, seed: of a sampling
+    only.
+    """
+
+    path: Path | None = None
+    grid: tuple[str, ...] = ()
+    sample: int | None = None
+    method: str | None = None
+    seed: int | None = None
+
+
+@dataclass(frozen=True)
+class Defaults:
+    """Defaults of missing values; the question's controls are not used."""
+
+    format: str
+    question: ClipQuestion = field(default_factory=lambda: ClipQuestion(controls={}))
+
+
+@dataclass(frozen=True)
+class RowReader:
+    """Queries of the rows of a source, for one model.
+
+    raw: begins a pass. text: whether cells are text. named: whether rows may give names; generated
+    ones are unique. usual: defaults of missing values. digest: of the source.
+    """
+
+    raw: RawRows
+    text: bool
+    named: bool
+    model: Synthesizer
+    usual: Defaults
+    digest: str
+
+    def rows(self) -> Iterator[ClipQuery | RowFault]:
+        """Yield a query, or the fault of a row that is none or has the name of another."""
+        names: set[str] = set()
+        for index, (place, cells) in enumerate(self.raw()):
+            try:
+                if isinstance(cells, QueryError):
+                    raise cells
+                query = self._query(place, index, cells)
+                if self.named and query.name.lower() in names:
+                    raise InvalidField("name", f"{query.name!r}, {REPEATED_NAME}")
+            except QueryError as fault:
+                yield RowFault(place, str(fault))
+                continue
+            if self.named:
+                names.add(query.name.lower())
+            yield query
+
+    def check(self, query: ClipQuery) -> None:
+        """Raise the error of a question that the model cannot answer."""
+        clips.check(self.model, query.question)
+
+    def _query(self, place: str, index: int, cells: Iterable[tuple[Column, Any]]) -> ClipQuery:
+        name, extension = generated_name(index), self.usual.format
+        texts: list[tuple[str, str]] = []
+        text_fields: set[str] = set()
+        values: dict[str, Any] = {}
+        for column, cell in cells:
+            if column.field == "format":
+                extension = _checked_format(cell)
+            elif column.field == "name":
+                name = _checked_name(cell)
+            elif isinstance(cell, str) and (self.text or column.field in TEXT_FIELDS):
+                texts += column.texts(cell)
+                text_fields.add(column.field)
+            else:
+                (values.setdefault(column.group, {}) if column.group else values)[column.name] = (
+                    cell
+                )
+        question = self.usual.question
+        if texts:
+            row = text_decoding.decode_question(ClipQuestion, texts)
+            question = _merged(question, row, text_fields)
+        if values:
+            row = json_decoding.convert_question(ClipQuestion, {"controls": {}} | values)
+            question = _merged(question, row, values)
+        return ClipQuery(name, extension, question, place)
+
+
+def _merged(usual: ClipQuestion, row: ClipQuestion, fields: Iterable[str]) -> ClipQuestion:
+    """Return a question with the fields of a row that have a value; other labels remain."""
+    given = {name: getattr(row, name) for name in fields}
+    if "labels" in given:
+        given["labels"] = {**usual.labels, **row.labels}
+    return structs.replace(usual, **given)
+
+
+def _checked_format(cell: object) -> str:
+    """Return the extension of a format; UnknownFormat for any other value."""
+    if isinstance(cell, str) and cell in CLIP_ENCODERS:
+        return cell
+    hint = did_you_mean(cell, CLIP_ENCODERS) if isinstance(cell, str) else ""
+    expected = f"expected one of {', '.join(CLIP_ENCODERS)}"
+    raise UnknownFormat("format", f"{shortened_text(cell)}{hint}, {expected}")
+
+
+def _checked_name(cell: object) -> str:
+    """Return a name that is a legal file name on all systems; InvalidField for any other value."""
+    if isinstance(cell, str) and LEGAL_NAME.fullmatch(cell):
+        return cell
+    expected = "1 to 100 of the letters A to Z, digits, '.', '_' and '-', not '.' first"
+    raise InvalidField("name", f"{shortened_text(cell)}, expected {expected}")
+
+
+def generated_name(index: int) -> str:
+    """Return the name of the row with this index, from 0; it does not depend on skipped rows."""
+    return f"clip-{index:06d}"
+
+
+def repeated_names(names: Iterable[str]) -> Iterator[int]:
+    """Yield the indices of names that an earlier one equals but for capitals."""
+    seen: set[str] = set()
+    for index, name in enumerate(names):
+        if name.lower() in seen:
+            yield index
+        seen.add(name.lower())
+
+
+def open_source(asked: SourceOptions, usual: Defaults, model: Synthesizer) -> RowReader:
+    """Return the source of the queries, with defaults for missing values.
+
+    Raises InvalidField, UnknownFormat and OutsideSamples for invalid options, and FileError for a
+    file that cannot be read or has a heading that does not fit the model.
+    """
+    _check_single_source(asked)
+    _checked_format(usual.format)
+    card = model.session.card
+    middle = {control.name: control.default for control in card.controls}
+    clips.check(model, structs.replace(usual.question, controls=middle))
+    columns = tables.table_columns(card)
+    spec: dict[str, Any]
+    raw: RawRows
+    if asked.path:
+        ending = asked.path.suffix.lower()
+        if ending not in TABLES:
+            found = f"{asked.path.name!r} ends in none of {', '.join(TABLES)}"
+            raise UnknownFormat("queries", found)
+        table = tables.open_table(asked.path, columns)
+        raw, text, named = table.rows, ending == ".csv", True
+        spec = {"file": ending, "sha256": table.digest}
+    elif asked.grid:
+        axes = parse_grid(asked.grid, columns)
+        raw, text, named = partial(_grid_rows, axes), True, False
+        spec = {"grid": [[column.field, column.name, texts] for column, texts in axes]}
+    else:
+        method, seed = asked.method or METHOD, SEED if asked.seed is None else asked.seed
+        count = asked.sample or 0
+        sampling.check_sampling(method, count, seed)
+        drawn = tuple(columns[f"controls/{control.name}"] for control in card.controls)
+        raw = partial(_sampled_rows, drawn, partial(sampling.METHODS[method], card, count, seed))
+        text, named, spec = False, False, {"method": method, "count": count, "seed": seed}
+    spec |= {"format": usual.format, "usual": to_builtins(usual.question)}
+    plain = orjson.dumps(spec, option=orjson.OPT_SORT_KEYS)
+    return RowReader(raw, text, named, model, usual, hashlib.sha256(plain).hexdigest())
+
+
+def points(path: Path, model: Synthesizer) -> list[dict[str, float]]:
+    """Return the controls of each row of a file, those that it leaves open as in its clip.
+
+    Raises as `open_source` does, and InvalidField for an invalid row.
+    """
+    found = []
+    for row in open_source(SourceOptions(path), Defaults("usdc"), model).rows():
+        if isinstance(row, RowFault):
+            raise InvalidField("candidates", f"{row.place}: {row.message}")
+        try:
+            clips.check(model, row.question)
+        except QueryError as fault:
+            raise InvalidField("candidates", f"{row.place}: {fault}") from fault
+        found.append(model.question(row.question).controls)
+    return found
+
+
+def _check_single_source(asked: SourceOptions) -> None:
+    given = {
+        "a file": asked.path is not None,
+        "--grid": bool(asked.grid),
+        "--sample": asked.sample is not None,
+    }
+    if sum(given.values()) != 1:
+        found = " and ".join(name for name, there in given.items() if there) or "none"
+        raise InvalidField("queries", f"{found}, expected one of {', '.join(given)}")
+    for option in ("method", "seed"):
+        if getattr(asked, option) is not None and asked.sample is None:
+            raise InvalidField(option, "without --sample, expected with it")
+
+
+def parse_grid(texts: Sequence[str], columns: Columns) -> list[tuple[Column, list[str]]]:
+    """Return the columns of NAME=VALUES texts, and their values as text.
+
+    VALUES: one value, several separated by commas, or `start:stop:count`, both ends included.
+    Raises InvalidField for a malformed or repeated one.
+    """
+    axes = []
+    for text in texts:
+        name, _, values = text.partition("=")
+        if not values:
+            expected = "expected NAME=VALUE,VALUE or NAME=START:STOP:COUNT"
+            raise InvalidField("grid", f"{text!r}, {expected}")
+        try:
+            column = tables.find_column(columns, name.strip())
+            if column.field == "name":
+                raise ValueError(f"column {name!r}, expected one that clips may share")
+            if column.field == "targets":
+                raise ValueError(f"column {name!r}, expected one whose values have no commas")
+            steps = column.numeric and ":" in values
+            axes.append((column, _grid_steps(values) if steps else values.split(",")))
+            if "" in axes[-1][1]:
+                raise ValueError("an empty value, expected one between commas")
+        except ValueError as fault:
+            raise InvalidField("grid", f"{text!r}: {fault}") from fault
+    used = [column for column, _ in axes]
+    for index, column in enumerate(used):
+        if column in used[:index]:
+            raise InvalidField("grid", f"{column.name!r} twice, expected once")
+    count = prod(len(values) for _, values in axes)
+    if count > MAX_POINTS:
+        raise InvalidField("grid", f"{count} points, expected at most {MAX_POINTS}")
+    return axes
+
+
+def _grid_steps(text: str) -> list[str]:
+    """Return the evenly spaced numbers of start:stop:count; ValueError for malformed text."""
+    try:
+        start, stop, steps = map(text_decoding.parse_number, text.split(":"))
+    except ValueError as fault:
+        raise ValueError(f"{text!r}, expected START:STOP:COUNT") from fault
+    if not steps.is_integer() or not 2 <= steps <= MAX_STEPS:
+        raise ValueError(f"{text!r}, expected START:STOP:COUNT with a COUNT of 2 to {MAX_STEPS}")
+    return [repr(value) for value in np.linspace(start, stop, int(steps)).tolist()]
+
+
+def _grid_rows(axes: Sequence[tuple[Column, Sequence[str]]]) -> Iterator[RawRow]:
+    """Yield all combinations of the axes' values; the last axis varies fastest."""
+    columns = [column for column, _ in axes]
+    for number, texts in enumerate(product(*(values for _, values in axes)), start=1):
+        yield f"grid point {number}", zip(columns, texts, strict=True)
+
+
+def _sampled_rows(
+    columns: Sequence[Column], drawn: Callable[[], Iterator[Floats]]
+) -> Iterator[RawRow]:
+    """Yield the points of a sampling, drawn in blocks (n, d)."""
+    for number, point in enumerate(chain.from_iterable(map(np.ndarray.tolist, drawn())), start=1):
+        yield f"sample {number}", zip(columns, point, strict=True)

@@ -1,1 +1,0 @@
-"""Rows of an export: read from tables, grids or samplings, and validated."""

@@ -1,0 +1,496 @@
+"""Tests of rows: the questions that their cells ask over HTTP, and the same validation."""
+
+import contextlib
+import json
+import tracemalloc
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec import structs
+from rowing import (
+    POINT,
+    asked,
+    faults,
+    rows,
+    source,
+    text,
+    write_csv,
+    write_jsonl,
+    write_parquet,
+)
+
+from posefield.batch import run
+from posefield.batch.rows import Defaults, RowFault, generated_name, points, repeated_names
+from posefield.batch.tables import OPTION_COLUMNS
+from posefield.common.errors import FileError, InvalidField, QueryError, UnknownFormat
+from posefield.encode.formats import CLIP_ENCODERS
+from posefield.question import json_decoding, text_decoding
+from posefield.question.floor import Floor
+from posefield.question.motion_question import ClipQuestion, NamedClipQuestion, Target
+from posefield.registry import model_registry
+from posefield.synthesis import clips
+
+WRITERS = {"csv": write_csv, "jsonl": write_jsonl, "parquet": write_parquet}
+USUAL = Defaults(
+    "bvh",
+    ClipQuestion(controls={}, fps=24.0, start=0.1, end=0.9, performer="short", level=1),
+)
+# Half of the numbers can be asked for; the others lie near an edge of what can, or far outside.
+NUMBERS = st.one_of(
+    st.sampled_from([1.7, 0.9, 10.0, 1.0]),
+    st.floats(-60, 90),
+    st.sampled_from([0.0, 1.62, 1.88, 1e300, -1e9, 5e-324, None]),
+)
+ROWS = st.fixed_dictionaries(
+    # A table has a column.
+    {"turn": NUMBERS},
+    optional={
+        **{
+            name: st.one_of(st.just(value), NUMBERS)
+            for name, value in POINT.items()
+            if name != "turn"
+        },
+        "name": st.sampled_from(["a", "A", "b", "c.d", ".x", "a b", "clip-000002", None]),
+        "format": st.sampled_from(["usda", "bvh", "fbx", None]),
+        "fps": st.sampled_from([30.0, 0.5, 1000.0, 1000.1, None]),
+        "level": st.sampled_from([0, 3, 4, None]),
+        "start": st.sampled_from([0.0, 0.5, -0.1, 20.0, None]),
+        "end": st.sampled_from([0.3, 0.5, 18.5, 18.6, None]),
+        "performer": st.sampled_from(["middle", "tall", "nobody", None]),
+        "extrapolate": st.sampled_from(["warn", "refuse", "no", None]),
+        "names": st.sampled_from(["own", "vrm", None]),
+        "root": st.sampled_from(["travelling", "in_place", None]),
+        "loop": st.sampled_from([False, True, None]),
+        "take": st.sampled_from([0, 7, 999_999_999, None]),
+        "variety": st.sampled_from([0.0, 0.5, 1.0, 1.1, None]),
+        "detail": st.sampled_from([False, True, None]),
+    },
+)
+HAND = {"joint": "RightHand", "position": [-0.2, 1.1, 0.5], "at": "end"}
+TARGETS = (
+    Target("RightHand", (-0.2, 1.1, 0.5), at="end"),
+    Target("LeftFoot", (0.1, 0.0, 0.5), time=0.25),
+)
+MIXED = {"marching": 0.75, "plain": 0.25}
+# Bytes of a batch of rows, and the names of 30,000.
+BOUND = 6e6
+MANY = 30_000
+
+
+def named_model(path):
+    return model_registry.load([path]).models[path.stem]
+
+
+@pytest.fixture(scope="module")
+def model(labelled_path):
+    return named_model(labelled_path)
+
+
+@pytest.fixture(scope="module")
+def walk(walk_path):
+    """A model of a cycle whose joints have no roles."""
+    return model_registry.load([walk_path]).models["stroll"]
+
+
+@pytest.fixture(scope="module")
+def styled(styled_path):
+    return named_model(styled_path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("rows")
+
+
+def bodies(model, table, usual=USUAL):
+    """Name, format and question of each row as a body over HTTP; None for one that is refused."""
+    controls = {control.name for control in model.session.card.controls}
+    names, found = set(), []
+    for index, row in enumerate(table):
+        given = {key: value for key, value in row.items() if value is not None}
+        form, name = given.pop("format", usual.format), given.get("name", generated_name(index))
+        body = {key: value for key, value in given.items() if key not in controls}
+        body["controls"] = {key: value for key, value in given.items() if key in controls}
+        found.append(None)
+        try:
+            asked = json_decoding.decode_question(NamedClipQuestion, json.dumps(body).encode())
+        except QueryError:
+            continue
+        fields = {key: getattr(asked, key) for key in body if key != "name"}
+        question = structs.replace(usual.question, **fields)
+        if form not in CLIP_ENCODERS or name.lower() in names:
+            continue
+        names.add(name.lower())
+        with contextlib.suppress(QueryError):
+            clips.check(model, question)
+            found[-1] = (name, form, question)
+    return found
+
+
+@given(table=st.lists(ROWS, min_size=1, max_size=8))
+@settings(max_examples=60, deadline=None)
+def test_rows_of_all_files_are_bodies_over_http(model, folder, table):
+    """Oracle: decoding and validation of a request."""
+    expected = bodies(model, table)
+    for ending, write in WRITERS.items():
+        found = rows(model, write(folder / f"q.{ending}", table), USUAL)
+        plain = [None if isinstance(r, RowFault) else (r.name, r.format, r.question) for r in found]
+        assert plain == expected, ending
+
+
+@given(table=st.lists(ROWS, min_size=2, max_size=8))
+@settings(max_examples=30, deadline=None)
+def test_faults_are_named_by_line_or_row(model, folder, table):
+    found = {
+        e: faults(model, write(folder / f"f.{e}", table), USUAL) for e, write in WRITERS.items()
+    }
+    at_fault = [int(place.removeprefix("f.jsonl:")) for place, _ in found["jsonl"]]
+    assert [place for place, _ in found["csv"]] == [f"f.csv:{n + 1}" for n in at_fault]
+    assert [place for place, _ in found["parquet"]] == [f"f.parquet row {n}" for n in at_fault]
+    assert [said for _, said in found["jsonl"]] == [said for _, said in found["parquet"]]
+
+
+def test_the_oracle_refuses_some_rows(model):
+    """Negative control."""
+    table = [POINT, {**POINT, "level": 4}, {"start": 0.5, "end": 0.3}, {"fps": 60.0}]
+    assert [row is not None for row in bodies(model, table)] == [True, False, False, True]
+
+
+def test_controls_may_be_left_open(model, tmp_path):
+    """A table, a grid and a URL ask the same question; the service chooses the other controls."""
+    path = text(tmp_path / "q.csv", "turn,stature", "10,", "20,1.75")
+    url = text_decoding.decode_question(ClipQuestion, [("turn", "10")])
+    assert [row.question for row in rows(model, path)] == [
+        url,
+        ClipQuestion(controls={"turn": 20.0, "stature": 1.75}),
+    ]
+    (point,) = rows(model, grid=("turn=10",))
+    assert point.question == url
+    first, _ = points(path, model)
+    assert first == model.question(url).controls and len(first) == len(POINT)
+
+
+def test_an_export_leaves_controls_open_as_a_grid_does(posefield, labelled_path, tmp_path):
+    table = text(tmp_path / "q.csv", "turn", "10", "20")
+    outs = [tmp_path / "table", tmp_path / "grid"]
+    for out, asks in zip(outs, ([table], ["--grid", "turn=10:20:2"]), strict=True):
+        code, _, err = posefield("export", labelled_path, *asks, "-o", out, "--format", "json")
+        assert code == 0, err
+    manifests = [(out / "manifest.jsonl").read_text() for out in outs]
+    assert manifests[0] == manifests[1]
+    entry = json.loads(manifests[0].splitlines()[0])
+    assert entry["inferred"] == ["stature", "hip_height", "target_height"]
+
+
+def test_a_row_may_say_everything(model, tmp_path):
+    path = text(
+        tmp_path / "q.csv",
+        f"name,format,fps,level,start,end,performer,extrapolate,names,root,loop,{','.join(POINT)}",
+        "a.b-C_9,bvh,24,2.0,0.25,0.5,tall,refuse,vrm,in_place,False,1.7,0.9,10,1.0",
+    )
+    question = ClipQuestion(
+        controls=POINT,
+        fps=24.0,
+        extrapolate="refuse",
+        start=0.25,
+        end=0.5,
+        performer="tall",
+        level=2,
+        names="vrm",
+        root="in_place",
+        loop=False,
+    )
+    assert asked(rows(model, path)) == [("a.b-C_9", "bvh", question)]
+    (row,) = rows(model, path)
+    assert row.place == f"{tmp_path}/q.csv:2"
+
+
+def test_columns_are_the_fields_of_a_question():
+    fields = {*NamedClipQuestion.__struct_fields__, "format"}
+    assert fields - set(OPTION_COLUMNS) == {"controls", "joint_sigma", "labels"}
+    assert set(OPTION_COLUMNS) <= fields
+
+
+def test_missing_values_are_those_of_the_command(styled, model, tmp_path):
+    path = text(tmp_path / "q.csv", "turn,fps,performer", "10,,", "10,60,tall")
+    plain = structs.replace(USUAL.question, controls={"turn": 10.0})
+    assert [form for _, form, _ in asked(rows(model, path, USUAL))] == ["bvh", "bvh"]
+    assert [question for *_, question in asked(rows(model, path, USUAL))] == [
+        plain,
+        structs.replace(plain, fps=60.0, performer="tall"),
+    ]
+    usual = Defaults("usdc", ClipQuestion(controls={}, labels={"style": "sneaking"}))
+    path = text(tmp_path / "s.csv", "haste,style", "4,plain", "4,")
+    labels = [row.question.labels for row in rows(styled, path, usual)]
+    assert labels == [{"style": "plain"}, {"style": "sneaking"}]
+
+
+def test_labels_are_names_or_weights(styled, tmp_path):
+    lines = ("4,ann,plain", '4,,"marching:0.75,plain:0.25"', "4,ben,")
+    expected = [{"style": "plain"}, {"style": MIXED}, {}]
+    for title in ("style", "labels/style"):
+        found = rows(styled, text(tmp_path / "q.csv", f"haste,performer,{title}", *lines))
+        assert [row.question.labels for row in found] == expected
+    assert [row.question.performer for row in found] == ["ann", None, "ben"]
+    given = [{"style": "plain"}, {"style": MIXED}, {"style": None}, {"style": "plain:0.5,ann:0"}]
+    found = rows(styled, write_jsonl(tmp_path / "q.jsonl", given))
+    assert [row.question.labels for row in found[:3]] == expected
+    assert isinstance(found[3], RowFault)
+
+
+def test_floors_are_text_numbers_or_objects(walk, tmp_path):
+    plane = Floor(0.1, 0.0, -0.2)
+    table = text(tmp_path / "q.csv", "floor,fps", "0.2,30", '"0.1,0,-0.2",30', ",30")
+    assert [row.question.floor for row in rows(walk, table)] == [0.2, plane, 0.0]
+    given = [0.2, {"height": 0.1, "slope_x": 0, "slope_z": -0.2}, "0.1,0,-0.2", None]
+    lines = write_jsonl(tmp_path / "q.jsonl", [{"floor": floor} for floor in given])
+    assert [row.question.floor for row in rows(walk, lines)] == [0.2, plane, plane, 0.0]
+
+
+def test_targets_are_text_or_objects(model, tmp_path):
+    words = "RightHand@end:-0.2,1.1,0.5; LeftFoot@0.25:0.1,0,0.5"
+    objects = [HAND, {"joint": "LeftFoot", "position": [0.1, 0, 0.5], "time": 0.25}]
+    table = [{**POINT, "exact": "none", "targets": words}, {**POINT, "exact": None}]
+    for ending, write in WRITERS.items():
+        first, second = rows(model, write(tmp_path / f"q.{ending}", table))
+        assert (first.question.targets, first.question.exact) == (TARGETS, "none")
+        assert (second.question.targets, second.question.exact) == ((), "auto")
+    path = write_jsonl(tmp_path / "o.jsonl", [{"controls": POINT, "targets": objects}])
+    assert rows(model, path)[0].question.targets == TARGETS
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({"targets": "RightHand"}, "target: 'RightHand', expected JOINT@MOMENT:X,Y,Z"),
+        ({"targets": [{**HAND, "time": 0}]}, "targets/0: time and at, expected one of them"),
+        ({"targets": [{**HAND, "joint": "Tail"}]}, "targets/0/joint: 'Tail', expected one of Hips"),
+        ({"exact": "turn"}, "exact: 'turn' is not measured on a motion"),
+        ({"exact": 1}, "exact: Expected `str | array`, got `int` 1"),
+        ({"feet": "stand"}, "feet: 'stand', but this model's recipe names no feet"),
+        ({"floor": "1,2"}, "floor: '1,2', expected a height or height,slope_x,slope_z"),
+        ({"turn": "10"}, "controls/turn: Expected `float`, got `str` '10'"),
+        ({"turn": 10**400}, "controls/turn: Number out of range"),
+        ({"level": 0.5}, "level: Expected `int`, got `float` 0.5"),
+        ({"level": 4}, "level: 4, expected 0 to 3"),
+        ({"performer": "Tall"}, "performer: 'Tall' (did you mean 'tall'?), expected one of "),
+        ({"format": "fbx"}, "format: 'fbx', expected one of usda, usdc, usdz, "),
+        ({"format": ["usdc"]}, "format: ['usdc'], expected one of usda, "),
+        ({"name": 5}, "name: 5, expected 1 to 100 of the letters A to Z"),
+        ({"turn": 1e6}, "controls/turn: 1000000 deg, expected -14731."),
+        (
+            {"turn": 99, "extrapolate": "refuse"},
+            "controls: turn = 99 deg lies outside what was sampled, -59.2188 to 87.5 deg",
+        ),
+    ],
+)
+def test_a_row_without_an_answer_is_named(model, tmp_path, said, message):
+    path = write_jsonl(tmp_path / "q.jsonl", [POINT, {**POINT, **said}, POINT])
+    ((place, found),) = faults(model, path)
+    assert place == "q.jsonl:2"
+    assert found.startswith(message)
+
+
+@pytest.mark.parametrize("name", ["a/b", "..", ".hidden", "a b", "ä", "a:b", "x" * 101, "walk "])
+def test_a_name_that_is_no_file_name_is_named(model, tmp_path, name):
+    path = text(tmp_path / "q.csv", "turn,name", "10," + "x" * 100, f"10,{name}")
+    assert faults(model, path) == [
+        (
+            "q.csv:3",
+            f"name: {name!r}, expected 1 to 100 of the letters A to Z, digits, '.', '_' and '-', "
+            "not '.' first",
+        )
+    ]
+
+
+def test_a_repeated_name_is_named(model, tmp_path):
+    said = "expected a name of its own: an earlier row has it, capitals count for nothing"
+    names = ("walk", "run", "Walk", "", "clip-000003", "run")
+    path = text(tmp_path / "q.csv", "turn,name", *(f"10,{name}" for name in names), "x,b", "10,b")
+    *repeated, (last, _) = faults(model, path)
+    assert repeated == [
+        ("q.csv:4", f"name: 'Walk', {said}"),
+        ("q.csv:6", f"name: 'clip-000003', {said}"),
+        ("q.csv:7", f"name: 'run', {said}"),
+    ]
+    assert last == "q.csv:8"
+    assert list(repeated_names(names)) == [2, 5]
+
+
+def test_rows_at_fault_move_no_generated_name(model, tmp_path):
+    path = text(tmp_path / "q.csv", "turn", "10", "x", "10")
+    found = [getattr(row, "name", None) for row in rows(model, path)]
+    assert found == ["clip-000000", None, "clip-000002"]
+
+
+def test_faults_are_counted_and_the_first_are_named(model, tmp_path):
+    lines = [f"10,{i % 7}" for i in range(700)]
+    opened = source(model, text(tmp_path / "q.csv", "turn,level", *lines))
+    with pytest.raises(InvalidField) as caught:
+        run.check_rows(opened, skip=False)
+    head, *shown, last = str(caught.value).splitlines()
+    assert head.startswith("queries: rows that cannot be answered: 300 (--skip-errors")
+    assert shown[0] == f"  {tmp_path}/q.csv:6: level: 4, expected 0 to 3"
+    assert (len(shown), last) == (20, "  and 280 more")
+    assert run.check_rows(opened, skip=True) == 700
+
+
+def test_a_table_without_a_valid_row_is_refused(model, tmp_path):
+    for lines in (["turn"], ["turn", "x"]):
+        with pytest.raises(InvalidField, match="no row that can be answered"):
+            run.check_rows(source(model, text(tmp_path / "q.csv", *lines)), skip=True)
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"),
+    [
+        ({}, "none"),
+        ({"path": True, "grid": ("turn=1",)}, "a file and --grid"),
+        ({"grid": ("turn=1",), "sample": 0}, "--grid and --sample"),
+    ],
+)
+def test_one_source_is_expected(model, tmp_path, asked, found):
+    path = write_csv(tmp_path / "q.csv", [POINT])
+    asked = {key: path if value is True else value for key, value in asked.items()}
+    with pytest.raises(InvalidField) as caught:
+        source(model, **asked)
+    assert str(caught.value) == f"queries: {found}, expected one of a file, --grid, --sample"
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"grid": ("turn=1",), "method": "hull"}, "method: without --sample, expected with it"),
+        ({"grid": ("turn=1",), "seed": 0}, "seed: without --sample, expected with it"),
+        ({"sample": 0}, "sample: 0, expected 1 to 1000000000"),
+        ({"sample": 5, "seed": -1}, "seed: -1, expected 0 or more"),
+        ({"sample": 5, "method": "sobol"}, "method: 'sobol', expected one of latin, hull"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(model, asked, said):
+    with pytest.raises(InvalidField) as caught:
+        source(model, **asked)
+    assert str(caught.value) == said
+
+
+@pytest.mark.parametrize(
+    ("usual", "fault"),
+    [
+        (Defaults("fbx"), UnknownFormat),
+        (Defaults("usdc", ClipQuestion(controls={}, performer="nobody")), InvalidField),
+        (Defaults("usdc", ClipQuestion(controls={}, exact=("turn",))), InvalidField),
+        (Defaults("usdc", ClipQuestion(controls={}, start=2.0, end=1.0)), InvalidField),
+    ],
+)
+def test_defaults_are_checked_before_rows(model, usual, fault):
+    with pytest.raises(fault):
+        source(model, sample=1, usual=usual)
+
+
+def test_a_grid_is_the_product_in_the_order_it_is_given(model):
+    texts = ("turn=0:80:17", "stature=1.7,1.75", "performer=tall,short", "format=bvh,usda")
+    found = rows(model, grid=texts)
+    turns = np.linspace(0, 80, 17).tolist()
+    expected = list(product(turns, (1.7, 1.75), ("tall", "short"), ("bvh", "usda")))
+    assert [
+        (*row.question.controls.values(), row.question.performer, row.format) for row in found
+    ] == expected
+    assert [row.place for row in found[:2]] == ["grid point 1", "grid point 2"]
+    assert found[33].name == "clip-000033"
+
+
+def test_points_of_a_grid_without_an_answer_are_faults(model):
+    usual = Defaults("usdc", ClipQuestion(controls={}, extrapolate="refuse"))
+    middle = tuple(
+        f"{c.name}={c.default!r}" for c in model.session.card.controls if c.name != "turn"
+    )
+    found = rows(model, usual=usual, grid=(*middle, "turn=80:90:3"))
+    assert [isinstance(row, RowFault) for row in found] == [False, False, True]
+    assert found[2].message.startswith("controls: turn = 90 deg lies outside what was sampled")
+    (fault,) = rows(model, grid=("turn=x",))
+    assert (fault.place, fault.message) == ("grid point 1", "turn: 'x', expected a finite number")
+
+
+@pytest.mark.parametrize(
+    ("texts", "said"),
+    [
+        (("turn",), "'turn', expected NAME=VALUE,VALUE or NAME=START:STOP:COUNT"),
+        (("trun=1",), "'trun=1': unknown column 'trun', did you mean 'turn'?"),
+        (("turn=1", "turn [deg]=2"), "'turn' twice, expected once"),
+        (("turn [rad]=1",), "'turn [rad]=1': column 'turn' in the unit 'rad', expected deg"),
+        (("turn=1,",), "'turn=1,': an empty value, expected one between commas"),
+        (("turn=1:2",), "'turn=1:2': '1:2', expected START:STOP:COUNT"),
+        (("turn=1:2:1",), "'turn=1:2:1': '1:2:1', expected START:STOP:COUNT with a COUNT of 2 to"),
+        (("name=a",), "'name=a': column 'name', expected one that clips may share"),
+        (("targets=a",), "'targets=a': column 'targets', expected one whose values have no commas"),
+        (("turn=0:1:100000", "stature=1:2:100000"), "10000000000 points, expected at most"),
+    ],
+)
+def test_a_malformed_grid_is_refused(model, texts, said):
+    with pytest.raises(InvalidField) as caught:
+        source(model, grid=texts)
+    assert str(caught.value).startswith(f"grid: {said}")
+
+
+def test_the_digest_is_of_all_that_determines_queries(model, tmp_path):
+    path, copy = (write_csv(tmp_path / name, [POINT]) for name in ("q.csv", "copy.csv"))
+    other = write_csv(tmp_path / "other.csv", [{**POINT, "turn": 11.0}])
+    asks = [
+        *({"path": path, "usual": usual} for usual in (None, USUAL, Defaults("usda"))),
+        {"path": other},
+        *({"sample": n, "seed": s} for n, s in product((5, 6), (0, 1))),
+        {"sample": 5, "method": "hull"},
+        *({"grid": (text,)} for text in ("turn=1,2", "turn=1,3", "stature=1,2")),
+        {"path": path, "usual": Defaults("usdc", ClipQuestion(controls={}, targets=TARGETS))},
+    ]
+    found = [source(model, **ask).digest for ask in asks]
+    assert len(set(found)) == len(found)
+    assert source(model, copy).digest == found[0]
+    assert source(model, sample=5, method="latin").digest == found[4]
+
+
+def test_a_file_that_changes_while_it_is_read_is_refused(model, tmp_path):
+    path = write_csv(tmp_path / "q.csv", [POINT] * 10_000)
+    opened = source(model, path)
+    assert list(opened.rows()) == list(opened.rows())
+    under_way = opened.rows()
+    next(under_way)
+    with path.open("ab") as file:
+        file.write(b"\n")
+    with pytest.raises(FileError, match="changed while it was used"):
+        next(under_way)
+    with pytest.raises(FileError, match="changed while it was used"):
+        run.check_rows(opened, skip=True)
+
+
+def peak(work):
+    """Return the bytes that work holds at most, beyond those there were."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("kind", ["csv", "jsonl", "sample", "grid"])
+def test_rows_are_not_held(model, tmp_path, kind):
+    lines = {
+        "csv": ["turn,name", *(f"{i % 50},walk-{i}" for i in range(MANY))],
+        "jsonl": [f'{{"turn": {i % 50}}}' for i in range(MANY)],
+    }
+    asked = {"sample": {"sample": MANY}, "grid": {"grid": ("turn=0:50:200", "stature=1.7:1.8:150")}}
+    ask = asked.get(kind) or {"path": text(tmp_path / f"q.{kind}", *lines[kind])}
+    opened = source(model, **ask)
+    assert peak(lambda: sum(1 for _ in opened.rows())) < BOUND
+
+
+@pytest.mark.system
+def test_rows_that_are_held_would_be_noticed(model):
+    """Negative control of the test above."""
+    opened = source(model, sample=MANY)
+    assert peak(lambda: list(opened.rows())) > 2 * BOUND
