@@ -21,7 +21,6 @@ import crowd
 import crowd_usd
 import exact
 import export
-import export_cluster
 import export_formats
 import export_usd
 import family
@@ -56,7 +55,6 @@ def main() -> None:
         "files": [
             *export_formats.rows(made),
             *export.rows(model),
-            *export_cluster.rows(model),
         ],
         "layers": export_usd.rows(),
         "requests": [

@@ -74,6 +74,6 @@ def jobs(scheduler: str | None, count: int | None = None) -> "AbstractContextMan
         from posefield_train.parallel.jobs import ProcessJobs
 
         return nullcontext(ProcessJobs(count))
-    from posefield_train.parallel import dask_jobs
+    from posefield_train.parallel.jobs import connect
 
-    return dask_jobs.connect(scheduler)
+    return connect(scheduler)

@@ -19,10 +19,8 @@ import joblib
 import posefield
 import posefield_train
 from posefield.common import atomic_files
-from posefield_train.parallel.jobs import Arguments, Jobs
+from posefield_train.parallel.jobs import LIBRARIES, Arguments, Jobs
 
-LIBRARIES = ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn")
-"""Libraries whose versions determine a result."""
 SUFFIX = ".result"
 CHECKSUM_BYTES = hashlib.sha256().digest_size
 

@@ -1,14 +1,20 @@
 """Jobs: one function called with many arguments, in processes of this machine or on a cluster."""
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain, islice
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import joblib
 
 from posefield_train.parallel import single_thread
 
+if TYPE_CHECKING:
+    from distributed import Client
+
+LIBRARIES = ("numpy", "scipy", "onnx", "onnxruntime", "pydantic", "scikit-learn")
+"""Libraries whose versions determine a result."""
 Arguments = tuple[Any, ...]
 """Arguments of one job, after the shared ones."""
 
@@ -82,3 +88,32 @@ class ProcessJobs:
         first = list(islice(jobs, self.count or joblib.cpu_count()))
         parallel = joblib.Parallel(n_jobs=max(len(first), 1), return_as="generator_unordered")
         yield from parallel(chain(first, jobs))
+
+
+@dataclass(frozen=True)
+class DaskJobs:
+    """Workers of a Dask cluster, which must have the same versions of the libraries."""
+
+    client: "Client"
+
+    def run(
+        self,
+        function: Callable[..., Any],
+        arguments: Iterable[Arguments],
+        shared: Arguments = (),
+    ) -> Iterator[Any]:
+        """Run jobs as `Jobs.run` does; ClusterError if the cluster cannot do them."""
+        from posefield.common import dask_cluster
+
+        packages = ("posefield", *LIBRARIES)
+        return dask_cluster.results(self.client, function, shared, arguments, packages)
+
+
+@contextmanager
+def connect(address: str) -> Iterator[DaskJobs]:
+    """Connect to the scheduler at an address such as tcp://host:8786; ClusterError without one."""
+    # Imported here because distributed is an optional extra.
+    from posefield.common import dask_cluster
+
+    with dask_cluster.connect(address) as client:
+        yield DaskJobs(client)

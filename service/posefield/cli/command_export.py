@@ -148,9 +148,9 @@ def _runner(execution: RunArguments) -> AbstractContextManager[Runner]:
     if scheduler is None:
         return nullcontext(process_pool.runner(workers or process_pool.usable_cores()))
     # Imported here because distributed is an optional extra.
-    from posefield.batch import dask_export
+    from posefield.batch import dask
 
-    return dask_export.runner(scheduler)
+    return dask.runner(scheduler)
 
 
 def _character(output: str, execution: RunArguments) -> "UserCharacter | None":
