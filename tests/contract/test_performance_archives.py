@@ -9,7 +9,7 @@ import pytest
 from asking import asker, unpacked
 from bad_scripts import ABSENT, REFUSED, UNREADABLE
 
-from posefield.batch.scripts import performance_archive
+from posefield.batch import scripts
 from posefield.encode.archives import ARCHIVE_WRITERS
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.http.api.settings import Settings
@@ -185,8 +185,8 @@ def test_performances_are_made_as_they_are_requested(loaded):
         made.append(answer.trust.frames)
         return order.encode(answer, convention)
 
-    watched = performance_archive.PerformanceOrder(order.scripts, encode)
-    members = performance_archive.archive_members(watched)
+    watched = scripts.PerformanceOrder(order.scripts, encode)
+    members = scripts.archive_members(watched)
     for count in range(1, 4):
         next(members)
         assert len(made) == count

@@ -7,8 +7,9 @@ the manifest.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from posefield.batch import character_clips, checkpoint, layouts, manifest
+from posefield.batch import checkpoint, layouts, manifest
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.job import WorkerInput, open_model_of
 from posefield.batch.layouts import ClipFile, Layout, ManifestEntry, path
@@ -16,9 +17,13 @@ from posefield.batch.rows import ClipQuery, RowFault
 from posefield.batch.target import open_target
 from posefield.common.errors import InvalidField, QueryError
 from posefield.encode.formats import CLIP_ENCODERS
+from posefield.model_file.model_card import ModelCard
 from posefield.question.results import ClipAnswer
 from posefield.synthesis import clips, frame_times
 from posefield.synthesis.synthesizer import Synthesizer
+
+if TYPE_CHECKING:
+    from posefield.characters.delivery import Delivery
 
 MAX_KEPT_FAULTS = 20
 """Number of invalid rows that a message names."""
@@ -161,7 +166,7 @@ class _ChunkInProgress:
         """Return the clip of a query; raises QueryError for one that cannot be delivered."""
         if isinstance(answer, QueryError):
             raise answer
-        delivery = character_clips.delivery_of(self.work, query.format)
+        delivery = delivery_of(self.work, query.format)
         if delivery is not None:
             roles = self.synthesizer.session.card.roles
             answer = delivery.clip(answer, query.question, roles)
@@ -182,9 +187,60 @@ class _ChunkInProgress:
         return [contents[index] for index in range(len(made))]
 
     def _encoded(self, extension: str, answers: Sequence[ClipAnswer]) -> list[bytes]:
-        delivery = character_clips.delivery_of(self.work, extension)
+        delivery = delivery_of(self.work, extension)
         if delivery is not None:
             return [delivery.encode(answer) for answer in answers]
         job = self.work.job
         convention = CLIP_ENCODERS[extension].convention(job.unit, job.up, job.body)
         return self.layout.encode(extension)(answers, convention)
+
+
+CHARACTER_LAYOUT = "folder"
+"""Layout whose files refer to the file of a character."""
+CHARACTER_FOLDER = layouts.path(0, "", "").rpartition("/")[0]
+"""Folder of the first clips in a target; those of all clips are as deep."""
+
+
+def check_character_layout(layout: str) -> None:
+    """Raise InvalidField for a layout other than loose files.
+
+    Those of an archive would refer to the character from wherever they are unpacked, and a library
+    has the character of its model.
+    """
+    if layout != CHARACTER_LAYOUT:
+        raise InvalidField(
+            "layout",
+            f"{layout!r} with a character, expected {CHARACTER_LAYOUT!r}: files refer to its file",
+        )
+
+
+def check_character_model(card: ModelCard) -> None:
+    """Raise InvalidField for a model whose clips cannot be retargeted."""
+    # Modules that only exports for a character need.
+    from posefield.retarget import role_map
+
+    role_map.body_of_motion(card.skeleton, card.skeleton.offsets, card.roles)
+
+
+def delivery_of(work: WorkerInput, extension: str) -> "Delivery | None":
+    """Return the delivery to the character of an export in a format; None without a character.
+
+    Raises InvalidField for what files of the format cannot hold.
+    """
+    if work.character is None:
+        return None
+    # Modules that only exports for a character need.
+    from posefield.characters import delivery
+
+    return delivery.deliver(work.character, CLIP_ENCODERS[extension], work.job)
+
+
+def character_misfit(work: WorkerInput, query: ClipQuery) -> str | None:
+    """Return why the clip of a query cannot be delivered to the character; None if it can."""
+    try:
+        order = delivery_of(work, query.format)
+        if order is not None:
+            order.character.target.check(query.question)
+    except InvalidField as fault:
+        return str(fault)
+    return None

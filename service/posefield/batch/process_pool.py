@@ -1,4 +1,4 @@
-"""Export in this process or in a pool of processes.
+"""Work in this process or in a pool of processes: chunks of an export, and many scripts.
 
 docs/decisions/0015-process-pool.md compares the pools that were tried and gives the reason for each
 precaution around `concurrent.futures`.
@@ -9,7 +9,7 @@ import os
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -17,6 +17,7 @@ from functools import partial
 from itertools import chain, islice
 from multiprocessing import connection
 from multiprocessing.connection import Connection
+from typing import TypeVar
 
 from posefield.batch import chunks
 from posefield.batch.checkpoint import ChunkResult
@@ -28,6 +29,9 @@ from posefield.common.errors import WorkerDied
 POLL_INTERVAL = 0.1
 """Seconds between two checks for a stop."""
 RESUMES = "finished chunks are kept, and the same command resumes the export"
+
+Job = TypeVar("Job")
+Result = TypeVar("Result")
 
 Runner = Callable[[WorkerInput, Iterator[ChunkTask], StopCheck], Iterator[ChunkResult]]
 """Run tasks until none is left or `stopped()` is true; yield the part of each finished one.
@@ -181,3 +185,24 @@ def _run_task(work: WorkerInput, task: ChunkTask) -> ChunkResult | None:
         return chunks.make_chunk(work, task, _stopped)
     except ChunkAbandoned:
         return None
+
+
+def results(work: Callable[[Job], Result], jobs: Sequence[Job], workers: int) -> Iterator[Result]:
+    """Yield the result of each job in order.
+
+    work: a function that can be pickled. Raises WorkerDied if a process ended before its work.
+    """
+    if min(workers, len(jobs)) < 2:
+        yield from map(work, jobs)
+        return
+    context = multiprocessing.get_context("spawn")
+    with worker_environment():
+        pool = ProcessPoolExecutor(min(workers, len(jobs)), context)
+        futures = [pool.submit(work, job) for job in jobs]
+    try:
+        for future in futures:
+            yield future.result()
+    except BrokenProcessPool as fault:
+        raise WorkerDied("a worker process has died; the same command resumes") from fault
+    finally:
+        pool.shutdown(cancel_futures=True)

@@ -7,7 +7,7 @@ from functools import partial
 from itertools import islice
 from typing import Any, Protocol
 
-from posefield.batch import character_clips, checkpoint, chunks, layouts, process_pool
+from posefield.batch import checkpoint, chunks, layouts, process_pool
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.chunks import MAX_KEPT_FAULTS, ChunkTask
 from posefield.batch.job import ExportJob, WorkerInput
@@ -200,8 +200,8 @@ def _checked_source(work: WorkerInput, source: RowSource) -> RowSource:
     """Return the source with faults in place of the queries that the job cannot write."""
     job = work.job
     if work.character is not None:
-        character_clips.check_layout(job.layout)
-        return _CheckedSource(source, lambda query: character_clips.misfit(work, query))
+        chunks.check_character_layout(job.layout)
+        return _CheckedSource(source, lambda query: chunks.character_misfit(work, query))
     misfit = layouts.find_layout(job.layout).misfit
     if misfit is None and (job.unit or job.up or job.body):
         misfit = _convention_misfit

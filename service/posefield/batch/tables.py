@@ -109,7 +109,7 @@ def table_columns(card: ModelCard) -> Columns:
     labels = [Column(each.name, "labels") for each in card.labels if each.name != PERFORMER]
     grouped = (*controls, *labels)
     whole = {f"{column.group}/{column.name}": column for column in grouped}
-    return {column.name: column for column in grouped} | OPTION_COLUMNS | whole
+    return {**{column.name: column for column in grouped}, **OPTION_COLUMNS, **whole}
 
 
 def read_heading(columns: Columns, titles: Sequence[str]) -> tuple[Column, ...]:

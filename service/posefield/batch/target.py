@@ -1,14 +1,26 @@
-"""Targets of an export: a folder, or an object store."""
+"""Targets of an export: a folder whose files are complete or absent, or an object store.
 
+A file in a folder is written under a temporary name that is unique to the writer, and renamed: an
+aborted write leaves only such a name, and two writers of one file do not conflict.
+"""
+
+import contextlib
+import errno
 import hashlib
+import os
 import re
+import shutil
+import time
+import uuid
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 from urllib.parse import unquote, urlsplit
 
-from posefield.batch.folder_target import FolderTarget
-from posefield.common.errors import InvalidField
+from posefield.common import atomic_files
+from posefield.common.errors import FileError, InvalidField
 
 STATE_FOLDER = ".posefield"
 """Folder that a target contains only until its export is complete."""
@@ -118,3 +130,148 @@ def open_target(place: str) -> ExportTarget:
     from posefield.batch.store_target import StoreTarget
 
     return StoreTarget(place)
+
+
+TRIES, PAUSE = 40, 0.05
+"""Attempts to remove a folder that another process may still be writing to, and the pause between
+them, s.
+"""
+
+NO_HARD_LINK_ERRORS = (errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS)
+"""Errors of file systems without hard links: exFAT, and some network file systems."""
+
+
+class FolderTarget:
+    """Files under a root folder.
+
+    Paths are strings: creating a Path costs a tenth of a small write.
+    """
+
+    def __init__(self, root: str, aside: str) -> None:
+        self.root = root
+        self._temporary_path = f"{root}/{aside}/{uuid.uuid4().hex}"
+        self._made_folders: set[str] = set()
+
+    def prepare(self) -> None:
+        """Create the root and its folder for temporary files."""
+        folder = Path(self._temporary_path).parent
+        with _file_errors(str(folder)):
+            folder.mkdir(parents=True, exist_ok=True)
+
+    def write(self, files: Iterable[tuple[str, bytes]]) -> None:
+        """Write files, replacing those of the same names."""
+        for path, content in files:
+            self.stream(path, (content,))
+
+    def stream(self, path: str, pieces: Iterable[bytes]) -> None:
+        """Write one file from an iterable of pieces."""
+        whole = self._path(path)
+        with self._write_temporary(whole, pieces):
+            os.rename(self._temporary_path, whole)
+
+    def create(self, path: str, content: bytes) -> bool:
+        """Write a file if none exists; return whether it was written."""
+        whole = self._path(path)
+        with self._write_temporary(whole, (content,)):
+            try:
+                return _move_if_absent(self._temporary_path, whole)
+            finally:
+                with contextlib.suppress(FileNotFoundError):
+                    os.unlink(self._temporary_path)
+
+    def read(self, path: str) -> bytes | None:
+        """Return the content of a file; None if it does not exist."""
+        with _file_errors(self._path(path)):
+            try:
+                return Path(self.root, path).read_bytes()
+            except (FileNotFoundError, NotADirectoryError):
+                return None
+
+    def pieces(self, path: str) -> Iterator[bytes]:
+        """Yield the content of a file in pieces; none if it does not exist."""
+        with (
+            _file_errors(self._path(path)),
+            contextlib.suppress(FileNotFoundError, NotADirectoryError),
+        ):
+            yield from atomic_files.read_chunks(Path(self.root, path))
+
+    def names(self, folder: str) -> set[str]:
+        """Return the names of the files in a folder."""
+        with _file_errors(self._path(folder)):
+            try:
+                return set(os.listdir(self._path(folder)))
+            except FileNotFoundError:
+                return set()
+
+    def holds(self, path: str, size: int) -> bool:
+        """Return whether a file exists with this size; after a power cut it may be empty."""
+        try:
+            return os.stat(self._path(path)).st_size == size
+        except OSError:
+            return False
+
+    def empty(self, but: str) -> bool:
+        """Return whether the root contains nothing except, possibly, one folder."""
+        return self.names("") <= {but}
+
+    def drop(self, path: str) -> None:
+        """Remove a file, if it exists."""
+        with _file_errors(self._path(path)):
+            Path(self._path(path)).unlink(missing_ok=True)
+
+    def remove(self, folder: str) -> None:
+        """Remove a folder and its content; FileError if that fails repeatedly."""
+        for _ in range(TRIES):
+            shutil.rmtree(self._path(folder), ignore_errors=True)
+            if not Path(self.root, folder).exists():
+                return
+            time.sleep(PAUSE)
+        raise FileError(self._path(folder), "cannot be taken away")
+
+    def _path(self, path: str) -> str:
+        return f"{self.root}/{path}" if path else self.root
+
+    @contextmanager
+    def _write_temporary(self, whole: str, pieces: Iterable[bytes]) -> Iterator[None]:
+        """Write the pieces to the temporary file, which the caller renames."""
+        with _file_errors(whole):
+            self._ensure_folder(whole.rpartition("/")[0])
+            try:
+                with open(self._temporary_path, "wb") as file:
+                    file.writelines(pieces)
+                yield
+            except BaseException:
+                with contextlib.suppress(OSError):
+                    os.unlink(self._temporary_path)
+                raise
+
+    def _ensure_folder(self, folder: str) -> None:
+        if folder not in self._made_folders:
+            Path(folder).mkdir(parents=True, exist_ok=True)
+            self._made_folders.add(folder)
+
+
+def _move_if_absent(aside: str, whole: str) -> bool:
+    """Move a file to a path if none exists there; return whether it was moved."""
+    try:
+        os.link(aside, whole)
+    except FileExistsError:
+        return False
+    except OSError as fault:
+        if fault.errno not in NO_HARD_LINK_ERRORS:
+            raise
+        # Not atomic: two processes that begin at once may both find no file; the later one's
+        # remains.
+        if os.path.exists(whole):
+            return False
+        os.rename(aside, whole)
+    return True
+
+
+@contextmanager
+def _file_errors(path: str) -> Iterator[None]:
+    """Convert errors of the file system to FileError for this path."""
+    try:
+        yield
+    except OSError as fault:
+        raise FileError(path, f"cannot be written or read: {fault.strerror}") from fault

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 
 import typer
 
-from posefield.batch import character_clips, layouts, process_pool, run, target
+from posefield.batch import chunks, layouts, process_pool, run, target
 from posefield.batch.checkpoint import ChunkResult
 from posefield.batch.chunks import MAX_KEPT_FAULTS
 from posefield.batch.job import ExportJob, WorkerInput
@@ -118,7 +118,7 @@ def export(
     found = layouts.find_layout(execution.layout)
     character = _character(output, execution)
     if character is not None:
-        character_clips.check_model(opened.session.card)
+        chunks.check_character_model(opened.session.card)
     job = ExportJob(
         opened.identity,
         hashlib.sha256(content).hexdigest(),
@@ -159,9 +159,9 @@ def _character(output: str, execution: RunArguments) -> "UserCharacter | None":
         execution.refuse("with a URL as output, expected a folder: files refer to its file")
     if execution.scheduler is not None:
         execution.refuse("with --scheduler, expected --workers: the file is read on this machine")
-    character = execution.open(Path(output) / character_clips.FOLDER)
+    character = execution.open(Path(output) / chunks.CHARACTER_FOLDER)
     if character is not None:
-        character_clips.check_layout(execution.layout)
+        chunks.check_character_layout(execution.layout)
     return character
 
 

@@ -102,12 +102,12 @@ def perform(
     scripts, each has a file in the folder performances and a line in manifest.jsonl; the same
     command resumes, and makes again what changed. With --crowd they are one stage.
     """
-    from posefield.batch.scripts import script_rows
+    from posefield.batch.scripts import are_many
     from posefield.performance import composition
     from posefield.performance.script import resolve_script
 
     _check_stage(question, many)
-    if script_rows.are_many(script):
+    if are_many(script):
         perform_them = _perform_crowd if many.crowd else _perform_many
         perform_them(script, one, many, _Stage(tuple(model or ()), question, json))
         return
@@ -193,31 +193,32 @@ def _workers(many: ManyArguments) -> int:
 
 
 def _perform_many(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
-    from posefield.batch.scripts import performance_batch, script_rows
+    from posefield.batch.scripts import PerformanceBatch, read_scripts, run
     from posefield.console.progress import ProgressBar
 
     output = _output(one, "a folder for the files of many scripts")
     form = encoder_for(Path(f"performance.{many.format or 'usdc'}")).extension
-    workers, rows = _workers(many), script_rows.read_scripts(scripts)
+    workers, rows = _workers(many), read_scripts(scripts)
     whom = _batch_character(output, one)
-    batch = performance_batch.PerformanceBatch(stage.models, output, form, one.layout, whom)
+    batch = PerformanceBatch(stage.models, output, form, one.layout, whom)
     with ProgressBar("performances", len(rows), 0) as bar:
-        outcome = performance_batch.run(batch, rows, workers, bar.advance)
+        outcome = run(batch, rows, workers, bar.advance)
     typer.echo(as_json(outcome.facts(output)) if stage.json else f"{output}: {outcome.sentence}")
 
 
 def _batch_character(output: str, whom: CharacterOptions) -> "UserCharacter | None":
     """Return the character of many scripts, to which files in the folder of performances refer."""
     from posefield.batch import target
-    from posefield.batch.scripts import performance_batch
+    from posefield.batch.scripts import FOLDER
 
     if target.URL.match(output):
         whom.refuse("with the URL of an object store, expected a folder: files refer to its file")
-    return whom.open(Path(output) / performance_batch.FOLDER)
+    return whom.open(Path(output) / FOLDER)
 
 
 def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage: _Stage) -> None:
-    from posefield.batch.scripts import performance_crowd, script_rows
+    from posefield.batch import performance_crowd
+    from posefield.batch.scripts import read_scripts
     from posefield.console.progress import ProgressBar
 
     output = Path(_output(one, "a file for the crowd"))
@@ -225,7 +226,7 @@ def _perform_crowd(scripts: Path, one: OneArguments, many: ManyArguments, stage:
     if one.layout != "whole":
         raise InvalidField("layout", f"{one.layout!r} with --crowd, expected 'whole'")
     crowd = performance_crowd.from_question(stage.models, output, stage.question)
-    workers, rows = _workers(many), script_rows.read_scripts(scripts)
+    workers, rows = _workers(many), read_scripts(scripts)
     with ProgressBar("performances", len(rows), 0) as bar:
         facts = performance_crowd.write(crowd, rows, workers, bar.advance)
     typer.echo(as_json(facts) if stage.json else performance_crowd.report_text(facts))

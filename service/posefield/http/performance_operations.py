@@ -8,8 +8,8 @@ from typing import get_args
 from starlette.requests import Request
 from starlette.responses import Response
 
-from posefield.batch.scripts import performance_archive
-from posefield.batch.scripts.performance_archive import PerformanceOrder
+from posefield.batch import scripts
+from posefield.batch.scripts import PerformanceOrder
 from posefield.characters import delivery
 from posefield.characters.delivery import Delivery
 from posefield.common.errors import InvalidField
@@ -213,7 +213,7 @@ async def plan_scripts(context: Packs, content: bytes) -> PerformanceOrder:
 
 async def perform_scripts(context: Packs, order: PerformanceOrder) -> Iterator[tuple[str, bytes]]:
     """Return an iterator over the names and files of the performances, made as they are sent."""
-    return performance_archive.archive_members(order)
+    return scripts.archive_members(order)
 
 
 async def pack_performances(

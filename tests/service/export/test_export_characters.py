@@ -7,7 +7,7 @@ import exporting
 import pytest
 from user_rigs import glb_rig, stage_positions, usd_rig
 
-from posefield.batch import character_clips
+from posefield.batch import chunks
 from posefield.common.errors import InvalidField
 
 SPEEDS = (1.1, 1.3, 1.5)
@@ -144,6 +144,6 @@ def test_more_is_refused(posefield, export, rigs, tmp_path):
 
 
 def test_a_model_without_legs_is_refused(card):
-    character_clips.check_model(card)
+    chunks.check_model(card)
     with pytest.raises(InvalidField, match="no joint for leftUpperLeg"):
-        character_clips.check_model(replace(card, roles={"hips": card.roles["hips"]}))
+        chunks.check_model(replace(card, roles={"hips": card.roles["hips"]}))

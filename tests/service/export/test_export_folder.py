@@ -7,13 +7,13 @@ import sys
 
 import pytest
 
-from posefield.batch.folder_target import FolderTarget
+from posefield.batch.target import FolderTarget
 from posefield.common.errors import FileError
 
 # Dies with half a file written; what is written reaches the disk before.
 DIES = """
 import os, signal, sys
-from posefield.batch.folder_target import FolderTarget
+from posefield.batch.target import FolderTarget
 
 def pieces():
     yield bytes(1 << 20)

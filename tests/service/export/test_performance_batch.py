@@ -5,8 +5,8 @@ import json
 
 import pytest
 
-from posefield.batch.scripts import performance_batch, script_rows
-from posefield.batch.scripts.performance_batch import PerformanceBatch
+from posefield.batch import scripts as many
+from posefield.batch.scripts import PerformanceBatch
 from posefield.common.errors import FileError, InvalidField
 
 
@@ -45,9 +45,7 @@ def contents(folder):
 
 def test_each_script_has_a_file_and_a_line(batch, scripts, tmp_path):
     told = []
-    outcome = performance_batch.run(
-        batch, script_rows.read_scripts(scripts), advance=lambda count: told.append(count)
-    )
+    outcome = many.run(batch, many.read_scripts(scripts), advance=lambda count: told.append(count))
     out = tmp_path / "out"
     found = entries(out)
     assert [each["name"] for each in found] == ["slow", "000002", "take"]
@@ -70,27 +68,27 @@ def test_a_folder_of_scripts_is_the_same(batch, tmp_path, models):
     folder.mkdir()
     (folder / "slow.json").write_text(json.dumps(walk()))
     (folder / "notes.txt").write_text("no script")
-    performance_batch.run(batch, script_rows.read_scripts(folder))
+    many.run(batch, many.read_scripts(folder))
     assert [each["file"] for each in entries(tmp_path / "out")] == ["performances/slow.bvh"]
 
 
 def test_only_what_changed_is_made_again(batch, scripts, tmp_path):
     out = tmp_path / "out"
-    rows = script_rows.read_scripts(scripts)
-    performance_batch.run(batch, rows)
+    rows = many.read_scripts(scripts)
+    many.run(batch, rows)
     whole = contents(out)
-    assert performance_batch.run(batch, rows).before == 3
+    assert many.run(batch, rows).before == 3
     (out / "performances/take.bvh").unlink()
-    assert performance_batch.run(batch, rows).before == 2
+    assert many.run(batch, rows).before == 2
     assert contents(out) == whole
     scripts.write_text(lines(walk(name="slow", fps=60), walk(fps=24)))
-    outcome = performance_batch.run(batch, script_rows.read_scripts(scripts))
+    outcome = many.run(batch, many.read_scripts(scripts))
     assert outcome.before == 1 and [each["name"] for each in outcome.entries] == ["slow", "000002"]
     assert contents(out)["performances/slow.bvh"] != whole["performances/slow.bvh"]
 
 
 def test_a_stopped_run_is_resumed_with_the_same_bytes(batch, scripts, tmp_path, models):
-    rows = script_rows.read_scripts(scripts)
+    rows = many.read_scripts(scripts)
 
     class Stopped(Exception):
         pass
@@ -100,11 +98,11 @@ def test_a_stopped_run_is_resumed_with_the_same_bytes(batch, scripts, tmp_path, 
             raise Stopped
 
     with pytest.raises(Stopped):
-        performance_batch.run(batch, rows, advance=stop)
+        many.run(batch, rows, advance=stop)
     assert not (tmp_path / "out/manifest.jsonl").exists()
-    assert performance_batch.run(batch, rows).before == 2
+    assert many.run(batch, rows).before == 2
     other = PerformanceBatch((models,), str(tmp_path / "other"), "bvh")
-    performance_batch.run(other, rows)
+    many.run(other, rows)
     assert contents(tmp_path / "out") == contents(tmp_path / "other")
 
 
@@ -113,7 +111,7 @@ def test_all_scripts_at_fault_are_named_and_nothing_is_written(batch, tmp_path):
     reech = {"segments": [{"kind": "act", "model": "reech"}]}
     path.write_text(lines(walk(), reech, walk(fps=5000)))
     with pytest.raises(InvalidField) as caught:
-        performance_batch.run(batch, script_rows.read_scripts(path))
+        many.run(batch, many.read_scripts(path))
     said = str(caught.value).splitlines()
     assert said[0] == "scripts: 2 that cannot be performed:"
     assert said[1].startswith("  scripts.jsonl:2: segments/0/model: no model 'reech' (did you")
@@ -136,7 +134,7 @@ def test_scripts_that_cannot_be_read_are_named(tmp_path, text, said):
     path = tmp_path / "scripts.jsonl"
     path.write_text(text)
     with pytest.raises(InvalidField) as caught:
-        script_rows.read_scripts(path)
+        many.read_scripts(path)
     assert said in str(caught.value)
 
 
@@ -145,9 +143,9 @@ def test_a_script_whose_performance_fails_is_named_and_the_others_are_kept(batch
     lost = {"segments": [{"kind": "walk", "model": "walk"}], "name": "lost"}
     path.write_text(lines(walk(name="kept"), lost))
     with pytest.raises(InvalidField, match=r"scripts\.jsonl:2: segments/0: a walk without along"):
-        performance_batch.run(batch, script_rows.read_scripts(path))
+        many.run(batch, many.read_scripts(path))
     path.write_text(lines(walk(name="kept"), walk(name="lost")))
-    assert performance_batch.run(batch, script_rows.read_scripts(path)).before == 1
+    assert many.run(batch, many.read_scripts(path)).before == 1
 
 
 @pytest.mark.parametrize(
@@ -158,16 +156,16 @@ def test_a_target_of_something_else_is_left_alone(batch, scripts, tmp_path, file
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / file).write_text(content)
     with pytest.raises(FileError):
-        performance_batch.run(batch, script_rows.read_scripts(scripts))
+        many.run(batch, many.read_scripts(scripts))
     assert contents(tmp_path / "out") == {file: content.encode()}
 
 
 @pytest.mark.system
 def test_processes_give_the_same_bytes(batch, scripts, tmp_path, models):
-    rows = script_rows.read_scripts(scripts)
-    performance_batch.run(batch, rows)
+    rows = many.read_scripts(scripts)
+    many.run(batch, rows)
     several = PerformanceBatch((models,), str(tmp_path / "several"), "bvh")
-    performance_batch.run(several, rows, workers=2)
+    many.run(several, rows, workers=2)
     assert contents(tmp_path / "several") == contents(tmp_path / "out")
 
 

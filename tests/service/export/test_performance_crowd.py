@@ -10,10 +10,9 @@ import pytest
 from msgspec import structs
 from pxr import Usd, UsdGeom, UsdSkel, UsdValidation
 
-from posefield.batch.scripts import performance_crowd, performance_levels, script_rows
-from posefield.batch.scripts.performance_batch import open_models
-from posefield.batch.scripts.performance_crowd import PerformanceCrowd
-from posefield.batch.scripts.performance_levels import View
+from posefield.batch import performance_crowd
+from posefield.batch.performance_crowd import PerformanceCrowd, View
+from posefield.batch.scripts import open_models
 from posefield.common.errors import InvalidField
 from posefield.inference.level_selection import Camera, pixels_per_metre
 from posefield.performance import composition
@@ -42,7 +41,7 @@ def rows(tmp_path):
 def written(folder, scripts):
     path = folder / "scripts.jsonl"
     path.write_text("".join(json.dumps(script) + "\n" for script in scripts))
-    return script_rows.read_scripts(path)
+    return scripts.read_scripts(path)
 
 
 def performed(models, script):
@@ -166,12 +165,12 @@ def test_levels_are_the_coarsest_that_the_view_allows(models, rows, tmp_path):
     find = open_models((models,)).find
     levels = []
     for row in rows:
-        answer, level = performance_levels.perform(row.script, find, VIEW, 1000)
+        answer, level = performance_crowd.perform_at_level(row.script, find, VIEW, 1000)
         script = resolve_script(row.script, find)
-        errors = performance_levels.level_errors(script)
+        errors = performance_crowd.level_errors(script)
         card = find("walk").session.card
         assert errors.tolist() == [each.pose for each in card.levels]
-        radius = performance_levels.body_radius(script)
+        radius = performance_crowd.body_radius(script)
         scale = pixels_per_metre(VIEW.camera, answer.clip.root_path, radius).max()
         assert level == 0 or errors[level] * scale <= VIEW.pixels
         # A coarser level would be seen, within what the path differs by.

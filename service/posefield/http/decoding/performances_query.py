@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from posefield.batch import rows
-from posefield.batch.scripts.performance_archive import ArchivedScript, PerformanceOrder
+from posefield.batch.scripts import ArchivedScript, PerformanceOrder
 from posefield.characters import delivery
 from posefield.characters.character_folder import EMPTY, CharacterFolder
 from posefield.characters.delivery import Delivery

@@ -3,10 +3,14 @@
 Each performance is a motion in the frame in which its script begins, and its character stands
 there. A performance that ends before the longest one keeps its last pose. Motions wait in files of
 a temporary folder, so that the crowd is never in memory as a whole.
+
+A performance has one level of detail from its begin to its end: at another level its joins are cut
+elsewhere, so that no pose of one belongs to a pose of the other, and there is nothing to blend. The
+level is chosen where the character is nearest to the camera.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,27 +19,38 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from posefield.batch.scripts import performance_levels, script_pool, script_rows
-from posefield.batch.scripts.performance_batch import MAX_FRAMES, open_models
-from posefield.batch.scripts.performance_levels import View
-from posefield.batch.scripts.script_rows import ScriptRow
+from posefield.batch import process_pool, scripts
+from posefield.batch.scripts import MAX_FRAMES, ScriptRow, open_models
+from posefield.common.array_shapes import RootPath
 from posefield.common.errors import InvalidField, QueryError
-from posefield.common.units import UP, Singles
+from posefield.common.units import UP, Floats, Singles
 from posefield.encode.usd_crowd import FILES
+from posefield.inference import level_selection
+from posefield.inference.level_selection import Camera
 from posefield.locomotion import crowd_order, floor_plane
 from posefield.motion import joint_roles, quat
 from posefield.motion.clip import Clip
 from posefield.motion.crowd_clip import CrowdClip, Motions, Placement
 from posefield.motion.skeleton import Skeleton
+from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
 from posefield.question.body_kind import DEFAULT_BODY, BodyKind
 from posefield.question.performance_batch_question import CrowdStageQuestion
-from posefield.question.performance_question import Start
-from posefield.question.performance_report import PerformanceReport
+from posefield.question.performance_question import PerformanceQuestion, Start
+from posefield.question.performance_report import PerformanceAnswer, PerformanceReport
 from posefield.question.walk_question import WalkQuestion
+from posefield.synthesis.synthesizer import Synthesizer
 
 Place = tuple[tuple[float, float], float]
 """Point on the floor, x and z, m, and heading, rad."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera, and the largest error of a level that it may see, pixels."""
+
+    camera: Camera
+    pixels: float
 
 
 @dataclass(frozen=True)
@@ -102,7 +117,7 @@ def write(
     with TemporaryDirectory() as folder:
         work = partial(stage_motion, crowd, Path(folder))
         staged = []
-        for motion in script_pool.results(work, list(enumerate(rows)), workers):
+        for motion in process_pool.results(work, list(enumerate(rows)), workers):
             staged.append(motion)
             advance(1)
         made = _crowd_clip(cast, rows, staged)
@@ -118,15 +133,13 @@ def _check(crowd: PerformanceCrowd, rows: Sequence[ScriptRow]) -> _Cast:
     for row in rows:
         try:
             script = resolve_script(row.script, find)
-            own = _Cast(
-                _skeleton(script), row.script.fps, len(performance_levels.level_errors(script))
-            )
+            own = _Cast(_skeleton(script), row.script.fps, len(level_errors(script)))
             cast = own if cast is None else _joined(cast, own, rows[0].place)
             _check_convention(row)
         except QueryError as fault:
             faults.append(f"{row.place}: {fault}")
     if faults or cast is None:
-        raise script_rows.faulty_scripts(faults)
+        raise scripts.faulty_scripts(faults)
     return cast
 
 
@@ -167,9 +180,9 @@ def stage_motion(crowd: PerformanceCrowd, folder: Path, job: tuple[int, ScriptRo
     index, row = job
     find = open_models(crowd.models).find
     try:
-        answer, level = performance_levels.perform(row.script, find, crowd.view, MAX_FRAMES)
+        answer, level = perform_at_level(row.script, find, crowd.view, MAX_FRAMES)
     except QueryError as fault:
-        raise script_rows.faulty_scripts([f"{row.place}: {fault}"]) from fault
+        raise scripts.faulty_scripts([f"{row.place}: {fault}"]) from fault
     place = _place(row.script.start, answer.clip)
     rotations, roots = _from_place(place, answer.clip)
     file = folder / f"{index}.npz"
@@ -267,3 +280,70 @@ def report_text(facts: dict[str, Any]) -> str:
         f"{facts['rate']:g} a second; {levels}"
     )
     return f"{text}\nwith a warning: {facts['warned']}" if facts["warned"] else text
+
+
+def perform_at_level(
+    question: PerformanceQuestion,
+    find: Callable[[str], Synthesizer],
+    view: View | None,
+    most: int,
+) -> tuple[PerformanceAnswer, int]:
+    """Return a performance and its level: the coarsest that the view allows.
+
+    view: None for the level of the script. most: largest number of frames. Raises QueryError as
+    `composition.perform`, and for a script that has a level beside a view or a character around the
+    camera.
+    """
+    script = resolve_script(question, find)
+    if view is None:
+        return composition.perform(script, most), question.level
+    if question.level:
+        raise InvalidField("level", f"{question.level}, expected none: the camera chooses it")
+    level = allowed_level(script, composition.compose(script).motion.roots, view)
+    answer = composition.perform(_at_level(script, level), most)
+    # At another level the character may come nearer.
+    while (needed := allowed_level(script, answer.clip.root_path, view)) < level:
+        level = needed
+        answer = composition.perform(_at_level(script, level), most)
+    return answer, level
+
+
+def allowed_level(script: Script, roots: RootPath, view: View) -> int:
+    """Return the coarsest level whose error is within the view's limit all along a path.
+
+    roots: (F, 3), m. Raises InvalidField if the character contains the camera.
+    """
+    distances = np.linalg.norm(roots - view.camera.position, axis=-1)
+    nearest, radius = int(np.argmin(distances)), body_radius(script)
+    if distances[nearest] <= radius:
+        raise InvalidField(
+            "camera",
+            f"{distances[nearest]:.3g} m from the middle of the character, expected more than "
+            f"{radius:.3g} m",
+        )
+    centre = roots[nearest : nearest + 1]
+    scale = level_selection.pixels_per_metre(view.camera, centre, radius)
+    return int(level_selection.select_by_error(level_errors(script), scale, view.pixels)[0])
+
+
+def level_errors(script: Script) -> Floats:
+    """Return the errors (L,), m, of the levels that all models of a script have: the largest."""
+    every = [
+        [level.pose for level in source.model.session.card.levels]
+        for source in script.sources
+        if source is not None
+    ]
+    count = min(map(len, every))
+    errors: Floats = np.max([errors[:count] for errors in every], axis=0)
+    return errors
+
+
+def _at_level(script: Script, level: int) -> Script:
+    return replace(script, question=structs.replace(script.question, level=level))
+
+
+def body_radius(script: Script) -> float:
+    """Return the radius, m, of a sphere about the root that contains the character at rest."""
+    character = script.character
+    rest = character.skeleton.at_rest(character.bones)
+    return float(np.linalg.norm(rest - rest[0], axis=-1).max())

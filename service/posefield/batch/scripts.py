@@ -1,6 +1,10 @@
-"""Performances of many scripts as files with a manifest; the same command resumes.
+"""Performances of many scripts: as members of an archive, or as files with a manifest.
 
-The folder contains `performances/NAME.FORMAT` and `manifest.jsonl`, one line for each script in its
+Scripts are JSON files of a folder, or lines of JSON Lines. An archive takes the files in sequence;
+every script is planned before the first is made, so that one that cannot be performed refuses the
+whole archive.
+
+A target contains `performances/NAME.FORMAT` and `manifest.jsonl`, one line for each script in its
 order: file, checksum, digest of what made it, and report. Until all are made, each finished file
 has its line in `.posefield/performances`. A file is made again if it is missing, or if its script,
 a model or a version changed.
@@ -8,7 +12,7 @@ a model or a version changed.
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from importlib.metadata import version
 from pathlib import Path
@@ -18,10 +22,8 @@ import msgspec
 import orjson
 
 from posefield import __version__
-from posefield.batch import checkpoint, manifest
+from posefield.batch import checkpoint, manifest, process_pool
 from posefield.batch.job import VERSIONED_PACKAGES
-from posefield.batch.scripts import performance_archive, script_pool, script_rows
-from posefield.batch.scripts.script_rows import ScriptRow
 from posefield.batch.target import (
     STATE_FOLDER,
     ExportTarget,
@@ -32,25 +34,174 @@ from posefield.batch.target import (
     read_lines,
 )
 from posefield.characters import delivery
+from posefield.characters.delivery import Delivery
 from posefield.characters.user_character import UserCharacter
-from posefield.common.errors import FileError, QueryError
+from posefield.common import cancellation
+from posefield.common.errors import FileError, InvalidField, QueryError
 from posefield.encode import performance_files
+from posefield.encode.files.file_convention import Convention
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.encode.performance_files import PerformanceEncoder
 from posefield.performance import composition
 from posefield.performance.script import Script, resolve_script
-from posefield.question.performance_batch_question import PerformanceLayout
+from posefield.question import json_decoding
+from posefield.question.performance_batch_question import NamedScript, PerformanceLayout
 from posefield.question.performance_report import PerformanceAnswer
 from posefield.registry import shipped_models
 from posefield.registry.model_registry import ModelRegistry
 from posefield.synthesis.frame_times import MAX_POSES
+
+Entry = dict[str, Any]
+LINES = ".jsonl"
+MAX_LINE_BYTES = 256 * 1024
+MAX_SHOWN_FAULTS = 10
+
+
+@dataclass(frozen=True)
+class ScriptRow:
+    """A script of many. place: file and line, for messages. name: of its file, without ending."""
+
+    place: str
+    name: str
+    script: NamedScript
+
+
+def are_many(path: Path) -> bool:
+    """Return whether a path holds many scripts: a folder, or JSON Lines."""
+    return path.is_dir() or path.suffix == LINES
+
+
+def read_scripts(path: Path) -> tuple[ScriptRow, ...]:
+    """Return the scripts of a path, in the order of the lines or of the names.
+
+    A script in a folder is named after its file; one in a line by `name`, else by its number.
+    Raises FileError for a path that cannot be read, and InvalidField, which lists the scripts at
+    fault, for invalid scripts, equal names, or no script.
+    """
+    rows: dict[str, ScriptRow] = {}
+    faults: list[str] = []
+    for place, name, content in _contents(path):
+        try:
+            row = _row(place, name, content)
+            if row.name in rows:
+                other = rows[row.name].place
+                raise InvalidField("name", f"{row.name!r} is that of {other}, expected another")
+            rows[row.name] = row
+        except QueryError as fault:
+            faults.append(f"{place}: {fault}")
+    if faults:
+        raise faulty_scripts(faults)
+    if not rows:
+        raise InvalidField("scripts", f"{path} has no script, expected at least one")
+    return tuple(rows.values())
+
+
+def faulty_scripts(faults: list[str]) -> InvalidField:
+    """Return the error for invalid scripts, with the first of their faults."""
+    shown = "".join(f"\n  {fault}" for fault in faults[:MAX_SHOWN_FAULTS])
+    more = len(faults) - MAX_SHOWN_FAULTS
+    rest = f"\n  and {more} more" if more > 0 else ""
+    return InvalidField("scripts", f"{len(faults)} that cannot be performed:{shown}{rest}")
+
+
+def _row(place: str, name: str, content: bytes) -> ScriptRow:
+    if len(content) > MAX_LINE_BYTES:
+        raise InvalidField("", f"{len(content)} bytes, expected at most {MAX_LINE_BYTES}")
+    script = json_decoding.decode_question(NamedScript, content)
+    return ScriptRow(place, script.name or name, script)
+
+
+def _contents(path: Path) -> Iterator[tuple[str, str, bytes]]:
+    """Yield place, default name and content of each script."""
+    try:
+        if path.is_dir():
+            for file in sorted(path.glob("*.json")):
+                yield file.name, file.stem, file.read_bytes()
+            return
+        for number, line in enumerate(path.read_bytes().splitlines(), 1):
+            if line.strip():
+                yield f"{path.name}:{number}", f"{number:06d}", line
+    except OSError as fault:
+        raise FileError(path, f"{fault.strerror}, expected scripts in JSON") from fault
+
+
+@dataclass(frozen=True)
+class ArchivedScript:
+    """A planned script.
+
+    file: name of its file, with the extension. convention: unit and up axis of the file. most:
+    largest number of frames. warned: whether its plan has a warning.
+    """
+
+    name: str
+    file: str
+    script: Script
+    convention: Convention
+    most: int
+    warned: bool
+
+
+@dataclass(frozen=True)
+class PerformanceOrder:
+    """Planned scripts of one format.
+
+    encode: writes their files. delivery: to a character of a user; None for those of the scripts.
+    """
+
+    scripts: Sequence[ArchivedScript]
+    encode: PerformanceEncoder
+    delivery: Delivery | None = None
+
+    def file(self, one: ArchivedScript) -> tuple[PerformanceAnswer, bytes]:
+        """Return the performance of a script, and its file."""
+        answer = composition.perform(one.script, one.most)
+        if self.delivery is None:
+            return answer, self.encode(answer, one.convention)
+        own = replace(self.delivery, convention=one.convention)
+        made = own.performance(answer, one.script.character.roles)
+        return made, own.encode(made)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warning with the number of scripts that have some; the manifest has those of each."""
+        count = sum(own.warned for own in self.scripts)
+        every = len(self.scripts)
+        return [f"{count} of {every} performances have warnings"] if count else []
+
+
+def archive_members(order: PerformanceOrder) -> Iterator[tuple[str, bytes]]:
+    """Yield name and content of each performance's file in the order given, then the manifest.
+
+    A performance is made when its file is requested; of earlier ones only manifest lines remain in
+    memory.
+    """
+    lines = bytearray()
+    for own in order.scripts:
+        cancellation.check()
+        answer, content = order.file(own)
+        lines += manifest.line(manifest_entry(own.name, own.file, content, answer))
+        yield own.file, content
+    yield MANIFEST, bytes(lines)
+
+
+def manifest_entry(
+    name: str, file: str, content: bytes, answer: PerformanceAnswer
+) -> dict[str, Any]:
+    """Return the manifest entry of a performance as plain values: path, checksum and report."""
+    return {
+        "name": name,
+        "file": file,
+        "bytes": len(content),
+        "sha256": hashlib.sha256(content).hexdigest(),
+        **answer.trust.document(),
+    }
+
 
 MAX_FRAMES = 10 * MAX_POSES
 FOLDER = "performances"
 MANIFEST, PARTS = "manifest.jsonl", f"{STATE_FOLDER}/performances"
 MARK = f"{STATE_FOLDER}/performances.json"
 """File of a target whose performances are not finished."""
-Entry = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -144,7 +295,7 @@ def run(
     target.create(MARK, b"{}\n")
     advance(len(found))
     left = [(row, digests[row.name]) for row in rows if row.name not in found]
-    for entry in script_pool.results(partial(make_one, batch), left, workers):
+    for entry in process_pool.results(partial(make_one, batch), left, workers):
         found[entry["name"]] = entry
         advance(1)
     entries = tuple(found[row.name] for row in rows)
@@ -166,7 +317,7 @@ def _checked(batch: PerformanceBatch, rows: Sequence[ScriptRow]) -> dict[str, st
         except QueryError as fault:
             faults.append(f"{row.place}: {fault}")
     if faults:
-        raise script_rows.faulty_scripts(faults)
+        raise faulty_scripts(faults)
     return digests
 
 
@@ -234,12 +385,12 @@ def make_one(batch: PerformanceBatch, job: tuple[ScriptRow, str]) -> Entry:
     try:
         answer, content = batch.file(resolve_script(script, open_models(batch.models).find))
     except QueryError as fault:
-        raise script_rows.faulty_scripts([f"{row.place}: {fault}"]) from fault
+        raise faulty_scripts([f"{row.place}: {fault}"]) from fault
     path = f"{FOLDER}/{row.name}.{batch.form}"
     target = open_target(batch.place)
     put_file(target, path, [content])
     entry = {
-        **performance_archive.entry(row.name, path, content, answer),
+        **manifest_entry(row.name, path, content, answer),
         "made_of": digest,
     }
     target.write([(f"{PARTS}/{row.name}.json", manifest.line(entry))])

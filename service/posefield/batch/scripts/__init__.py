@@ -1,1 +1,0 @@
-"""Performances of many scripts: scripts in, files and their manifest out."""
