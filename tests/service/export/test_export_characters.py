@@ -146,4 +146,4 @@ def test_more_is_refused(posefield, export, rigs, tmp_path):
 def test_a_model_without_legs_is_refused(card):
     chunks.check_character_model(card)
     with pytest.raises(InvalidField, match="no joint for leftUpperLeg"):
-        chunks.check_model(replace(card, roles={"hips": card.roles["hips"]}))
+        chunks.check_character_model(replace(card, roles={"hips": card.roles["hips"]}))
