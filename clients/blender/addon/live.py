@@ -1,49 +1,34 @@
 """Live updates of the imported clip: requests in a thread, results applied by a Blender timer."""
 
-import traceback
-from dataclasses import dataclass
-
 import bpy
 
-from . import action, placing, preferences, questions, rig, session
-from .without_blender import clips, faults
-from .without_blender.clips import Clip, Question
+from . import scene as scenes
+from . import settings, state
+from .without_blender import card as cards
 from .without_blender.latest import Latest
-from .without_blender.service import Service
+from .without_blender.service import Answer, Fault
 
-INTERVAL = 0.02
-"""Seconds between two checks for a response; screens are hardly faster."""
+INTERVAL = 0.05
+"""Seconds between two checks for a response."""
 
 asking: Latest | None = None
 """Thread of the requests; None without requests."""
 
 
-@dataclass(frozen=True)
-class Asked:
-    """A question, and the name of the scene it belongs to."""
-
-    service: Service
-    question: Question
-    scene: str
-
-
 def changed(scene) -> None:
     """Request the clip again after a change of a setting, if live updates are on."""
-    if scene.posefield.live:
-        try:
-            ask(scene)
-        except faults.Fault as fault:
-            session.current.tell(str(fault), failed=True)
-
-
-def ask(scene) -> None:
-    """Request the clip of the current sliders; a request that still waits is replaced."""
     global asking
-    action.own(character(scene))
-    asked = Asked(preferences.service(bpy.context), questions.question(scene), scene.name)
+    if state.current.taking or not scene.posefield.live:
+        return
+    try:
+        scenes.existing(scene, scene.posefield.character)
+        asked = settings.service(), settings.card_of(scene).identity, settings.question(scene)
+    except Fault as fault:
+        state.current.tell(str(fault), failed=True)
+        return
     if asking is None:
-        asking = Latest(_answered)
-    asking.ask(asked)
+        asking = Latest(_answer)
+    asking.ask((*asked, scene.name))
     if not bpy.app.timers.is_registered(tick):
         bpy.app.timers.register(tick, first_interval=INTERVAL)
 
@@ -52,65 +37,50 @@ def tick() -> float | None:
     """Apply a response, if there is one; return the seconds to the next call, None to end."""
     if asking is None:
         return None
-    for found in asking.take():
-        _take(found)
+    for result in asking.take():
+        try:
+            if isinstance(result, Exception):
+                raise result
+            _apply(*result)
+        except Fault as fault:
+            state.current.tell(str(fault), failed=True)
+        _redraw()
     return INTERVAL if asking is not None and asking.busy else None
 
 
-def stop() -> Latest | None:
-    """Drop pending requests, and end timer and thread; return the thread, None if there is none."""
+def stop() -> None:
+    """Drop pending requests, and end the timer."""
     global asking
-    ended, asking = asking, None
-    if ended is not None:
-        ended.close()
+    asking = None
     if bpy.app.timers.is_registered(tick):
         bpy.app.timers.unregister(tick)
-    return ended
 
 
-def character(scene):
-    """Return the imported armature; raise Fault if it was deleted."""
-    found = scene.posefield.character
-    # The pointer keeps a deleted object, but no scene contains it.
-    if found is None or found.name not in scene.objects:
-        raise faults.Fault("there is no imported armature in this scene: import a clip first")
-    return found
-
-
-def _answered(asked: Asked) -> tuple[Asked, Clip]:
+def _answer(asked) -> tuple[Answer, bool, str]:
     """Fetch the clip; runs in the thread, where bpy must not be used."""
-    return asked, clips.ask(asked.service, asked.question)
+    service, model, question, scene = asked
+    answer = service.fetch(f"{cards.path(model)}/clip.glb", question)
+    return answer, bool(question["loop"]), scene
 
 
-def _take(found) -> None:
-    if isinstance(found, faults.Fault):
-        session.current.tell(str(found), failed=True)
-    elif isinstance(found, Exception):
-        session.current.tell(f"an error in the add-on: {found!r}", failed=True)
-        traceback.print_exception(found)
-    else:
-        _apply(*found)
-    _redraw()
+def _apply(answer: Answer, loop: bool, name: str) -> None:
+    scene = bpy.data.scenes.get(name)
+    if scene is not None and scene.posefield.live:
+        replaced = scenes.existing(scene, scene.posefield.character)
+        said = put_clip(scene, answer, loop, replaced.name, replaced)
+        state.current.tell(*said)
 
 
-def _apply(asked: Asked, clip: Clip) -> None:
-    scene = bpy.data.scenes.get(asked.scene)
-    if scene is None or not scene.posefield.live:
-        return
-    try:
-        armature = character(scene)
-        keep_lengths = action.keeps_lengths(armature)
-        rig.check(armature, clip)
-    except faults.Fault as fault:
-        scene.posefield.live = False
-        session.current.tell(str(fault), failed=True)
-        return
-    loop = asked.question.loop
-    placing.put(scene, armature, clip, keep_lengths, loop)
-    if scene.posefield.set_scene:
-        placing.set_scene(scene, armature, clip, loop)
-    session.current.clip = clip
-    session.current.tell(*placing.unrepeated(clip, loop))
+def put_clip(scene, answer: Answer, loop: bool, name: str, replaced=None) -> list[str]:
+    """Import a clip as the scene's character and return sentences on it."""
+    own = scene.posefield
+    armature = scenes.import_character(answer.content, name, own.start, replaced)
+    said = scenes.repeat(armature) if loop else []
+    if own.set_range:
+        # The last key of a loop repeats its first and is not played.
+        said += scenes.set_range(scene, own.start, scenes.last_frame(armature) - loop)
+    own.character = armature
+    return answer.sentences + said
 
 
 def _redraw() -> None:

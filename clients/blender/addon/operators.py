@@ -1,82 +1,68 @@
 """Operators of the panel's buttons, also for scripts: `bpy.ops.posefield`."""
 
-import json
-import math
+import urllib.parse
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
+from bpy.props import StringProperty
 
-from . import (
-    action,
-    label_sets,
-    placing,
-    preferences,
-    properties,
-    questions,
-    rig,
-    session,
-    sliders,
-)
-from .questions import Picked
-from .without_blender import bones, cards, clips, faults, label_choice, variation
-from .without_blender.cards import Card
-from .without_blender.clips import Clip
-from .without_blender.service import Service
-from .without_blender.variation import Variation
+from . import live, settings, state
+from . import scene as scenes
+from .without_blender import card as cards
+from .without_blender.service import Fault
+
+MARK = "posefield_script"
+"""Property of an armature: name of the text block that was performed on it last."""
 
 
-class POSEFIELD_OT_refresh(bpy.types.Operator):
+class _Operator:
+    """Base of operators: a Fault is reported and shown in the panel."""
+
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
+
+    def execute(self, context):
+        """Run the operator; on an error nothing changes."""
+        try:
+            sentences = self.run(context.scene)
+        except Fault as fault:
+            state.current.tell(str(fault), failed=True)
+            self.report({"ERROR"}, str(fault))
+            return {"CANCELLED"}
+        state.current.tell(*sentences)
+        for sentence in sentences:
+            self.report({"INFO"}, sentence)
+        return {"FINISHED"}
+
+
+class POSEFIELD_OT_refresh(_Operator, bpy.types.Operator):
     """Ask the service which models it has, and for the picked one's controls"""
 
     bl_idname = "posefield.refresh"
     bl_label = "Refresh"
     bl_options = {"REGISTER"}  # noqa: RUF012
 
-    def execute(self, context):
-        """Fetch models and card again; on an error nothing changes."""
-        try:
-            questions.refresh(context, context.scene)
-        except faults.Fault as fault:
-            return session.ended(self, [str(fault)], "ERROR")
-        return session.ended(self, [])
+    def run(self, scene) -> list[str]:
+        """Fetch models and card again."""
+        settings.refresh(scene)
+        return []
 
 
-class POSEFIELD_OT_reset(bpy.types.Operator):
+class POSEFIELD_OT_reset(_Operator, bpy.types.Operator):
     """Set all controls to their defaults"""
 
     bl_idname = "posefield.reset"
     bl_label = "Reset controls"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
-    def execute(self, context):
+    def run(self, scene) -> list[str]:
         """Set every slider to its default."""
-        try:
-            sliders.reset(context.scene, questions.card_of(context.scene))
-        except faults.Fault as fault:
-            return session.ended(self, [str(fault)], "ERROR")
-        return session.FINISHED
+        settings.reset(scene)
+        return []
 
 
-class POSEFIELD_OT_next_take(bpy.types.Operator):
-    """Choose the seed of the next take; with live updates the clip follows"""
-
-    bl_idname = "posefield.next_take"
-    bl_label = "Next take"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
-
-    def execute(self, context):
-        """Raise the seed by one."""
-        own = context.scene.posefield
-        own.take = variation.next_seed(own.take)
-        return session.FINISHED
-
-
-class POSEFIELD_OT_import_clip(bpy.types.Operator):
-    """Import the clip at these controls as an action"""
+class POSEFIELD_OT_import_clip(_Operator, bpy.types.Operator):
+    """Import the clip at these controls as a character"""
 
     bl_idname = "posefield.import_clip"
     bl_label = "Import clip"
-    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012
 
     model: StringProperty(name="Model", description="Name of a model; the panel's, if empty")
     controls: StringProperty(
@@ -85,162 +71,86 @@ class POSEFIELD_OT_import_clip(bpy.types.Operator):
     )
     labels: StringProperty(
         name="Labels",
-        description="JSON object of a name, weights by name, or null for unknown, by label set; "
-        "the panel's for those it leaves out",
-    )
-    # Not saved, so that an import from the panel starts from the panel's settings.
-    take: IntProperty(
-        name="Take",
-        description="Seed of another take, 0 for the prediction; the panel's, if not given",
-        min=0,
-        max=variation.LARGEST_SEED,
-        options={"SKIP_SAVE"},
-    )
-    variety: FloatProperty(
-        name="Variety",
-        description="Size of a take's deviations; the panel's, if not given",
-        default=variation.VARIETY,
-        min=0.0,
-        max=1.0,
-        options={"SKIP_SAVE"},
-    )
-    detail: BoolProperty(
-        name="Sampled detail",
-        description="Add details that no control predicts; the panel's, if not given",
-        options={"SKIP_SAVE"},
-    )
-    feet: EnumProperty(
-        name="Feet",
-        description="Whether feet stand; the panel's, if not given",
-        items=properties.FEET_ITEMS,
-        options={"SKIP_SAVE"},
-    )
-    floor: FloatProperty(
-        name="Floor",
-        description="Height of the floor on which feet stand, m; the panel's, if not given",
-        min=-variation.LARGEST_HEIGHT,
-        max=variation.LARGEST_HEIGHT,
-        options={"SKIP_SAVE"},
-    )
-    onto: EnumProperty(
-        name="Onto",
-        items=[
-            ("NEW", "A new armature", "Made for the clip, with its bone lengths"),
-            ("ACTIVE", "The active armature", "Whose bones have the names of the clip's joints"),
-        ],
-    )
-    lengths: EnumProperty(
-        name="Bone lengths",
-        items=[
-            ("ARMATURE", "The armature's", "Bones turn as in the clip and keep their lengths"),
-            ("CLIP", "The clip's", "Bones move to where the clip's joints are"),
-        ],
-    )
-    set_scene: BoolProperty(
-        name="Set scene rate and range",
-        description="The scene plays the clip as fast as it is, and from end to end",
-        default=True,
+        description="JSON object of a name or weights by name, by label set; the panel's for those "
+        "it leaves out",
     )
 
-    def execute(self, context):
-        """Fetch the clip, check that it fits, and only then change the scene."""
-        try:
-            armature = self._armature(context)
-            asked = preferences.service(context).in_all()
-            picked = self._picked(asked, context.scene)
-            others = self._controls(picked.card)
-            labels = label_choice.of_json(self.labels, picked.card.labels)
-            varied = self._varied()
-            question = questions.question_of(context.scene, picked, others, labels, varied)
-            clip = clips.ask(asked, question)
-            _check(armature, clip)
-        except faults.Fault as fault:
-            return session.ended(self, [str(fault)], "ERROR")
-        if picked.card is not session.current.card:
-            questions.take(context.scene, picked)
-        said = self._put(context, armature, clip, question.loop)
-        session.current.clip = clip
-        label_sets.put(context.scene.posefield, labels)
-        questions.put_variation(context.scene.posefield, question.variation)
-        sliders.put(context.scene, picked.card, others)
-        self._tell(question.variation, clip, picked.card)
-        return session.ended(self, said)
-
-    def _varied(self) -> dict[str, object]:
-        """Return the given fields of Variation: take, variety, detail, feet and floor."""
-        given = variation.of_sliders(self.take, self.variety, self.detail, self.feet, self.floor)
-        same = {name: name for name in ("variety", "detail", "feet", "floor")}
-        fields = {"take": "seed"} | same
-        return {
-            field: getattr(given, field)
-            for name, field in fields.items()
-            if self.properties.is_property_set(name)
-        }
-
-    def _tell(self, varied: Variation, clip: Clip, card: Card) -> None:
-        """Show take and feet as the operator's own settings, and report the feet to scripts."""
-        self.take, self.variety = varied.seed, varied.variety
-        self.detail, self.feet, self.floor = varied.detail, varied.feet, varied.floor
-        for sentence in varied.feet_sentences(clip.trust, card.why_no_stances):
-            self.report({"INFO"}, sentence)
-
-    def _armature(self, context):
-        return None if self.onto == "NEW" else rig.active(context)
-
-    def _picked(self, asked: Service, scene) -> Picked:
-        known, name = session.current.card is not None, scene.posefield.model_name
-        if self.model and not (known and self.model == name):
-            return Picked(self.model, cards.get(asked, self.model))
-        return Picked(name, questions.card_of(scene)) if known else questions.found(asked, scene)
-
-    def _controls(self, card: Card) -> dict[str, float]:
-        try:
-            given = {
-                name: float(value) for name, value in json.loads(self.controls or "{}").items()
-            }
-        except (ValueError, TypeError, AttributeError) as fault:
-            raise faults.Fault(
-                f"controls are {self.controls!r}, expected numbers by name"
-            ) from fault
-        if not all(map(math.isfinite, given.values())):
-            raise faults.Fault(f"controls are {self.controls!r}, expected finite numbers")
-        known = [control.name for control in card.controls]
-        unknown = sorted(set(given) - set(known))
-        if unknown:
-            raise faults.Fault(f"no control is named {unknown[0]}; there are {', '.join(known)}")
-        return given
-
-    def _put(self, context, armature, clip: Clip, loop: bool) -> list[str]:
-        scene, card = context.scene, questions.card_of(context.scene)
-        said, keep_lengths = [], False
-        if armature is None:
-            armature = rig.make(context, card, clip)
-        else:
-            keep_lengths = self.lengths == "ARMATURE"
-            said = bones.differences(clip, rig.rest(armature, clip)) if keep_lengths else []
-            said += rig.settle(armature)
-        said += action.begin(armature, card.name)
-        if self.set_scene:
-            said += placing.set_scene(scene, armature, clip, loop)
-        placing.put(scene, armature, clip, keep_lengths, loop)
-        scene.posefield.character = armature
-        return [_summary(card, armature, clip), *said, *placing.unrepeated(clip, loop)]
+    def run(self, scene) -> list[str]:
+        """Fetch the clip, and only then change the scene."""
+        if state.current.card is None:
+            settings.refresh(scene)
+        if self.model and self.model != scene.posefield.model:
+            settings.take(scene, cards.fetch(settings.service(), self.model))
+        card, question = settings.card_of(scene), settings.question(scene)
+        known = {control.name: control for control in card.controls}
+        question["controls"] |= cards.values_of_json(self.controls, known, "control")
+        question["labels"] |= cards.values_of_json(self.labels, card.labels, "label set")
+        answer = settings.service().fetch(f"{cards.path(card.identity)}/clip.glb", question)
+        return live.put_clip(scene, answer, question["loop"], card.name)
 
 
-def _check(armature, clip: Clip) -> None:
-    if armature is None:
-        bones.check_names(clip)
-    else:
-        rig.check(armature, clip)
+class POSEFIELD_OT_import_crowd(_Operator, bpy.types.Operator):
+    """Import a crowd that walks, of a model of a gait"""
+
+    bl_idname = "posefield.import_crowd"
+    bl_label = "Import crowd"
+
+    def run(self, scene) -> list[str]:
+        """Fetch the crowd as USD and import it into a collection."""
+        own, card = scene.posefield, settings.card_of(scene)
+        if not card.walks:
+            raise Fault(f"{card.name} is no gait that travels, expected one for a crowd")
+        query = {"count": own.count, "seconds": own.seconds, "fps": settings.rate(scene)}
+        query |= {"seed": own.take} if own.take else {}
+        path = f"{cards.path(card.identity)}/crowd.usdc?{urllib.parse.urlencode(query)}"
+        answer = settings.service().fetch(path)
+        count = scenes.import_crowd(answer.content, f"{card.name} crowd")
+        return [f"{count} characters", *answer.sentences]
 
 
-def _summary(card: Card, armature, clip: Clip) -> str:
-    return f"{card.name} on {armature.name}: {len(clip)} frames at {clip.rate:g} a second"
+class POSEFIELD_OT_perform_script(_Operator, bpy.types.Operator):
+    """Import the performance of a script as a character, with markers at its segments"""
+
+    bl_idname = "posefield.perform_script"
+    bl_label = "Perform script"
+
+    text: StringProperty(name="Text", description="Name of the text block; the panel's, if empty")
+
+    def run(self, scene) -> list[str]:
+        """Fetch the performance and its report, and only then change the scene."""
+        text, own = self._text(scene), scene.posefield
+        service, fps = settings.service(), settings.rate(scene)
+        script = {"fps": fps} | cards.json_object(text.as_string(), text.name)
+        report = service.fetch("/v1/performances.json?plan=true", script).document["trust"]
+        answer = service.fetch("/v1/performances.glb", script)
+        performers = (each for each in scene.objects if each.get(MARK) == text.name)
+        armature = scenes.import_character(
+            answer.content, text.name, own.start, next(performers, None)
+        )
+        armature[MARK] = text.name
+        moments = [
+            (round(own.start + fps * each["begins"]), f"{index} {each['kind']}")
+            for index, each in enumerate(report["segments"])
+        ]
+        scenes.put_markers(scene, text.name, moments)
+        said = []
+        if own.set_range:
+            said = scenes.set_range(scene, own.start, scenes.last_frame(armature))
+        warnings = [f"{each['pointer']}: {each['message']}" for each in report["warnings"]]
+        return [*answer.sentences[:1], *warnings, *said]
+
+    def _text(self, scene):
+        text = bpy.data.texts.get(self.text) if self.text else scene.posefield.script
+        if text is None:
+            known = ", ".join(bpy.data.texts.keys()) or "none"
+            raise Fault(f"no text block {self.text!r}, expected one of {known}")
+        return text
 
 
 CLASSES = (
     POSEFIELD_OT_refresh,
     POSEFIELD_OT_reset,
-    POSEFIELD_OT_next_take,
     POSEFIELD_OT_import_clip,
+    POSEFIELD_OT_import_crowd,
+    POSEFIELD_OT_perform_script,
 )

@@ -31,7 +31,7 @@ def test_it_holds_the_add_on_and_nothing_else(tmp_path):
     with zipfile.ZipFile(archive.build(tmp_path)) as opened:
         names = opened.namelist()
         assert opened.read("LICENSE") == (ROOT / "LICENSE").read_bytes()
-    assert {"__init__.py", "blender_manifest.toml", "without_blender/clips.py"} < set(names)
+    assert {"__init__.py", "blender_manifest.toml", "without_blender/card.py"} < set(names)
     assert all(name.endswith(".py") for name in set(names) - {"LICENSE", "blender_manifest.toml"})
     assert not any("__pycache__" in name for name in names)
 
@@ -67,4 +67,4 @@ def test_it_needs_nothing_but_blender(file):
 
 
 def test_the_check_sees_what_is_imported():
-    assert "bpy" in set(imports(ADDON / "rig.py"))
+    assert "bpy" in set(imports(ADDON / "scene.py"))

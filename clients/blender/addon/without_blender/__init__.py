@@ -1,4 +1,1 @@
-"""Parts of the add-on without bpy: HTTP requests, decoding, and bones as arrays.
-
-They are tested by an ordinary interpreter.
-"""
+"""The add-on's code that needs no Blender."""
