@@ -8,19 +8,17 @@ import { Latest } from "./latest.ts";
 import { type Pose, pose, sample } from "./playback.ts";
 import type { Session } from "./player.ts";
 import { clip, otherTakes } from "./questions.ts";
-import { type Changes, has, type State } from "./state.ts";
+import { has, type State } from "./state.ts";
 import * as theme from "./theme.ts";
 
 /** Largest extent of a person's joints at rest, m. */
 const PERSON = 1.5;
-/** Milliseconds without a new answer until the nearest captured clip is asked for. */
-const CALM = 160;
 /** Number of other takes, and their opacity, which lets the body be seen. */
 const [TAKES, PALE] = [5, 0.2];
 
 export function mount(host: HTMLElement, session: Session): void {
   mountBody(session);
-  host.append(new Ghost(session).label, new Fan(session).label);
+  host.append(ghost(session), fan(session));
 }
 
 function mountBody({ card, character, player, scene, signal, store }: Session): void {
@@ -73,80 +71,81 @@ interface Companion {
 }
 
 /** Pale bodies beside the motion, each at the same share of its own duration. */
-abstract class Companions {
-  abstract readonly label: HTMLElement;
-  protected readonly session: Session;
-  protected readonly latest = new Latest<null>(() => this.#fetch());
-  protected companions: readonly Companion[] = [];
+class Companions {
+  readonly label: HTMLElement;
+  readonly #session: Session;
   readonly #toggle: "ghost" | "fan";
-  readonly #count: number;
-  readonly #opacity: number;
+  readonly #fetch: () => Promise<readonly Motion[] | null>;
+  readonly #latest = new Latest<null>(() => this.#refresh());
+  readonly #make: () => readonly Companion[];
+  #companions: readonly Companion[] = [];
 
-  constructor(session: Session, toggle: "ghost" | "fan", count: number, opacity: number) {
-    this.session = session;
+  /** fetch: returns the clips, or null where they are those that are shown. */
+  constructor(
+    session: Session,
+    toggle: "ghost" | "fan",
+    [count, opacity]: readonly [number, number],
+    fetch: (label: HTMLElement) => Promise<readonly Motion[] | null>,
+  ) {
+    const { card, character, player, scene, signal, store } = session;
+    this.#session = session;
     this.#toggle = toggle;
-    this.#count = count;
-    this.#opacity = opacity;
-    const { player, signal, store } = session;
-    store.listen((_, changed) => this.update(changed), signal);
-    player.watch(() => this.#move());
-    theme.listen(() => {
-      for (const { figure } of this.companions) figure.tint();
-    }, signal);
-    signal.addEventListener("abort", () => {
-      for (const { figure } of this.companions) figure.dispose();
-    });
-  }
-
-  /** Ask for the clips, where they have become others. */
-  protected abstract fetch(): Promise<void>;
-  /** Ask soon for the clips of what is shown now. */
-  protected abstract refresh(): void;
-
-  protected get wanted(): boolean {
-    const { state } = this.session.store;
-    return state[this.#toggle] && state.view === "one";
-  }
-
-  protected update(changed: Changes): void {
-    if (has(changed, this.#toggle, "view", "body")) this.appear();
-  }
-
-  protected appear(): void {
-    const { card, character, scene, store } = this.session;
-    this.label.hidden = !this.wanted;
-    if (this.wanted && !this.companions.length)
-      this.companions = Array.from({ length: this.#count }, () => {
-        const figure = new Figure(card, character, true, this.#opacity);
+    this.label = el("p", { class: "ghost", [`data-${toggle}`]: "" });
+    this.#fetch = () => fetch(this.label);
+    this.#make = () =>
+      Array.from({ length: count }, () => {
+        const figure = new Figure(card, character, true, opacity);
         scene.root.add(figure.group);
         return { figure, pose: pose(card.skeleton.names.length), clip: null };
       });
-    for (const { figure } of this.companions) figure.wear(store.state.body);
-    if (this.wanted) this.refresh();
-    this.#move();
-    scene.redraw();
+    store.listen((_, changed) => {
+      if (has(changed, toggle, "view", "body")) this.appear();
+    }, signal);
+    player.watch(() => this.#move());
+    theme.listen(() => {
+      for (const { figure } of this.#companions) figure.tint();
+    }, signal);
+    signal.addEventListener("abort", () => {
+      for (const { figure } of this.#companions) figure.dispose();
+    });
+    this.appear();
   }
 
-  async #fetch(): Promise<void> {
-    const { notice, signal } = this.session;
+  get #wanted(): boolean {
+    const { state } = this.#session.store;
+    return state[this.#toggle] && state.view === "one";
+  }
+
+  /** Show or hide the bodies, and ask for their clips. */
+  appear(): void {
+    this.label.hidden = !this.#wanted;
+    if (this.#wanted && !this.#companions.length) this.#companions = this.#make();
+    for (const { figure } of this.#companions) figure.wear(this.#session.store.state.body);
+    if (this.#wanted && this.#session.player.clip) this.#latest.ask(null);
+    this.#move();
+  }
+
+  async #refresh(): Promise<void> {
+    const { notice, signal } = this.#session;
     try {
-      await this.fetch();
-      if (!signal.aborted) this.#move();
+      const clips = await this.#fetch();
+      if (signal.aborted || !clips) return;
+      this.#companions.forEach((companion, i) => {
+        companion.clip = clips[i]!;
+      });
+      this.#move();
     } catch (fault) {
       if (!signal.aborted) notice(fault);
     }
   }
 
-  protected visible(): boolean {
-    return this.wanted;
-  }
-
+  /** Pose the bodies; while controls are on the move, their clips are not known. */
   #move(): void {
-    if (!this.companions.length) return;
-    const { player, scene, store } = this.session;
+    if (!this.#companions.length) return;
+    const { player, scene, store } = this.#session;
     const { carried } = player.shown;
-    for (const { clip, figure, pose } of this.companions) {
-      figure.group.visible = clip !== null && this.visible();
+    for (const { clip, figure, pose } of this.#companions) {
+      figure.group.visible = clip !== null && this.#wanted && player.clip !== null;
       if (!clip || !figure.group.visible) continue;
       sample(pose, clip, (store.state.time / player.duration) * clip.trust.duration);
       figure.show({ ...pose, offsets: clip.boneOffsets, carried });
@@ -156,79 +155,50 @@ abstract class Companions {
 }
 
 /** The model's answer at the controls of the nearest captured clip. */
-class Ghost extends Companions {
-  readonly label = el("p", { class: "ghost", "data-ghost": "" });
-  #timer: ReturnType<typeof setTimeout> | undefined;
+function ghost(session: Session): HTMLElement {
+  const { card, player, service, signal, store } = session;
   /** Source and settings of the clip that is shown. */
-  #key = "";
-
-  constructor(session: Session) {
-    super(session, "ghost", 1, 0.32);
-    session.player.onTrust(() => this.refresh());
-    session.signal.addEventListener("abort", () => clearTimeout(this.#timer));
-    this.appear();
-  }
-
-  protected override refresh(): void {
-    if (!this.wanted) return;
-    clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.latest.ask(null), CALM);
-  }
-
-  protected override async fetch(): Promise<void> {
-    const { card, service, signal, store } = this.session;
+  let shown = "";
+  const companions = new Companions(session, "ghost", [1, 0.32], async (label) => {
     const { controls, labels, performer, model } = store.state;
     const question = { controls, performer, labels, nearest: 1 };
     const [nearest] = (await service.client.why(model, question, signal)).nearest;
-    if (!nearest || signal.aborted) return;
-    this.label.textContent = `Ghost: the model at the controls of ${nearest.source}, the nearest captured clip (distance ${nearest.distance.toFixed(2)})`;
+    if (!nearest || signal.aborted) return null;
+    const text = `Ghost: the model at the controls of ${nearest.source}, the nearest captured clip (distance ${nearest.distance.toFixed(2)})`;
     const { level, loop, root, stands } = store.state;
     const key = `${nearest.source} ${level} ${root} ${loop} ${stands}`;
-    if (key === this.#key) return;
+    if (key === shown) {
+      label.textContent = text;
+      return null;
+    }
     const state: State = {
       ...store.state,
       controls: nearest.controls,
       performer: nearest.performer,
       labels: nearest.labels ?? {},
-      take: 0,
-      detail: false,
-      target: null,
+      ...{ take: 0, detail: false, target: null },
     };
-    this.companions[0]!.clip = await clip(service, card, state, signal);
-    this.#key = key;
-  }
+    const motion = await clip(service, card, state, signal);
+    label.textContent = text;
+    shown = key;
+    return [motion];
+  });
+  player.onClip(() => companions.appear());
+  return companions.label;
 }
 
 /** Other takes of the same question. */
-class Fan extends Companions {
-  readonly label = el("p", { class: "ghost", "data-fan": "" });
-
-  constructor(session: Session) {
-    super(session, "fan", TAKES, PALE);
-    session.player.onClip(() => this.appear());
-    this.appear();
-  }
-
-  protected override refresh(): void {
-    if (this.session.player.clip) this.latest.ask(null);
-  }
-
-  /** While controls are on the move, the clips of other takes are unknown. */
-  protected override visible(): boolean {
-    return this.wanted && this.session.player.clip !== null;
-  }
-
-  protected override async fetch(): Promise<void> {
-    const { card, service, signal, store } = this.session;
+function fan(session: Session): HTMLElement {
+  const { card, player, service, signal, store } = session;
+  const companions = new Companions(session, "fan", [TAKES, PALE], async (label) => {
     const { state } = store;
     const seeds = otherTakes(state.take, TAKES);
     const clips = await Promise.all(
       seeds.map((take) => clip(service, card, { ...state, take }, signal)),
     );
-    if (signal.aborted) return;
-    this.companions.forEach((companion, i) => {
-      companion.clip = clips[i]!;
-    });
-    this.label.textContent = `Fan: takes ${seeds.join(", ")} of the same question, variety ${state.variety.toFixed(2)}`;
-  }
+    label.textContent = `Fan: takes ${seeds.join(", ")} of the same question, variety ${state.variety.toFixed(2)}`;
+    return clips;
+  });
+  player.onClip(() => companions.appear());
+  return companions.label;
 }

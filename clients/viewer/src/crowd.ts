@@ -12,10 +12,9 @@ import {
   Vector3,
 } from "three";
 
-import "./crowd.css";
 import { CrowdDrawing } from "./crowd-drawing.ts";
 import { Crowd, fetchMotions, half, type Motions, TAKES } from "./crowd-motions.ts";
-import { type Ladder, ladder, lens, pixels } from "./detail.ts";
+import { type Ladder, ladder, lens, pixels, withLevel } from "./detail.ts";
 import { el, labelled, toggle } from "./dom.ts";
 import { understood } from "./faults.ts";
 import type { Session } from "./player.ts";
@@ -242,7 +241,7 @@ class Panel {
     const { card, signal, store } = session;
     this.#counts = card.levels.map(() => el("b", {}, "–"));
     const levels = this.#counts.map((count, level) =>
-      el("li", { class: `crowd-${Math.min(level, 3)}` }, `level ${level}`, count),
+      withLevel(el("li", {}, `level ${level}`, count), level),
     );
     const about =
       card.cyclic && card.root === "travelling"

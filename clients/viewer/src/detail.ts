@@ -65,3 +65,9 @@ export function choose(errors: Float64Array, scale: number, limit: number, previ
 export function farEnough({ errors, radius }: Ladder, level: number, lens: Lens): number {
   return errors[level]! * pixels(lens) + radius;
 }
+
+/** Give an element the colour of a level, as the custom property --level. */
+export function withLevel<Kind extends HTMLElement>(element: Kind, level: number): Kind {
+  element.style.setProperty("--level", `var(--level-${Math.min(level, 3)})`);
+  return element;
+}

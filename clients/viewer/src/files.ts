@@ -2,11 +2,10 @@
 
 import { type ClipFormat, type ClipQuestion, PosefieldError } from "@posefield/client";
 
-import "./files.css";
 import { curl, fileName, link, python, type Wanted } from "./code-texts.ts";
 import { checkbox, chooser, el, labelled, saveFile, textButton } from "./dom.ts";
 import type { Session } from "./player.ts";
-import { TAKE_AND_FEET, takeAndFeet, targetFields, whyFeetCannotStand } from "./questions.ts";
+import { TAKE_AND_FEET, takeAndFeet, targetFields } from "./questions.ts";
 import { type Changes, has } from "./state.ts";
 import { videoButton } from "./video.ts";
 import { figure, title } from "./written.ts";
@@ -26,10 +25,6 @@ const NAMES = [
   ["ue5", "Unreal 5"],
   ["vrm", "VRM"],
   ["humanik", "HumanIK"],
-] as const;
-const WAYS = [
-  ["travelling", "travels"],
-  ["in_place", "stays in place"],
 ] as const;
 const DEFAULT = ["", "default"] as const;
 const UNITS = [DEFAULT, ["m", "metres"], ["cm", "centimetres"]] as const;
@@ -60,7 +55,7 @@ export function mount(host: HTMLElement, session: Session): void {
 class Files {
   readonly #session: Session;
   readonly #choice: Choice;
-  readonly #get = textButton("", () => this.#getOrStop(), "files-get");
+  readonly #get = textButton("", () => this.#getOrStop(), "act files-get");
   readonly #status = el("p", { class: "files-said", role: "status" });
   readonly #code = el("pre", { tabindex: 0, "aria-label": "Text to copy" });
   /** Each shows a field as the choice and the state are now. */
@@ -166,31 +161,18 @@ class Files {
     this.#code.textContent = TEXTS[this.#choice.text](this.#wanted);
   }
 
-  #list<Value extends string>(
-    word: string,
-    options: readonly (readonly [Value, string])[],
-    now: () => string,
-    take: (value: Value) => void,
-  ): HTMLElement {
-    const list = chooser(options, now(), (value) => take(value as Value));
-    this.#shows.push(() => {
-      list.value = now();
-    });
-    return labelled(word, list);
-  }
-
   /** A list for a value of the choice. */
   #choose<Key extends "format" | "names" | "unit" | "up">(
     word: string,
     key: Key,
     options: readonly (readonly [Choice[Key] & string, string])[],
   ): HTMLElement {
-    const take = (value: string) => this.#take({ [key]: value });
-    return this.#list(word, options, () => this.#choice[key], take);
+    const list = chooser(options, this.#choice[key], (value) => this.#take({ [key]: value }));
+    return labelled(word, list);
   }
 
   #fields(): HTMLElement[] {
-    const { card, store } = this.#session;
+    const { card } = this.#session;
     const fps = el("input", { type: "number", min: 1, max: 1000, step: "any" });
     fps.addEventListener("change", () => {
       const value = Number(fps.value);
@@ -199,7 +181,6 @@ class Files {
     this.#shows.push(() => {
       fps.value = String(this.#choice.fps);
     });
-    const levels = card.levels.map((_, i) => [String(i), String(i)] as const);
     const measures = [this.#choose("Unit", "unit", UNITS), this.#choose("Up axis", "up", UPS)];
     // The units and axes of glTF are fixed.
     this.#shows.push(() => {
@@ -208,18 +189,6 @@ class Files {
     return [
       this.#choose("Format", "format", FORMATS),
       labelled("Frames a second", fps),
-      this.#list(
-        "Movement",
-        WAYS,
-        () => store.state.root,
-        (root) => store.set({ root }),
-      ),
-      this.#list(
-        "Level of detail",
-        levels,
-        () => String(store.state.level),
-        (level) => store.set({ level: Number(level) }),
-      ),
       ...(Object.keys(card.roles).length ? [this.#choose("Joint names", "names", NAMES)] : []),
       ...measures,
     ];
@@ -229,13 +198,6 @@ class Files {
     const { card, store } = this.#session;
     const rows: HTMLElement[] = [];
     if (card.cyclic) rows.push(checkbox("Closed loop", (loop) => this.#take({ loop })));
-    if (!whyFeetCannotStand(card)) {
-      const stands = checkbox("Feet stand where they contact the ground", (on) =>
-        store.set({ stands: on }),
-      );
-      this.#shows.push(() => stands.set(store.state.stands));
-      rows.push(stands);
-    }
     const measured = card.controls.filter(({ measure }) => measure).map(({ name }) => title(name));
     if (measured.length) {
       const box = checkbox(`Match exactly: ${measured.join(", ")}`, (exact) =>

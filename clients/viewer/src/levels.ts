@@ -13,8 +13,7 @@ import {
   Vector3,
 } from "three";
 
-import "./levels.css";
-import { farEnough, type Ladder, type Lens, ladder, lens } from "./detail.ts";
+import { farEnough, type Ladder, type Lens, ladder, lens, withLevel } from "./detail.ts";
 import { el } from "./dom.ts";
 import { SkinnedBody } from "./figure.ts";
 import { Latest } from "./latest.ts";
@@ -221,12 +220,9 @@ function note(level: number, card: ModelCard, now: HTMLElement, from: HTMLElemen
     ["now", now],
     ["≤ 1 px", from],
   ] as const;
-  return el(
-    "article",
-    { class: `level-${Math.min(level, 3)}` },
-    el("h3", {}, `Level ${level}`, el("small", {}, ranks.join(" × "))),
-    el("dl", {}, ...rows.flatMap(([term, value]) => [el("dt", {}, term), value])),
-  );
+  const title = el("h3", {}, `Level ${level}`, el("small", {}, ranks.join(" × ")));
+  const list = el("dl", {}, ...rows.flatMap(([term, value]) => [el("dt", {}, term), value]));
+  return withLevel(el("article", {}, title, list), level);
 }
 
 const pixels = (value: number): string => value.toFixed(value < 10 ? 1 : 0);

@@ -2,7 +2,6 @@
 
 import type { SigmaGrid } from "@posefield/client";
 
-import "./map.css";
 import { draw, Frame, heat, MARGIN, rounded, type Veil, veil } from "./chart.ts";
 import { chooser, el, labelled } from "./dom.ts";
 import {

@@ -230,8 +230,7 @@ function atRest({ skeleton }: ModelCard): Pose {
 
 /** Measures of dragging that the browser keeps; then all of them are dropped. */
 const KEPT = 1000;
-let first = true;
-let kept = 0;
+const measures = { count: 0 };
 
 /** Latency of answers, as measures of the browser that tests read.
  *
@@ -239,11 +238,11 @@ let kept = 0;
  * control to the drawing of a pose that answers it or a newer one.
  */
 class Stopwatch {
-  readonly #open: { readonly turn: number; readonly since: number }[] = [];
+  #open: (readonly [turn: number, since: number])[] = [];
   #answered = 0;
 
   asked(turn: number): void {
-    this.#open.push({ turn, since: performance.now() });
+    this.#open.push([turn, performance.now()]);
   }
 
   answered(turn: number): void {
@@ -252,20 +251,17 @@ class Stopwatch {
 
   /** Call before the drawing of an answer, which ends with this turn of the event loop. */
   drawn(): void {
-    if (this.#answered && this.#open.length) queueMicrotask(() => this.#close());
+    if (this.#answered && this.#open.length) queueMicrotask(() => this.#measure());
   }
 
-  #close(): void {
+  #measure(): void {
     const end = performance.now();
-    while (this.#open.length && this.#open[0]!.turn <= this.#answered) {
-      const { since } = this.#open.shift()!;
-      if (++kept > KEPT) {
-        performance.clearMeasures("posefield:drag");
-        kept = 1;
-      }
-      if (first) performance.measure("posefield:first-pose", { start: 0, end });
-      else performance.measure("posefield:drag", { start: since, end });
-      first = false;
+    for (const [turn, since] of this.#open) {
+      if (turn > this.#answered) break;
+      const [name, start] = measures.count++ ? ["drag", since] : ["first-pose", 0];
+      if (measures.count % KEPT === 0) performance.clearMeasures("posefield:drag");
+      performance.measure(`posefield:${name}`, { start, end });
     }
+    this.#open = this.#open.filter(([turn]) => turn > this.#answered);
   }
 }

@@ -50,7 +50,6 @@ export class TimeBar {
     this.scrubber.max = String(duration || 1);
     this.scrubber.value = String(time);
     this.scrubber.setAttribute("aria-valuetext", text);
-    this.scrubber.style.setProperty("--done", `${(100 * time) / (duration || 1)}%`);
   }
 }
 

@@ -62,8 +62,8 @@ describe("files", () => {
     await choose("Format", "usda");
     await choose("Up axis", "z");
     await choose("Unit", "cm");
-    await choose("Movement", "in_place");
-    await choose("Level of detail", "1");
+    await page.getByRole("button", { name: "Root motion" }).click();
+    await page.getByLabel("Level", { exact: true }).selectOption("1");
     await choose("Joint names", "mixamo");
     await page.locator(".files").getByLabel("Closed loop").check();
     await page.locator(".files").getByLabel("Frames a second").fill("24");

@@ -302,12 +302,12 @@ test("performers are chosen by name", () =>
 test("sticks, ghost, contacts and level change the picture", () =>
   on(WALK, async (page) => {
     const seen = [await picture(page)];
-    for (const name of [
-      "Sticks",
-      "Ghost of the nearest example",
-      "Contacts and skate of the feet",
-    ]) {
+    for (const [name, shown] of [
+      ["Sticks", "#stage[data-clip]"],
+      ["Ghost of the nearest example", "[data-ghost]:not(:empty)"],
+    ] as const) {
       await page.getByRole("button", { name }).click();
+      await page.locator(shown).waitFor();
       seen.push(await picture(page));
     }
     await page.getByLabel("Level", { exact: true }).selectOption("3");
@@ -321,6 +321,10 @@ test("sticks, ghost, contacts and level change the picture", () =>
       (await page.locator("[data-ghost]").textContent())!,
       /the model at the controls of .*nearest captured clip/,
     );
+    const stage = () => page.locator("#stage canvas").screenshot();
+    const without = await stage();
+    await page.getByRole("button", { name: "Contacts and skate of the feet" }).click();
+    await until(async () => !(await stage()).equals(without), "contacts are drawn");
     assert.match((await page.locator("[data-skate]").textContent())!, /^\d+\.\d cm\/s$/);
   }));
 

@@ -1,21 +1,15 @@
 /** What a model leaves behind when another is shown, or the same one otherwise: nothing. */
 
 import assert from "node:assert/strict";
-import { execFileSync } from "node:child_process";
-import { dirname, join, resolve } from "node:path";
 import { after, before, test } from "node:test";
 
-import { Client, type ModelCard, type Motion } from "@posefield/client";
+import { Client } from "@posefield/client";
 import type { Browser, Page } from "playwright-core";
 
-import { place, placed } from "../src/skeleton.ts";
 import { browser, opened, SERVICE } from "./harness.ts";
 import { picture, settled, until } from "./look.ts";
 
 const client = new Client(SERVICE);
-const COMMAND = process.env["POSEFIELD_COMMAND"] ?? "../../.venv/bin/posefield";
-const PYTHON = resolve(join(dirname(COMMAND), "python"));
-const ROOT = resolve(import.meta.dirname, "../../..");
 
 let chromium: Browser;
 before(async () => {
@@ -80,32 +74,19 @@ test("who drags while the model is replaced may look around afterwards", async (
   await page.close();
 });
 
-test("feet slide as fast as the service reckons, and what is not known yet is not said", async () => {
-  const { page } = await opened(chromium, "/#cmu_walk?~feet=yes&~stands=no&~playing=no");
+test("feet slide as fast as the service says, and feet as predicted have no contacts", async () => {
+  const { page } = await opened(chromium, "/#cmu_walk?~feet=yes&~playing=no");
   await settled(page);
   const skate = page.locator("[data-skate]");
-  const known = async () => /cm\/s/.test((await skate.textContent())!);
-  await until(known, "it is said how fast they slide");
   const card = await client.card("cmu_walk");
   const controls = Object.fromEntries(card.controls.map((each) => [each.name, each.default]));
-  // Feet that stand do not slide, whichever they are.
-  const feet = "as_predicted" as const;
-  const clip = await client.clip("cmu_walk", { controls, fps: 60, loop: true, feet });
-  const said = await skate.textContent();
-  assert.equal(said, sliding(card, clip));
-  assert.notEqual(said, sliding({ ...card, feet: [card.feet[0]!] }, clip));
-  const root = page.getByRole("button", { name: "Root motion" });
-  await root.click();
+  const { trust } = await client.clip("cmu_walk", { controls, fps: 60, loop: true });
+  assert.equal(await skate.textContent(), `${(100 * trust.feet!.skate).toFixed(1)} cm/s`);
+  await page.getByRole("button", { name: "Feet stand" }).click();
+  await page.getByText("Feet as predicted: let them stand").waitFor();
+  assert.equal(await skate.textContent(), "");
+  await page.getByRole("button", { name: "Root motion" }).click();
   await page.getByText("In place, every foot slides").waitFor();
-  await page.waitForLoadState("networkidle");
-  await page.route(/clip.msgpack/, async (route) => {
-    await new Promise((done) => setTimeout(done, 1500));
-    return route.continue();
-  });
-  await root.click();
-  assert.equal(await skate.textContent(), "…");
-  await until(known, "it is said again");
-  assert.equal(await skate.textContent(), said);
   await page.close();
 });
 
@@ -114,18 +95,4 @@ async function people(page: Page, count: string): Promise<void> {
   const counted = async () =>
     (await page.locator(".crowd li b").allInnerTexts()).reduce((all, one) => all + Number(one), 0);
   await until(async () => (await counted()) === Number(count), `there are ${count}`);
-}
-
-/** By service/posefield/motion/foot_skate.py, as the page writes it. */
-function sliding(card: ModelCard, clip: Motion): string {
-  const { parents } = card.skeleton;
-  const at = placed(parents.length);
-  const feet = Array.from({ length: clip.frames }, (_, frame) => {
-    place(at, parents, clip.boneOffsets, clip.rotations, clip.rootPosition, frame);
-    return card.feet.map((joint) => [...at.positions.slice(3 * joint, 3 * joint + 3)]);
-  });
-  const code =
-    "import json, sys, numpy; from posefield.motion.foot_skate import mean_skate_speed; " +
-    "print(f'{100 * mean_skate_speed(numpy.array(json.load(sys.stdin)), 60):.1f} cm/s', end='')";
-  return execFileSync(PYTHON, ["-c", code], { cwd: ROOT, input: JSON.stringify(feet) }).toString();
 }
