@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from posefield.inference.graph_parts import Graph
+from posefield.inference.onnx_runtime import Graph
 from posefield.inference.session import Session
 
 Feed = dict[str, Any]

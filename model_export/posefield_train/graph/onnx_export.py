@@ -9,8 +9,8 @@ from posefield import __version__
 from posefield.common.array_shapes import ClipPositions, PerClip
 from posefield.common.errors import ExportRefused
 from posefield.common.units import Floats
-from posefield.inference import graph_ports, motion_detail, session
-from posefield.inference.motion_detail import Deviations
+from posefield.inference import graph_ports, reduced_motion, session
+from posefield.inference.reduced_motion import Deviations
 from posefield.inference.session import Session
 from posefield.model_file import model_card
 from posefield.model_file.model_card import ModelCard, rounded
@@ -159,7 +159,7 @@ class TakeStatistics:
         """Return the card with the statistics; unchanged for a motion without cycle."""
         if not self.root:
             return card
-        stored = motion_detail.to_bytes(self.detail.deviations) if self.detail else b""
+        stored = reduced_motion.to_bytes(self.detail.deviations) if self.detail else b""
         facts = {"detail": self.detail.facts} if self.detail else {}
         return replace(
             card,
@@ -235,7 +235,7 @@ def _harmonic_deviations(trained: TrainedModel) -> Deviations:
     # The last frame is the first one of the next cycle.
     period = missed.shape[1] - 1
     harmonics = min(MAX_HARMONICS, (period - 1) // 2)
-    waves = motion_detail.waves(period + 1, harmonics)[:-1]
+    waves = reduced_motion.waves(period + 1, harmonics)[:-1]
     parts = 2.0 / period * np.einsum("dtn,tw->wdn", missed[:, :-1], waves)
     powers = np.mean(np.square(parts), axis=2).reshape(2, harmonics, -1)
     return np.asarray(np.sqrt(powers.mean(axis=0)))
@@ -245,7 +245,7 @@ def _sampled(trained: TrainedModel, predicted: Floats, found: Deviations, draw: 
     """Return predictions (D', T, N) with detail, a seed of its own for each clip and draw."""
     frames, clips = predicted.shape[1:]
     seeds = 1 + draw * clips + np.arange(clips)
-    detail = [motion_detail.sample(found, frames, int(seed)) for seed in seeds]
+    detail = [reduced_motion.sample(found, frames, int(seed)) for seed in seeds]
     first = trained.model.decoder.reduced.bases[0]
     return predicted + np.tensordot(first, np.stack(detail, axis=2), axes=(1, 1))
 

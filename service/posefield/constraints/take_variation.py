@@ -11,7 +11,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import Floats, Indices
 from posefield.constraints.constrained_motion import ConstrainedMotion, LevelCorrector
 from posefield.constraints.motion_variables import CYCLE_VARIABLES
-from posefield.inference import motion_detail
+from posefield.inference import reduced_motion
 from posefield.inference.session import Session
 from posefield.inference.takes import EVENTFUL_TIMES, TakeSampler, TakeSettings
 from posefield.kriging import random_field
@@ -97,7 +97,7 @@ class TakeVariation:
     ) -> Annotated[Floats, "paths frames freedoms"]:
         """Return the details (N, T, r1) of seeds (N,), at the finest level."""
         card = self._session.card
-        return motion_detail.sample(motion_detail.deviations(card), card.frames, seeds)
+        return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seeds)
 
     def detail(self, bench: LevelCorrector, seed: int) -> Annotated[Floats, "frames freedoms"]:
         """Return the detail (T, r1) of a seed."""
@@ -105,7 +105,7 @@ class TakeVariation:
 
     def _detail(self, seed: int) -> Annotated[Floats, "frames freedoms"]:
         card = self._session.card
-        return motion_detail.sample(motion_detail.deviations(card), card.frames, seed)
+        return reduced_motion.sample(reduced_motion.deviations(card), card.frames, seed)
 
 
 def change_coefficients(

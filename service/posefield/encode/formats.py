@@ -40,11 +40,11 @@ class ClipEncoder(Format):
     """Encoder of clips in one format; equal results give equal bytes.
 
     write: returns the files of several results, in their order; those of one model and length are
-    computed together. usual: the format's default convention, which its readers expect. law:
-    whether the format allows no other convention. at_once: number of frames up to which a file is
-    written in a millisecond or two, so that other requests may wait for it. per_joint: largest
-    number of bytes of a joint in a frame, without the parts that all frames share. has_body:
-    whether the format carries a body. has_curves: whether it carries curves.
+    computed together. bytes_per_joint: largest number of bytes of a joint in a frame, without the
+    parts that all frames share. usual: the format's default convention, which its readers expect.
+    convention_fixed: whether the format allows no other convention. inline_limit: number of frames
+    up to which a file is written in a millisecond or two, so that other requests may wait for it.
+    has_body, has_curves: whether the format carries a body and curves.
     """
 
     write: Callable[[Sequence[SampledClip], Convention], list[bytes]]
@@ -177,10 +177,10 @@ CLIP_ENCODERS = by_extension(
 class TableEncoder(Format, Generic[A]):
     """Encoder of poses, crowd poses or grids as tables in one format.
 
-    table: returns the table of a result. write: returns its bytes. at_once: number of poses or grid
-    points up to which a result is computed and written in about a millisecond, so that other
-    requests may wait for it. per_joint: largest number of bytes of a joint of a character. most:
-    largest number of characters.
+    table: returns the table of a result. write: returns its bytes. inline_limit: number of poses or
+    grid points up to which a result is computed and written in about a millisecond, so that other
+    requests may wait for it. bytes_per_joint: largest number of bytes of a joint of a character.
+    most: largest number of characters.
     """
 
     table: Callable[[A], Table]

@@ -12,8 +12,8 @@ import numpy as np
 from posefield.common.array_shapes import Bones, Frames, PointControls, Vector
 from posefield.common.units import Floats, Indices, Singles
 from posefield.inference import graph_ports, onnx_runtime
-from posefield.inference.graph_parts import Graph, GraphParts
 from posefield.inference.graph_ports import CONTACTS, LABELS
+from posefield.inference.onnx_runtime import Graph, GraphParts
 from posefield.inference.trial_process import DEFAULT_LIMITS, TrialLimits
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import KrigingWeights

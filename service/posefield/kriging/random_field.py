@@ -32,7 +32,7 @@ GAUSSIAN_RATE = np.sqrt(6.0)
 """Standard deviation of the frequencies of exp(-3 h²)."""
 
 FIELD, SIGNS, NUGGETS = range(3)
-"""Streams of a seed; `motion_detail` has another one."""
+"""Streams of a seed; `reduced_motion` has another one."""
 
 
 def has_features(hyper: Hyper) -> bool:

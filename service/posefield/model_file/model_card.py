@@ -115,7 +115,7 @@ class TrainingParameters:
     facing: degrees from the root's +z in the files to the body's facing, to the left; None for
     motions without one. take_root (4, r3 + 4): of a cycle, last rows of a root of the covariance of
     the errors of the coefficients, of the duration's logarithm and of the travel, for a sigma of
-    one metre. detail: of a cycle, deviations that no control predicts (`motion_detail`). chart: of
+    one metre. detail: of a cycle, deviations that no control predicts (`reduced_motion`). chart: of
     the numbers of rotations (`rotation_charts`).
     """
 

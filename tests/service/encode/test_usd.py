@@ -66,22 +66,6 @@ def test_quaternions_in_the_wrong_order_would_be_seen(walk, tmp_path):
     assert error(opened(data, tmp_path / "wrong.usdc"), walk.clip) > 0.1
 
 
-def test_joints_stand_where_they_rest(stage, walk):
-    _, _, skeleton = query(stage)
-    offsets = walk.clip.translations[0].copy()
-    offsets[0] = walk.clip.skeleton.offsets[0]
-    local = np.array(skeleton.GetJointWorldBindTransforms())[:, 3, :3]
-    rest = np.array(skeleton.ComputeJointSkelTransforms(0, atRest=True))[:, 3, :3]
-    np.testing.assert_allclose(value(stage, "/Skel.restTransforms"), matrices(offsets), atol=1e-7)
-    np.testing.assert_allclose(local, rest, atol=1e-6)
-
-
-def matrices(offsets):
-    found = np.tile(np.eye(4), (len(offsets), 1, 1))
-    found[:, 3, :3] = offsets
-    return found
-
-
 def test_the_stage_states_its_units_and_times(stage, walk):
     assert stage.GetDefaultPrim().GetPath() == "/Character"
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0, len(walk.clip) - 1)

@@ -8,7 +8,7 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.http.decoding import crowd_query
-from posefield.inference import motion_detail, session
+from posefield.inference import reduced_motion, session
 from posefield.question.motion_question import PoseQuestion
 from posefield.synthesis import crowd_synthesis, poses
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
@@ -86,7 +86,7 @@ def test_takes_are_blended_between_levels(walk):
 
 def test_detail_is_sampled_by_each_seed(walk):
     opened = walk.session
-    stored = motion_detail.to_bytes(np.full((3, opened.card.levels[0].ranks[0]), 0.01))
+    stored = reduced_motion.to_bytes(np.full((3, opened.card.levels[0].ranks[0]), 0.01))
     making = replace(opened.card.making, detail=stored)
     detailed = Synthesizer("walk", replace(opened, card=replace(opened.card, making=making)))
     found = crowd(detailed, take="index", detail=True)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield.inference import motion_detail, session
+from posefield.inference import reduced_motion, session
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
@@ -24,7 +24,7 @@ def plain(walk_path) -> Synthesizer:
 def walk(plain) -> Synthesizer:
     """The same with detail."""
     opened = plain.session
-    making = replace(opened.card.making, detail=motion_detail.to_bytes(DEVIATIONS))
+    making = replace(opened.card.making, detail=reduced_motion.to_bytes(DEVIATIONS))
     return Synthesizer("walk", replace(opened, card=replace(opened.card, making=making)))
 
 
@@ -41,19 +41,19 @@ def clip(model, **more):
 
 
 def test_a_card_stores_deviations_in_half_precision(walk):
-    found = motion_detail.deviations(walk.session.card)
+    found = reduced_motion.deviations(walk.session.card)
     assert found.shape == DEVIATIONS.shape
     assert np.allclose(found, DEVIATIONS, rtol=1e-3, atol=0.0)
 
 
 def test_samples_have_the_deviations_and_close(rng):
     frames, seeds = 41, 400
-    drawn = np.array([motion_detail.sample(DEVIATIONS, frames, seed) for seed in range(seeds)])
+    drawn = np.array([reduced_motion.sample(DEVIATIONS, frames, seed) for seed in range(seeds)])
     assert np.abs(drawn[:, 0] - drawn[:, -1]).max() < 1e-12
     variances = np.sum(np.square(DEVIATIONS), axis=0)
     ratios = np.mean(np.square(drawn), axis=(0, 1)) / variances
     assert np.allclose(ratios, 1.0, atol=0.2) and ratios.mean() == pytest.approx(1.0, abs=0.05)
-    doubled = motion_detail.sample(2.0 * DEVIATIONS, frames, SEED)
+    doubled = reduced_motion.sample(2.0 * DEVIATIONS, frames, SEED)
     assert np.allclose(doubled, 2.0 * drawn[SEED])
 
 

@@ -38,9 +38,9 @@ FRAMES_AT_ONCE = 3200
 class TreeLevel:
     """Points of one depth in the tree, and their parents.
 
-    points: their places in the tree's order. turns: places, among the turning joints, of those
-    points that have children; they come first. holders: place of each point's parent. turners: the
-    same among the turning joints. Slices stand for consecutive places.
+    points: their indices in the tree's order. turns: indices, among the turning joints, of those
+    points that have children; they come first. parents: index of each point's parent.
+    turning_parents: the same among the turning joints. Slices stand for consecutive indices.
     """
 
     points: slice
@@ -107,7 +107,7 @@ def pose_independent_box(skeleton: Skeleton, offsets: Floats, path: Floats) -> F
 def enlarged_box(low: Floats, high: Floats) -> Floats:
     """Return corners (..., 2, 3) enlarged to allow for rounding errors.
 
-    Each axis grows at both ends by SLACK (1 + its largest absolute coordinate).
+    Each axis grows at both ends by RELATIVE_MARGIN (1 + its largest absolute coordinate).
     """
     slack = RELATIVE_MARGIN * (1.0 + np.maximum(np.abs(low), np.abs(high)))
     return np.stack([low - slack, high + slack], axis=-2)

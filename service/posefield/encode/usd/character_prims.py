@@ -26,7 +26,7 @@ NO_OFFSET = np.zeros((1, 3), np.float32)
 MESH_SCHEMAS = ("SkelBindingAPI", "MaterialBindingAPI")
 
 UsdValues = Mapping[str, Any]
-"""Arrays of `Numbers` by the same names, in types of usd-core, whose copies share their memory."""
+"""`CharacterArrays` in types of usd-core, whose copies share their memory."""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ class ClipArrays(NamedTuple):
 def arrays_with_character(
     answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[ClipArrays]:
-    """Yield takes in the order of their results, with samples, character values and facts."""
+    """Yield arrays in the order of their results, with samples, character values and facts."""
     for rig, some in _grouped_by_rig(answers, convention):
         made = animation_samples.from_clips([answer.clip for answer in some])
         rest = character.rest_pose(rig, made.offsets)
@@ -52,7 +52,7 @@ def arrays_with_character(
 def arrays_without_character(
     answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[ClipArrays]:
-    """Yield takes in the order of their results, with samples and facts only."""
+    """Yield arrays in the order of their results, with samples and facts only."""
     for rig, some in _grouped_by_rig(answers, WITHOUT_BODY):
         made = animation_samples.from_clips([answer.clip for answer in some])
         for answer, samples in zip(some, _samples(made, some, convention), strict=True):
@@ -62,7 +62,7 @@ def arrays_without_character(
 def _grouped_by_rig(
     answers: Sequence[SampledClip], convention: Convention
 ) -> Iterator[tuple[CharacterRig, list[SampledClip]]]:
-    """Yield consecutive results of one skeleton, at most TOGETHER frames at a time."""
+    """Yield consecutive results of one skeleton, at most FRAMES_AT_ONCE frames at a time."""
     _keep_freed_memory()
     for _, some in groupby(answers, lambda answer: id(answer.clip.skeleton)):
         part: list[SampledClip] = []

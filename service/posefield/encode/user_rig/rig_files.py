@@ -8,7 +8,7 @@ from posefield.common.errors import InvalidField
 from posefield.common.units import LengthUnit, UpAxis
 from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.formats import ClipEncoder
-from posefield.encode.user_rig import metre_joints, rig_glb
+from posefield.encode.user_rig import rig_glb, rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion.clip import Clip
 from posefield.question.body_kind import BodyKind
@@ -140,7 +140,7 @@ class RigTarget:
         if form.extension in LAYERS:
             return _layer_bytes(form.extension, self._layer(answer))
         if form.extension == "glb":
-            own = self.rig.rest if self.stage is None else metre_joints.in_metres(self.rig.rest)
+            own = self.rig.rest if self.stage is None else rig_stage.in_metres(self.rig.rest)
             return rig_glb.animation_glb(answer, own)
         return form.encode(answer, replace(convention, body="none"))
 

@@ -23,7 +23,7 @@ from posefield.encode.files.file_convention import METRES, Convention
 from posefield.encode.usd import character_prims
 from posefield.encode.usd_layers import layer_metadata, prim_specs
 from posefield.encode.usd_layers.prim_specs import ValueTypes
-from posefield.encode.user_rig import metre_joints
+from posefield.encode.user_rig import rig_stage
 from posefield.encode.user_rig.rig_stage import RigStage
 from posefield.motion import quat
 from posefield.question.results import SampledClip
@@ -155,7 +155,7 @@ def referring_layer(answer: SampledClip, rest: RestJoints, stage: RigStage, refe
 
 def skeleton_layer(answer: SampledClip, rest: RestJoints) -> Any:
     """Return a layer of the same joints in metres with Y up and their motion, without a skin."""
-    own = metre_joints.in_metres(rest)
+    own = rig_stage.in_metres(rest)
     made = Sdf.Layer.CreateAnonymous("clip.usda")
     paths = joint_names.joint_paths(joint_names.legal_names(own.names), own.parents)
     schemas = character_prims.BINDING_SCHEMAS
@@ -209,7 +209,7 @@ def _add_skeleton(root: Any, paths: Sequence[str], rest: RestJoints) -> None:
 
 
 def _matrix_array(rotations: JointRotations, translations: Bones) -> Any:
-    return Vt.Matrix4dArray.FromNumpy(metre_joints.matrices(rotations, translations))
+    return Vt.Matrix4dArray.FromNumpy(rig_stage.matrices(rotations, translations))
 
 
 def _add_animation(
