@@ -163,47 +163,36 @@ def test_one_frame():
     assert_positions(clip_of(short), worlds(JOINTS, ROWS[:1]))
 
 
-@pytest.mark.parametrize("newline", ["\r\n", "\r"])
-def test_newlines_of_other_systems(newline):
-    assert_plain(PLAIN.replace("\n", newline))
+def stripped(text):
+    """The text without indentation."""
+    return "\n".join(line.strip() for line in text.split("\n"))
 
 
-def test_missing_final_newline_keeps_the_last_frame():
-    assert_plain(PLAIN.rstrip("\n"))
+SPELLINGS = {
+    "carriage returns": lambda text: text.replace("\n", "\r\n"),
+    "lines of old Macintoshes": lambda text: text.replace("\n", "\r"),
+    "no final newline": lambda text: text.rstrip("\n"),
+    "blank lines at the end": lambda text: text + "\n  \n\t\n\r\n",
+    "blank lines around the section": lambda text: text.replace("MOTION\n", "\nMOTION\n\n").replace(
+        "0.0333333\n", "0.0333333\n\n"
+    ),
+    "blank lines between frames": lambda text: text.replace("\n-1.5 90", "\n\n-1.5 90"),
+    "tabs": lambda text: stripped(text).replace(" ", "\t").replace("\n", "\t\n"),
+    "several blanks": lambda text: stripped(text).replace(" ", " \t ").replace("\n", " \t \n"),
+    "a brace behind the name": lambda text: stripped(text).replace("\n{", " {"),
+    "braces without blanks": lambda text: stripped(text).replace("\n{\n", "{"),
+    "frames over several lines": lambda text: text.replace(" 10 20 30 -40", " 10 20\n30 -40"),
+    "signs, exponents and bare points": lambda text: text.replace(
+        "1 92.5 3 10", "+1. 9.25e1 .3E+1 1000e-2"
+    ).replace("-8 3 0.5", "-.8e1 +3. .5"),
+}
 
 
-def test_trailing_blank_lines():
-    assert_plain(PLAIN + "\n  \n\t\n\r\n")
-
-
-def test_blank_lines_between_sections_and_frames():
-    text = PLAIN.replace("MOTION\n", "\nMOTION\n\n").replace("0.0333333\n", "0.0333333\n\n")
-    assert_plain(text.replace("\n-1.5 90", "\n\n-1.5 90"))
-
-
-def test_no_indentation():
-    assert_plain("\n".join(line.strip() for line in PLAIN.split("\n")))
-
-
-@pytest.mark.parametrize("blank", ["\t", "  ", " \t "])
-def test_tabs_and_double_spaces_between_all_words(blank):
-    lines = [line.strip().replace(" ", blank) for line in PLAIN.split("\n")]
-    clip = assert_plain("\n".join(line + blank if line else "" for line in lines))
-    assert clip.skeleton.names[0] == "hips"
-
-
-def test_frames_header_with_a_tab():
-    assert_plain(PLAIN.replace("Frames: 2", "Frames:\t2").replace("Time: ", "Time:\t"))
-
-
-def test_brace_on_the_same_line():
-    lines = [line.strip() for line in PLAIN.split("\n")]
-    clip = assert_plain("\n".join(lines).replace("\n{", " {"))
-    assert clip.skeleton.names == ("hips", "spine", "head", "arm", "hand")
-
-
-def test_braces_without_blanks_around_them():
-    assert_plain("\n".join(line.strip() for line in PLAIN.split("\n")).replace("\n{\n", "{"))
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_spellings_of_the_same_file(spelling):
+    text = SPELLINGS[spelling](PLAIN)
+    assert text != PLAIN
+    assert assert_plain(text).skeleton.names == ("hips", "spine", "head", "arm", "hand")
 
 
 @pytest.mark.parametrize("change", [str.lower, str.upper])
@@ -221,15 +210,6 @@ def test_keywords_in_any_case():
     for word in ("HIERARCHY", "ROOT", "OFFSET", "JOINT", "End Site", "MOTION", "Frame Time"):
         text = text.replace(word, word.lower())
     assert_plain(text)
-
-
-def test_frame_wrapped_over_lines():
-    assert_plain(PLAIN.replace(" 10 20 30 -40", " 10 20\n30 -40"))
-
-
-def test_numbers_with_exponents_signs_and_bare_points():
-    text = PLAIN.replace("1 92.5 3 10", "+1. 9.25e1 .3E+1 1000e-2")
-    assert_plain(text.replace("OFFSET -8 3 0.5", "OFFSET -.8e1 +3. .5"))
 
 
 def test_utf8_byte_order_mark():
@@ -383,7 +363,7 @@ def test_no_end_site():
 def test_several_end_sites_on_one_joint_and_beside_children():
     site = "End Site\n{\nOFFSET 0 15 1\n}\n"
     more = site + "End Site\n{\nOFFSET 7 8 9\n}\n"
-    text = "\n".join(line.strip() for line in PLAIN.split("\n")).replace(site, more)
+    text = stripped(PLAIN).replace(site, more)
     clip = assert_plain(text.replace("JOINT head", site + "JOINT head"))
     assert clip.skeleton.tip_joints == (1, 2, 2, 4)
     expected = [[0, 15, 1], [0, 15, 1], [7, 8, 9], [-5, 0, 0]]

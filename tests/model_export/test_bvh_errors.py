@@ -66,22 +66,11 @@ OWN_LINES = "each frame on lines of its own"
 
 HIERARCHY_FAULTS = {
     "empty file": ("", 1, "found the end of the file, expected HIERARCHY"),
-    "blank file": ("\n\n  \n", 4, "found the end of the file, expected HIERARCHY"),
     "another format": ("; FBX 7.3\n", 1, "found ';', expected HIERARCHY"),
-    "only motion": (
-        "MOTION\nFrames: 1\nFrame Time: 1\n0\n",
-        1,
-        "found MOTION, expected HIERARCHY",
-    ),
     "no root": (line_changed(2, "JOINT hips"), 2, "found 'JOINT', expected ROOT"),
     "root without a name": (
         line_changed(2, "ROOT"),
         2,
-        "found no name, expected a joint's name on this line",
-    ),
-    "joint without a name": (
-        line_changed(6, "JOINT {"),
-        6,
         "found no name, expected a joint's name on this line",
     ),
     "no opening brace": (line_changed(3, ""), 4, "found 'OFFSET', expected {"),
@@ -125,11 +114,6 @@ HIERARCHY_FAULTS = {
         8,
         "found '10,5', expected a number, the Y of an OFFSET of three",
     ),
-    "offset not a number": (
-        line_changed(8, "OFFSET nan 10 0"),
-        8,
-        "found 'nan', expected a number, the X of an OFFSET of three",
-    ),
     "offset past all floats": (
         line_changed(8, "OFFSET 1e999 10 0"),
         8,
@@ -153,11 +137,6 @@ HIERARCHY_FAULTS = {
         9,
         "found channel Zrotation a second time in one joint, expected once",
     ),
-    "fewer channels than declared": (
-        changed("CHANNELS 3", "CHANNELS 4"),
-        9,
-        "found 3 channel names, expected CHANNELS 4",
-    ),
     "more channels than declared": (
         changed("CHANNELS 3", "CHANNELS 2"),
         9,
@@ -167,11 +146,6 @@ HIERARCHY_FAULTS = {
         changed("CHANNELS 3 Z", "CHANNELS Z"),
         9,
         "found 'Zrotation', expected the number of CHANNELS",
-    ),
-    "negative number of channels": (
-        changed("CHANNELS 3", "CHANNELS -3"),
-        9,
-        "found '-3', expected the number of CHANNELS",
     ),
     "duplicate joint name": (
         changed("JOINT spine", "JOINT hips"),
@@ -245,11 +219,6 @@ MOTION_FAULTS = {
         17,
         "found 'Frames: -3', expected 'Frames: N', N a whole number",
     ),
-    "broken number of frames": (
-        line_changed(17, "Frames: 3.5"),
-        17,
-        "found 'Frames: 3.5', expected 'Frames: N', N a whole number",
-    ),
     "zero frames": (line_changed(17, "Frames: 0"), 17, "found 0 frames, expected at least 1"),
     "no frame time": (
         line_changed(18, ""),
@@ -265,16 +234,6 @@ MOTION_FAULTS = {
         line_changed(18, "Frame Time: 0"),
         18,
         f"found frame time 0, {FRAME_TIME}",
-    ),
-    "negative frame time": (
-        line_changed(18, "Frame Time: -0.01"),
-        18,
-        f"found frame time -0.01, {FRAME_TIME}",
-    ),
-    "infinite frame time": (
-        line_changed(18, "Frame Time: 1e999"),
-        18,
-        f"found frame time 1e999, {FRAME_TIME}",
     ),
     "frame time whose inverse overflows": (
         line_changed(18, "Frame Time: 1e-320"),
@@ -306,11 +265,6 @@ MOTION_FAULTS = {
         20,
         "found 26 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
     ),
-    "a number too many in a line": (
-        line_changed(20, "1 2 3 4 5 6 7 8 9 10"),
-        20,
-        "found 28 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
-    ),
     "one too few made up by one too many": (
         "\n".join([*VALID.split("\n")[:18], "1 2 3 4 5 6 7 8", ROW + "1 2 3 4 5 6 7 8 9 10", ""]),
         19,
@@ -321,21 +275,10 @@ MOTION_FAULTS = {
         20,
         "found 'nan', expected a number",
     ),
-    "infinity": (line_changed(21, "1 2 3 4 5 6 7 8 -inf"), 21, "found '-inf', expected a number"),
-    "past all floats": (
-        line_changed(20, "1 2 3 4 1e999 6 7 8 9"),
-        20,
-        "found '1e999', expected at most 1e+09",
-    ),
     "past all lengths": (
         line_changed(20, "1 2 3 4 -1e300 6 7 8 9"),
         20,
         "found '-1e300', expected at most 1e+09",
-    ),
-    "decimal comma": (
-        line_changed(20, "1 2 3 4,5 5 6 7 8 9"),
-        20,
-        "found '4,5', expected a number",
     ),
     "underscore, which Python's float takes": (
         line_changed(20, "1 2 3 4 5 6 7 8 9_0"),
@@ -347,11 +290,6 @@ MOTION_FAULTS = {
         20,
         "found '９', expected a number",
     ),
-    "signs in a number's place": (
-        line_changed(19, "1 2 - 4 5 6 7 8 9"),
-        19,
-        "found '-', expected a number",
-    ),
     "two numbers run together": (
         line_changed(19, "1 2-3 4 5 6 7 8 9"),
         19,
@@ -361,11 +299,6 @@ MOTION_FAULTS = {
         VALID + "\nNotes by hand\n",
         23,
         "found 'Notes' after the last frame, expected nothing",
-    ),
-    "a second file after the data": (
-        VALID + VALID,
-        22,
-        "found 'HIERARCHY' after the last frame, expected nothing",
     ),
 }
 
@@ -379,7 +312,7 @@ def test_fault_is_named_with_its_line(fault):
     assert (error.line, error.message) == (line, message)
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("fault", list(FAULTS)[::9])
 def test_line_is_the_same_with_carriage_returns(fault):
     content, line, message = FAULTS[fault]
     error = refused(content.replace("\n", "\r\n"))
@@ -455,8 +388,9 @@ def test_a_long_blank_line_is_passed_in_linear_time():
     assert refused(line_changed(17, " " * 1_000_000 + "Frames")).line == 17
 
 
-@pytest.mark.parametrize("line", [2, 12, 16, 17, 18, 19, 20])
-@pytest.mark.parametrize("blank", ["\n", " \n", "\r\n"])
+@pytest.mark.parametrize(
+    ("line", "blank"), [(2, "\n"), (12, "\r\n"), (16, " \n"), (17, "\n"), (18, "\n"), (19, " \n")]
+)
 def test_blank_lines_take_no_memory(line, blank):
     lines = VALID.split("\n")
     count = 1_000_000
@@ -550,7 +484,7 @@ def test_faults_are_found_in_every_block(row):
     assert (error.line, error.message) == (19 + 5, f"found 1800000 numbers {lines}, {expected}")
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(4))
 def test_binary_garbage_is_refused(seed):
     content = np.random.default_rng(seed).bytes(5000)
     assert "expected HIERARCHY" in refused(content).message

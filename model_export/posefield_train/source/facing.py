@@ -66,38 +66,32 @@ class Evidence:
         return min(AXES, key=lambda axis: abs(_difference(self.mean, AXES[axis])))
 
 
-@dataclass(frozen=True)
-class FoundFacing:
-    """Facing of a family: degrees to the left of the root's +z, None without; and notes."""
-
-    degrees: float | None
-    notes: tuple[str, ...] = ()
-
-
 def find_facing(
     clips: Sequence[Clip], asked: Facing | None, roles: Mapping[str, str], cyclic: bool
-) -> FoundFacing:
-    """Return the facing of a family's clips, which have one skeleton.
+) -> tuple[float | None, tuple[str, ...]]:
+    """Return the facing of a family's clips, which have one skeleton, and notes.
+
+    The facing is in degrees to the left of the root's +z; None without one.
 
     asked: of the recipe; None means +z. roles: joints by role. Raises FacingError if the motion
     contradicts it, or does not tell it.
     """
     if asked == "none":
-        return FoundFacing(None)
+        return None, ()
     body = hips_evidence(clips, roles, asked == "roles")
     way = travel_evidence(clips, cyclic)
     if asked in ("hips", "roles"):
-        return FoundFacing(*_measured(body, asked, "two joints of a left and a right side", way))
+        return _measured(body, asked, "two joints of a left and a right side", way)
     if asked == "travel":
         degrees, notes = _measured(way, asked, "clips that travel in one direction")
         _verify(body, degrees, "measured from the travel")
-        return FoundFacing(degrees, notes)
+        return degrees, notes
     stated = "+z, the default," if asked is None else asked
     for evidence in (body, way):
         _verify(evidence, AXES[asked or "+z"], f"stated as {stated}")
     unknown = body is None and way is None and asked is None
     notes = ("nothing tells the facing: +z of the root is taken; say motion.facing",)
-    return FoundFacing(AXES[asked or "+z"], notes if unknown else ())
+    return AXES[asked or "+z"], notes if unknown else ()
 
 
 def _measured(

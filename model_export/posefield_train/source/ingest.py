@@ -34,7 +34,7 @@ from posefield_train.source.motion_file import MotionFile, ReadOptions
 from posefield_train.source.motion_readers import MotionFiles
 from posefield_train.source.recipe import Recipe
 from posefield_train.source.recipe_sections import PERFORMER, Source
-from posefield_train.source.skeleton_checks import RigError, RiggedClips, RigSettings
+from posefield_train.source.skeleton_checks import RigError
 
 # Limit of frames times joints of all files of a training: two hours of 31 joints at 120 frames a
 # second, which take 2.4 GB.
@@ -94,16 +94,41 @@ def ingest(
     wholes.clear()
     clips, lasts = [clip for clip, _ in cuts], [last for _, last in cuts]
     cuts.clear()
-    shared, said = _on_one_topology(recipe, rows, clips)
-    notes += said
+    shared: Sequence[Clip] = clips
+    if recipe.skeleton.is_unified:
+        files_of_rows, stretches = (
+            [row.place.name for row in rows],
+            recipe.motion.bones == "stretch",
+        )
+        try:
+            shared, unified_notes = unified_clips.unify_recipe(
+                clips, files_of_rows, recipe.skeleton.stated, stretches
+            )
+        except TopologyError as fault:
+            row = rows[fault.clip]
+            raise row.error(f"{row.place}: {fault}") from fault
+        notes += unified_notes
     left = list(reversed(shared))
     del shared, clips
     clips = [clip_joints.drop_joints(left.pop(), recipe, row) for row in rows]
     clip_joints.expect_same_skeleton(rows, clips)
-    rigged = _normalize_rigs(recipe, rows, clips)
-    clips, facing = list(rigged.clips), rigged.facing
-    notes_of_rigs = rigged.notes
-    del rigged
+    motion, joints = recipe.motion, {role: recipe.joint_with(role) for role in get_args(Role)}
+    directions = {"left", "forward", "step_length"}
+    try:
+        clips, facing, rig_notes = skeleton_checks.normalize(
+            clips,
+            [row.performer for row in rows],
+            [row.place.name for row in rows],
+            facing=motion.facing,
+            stretches=motion.bones == "stretch",
+            cyclic=motion.cyclic,
+            directed=any(control.auto.quantity in directions for control in recipe.measured),
+            roles={str(role): joint for role, joint in joints.items() if joint},
+            named=clip_joints.named_joints(recipe),
+        )
+    except RigError as fault:
+        row = rows[fault.clip]
+        raise row.error(f"{row.place}: {fault}") from fault
     clips.reverse()
     canonical.return_freed_memory()
     found = [
@@ -114,26 +139,18 @@ def ingest(
     measured_controls.expect_same_order(
         recipe.landmark_names, rows, [own.landmarks for own in examples]
     )
-    notes += [*notes_of_rigs, *stretch_notes(rows, [own.stretch for own in found])]
+    notes += [*rig_notes, *stretch_notes(rows, [own.stretch for own in found])]
     canonical.return_freed_memory()
-    takes, said = _takes(rows, found)
+    takes, take_notes = clip_table.stated_takes(rows), list[str]()
+    if takes is None:
+        takes, take_notes = take_groups.find_takes(
+            [row.motion for row in rows],
+            [row.named for row in rows],
+            [own.positions for own in found],
+            examples[0].clip.skeleton.names,
+        )
     examples = [replace(own, take=take) for own, take in zip(examples, takes, strict=True)]
-    return examples, [*said, *notes]
-
-
-def _takes(
-    rows: Sequence[ClipRow], found: "Sequence[_FoundExample]"
-) -> tuple[list[str], list[str]]:
-    """Return the take of each row, stated or found, and notes on those that were found."""
-    stated = clip_table.stated_takes(rows)
-    if stated is not None:
-        return stated, []
-    return take_groups.find_takes(
-        [row.motion for row in rows],
-        [row.named for row in rows],
-        [own.positions for own in found],
-        found[0].example.clip.skeleton.names,
-    )
+    return examples, [*take_notes, *notes]
 
 
 def read_files(
@@ -180,42 +197,6 @@ def _whole_clip(
         return curve_files.resting_clip(values, recipe.curves.rate)
     clip = wholes[row.motion]
     return curve_files.with_curves(clip, values, row) if values else clip
-
-
-def _on_one_topology(
-    recipe: Recipe, rows: Sequence[ClipRow], clips: Sequence[Clip]
-) -> tuple[Sequence[Clip], list[str]]:
-    """Return the clips on the topology of roles and notes, or as they are; RecipeError as above."""
-    if not recipe.skeleton.is_unified:
-        return clips, []
-    files = [row.place.name for row in rows]
-    stretches = recipe.motion.bones == "stretch"
-    try:
-        return unified_clips.unify_recipe(clips, files, recipe.skeleton.stated, stretches)
-    except TopologyError as fault:
-        row = rows[fault.clip]
-        raise row.error(f"{row.place}: {fault}") from fault
-
-
-def _normalize_rigs(recipe: Recipe, rows: Sequence[ClipRow], clips: Sequence[Clip]) -> RiggedClips:
-    """Return the clips with normalized skeletons; RecipeError names the row at fault."""
-    motion = recipe.motion
-    known = {role: recipe.joint_with(role) for role in get_args(Role)}
-    roles = {str(role): joint for role, joint in known.items() if joint}
-    named = frozenset(clip_joints.named_joints(recipe))
-    directions = {"left", "forward", "step_length"}
-    directed = any(control.auto.quantity in directions for control in recipe.measured)
-    settings = RigSettings(
-        motion.facing, motion.bones == "stretch", motion.cyclic, directed, roles, named
-    )
-    performers = [row.performer for row in rows]
-    try:
-        return skeleton_checks.normalize(
-            clips, performers, [row.place.name for row in rows], settings
-        )
-    except RigError as fault:
-        row = rows[fault.clip]
-        raise row.error(f"{row.place}: {fault}") from fault
 
 
 def _example(

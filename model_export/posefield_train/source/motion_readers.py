@@ -35,10 +35,6 @@ class MotionFormat:
     several: bool = False
 
 
-def _read_bvh(place: FileLocation, options: ReadOptions) -> MotionFile:
-    return bvh.motion_file(bvh.read(place))
-
-
 def _read_acclaim(place: FileLocation, options: ReadOptions) -> MotionFile:
     """Return the motion of an AMC file with the ASF file beside it."""
     beside = [name for name in data_folder.names_beside(place) if _suffix(name) == ".asf"]
@@ -82,7 +78,11 @@ def _read_usd(place: FileLocation, options: ReadOptions) -> MotionFile:
     from posefield_train.source import usd_motion
 
     if isinstance(place, Path):
-        _check_readable(place)
+        # USD's own error of a file that cannot be read names no reason.
+        try:
+            place.open("rb").close()
+        except OSError as fault:
+            raise MotionFileError(str(place), f"cannot be read: {fault.strerror}") from fault
         return usd_motion.read(place, str(place), options)
     # USD opens files by name only; references to other files of the archive are not found.
     with tempfile.TemporaryDirectory() as folder:
@@ -92,15 +92,13 @@ def _read_usd(place: FileLocation, options: ReadOptions) -> MotionFile:
         return usd_motion.read(copy, str(place), options)
 
 
-def _check_readable(place: Path) -> None:
-    try:
-        place.open("rb").close()
-    except OSError as fault:
-        raise MotionFileError(str(place), f"cannot be read: {fault.strerror}") from fault
-
-
 FORMATS = (
-    MotionFormat("BVH", (".bvh",), _read_bvh, "the rate; neither unit nor up axis"),
+    MotionFormat(
+        "BVH",
+        (".bvh",),
+        lambda place, _: bvh.motion_file(bvh.read(place)),
+        "the rate; neither unit nor up axis",
+    ),
     MotionFormat("Acclaim", (".amc",), _read_acclaim, "neither unit, up axis nor rate"),
     MotionFormat(
         "glTF", (".glb", ".gltf"), _read_gltf, "metres, y up, times of keys", several=True
@@ -195,32 +193,23 @@ class MotionFiles:
 
     def read(self, place: FileLocation, options: ReadOptions = AS_STATED) -> MotionFile:
         """Return the motion of a file, as `read`."""
-        key = self._key(place, options)
+        named, suffix = str(place), _suffix(place.name)
+        if named not in self._digests:
+            self._digests[named] = _digest(place)
+        # Other formats refer to files beside them, and are known by their place too.
+        alone = suffix in (".bvh", ".glb", ".usdz")
+        told = (str(options.rate), str(options.animation))
+        key = (suffix, self._digests[named], *told, "" if alone else named)
         found = self._kept.pop(key, None)
         if found is None:
             found = read(place, options)
             self._poses += found.poses
         self._kept[key] = found
-        self._drop_oldest()
-        return found
-
-    def _key(self, place: FileLocation, options: ReadOptions) -> tuple[str, ...]:
-        """Return a key of the content and of all that the reading depends on."""
-        named = str(place)
-        if named not in self._digests:
-            self._digests[named] = _digest(place)
-        told = (str(options.rate), str(options.animation))
-        suffix = _suffix(place.name)
-        # Other formats refer to files beside them, and are known by their place too.
-        alone = suffix in (".bvh", ".glb", ".usdz")
-        return (suffix, self._digests[named], *told, *([] if alone else [named]))
-
-    def _drop_oldest(self) -> None:
-        if self.most_poses is None:
-            return
-        while len(self._kept) > 1 and self._poses > self.most_poses:
+        most = self.most_poses
+        while most is not None and len(self._kept) > 1 and self._poses > most:
             _, oldest = self._kept.popitem(last=False)
             self._poses -= oldest.poses
+        return found
 
 
 def _digest(place: FileLocation) -> str:

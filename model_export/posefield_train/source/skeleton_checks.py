@@ -1,6 +1,6 @@
 """Checks and normalization of skeletons: dummy roots, rest poses, stretching bones."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -10,8 +10,7 @@ from posefield.common.units import UP, Floats
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import facing
-from posefield_train.source.facing import Facing, FacingError
+from posefield_train.source.facing import Facing, FacingError, find_facing, turn_basis
 
 STATIC = 1e-6
 """Largest change of a static joint: of its place, m, and of its quaternion's components."""
@@ -25,24 +24,25 @@ def count_dummies(clips: Sequence[Clip]) -> int:
     Each has one child, and is static or slides over the floor: upright and at one height. The
     child of the last moves against it.
     """
+
+    def is_static(clip: Clip) -> bool:
+        parts = clip.rotations[:, joint], clip.translations[:, joint]
+        return max(float(np.ptp(part, axis=0).max()) for part in parts) < STATIC
+
+    def slides(clip: Clip) -> bool:
+        """Return whether the joint slides over the floor upright and at one height."""
+        upright = np.abs(clip.rotations[:, joint][:, [1, 3]]).max() < STATIC
+        return bool(upright and np.ptp(clip.translations[:, joint] @ UP) < RIGID)
+
     own = clips[0].skeleton
     count = joint = 0
     while own.parents.count(joint) == 1 and joint not in own.tip_joints:
-        if not all(_is_dummy(clip, joint) for clip in clips):
+        if not all(is_static(clip) or slides(clip) for clip in clips):
             break
         joint += 1
         if any(np.ptp(clip.translations[:, joint], axis=0).max() > RIGID for clip in clips):
             count = joint
     return count
-
-
-def _is_dummy(clip: Clip, joint: int) -> bool:
-    """Return whether a joint is static, or slides over the floor upright and at one height."""
-    turns, place = clip.rotations[:, joint], clip.translations[:, joint]
-    if max(np.ptp(turns, axis=0).max(), np.ptp(place, axis=0).max()) < STATIC:
-        return True
-    upright = np.abs(turns[:, [1, 3]]).max() < STATIC
-    return bool(upright and np.ptp(place @ UP) < RIGID)
 
 
 def collapse_roots(clip: Clip, count: int) -> Clip:
@@ -228,22 +228,6 @@ def _distances(offsets: Floats, one: Floats) -> Floats:
     return np.asarray(np.sqrt(np.mean(np.sum(np.square(offsets - one), axis=-1), axis=-1)))
 
 
-@dataclass(frozen=True)
-class RigSettings:
-    """Settings of a recipe.
-
-    stretches: bones may stretch. directed: controls depend on the facing. named: joints that the
-    recipe names.
-    """
-
-    facing: Facing | None
-    stretches: bool
-    cyclic: bool
-    directed: bool
-    roles: Mapping[str, str]
-    named: frozenset[str]
-
-
 class RigError(ValueError):
     """A skeleton that cannot be trained; clip: index of a clip that shows it."""
 
@@ -252,29 +236,29 @@ class RigError(ValueError):
         self.clip = clip
 
 
-@dataclass(frozen=True)
-class RiggedClips:
-    """Clips in the basis of their facing, without dummy roots.
-
-    facing: degrees to the left of the root's +z; None for a family without a facing.
-    """
-
-    clips: tuple[Clip, ...]
-    facing: float | None
-    notes: tuple[str, ...]
-
-
 def normalize(
-    clips: Sequence[Clip], performers: Sequence[str], files: Sequence[str], settings: RigSettings
-) -> RiggedClips:
-    """Return the clips of one skeleton, normalized.
+    clips: Sequence[Clip],
+    performers: Sequence[str],
+    files: Sequence[str],
+    *,
+    facing: Facing | None,
+    stretches: bool,
+    cyclic: bool,
+    directed: bool,
+    roles: Mapping[str, str],
+    named: Collection[str],
+) -> tuple[list[Clip], float | None, list[str]]:
+    """Return the clips of one skeleton in the basis of their facing, without dummy roots.
 
-    performers, files: names by clip. Raises RigError for a rest pose without extent, bones that
-    stretch, two bodies under one name, and a facing that the motion contradicts.
+    The facing is in degrees to the left of the root's +z, None for a family without one; notes
+    follow. performers, files: names by clip. stretches: bones may stretch. directed: controls
+    depend on the facing. roles: joints by role. named: joints that the recipe names. Raises
+    RigError for a rest pose without extent, bones that stretch, two bodies under one name, and a
+    facing that the motion contradicts.
     """
     names = clips[0].skeleton.names
     count = count_dummies(clips)
-    gone = settings.named & set(names[:count])
+    gone = set(named) & set(names[:count])
     if gone:
         raise RigError(
             f"the recipe names {', '.join(map(repr, sorted(gone)))}, but "
@@ -282,27 +266,12 @@ def normalize(
         )
     notes = [describe_dummies(names, count)] if count else []
     clips = [collapse_roots(clip, count) for clip in clips]
-    _check_bones(clips, performers, files, settings.stretches)
-    try:
-        found = facing.find_facing(clips, settings.facing, settings.roles, settings.cyclic)
-    except FacingError as fault:
-        raise RigError(str(fault), fault.clip) from fault
-    turned = tuple(facing.turn_basis(clip, found.degrees or 0.0) for clip in clips)
-    if settings.facing or settings.directed:
-        notes += found.notes
-    return RiggedClips(turned, found.degrees, tuple(notes))
-
-
-def _check_bones(
-    clips: Sequence[Clip], performers: Sequence[str], files: Sequence[str], stretches: bool
-) -> None:
-    """Raise RigError for degenerate rest poses, stretch, and two bodies under one name."""
     offsets = np.stack([clip.translations.mean(axis=0) for clip in clips])
     offsets[:, 0] = 0.0
-    for index, own in enumerate(offsets):
-        if is_degenerate(own):
+    for index, bones in enumerate(offsets):
+        if is_degenerate(bones):
             raise RigError(
-                f"the rest pose is degenerate: all {len(own)} joints lie in one point, expected "
+                f"the rest pose is degenerate: all {len(bones)} joints lie in one point, expected "
                 "bones with a length",
                 index,
             )
@@ -312,3 +281,10 @@ def _check_bones(
     bodies = find_two_bodies(offsets, performers)
     if bodies:
         raise RigError(bodies.sentence(files), bodies.second)
+    try:
+        degrees, facing_notes = find_facing(clips, facing, roles, cyclic)
+    except FacingError as fault:
+        raise RigError(str(fault), fault.clip) from fault
+    if facing or directed:
+        notes += facing_notes
+    return [turn_basis(clip, degrees or 0.0) for clip in clips], degrees, notes
