@@ -136,7 +136,11 @@ def propose_controls(clips: FamilyClips) -> ControlProposal:
         raise ValueError("clips of one take, expected two takes or more")
     prediction = TakePrediction(motion_coefficients(clips.motions), clips.performers, clips.takes)
     known = _candidates(clips)
-    values = {name: _standardized(own) for name, own in known.items() if _varies(own)}
+    values = {
+        control: (measured - measured.mean()) / measured.std()
+        for control, measured in known.items()
+        if len(np.unique(measured.round(4))) >= FEWEST_VALUES
+    }
     event = None if clips.cyclic else _event(clips, prediction, values)
     if clips.cyclic:
         first = [ProposedControl(quantity) for quantity in GAIT]
@@ -183,14 +187,6 @@ def _measured(clips: FamilyClips, measure: Measure) -> Floats:
     return np.array([measures.evaluate(measure, motion) for motion in clips.motions])
 
 
-def _varies(values: Floats) -> bool:
-    return len(np.unique(values.round(4))) >= FEWEST_VALUES
-
-
-def _standardized(values: Floats) -> Floats:
-    return np.asarray((values - values.mean()) / values.std())
-
-
 def _event(
     clips: FamilyClips, prediction: TakePrediction, values: Mapping[ProposedControl, Floats]
 ) -> tuple[str, MeasureMoment] | None:
@@ -207,18 +203,18 @@ def _event(
     if least > 1.0 - LEAST_GAIN:
         return None
     near = [role for role, (left, _) in found.items() if left <= NEAR_BEST * least]
-    role = max(near, key=lambda role: _excursion(clips, role))
+
+    def excursion(role: str) -> float:
+        """Return how far a joint goes relative to the hips, from its first position, mean, m."""
+        joint, hips = clips.joints[role], clips.joints["hips"]
+        ways = []
+        for motion in clips.motions:
+            relative = motion.positions[:, joint] - motion.positions[:, hips]
+            ways.append(float(np.linalg.norm(relative - relative[0], axis=1).max()))
+        return float(np.mean(ways))
+
+    role = max(near, key=excursion)
     return role, found[role][1]
-
-
-def _excursion(clips: FamilyClips, role: str) -> float:
-    """Return how far a joint goes relative to the hips, from its first place, mean of clips, m."""
-    joint, hips = clips.joints[role], clips.joints["hips"]
-    found = []
-    for motion in clips.motions:
-        own = motion.positions[:, joint] - motion.positions[:, hips]
-        found.append(float(np.linalg.norm(own - own[0], axis=1).max()))
-    return float(np.mean(found))
 
 
 def _next(

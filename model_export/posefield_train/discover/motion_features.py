@@ -208,7 +208,10 @@ def take_features(take: Take, roles: Sequence[str]) -> Floats:
     times = np.arange(0.0, (len(take) - 1) / take.rate + 1e-9, 1.0 / RATE)
     own = np.arange(len(take)) / take.rate
     angles = np.interp(times, own, take.headings())
-    places = {role: _resampled(take.places[role], own, times) for role in {*roles, "hips"}}
+    places = {
+        role: np.stack([np.interp(times, own, axis) for axis in take.places[role].T], axis=1)
+        for role in {*roles, "hips"}
+    }
     floor = np.percentile(np.concatenate([places[role][:, 1] for role in roles]), 1.0)
     base = places["hips"] * [1.0, 0.0, 1.0] + [0.0, floor, 0.0]
     columns = [WEIGHTS[role] * _turned(places[role] - base, -angles) for role in roles]
@@ -229,10 +232,6 @@ def principal_components(values: Floats) -> tuple[Floats, Floats]:
     share = np.cumsum(variances[::-1]) / variances.sum()
     count = int(np.searchsorted(share, EXPLAINED)) + 1
     return mean, np.asarray(directions[:, ::-1][:, :count])
-
-
-def _resampled(places: Floats, own: Floats, times: Floats) -> Floats:
-    return np.stack([np.interp(times, own, places[:, axis]) for axis in range(3)], axis=1)
 
 
 def _turned(vectors: Floats, angles: Floats) -> Floats:

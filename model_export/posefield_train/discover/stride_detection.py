@@ -4,9 +4,7 @@ The distance of the feet along the heading of the hips swings once a stride. Its
 cuts, so that a stride begins and ends in the same pose.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -50,32 +48,27 @@ def find_strides(take: Take) -> list[Stride]:
 
     Within them no joint leaps.
     """
-    signal = feet_distance(take)
+    # Distance (F,) by which the left foot is before the right, leg lengths, smooth.
+    angles, across = take.headings(), take.across("Foot")
+    ahead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
+    signal = moving_mean(ahead, round(SMOOTHING * take.rate))
+    extrema = alternating_extrema(signal)
     found = []
-    for (first, kind), (middle, _), (last, _) in _triples(alternating_extrema(signal)):
+    for (first, kind), (middle, _), (last, _) in zip(
+        extrema, extrema[1:], extrema[2:], strict=False
+    ):
         share = (middle - first) / (last - first)
         is_far = min(signal[first], -signal[middle], signal[last]) > LEAST
         lasts = SHORTEST <= (last - first) / take.rate <= LONGEST
         is_one = lasts and EARLIEST <= share <= LATEST and take.is_whole(first, last)
         if kind > 0 and is_far and is_one:
             swing = signal[first] + signal[last] - 2.0 * signal[middle]
-            found.append(Stride(first, last, _way(take, first, last) / swing))
+            # Horizontal way of the hips, leg lengths.
+            step = max(1, round(WAY_STEP * take.rate))
+            hips = take.places["hips"][first : last + 1 : step, [0, 2]]
+            way = float(np.linalg.norm(np.diff(hips, axis=0), axis=1).sum())
+            found.append(Stride(first, last, way / swing))
     return found
-
-
-def _way(take: Take, first: int, last: int) -> float:
-    """Return the horizontal way of the hips between two frames, leg lengths."""
-    step = max(1, round(WAY_STEP * take.rate))
-    places = take.places["hips"][first : last + 1 : step, [0, 2]]
-    return float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-
-
-def feet_distance(take: Take) -> Floats:
-    """Return the distance (F,) by which the left foot is before the right, leg lengths, smooth."""
-    angles = take.headings()
-    across = take.across("Foot")
-    ahead = across[:, 2] * np.cos(angles) + across[:, 0] * np.sin(angles)
-    return moving_mean(ahead, round(SMOOTHING * take.rate))
 
 
 def moving_mean(values: Floats, frames: int) -> Floats:
@@ -104,10 +97,3 @@ def alternating_extrema(values: Floats) -> list[tuple[int, int]]:
             found += [(low, -1)] if low > 0 else []
             sign, high = 1, at
     return found
-
-
-def _triples(
-    extrema: list[tuple[int, int]],
-) -> Iterator[tuple[tuple[int, int], tuple[int, int], tuple[int, int]]]:
-    for (first, second), (_, third) in pairwise(pairwise(extrema)):
-        yield first, second, third

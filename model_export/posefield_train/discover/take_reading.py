@@ -249,8 +249,21 @@ def _body(name: str, file: MotionFile, stated: Stated) -> Body:
         raise UnusableTake(f"found {len(file)} frame, expected a motion")
     if file.rate is None:
         raise UnusableTake(f"{file.format} states no frame rate: say it with --rate")
-    measured = _with_roles(proposals.measure(file), stated.roles)
-    lacking = _lacking(measured)
+    measured, roles = proposals.measure(file), stated.roles
+    unknown = sorted(set(roles.values()) - set(measured.names))
+    if unknown:
+        raise UnusableTake(f"no joint {', '.join(map(repr, unknown))}, which the roles name")
+    # Stated roles in place of those that were recognised.
+    certain = {role: RoleGuess(joint, 1.0) for role, joint in roles.items()}
+    others = {r: g for r, g in measured.guesses.items() if g.joint not in roles.values()}
+    measured = replace(measured, guesses=others | certain)
+    lacking = []
+    for role in NEEDED:
+        guess = measured.guesses.get(role)
+        if guess is None:
+            lacking.append(role)
+        elif not guess.is_sure:
+            lacking.append(f"{role} ({guess.joint}? {'; '.join(guess.reasons)})")
     if lacking:
         raise UnusableTake(
             f"no joint for {', '.join(lacking)}, expected a body with two legs; roles can be stated"
@@ -283,25 +296,20 @@ def _of_one_unit(bodies: Sequence[Body], refused: dict[str, str]) -> list[Body]:
         kinds.setdefault(body.joints, []).append(body)
     kept = set[str]()
     for alike in kinds.values():
-        groups = _groups_of_legs(alike)
-        usual = max(groups, key=len)
+        # Groups between whose legs the lengths leap.
+        lengths = sorted({body.leg for body in alike})
+        tops = [low for low, high in pairwise(lengths) if high > OTHER_UNIT * low]
+        groups: dict[int, list[Body]] = {}
+        for body in alike:
+            groups.setdefault(bisect_left(tops, body.leg), []).append(body)
+        usual = max(groups.values(), key=len)
         kept.update(body.take.file for body in usual)
-        for body in (own for group in groups if group is not usual for own in group):
+        for body in (own for group in groups.values() if group is not usual for own in group):
             refused[body.take.file] = (
                 f"its legs are {body.leg:.4g} units long, those of {usual[0].take.file} and most "
                 f"files with its joints {usual[0].leg:.4g}: search files of one unit together"
             )
     return [body for body in bodies if body.take.file in kept]
-
-
-def _groups_of_legs(bodies: Sequence[Body]) -> list[list[Body]]:
-    """Return bodies in groups between whose legs the lengths leap, each in the bodies' order."""
-    ordered = sorted({body.leg for body in bodies})
-    tops = [low for low, high in pairwise(ordered) if high > OTHER_UNIT * low]
-    groups: dict[int, list[Body]] = {}
-    for body in bodies:
-        groups.setdefault(bisect_left(tops, body.leg), []).append(body)
-    return list(groups.values())
 
 
 def _recordings(takes: Sequence[Take]) -> tuple[list[Take], dict[str, list[str]]]:
@@ -350,26 +358,4 @@ def _turned(bodies: list[Body], up: UpAxis | None, refused: dict[str, str]) -> l
             continue
         places = {r: motion_file.to_y_up(own, axis) for r, own in body.take.places.items()}
         found.append(replace(body.take, places=places))
-    return found
-
-
-def _with_roles(measured: proposals.Figure, roles: Mapping[str, str]) -> proposals.Figure:
-    """Return the figure with stated roles in place of those that were recognised."""
-    unknown = sorted(set(roles.values()) - set(measured.names))
-    if unknown:
-        raise UnusableTake(f"no joint {', '.join(map(repr, unknown))}, which the roles name")
-    certain = {role: RoleGuess(joint, 1.0) for role, joint in roles.items()}
-    others = {r: g for r, g in measured.guesses.items() if g.joint not in roles.values()}
-    return replace(measured, guesses=others | certain)
-
-
-def _lacking(measured: proposals.Figure) -> list[str]:
-    """Return each role of hips and legs without a joint that is sure, with the reason."""
-    found = []
-    for role in NEEDED:
-        guess = measured.guesses.get(role)
-        if guess is None:
-            found.append(role)
-        elif not guess.is_sure:
-            found.append(f"{role} ({guess.joint}? {'; '.join(guess.reasons)})")
     return found

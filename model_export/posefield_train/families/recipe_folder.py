@@ -126,7 +126,15 @@ def recipe_text(facts: RecipeFacts, proposal: ControlProposal, accepted: bool = 
             f"accepted = {str(accepted).lower()}",
             "",
             *recipe_draft.source_lines(facts.report),
-            *_clips(facts.name),
+            "[clips]",
+            f'table = "{facts.name}.csv"',
+            'file = "file"',
+            'performer = "performer"',
+            'take = "take"',
+            'first_frame = "first_frame"',
+            'last_frame = "last_frame"',
+            'where = { accepted = { among = ["true"] } }',
+            "",
             *proposal_lines(proposal, facts.report.roles),
             "",
             *facts.skeleton,
@@ -167,12 +175,6 @@ def with_accepted(text: str, accepted: bool) -> str:
     return line.sub(f"accepted = {str(accepted).lower()}", text, count=1)
 
 
-def with_licence(text: str, licence: str) -> str:
-    """Return a recipe with a licence if it has none, and the rest of it as it is."""
-    line = re.compile(r'^licence = ""$', re.MULTILINE)
-    return line.sub(lambda _: f"licence = {recipe_draft.quote(licence)}", text, count=1)
-
-
 def proposal_lines(proposal: ControlProposal, roles: dict[str, str]) -> list[str]:
     """Return the event and the controls of a recipe, with what they explain as comments."""
     quote = recipe_draft.quote
@@ -192,20 +194,6 @@ def control_name(control: ProposedControl) -> str:
     """Return the name of a control, such as right_hand_height_end."""
     parts = [control.role, control.quantity, control.at]
     return "_".join(re.sub(r"([A-Z])", r"_\1", part).lower() for part in parts if part)
-
-
-def _clips(name: str) -> list[str]:
-    return [
-        "[clips]",
-        f'table = "{name}.csv"',
-        'file = "file"',
-        'performer = "performer"',
-        'take = "take"',
-        'first_frame = "first_frame"',
-        'last_frame = "last_frame"',
-        'where = { accepted = { among = ["true"] } }',
-        "",
-    ]
 
 
 def _evidence(proposal: ControlProposal) -> list[str]:

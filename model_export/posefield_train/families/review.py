@@ -59,14 +59,27 @@ def of_texts(
     pairs = [_numbers("merge", text) for text in merge]
     if odd := next((text for text, own in zip(merge, pairs, strict=True) if len(own) != 2), None):
         raise InvalidField("merge", f"{odd!r}, expected two numbers of families, such as 4,5")
-    return _checked(
-        Decisions(
-            _numbers("accept", accept) if accept else (),
-            _numbers("reject", reject) if reject else (),
-            tuple((own[0], own[1]) for own in pairs),
-            tuple(_dropped(text) for text in drop),
-        )
-    )
+    accepted = _numbers("accept", accept) if accept else ()
+    rejected = _numbers("reject", reject) if reject else ()
+    clips = []
+    for text in drop:
+        parts = DROP.fullmatch(text)
+        if parts is None:
+            expected = "expected FAMILY:FILE@SECONDS, such as 2:bd_1.bvh@33.2"
+            raise InvalidField("drop", f"{text!r}, {expected}")
+        clips.append(DroppedClip(int(parts[1]), parts[2], float(parts[3])))
+    merged = tuple((own[0], own[1]) for own in pairs)
+    both = sorted(set(accepted) & set(rejected))
+    if both:
+        raise InvalidField("reject", f"{both[0]} is accepted too, expected one of both")
+    seconds = [second for _, second in merged]
+    for first, second in merged:
+        if first == second or first in seconds or seconds.count(second) > 1:
+            raise InvalidField("merge", f"{first},{second}: expected each family merged once")
+        if second in accepted or second in rejected:
+            said = f"{second} goes into {first}, expected no other decision on it"
+            raise InvalidField("merge", said)
+    return Decisions(accepted, rejected, merged, tuple(clips))
 
 
 def read(path: Path) -> Decisions:
@@ -83,42 +96,15 @@ def read(path: Path) -> Decisions:
     return of_texts(
         ",".join(map(str, lists["accept"])),
         ",".join(map(str, lists["reject"])),
-        [_pair_text(pair) for pair in lists["merge"]],
+        [",".join(map(str, p)) if isinstance(p, list) else str(p) for p in lists["merge"]],
         [str(clip) for clip in lists["drop"]],
     )
-
-
-def _pair_text(pair: Any) -> str:
-    return ",".join(map(str, pair)) if isinstance(pair, list) else str(pair)
 
 
 def _numbers(field: str, text: str) -> tuple[int, ...]:
     if not re.fullmatch(r"\d{1,6}(\s*,\s*\d{1,6})*", text):
         raise InvalidField(field, f"{text!r}, expected numbers of families, such as 1,2")
     return tuple(dict.fromkeys(int(word) for word in text.split(",")))
-
-
-def _dropped(text: str) -> DroppedClip:
-    parts = DROP.fullmatch(text)
-    if parts is None:
-        said = "expected FAMILY:FILE@SECONDS, such as 2:bd_1.bvh@33.2"
-        raise InvalidField("drop", f"{text!r}, {said}")
-    return DroppedClip(int(parts[1]), parts[2], float(parts[3]))
-
-
-def _checked(found: Decisions) -> Decisions:
-    """Return decisions that do not contradict each other."""
-    both = sorted(set(found.accept) & set(found.reject))
-    if both:
-        raise InvalidField("reject", f"{both[0]} is accepted too, expected one of both")
-    seconds = [second for _, second in found.merge]
-    for first, second in found.merge:
-        if first == second or first in seconds or seconds.count(second) > 1:
-            raise InvalidField("merge", f"{first},{second}: expected each family merged once")
-        if second in found.accept or second in found.reject:
-            said = f"{second} goes into {first}, expected no other decision on it"
-            raise InvalidField("merge", said)
-    return found
 
 
 MAX_FAMILIES_BYTES = 16_000_000
@@ -223,7 +209,9 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
     own.rows[first] += moved
     own.texts.pop(second)
     into["performers"] = sorted({row.performer for row in own.rows[first]})
-    into["seconds"] = _median_seconds(own, first)
+    rates = {file: float(take["rate"]) for file, take in own.facts["takes"].items()}
+    spans = [(row.last_frame - row.first_frame) / rates[row.file] for row in own.rows[first]]
+    into["seconds"] = round(statistics.median(spans), 3)
     into["left_out"] |= gone["left_out"]
     text = recipe_folder.with_merged(
         own.texts[first],
@@ -237,12 +225,6 @@ def _merge(own: ReviewedFolder, first: int, second: int) -> None:
     into |= recipe_folder.proposal_facts(found)
     into["clips"] = len(own.rows[first])
     gone |= {"status": "merged", "into": first}
-
-
-def _median_seconds(own: ReviewedFolder, number: int) -> float:
-    rates = {file: float(take["rate"]) for file, take in own.facts["takes"].items()}
-    spans = [(row.last_frame - row.first_frame) / rates[row.file] for row in own.rows[number]]
-    return round(statistics.median(spans), 3)
 
 
 def _merged_text(gone: Mapping[str, Any]) -> str:
@@ -259,7 +241,7 @@ def _merged_text(gone: Mapping[str, Any]) -> str:
 def _propose(own: ReviewedFolder, number: int, text: str) -> ControlProposal:
     name = recipe_folder.family_name(number)
     rows: Sequence[FamilyRow] = own.rows[number]
-    draft = recipe_folder.with_licence(text, "not stated yet")
+    draft = re.sub('^licence = ""$', 'licence = "not stated yet"', text, count=1, flags=re.M)
     try:
         return recipe_folder.propose(draft, name, rows, own.data)
     except (MotionError, ValueError) as fault:

@@ -218,7 +218,18 @@ def propose_up(figures: Sequence[Figure]) -> Proposal:
 
 def _measured_up(figures: Sequence[Figure]) -> Proposal:
     """Return the up axis, from the bodies in motion, the floor under their feet, and at rest."""
-    votes = [_body_axis(figures), _floor_axis(figures), _rest_axis(figures)]
+    moving = [_upward(figure, figure.positions) for figure in figures]
+    at_rest = [
+        _upward(figure, figure.file.skeleton.at_rest(figure.file.skeleton.offsets)[None])
+        for figure in figures
+    ]
+    votes = [
+        _main_axis([one for one in moving if one is not None], "from the feet to the head"),
+        _floor_axis(figures),
+        _main_axis(
+            [one for one in at_rest if one is not None], "from the feet to the head at rest"
+        ),
+    ]
     found = [(axis, said) for axis, said in votes if axis is not None]
     evidence = tuple(said for _, said in found)
     if not found:
@@ -233,22 +244,6 @@ def _measured_up(figures: Sequence[Figure]) -> Proposal:
 
 
 Vote = tuple[str | None, str]
-
-
-def _body_axis(figures: Sequence[Figure]) -> Vote:
-    """Return the axis of the mean direction from the feet to the head."""
-    found = [_upward(figure, figure.positions) for figure in figures]
-    return _main_axis([each for each in found if each is not None], "from the feet to the head")
-
-
-def _rest_axis(figures: Sequence[Figure]) -> Vote:
-    """Return the axis from the feet to the head of the figure at rest."""
-    found = []
-    for figure in figures:
-        joints = figure.file.skeleton
-        found.append(_upward(figure, joints.at_rest(joints.offsets)[None]))
-    known = [each for each in found if each is not None]
-    return _main_axis(known, "from the feet to the head at rest")
 
 
 def _upward(figure: Figure, positions: Floats) -> Floats | None:
@@ -304,17 +299,17 @@ def propose_feet(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:
         return Proposal(feet, "medium", tuple(evidence))
     axis = AXES.index(up)
     heights = np.mean(
-        [figure.positions[..., axis].min(axis=0) for figure in figures if _alike(figure, first)],
+        [
+            figure.positions[..., axis].min(axis=0)
+            for figure in figures
+            if figure.names == first.names
+        ],
         axis=0,
     )
     lowest = [first.names[joint] for joint in np.argsort(heights, kind="stable")[:4]]
     agree = set(feet) <= set(lowest)
     evidence.append(f"joints that come lowest: {', '.join(lowest)}")
     return Proposal(feet, "high" if agree else "medium", tuple(evidence))
-
-
-def _alike(figure: Figure, other: Figure) -> bool:
-    return figure.names == other.names
 
 
 def propose_facing(figures: Sequence[Figure], up: UpAxis | None) -> Proposal:

@@ -15,6 +15,9 @@ from posefield.motion.skeleton import Skeleton
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.recipe import Recipe
 
+MAX_LISTED = 60
+"""Joints that a message lists."""
+
 
 def drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     """Return the clip without the dropped joints and their descendants.
@@ -27,8 +30,12 @@ def drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     joints = clip.skeleton
     missing = (needed | set(recipe.motion.drop_joints)) - set(joints.names)
     if missing:
+        known = list(dict.fromkeys((*joints.names, *sites)))
+        told = ", ".join(f"{name!r}{did_you_mean(name, known)}" for name in sorted(missing))
+        more = f" and {len(known) - MAX_LISTED} more" if len(known) > MAX_LISTED else ""
         raise row.error(
-            f"{row.place} has no joints {_missing_names(missing, (*joints.names, *sites))}"
+            f"{row.place} has no joints {told} that the recipe names, expected some of "
+            f"{', '.join(known[:MAX_LISTED])}{more}"
         )
     dropped = {joints.names.index(name) for name in recipe.motion.drop_joints}
     for joint, parent in enumerate(joints.parents):
@@ -41,19 +48,6 @@ def drop_joints(clip: Clip, recipe: Recipe, row: ClipRow) -> Clip:
     if gone:
         raise row.error(f"joints {sorted(gone)} are dropped, and named by the recipe elsewhere")
     return keep_joints(clip, kept)
-
-
-MOST_LISTED = 60
-"""Joints that a message lists."""
-
-
-def _missing_names(missing: Collection[str], known: Sequence[str]) -> str:
-    """Return names that the recipe has and a file lacks, with similar ones and all that it has."""
-    told = ", ".join(f"{name!r}{did_you_mean(name, known)}" for name in sorted(missing))
-    there = list(dict.fromkeys(known))
-    more = f" and {len(there) - MOST_LISTED} more" if len(there) > MOST_LISTED else ""
-    listed = ", ".join(there[:MOST_LISTED])
-    return f"{told} that the recipe names, expected some of {listed}{more}"
 
 
 def has_all_parents(joints: Skeleton, kept: Sequence[int]) -> bool:
@@ -97,17 +91,14 @@ def expect_same_skeleton(rows: Sequence[ClipRow], clips: Sequence[Clip]) -> None
     first = clips[0].skeleton
     for row, clip in zip(rows, clips, strict=True):
         if not clip.skeleton.same_tree(first):
+            only = sorted(set(clip.skeleton.names) ^ set(first.names))
+            difference = "the same names in another order or hierarchy"
+            if only:
+                difference = f"only one of them has {only}"
             raise row.error(
-                f"{row.place} has other joints than {rows[0].place} of line "
-                f"{rows[0].line}: {_difference(clip.skeleton, first)}; of people, say "
-                "skeleton.topology = 'roles'"
+                f"{row.place} has other joints than {rows[0].place} of line {rows[0].line}: "
+                f"{difference}; of people, say skeleton.topology = 'roles'"
             )
-
-
-def _difference(a: Skeleton, b: Skeleton) -> str:
-    if set(a.names) != set(b.names):
-        return f"only one of them has {sorted(set(a.names) ^ set(b.names))}"
-    return "the same names in another order or hierarchy"
 
 
 ENDING = "_end"

@@ -9,13 +9,11 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import IO, TYPE_CHECKING, Literal
 
-from posefield.common.errors import RecipeError
+from posefield.common.errors import InvalidField, RecipeError
+from posefield.common.name_suggestion import did_you_mean
 
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
-
-from posefield.common.errors import InvalidField
-from posefield.common.name_suggestion import did_you_mean
 
 COMPRESSION_METHODS = {zipfile.ZIP_STORED: "stored", zipfile.ZIP_DEFLATED: "deflate"}
 """Accepted compression methods. For bzip2 and LZMA, `zipfile` unpacks the whole content of 4 kB at
@@ -168,7 +166,10 @@ def find(folder: Path, name: str) -> FileLocation:
     parts = PurePosixPath(name).parts
     if not parts or parts[0] == "/" or ".." in parts:
         raise RecipeError(folder, f"file {name!r}, expected a path below the data folder")
-    places = [folder / name, *_zip_candidates(folder, parts)]
+    places: list[FileLocation] = [folder / name]
+    archive = folder / f"{parts[0]}.zip"
+    if len(parts) > 1 and archive.is_file():
+        places += [ZipMember(archive, "/".join(parts)), ZipMember(archive, "/".join(parts[1:]))]
     for place in places:
         if _is_file(place):
             return place
@@ -181,14 +182,6 @@ def _is_file(place: FileLocation) -> bool:
         return place.is_file()
     except OSError:  # a name that no file can have
         return False
-
-
-def _zip_candidates(folder: Path, parts: tuple[str, ...]) -> list[FileLocation]:
-    archive = folder / f"{parts[0]}.zip"
-    if len(parts) < 2 or not archive.is_file():
-        return []
-    names = ("/".join(parts), "/".join(parts[1:]))
-    return [ZipMember(archive, name) for name in names]
 
 
 @lru_cache(maxsize=8)

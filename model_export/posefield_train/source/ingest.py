@@ -208,10 +208,12 @@ def _example(
     opened, jumps = canonical.without_jumps(captured, motion.cyclic, has_facing)
     clip = canonical.closed(opened, motion.cyclic, in_place)
     before = canonical.closed(opened, False, in_place) if motion.cyclic else None
-    marks = (
-        *measured_controls.landmarks(row, last, recipe.clips.landmarks),
-        *measured_controls.found_landmark(recipe, row, clip),
-    )
+    marks = measured_controls.landmarks(row, last, recipe.clips.landmarks)
+    event = recipe.event
+    if event is not None and event.is_found:
+        joint = clip.skeleton.names.index(event.joint)
+        share = measured_controls.moment_share(clip, joint, event.at)
+        marks += (measured_controls.event_landmark(row, event.joint, event.at, share),)
     values = measured_controls.control_values(recipe, row, clip, marks)
     spans = measured_controls.contact_spans(row, last, recipe.contacts.columns)
     example = Example(

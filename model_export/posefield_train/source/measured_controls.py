@@ -169,15 +169,6 @@ def landmarks(row: ClipRow, last: int, columns: Sequence[str]) -> tuple[float, .
     return tuple((frame - row.first_frame) / (last - row.first_frame) for frame in row.landmarks)
 
 
-def found_landmark(recipe: Recipe, row: ClipRow, clip: Clip) -> tuple[float, ...]:
-    """Return the moment of the recipe's event as a share of the clip, if it is found there."""
-    if recipe.event is None or not recipe.event.is_found:
-        return ()
-    joint = clip.skeleton.names.index(recipe.event.joint)
-    share = moment_share(clip, joint, recipe.event.at)
-    return (event_landmark(row, recipe.event.joint, recipe.event.at, share),)
-
-
 def event_landmark(row: ClipRow, joint: str, at: str, share: float) -> float:
     """Return the share of the clip of a row at which its event is.
 

@@ -141,18 +141,15 @@ class Recipe(RecipePart):
         recipe_checks.check_label_sets(self.clips, self.kriging)
         recipe_checks.check_label_names(self.controls, self.kriging)
         recipe_checks.check_presets(self.presets, self.controls, self.kriging)
-        self._check_measured_controls()
-        recipe_checks.check_event(self.event, self.size, self.clips.landmarks)
-        recipe_checks.check_landmarks(self.clips.landmarks)
-        return self
-
-    def _check_measured_controls(self) -> None:
         for index, control in enumerate(self.controls):
             if isinstance(control, ControlMeasured):
                 auto = control.auto
                 given = auto, self.motion, self.clips.landmarks, self.leg_ends(auto)
                 for key, fault in recipe_checks.measurement_faults(*given):
                     raise KeyFault(f"{fault} (control {control.name})", "controls", index, *key)
+        recipe_checks.check_event(self.event, self.size, self.clips.landmarks)
+        recipe_checks.check_landmarks(self.clips.landmarks)
+        return self
 
 
 MAX_BYTES = 128_000

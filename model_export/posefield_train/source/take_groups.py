@@ -164,8 +164,7 @@ def find_pairs(motions: Motions, swapped: tuple[int, ...]) -> list[ClipPair]:
 
 
 def _overlaps(motions: Motions, swapped: list[int]) -> Iterator[ClipPair]:
-    features = [frame_features(motion) for motion in motions]
-    index = index_frames(features)
+    index = index_frames([frame_features(motion) for motion in motions])
     # Views: of thousands of clips a second copy is hundreds of megabytes.
     features = np.split(index.features, np.cumsum(index.counts)[:-1])
     joints = len(swapped)

@@ -8,7 +8,7 @@ import numpy as np
 from pxr import UsdGeom, UsdSkel
 
 from posefield.common.array_shapes import Positions, Rotations
-from posefield.common.units import Floats, UpAxis
+from posefield.common.units import Floats
 from posefield.motion import quat
 from posefield.rigs.joints import format_faults, posed_joints
 from posefield.rigs.joints.posed_joints import PosedJoints
@@ -146,6 +146,7 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
     plain = posed_joints.plain_motion(motion.posed_joints(exact))
     stage = opened.stage
     has_unit = UsdGeom.StageHasAuthoredMetersPerUnit(stage)
+    is_z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
     return MotionFile(
         source,
         "USD",
@@ -155,7 +156,7 @@ def _read(path: Path, source: str, options: ReadOptions) -> MotionFile:
         found.rate,
         found.evidence,
         metres_per_unit=float(UsdGeom.GetStageMetersPerUnit(stage)) if has_unit else None,
-        up=_up(opened),
+        up=("z" if is_z_up else "y") if stage.HasAuthoredMetadata("upAxis") else None,
         notes=notes,
     )
 
@@ -222,10 +223,3 @@ def _codes_per_second(opened: SkelStage) -> tuple[float, tuple[str, ...]]:
     if authored:
         return pace, ()
     return pace, (f"{opened.source}: states no timeCodesPerSecond, {pace:g} is USD's default",)
-
-
-def _up(opened: SkelStage) -> UpAxis | None:
-    """Return the stated up axis; None if the file states none."""
-    if not opened.stage.HasAuthoredMetadata("upAxis"):
-        return None
-    return "z" if UsdGeom.GetStageUpAxis(opened.stage) == UsdGeom.Tokens.z else "y"
