@@ -136,10 +136,7 @@ class AsyncClient:
         words = questions.question({"layout": layout, "character": user_character})
         query = "?" + "&".join(f"{key}={value}" for key, value in words.items()) if words else ""
         name = "queryPerformanceInFormat"
-
-        def call(read: Any, form: str) -> Call[Any]:
-            return questions.post(name, "", body, read, form, query)
-
+        call = partial(questions.post, name, "", body, query=query)
         about = f"{len(body.get('segments', ()))} segments"
         return AsyncMotion(self, Files(call, name, about), PERFORMANCE)
 
@@ -431,10 +428,7 @@ class AsyncModel:
     ) -> "AsyncMotion[ClipNumbers]":
         """Return a clip; the request is sent when it is saved or its numbers are read."""
         words = questions.question(locals())
-
-        def call(read: Any, form: str) -> Call[Any]:
-            return questions.ask("ClipInFormat", self.name, words, read, form)
-
+        call = partial(questions.ask, "ClipInFormat", self.name, words)
         files = Files(call, "getClipInFormat", questions.about(self.name, words))
         return AsyncMotion(self.client, files, CLIP)
 

@@ -134,10 +134,7 @@ class Client:
         words = questions.question({"layout": layout, "character": user_character})
         query = "?" + "&".join(f"{key}={value}" for key, value in words.items()) if words else ""
         name = "queryPerformanceInFormat"
-
-        def call(read: Any, form: str) -> Call[Any]:
-            return questions.post(name, "", body, read, form, query)
-
+        call = partial(questions.post, name, "", body, query=query)
         about = f"{len(body.get('segments', ()))} segments"
         return Motion(self, Files(call, name, about), PERFORMANCE)
 
@@ -422,10 +419,7 @@ class Model:
     ) -> "Motion[ClipNumbers]":
         """Return a clip; the request is sent when it is saved or its numbers are read."""
         words = questions.question(locals())
-
-        def call(read: Any, form: str) -> Call[Any]:
-            return questions.ask("ClipInFormat", self.name, words, read, form)
-
+        call = partial(questions.ask, "ClipInFormat", self.name, words)
         files = Files(call, "getClipInFormat", questions.about(self.name, words))
         return Motion(self.client, files, CLIP)
 

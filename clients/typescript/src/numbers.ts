@@ -37,25 +37,25 @@ export function performance(content: Uint8Array<ArrayBuffer>): PerformanceMotion
 }
 
 function motionOf(found: Packed): Omit<Motion, "trust"> {
-  const own = arraysOf(found);
+  const arrays = arraysOf(found);
   const names = strings(found, "names");
-  expectLength("names", names.length, own.boneOffsets.length / 3);
+  expectSame("names", names.length, arrays.boneOffsets.length / 3);
   return {
-    ...own,
+    ...arrays,
     names,
     parents: integers(found, "parents", names.length),
-    curveNames: own.curves ? strings(found, "curve_names") : [],
-    rate: number(found, "rate"),
-    frames: own.times.length,
-    units: record<Record<string, string>>(found, "units"),
+    curveNames: arrays.curves ? strings(found, "curve_names") : [],
+    rate: field(found, "rate", isNumber, "a number"),
+    frames: arrays.times.length,
+    units: field(found, "units", isMap, "a map") as Record<string, string>,
   };
 }
 
 export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
   const found = unpacked(content);
-  const [count = 0, joints = 0] = array(found, "rotations").shape;
+  const [count = 0, joints = 0] = arrayOf(found, "rotations").shape;
   return {
-    model: text(found, "model"),
+    model: field(found, "model", isText, "a text"),
     names: strings(found, "names"),
     parents: integers(found, "parents", joints),
     warnings: strings(found, "warnings"),
@@ -65,7 +65,7 @@ export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
     duration: float32(found, "duration", [count]),
     sigma: float32(found, "sigma", [count]),
     supported: "supported" in found ? truths(found, "supported", [count]) : null,
-    levels: Int32Array.from(int8(found, "levels", [count])),
+    levels: Int32Array.from(new Int8Array(bytes(found, "levels", "|i1", 1, [count]))),
     errorPx: "error_px" in found ? float32(found, "error_px", [count]) : null,
     curveNames: "curve_names" in found ? strings(found, "curve_names") : [],
     curves: "curves" in found ? curvesOf(found, count) : null,
@@ -73,7 +73,7 @@ export function crowd(content: Uint8Array<ArrayBuffer>): CrowdPoses {
 }
 
 function arraysOf(found: Packed): Omit<Poses, "trust"> {
-  const [frames = 0, joints = 0] = array(found, "rotations").shape;
+  const [frames = 0, joints = 0] = arrayOf(found, "rotations").shape;
   return {
     times: float64(found, "times", [frames]),
     rotations: float32(found, "rotations", [frames, joints, 4]),
@@ -84,13 +84,13 @@ function arraysOf(found: Packed): Omit<Poses, "trust"> {
 }
 
 function curvesOf(found: Packed, rows: number): Float32Array {
-  const [, curves = 0] = array(found, "curves").shape;
+  const [, curves = 0] = arrayOf(found, "curves").shape;
   return float32(found, "curves", [rows, curves]);
 }
 
 function unpacked(content: Uint8Array<ArrayBuffer>): Packed {
   try {
-    return record({ answer: decode(content) }, "answer");
+    return field({ answer: decode(content) }, "answer", isMap, "a map");
   } catch (fault) {
     if (fault instanceof Unexpected) throw fault;
     throw new Unexpected(`the answer is no MessagePack: ${fault}`, { cause: fault });
@@ -107,16 +107,11 @@ function float64(found: Packed, name: string, shape: Shape): Float64Array<ArrayB
   return new Float64Array(buffer, byteOffset, byteLength / 8);
 }
 
-function int8(found: Packed, name: string, shape: Shape): Int8Array<ArrayBuffer> {
-  const { buffer, byteOffset, byteLength } = bytes(found, name, "|i1", 1, shape);
-  return new Int8Array(buffer, byteOffset, byteLength);
-}
-
 function truths(found: Packed, name: string, shape: Shape): boolean[] {
   return Array.from(bytes(found, name, "|b1", 1, shape), (byte) => byte !== 0);
 }
 
-/** The bytes of an array of a shape, where numbers of their size may begin. */
+/** Bytes of an array of a shape, at an offset where numbers of their size may begin. */
 function bytes(
   found: Packed,
   name: string,
@@ -124,68 +119,50 @@ function bytes(
   size: number,
   shape: Shape,
 ): Uint8Array<ArrayBuffer> {
-  const { data, ...own } = array(found, name);
-  const [said, expected] = [`${own.dtype} (${own.shape})`, `${dtype} (${shape})`];
-  if (said !== expected) throw new Unexpected(`${name}: found ${said}, expected ${expected}`);
-  expectLength(`bytes of ${name}`, data.length, size * shape.reduce((a, b) => a * b, 1));
-  return data.byteOffset % size ? data.slice() : data;
+  const array = arrayOf(found, name);
+  expectSame(name, `${array.dtype} (${array.shape})`, `${dtype} (${shape})`);
+  expectSame(`bytes of ${name}`, array.data.length, size * shape.reduce((a, b) => a * b, 1));
+  return array.data.byteOffset % size ? array.data.slice() : array.data;
 }
 
-function array(found: Packed, name: string): PackedArray {
-  const { dtype, shape, data } = record(found, name);
-  if (typeof dtype === "string" && isIntegers(shape) && isBytes(data))
-    return { dtype, shape, data };
+function arrayOf(found: Packed, name: string): PackedArray {
+  const { dtype, shape, data } = field(found, name, isMap, "an array");
+  if (typeof dtype === "string" && isIntegers(shape) && data instanceof Uint8Array)
+    return { dtype, shape, data: data as Uint8Array<ArrayBuffer> };
   throw new Unexpected(`${name}: found no array`);
 }
 
-function record<Kind extends object = Packed>(found: Packed, name: string): Kind {
-  const value = found[name];
-  if (typeof value === "object" && value && !Array.isArray(value)) return value as Kind;
-  throw unlike(name, value, "a map");
-}
-
-function text(found: Packed, name: string): string {
-  const value = found[name];
-  if (typeof value === "string") return value;
-  throw unlike(name, value, "a text");
-}
-
-function number(found: Packed, name: string): number {
-  const value = found[name];
-  if (typeof value === "number") return value;
-  throw unlike(name, value, "a number");
-}
-
 function strings(found: Packed, name: string): readonly string[] {
-  const value = found[name];
-  if (isList(value) && value.every((text) => typeof text === "string")) return value;
-  throw unlike(name, value, "a list of texts");
+  return field(found, name, isTexts, "a list of texts");
 }
 
 function integers(found: Packed, name: string, length: number): readonly number[] {
+  const values = field(found, name, isIntegers, "a list of whole numbers");
+  expectSame(name, values.length, length);
+  return values;
+}
+
+function field<Kind>(
+  found: Packed,
+  name: string,
+  is: (value: unknown) => value is Kind,
+  expected: string,
+): Kind {
   const value = found[name];
-  if (!isIntegers(value)) throw unlike(name, value, "a list of whole numbers");
-  expectLength(name, value.length, length);
-  return value;
-}
-
-function isList(value: unknown): value is readonly unknown[] {
-  return Array.isArray(value);
-}
-
-function isIntegers(value: unknown): value is readonly number[] {
-  return isList(value) && value.every(Number.isInteger);
-}
-
-function isBytes(value: unknown): value is Uint8Array<ArrayBuffer> {
-  return value instanceof Uint8Array;
-}
-
-function unlike(name: string, value: unknown, expected: string): Unexpected {
+  if (is(value)) return value;
   const kind = value === undefined ? "nothing" : JSON.stringify(value).slice(0, 40);
-  return new Unexpected(`${name}: found ${kind}, expected ${expected}`);
+  throw new Unexpected(`${name}: found ${kind}, expected ${expected}`);
 }
 
-function expectLength(name: string, found: number, expected: number): void {
+const isText = (value: unknown): value is string => typeof value === "string";
+const isNumber = (value: unknown): value is number => typeof value === "number";
+const isMap = (value: unknown): value is Packed =>
+  typeof value === "object" && value !== null && !Array.isArray(value);
+const isTexts = (value: unknown): value is readonly string[] =>
+  Array.isArray(value) && value.every(isText);
+const isIntegers = (value: unknown): value is readonly number[] =>
+  Array.isArray(value) && value.every(Number.isInteger);
+
+function expectSame(name: string, found: string | number, expected: string | number): void {
   if (found !== expected) throw new Unexpected(`${name}: found ${found}, expected ${expected}`);
 }

@@ -19,20 +19,11 @@ USDC = "model/vnd.usdc"
 EAGER = Retry(first=0.001)
 
 
-def by_waiting(address, path, ask=lambda model: model.clip(turn=1), retry=NEVER, **given):
+def save(address, path, ask=lambda model: model.clip(turn=1), retry=NEVER, **given):
     with Client(address, retry=retry) as client:
         return ask(client.model("reach")).save(path, **given)
 
 
-def by_awaiting(address, path, ask=lambda model: model.clip(turn=1), retry=NEVER, **given):
-    async def save():
-        async with AsyncClient(address, retry=retry) as client:
-            return await ask(client.model("reach")).save(path, **given)
-
-    return asyncio.run(save())
-
-
-BOTH = pytest.mark.parametrize("save", [by_waiting, by_awaiting])
 CUT = {
     "length": answer(bytes(100_000), USDC)[:-1],
     "chunks": chunked(bytes(70_000), ended=False, kind=USDC),
@@ -41,17 +32,15 @@ CUT = {
 }
 
 
-@BOTH
 @pytest.mark.parametrize("cut", CUT)
-def test_a_cut_clip_leaves_nothing(cut, save, tmp_path):
+def test_a_cut_clip_leaves_nothing(cut, tmp_path):
     with scripted.serving(CUT[cut]) as server:
         with pytest.raises((errors.Broken, errors.Unreachable)):
             save(server.address, tmp_path / "clip.usdc")
     assert list(tmp_path.iterdir()) == []
 
 
-@BOTH
-def test_what_was_there_stays_until_the_new_file_is_whole(save, tmp_path):
+def test_what_was_there_stays_until_the_new_file_is_whole(tmp_path):
     path = tmp_path / "clip.usdc"
     path.write_bytes(b"before")
     with scripted.serving(CUT["length"], answer(b"after", USDC)) as server:
@@ -63,8 +52,7 @@ def test_what_was_there_stays_until_the_new_file_is_whole(save, tmp_path):
     assert list(tmp_path.iterdir()) == [path]
 
 
-@BOTH
-def test_a_cut_clip_is_asked_for_again_from_its_beginning(save, tmp_path):
+def test_a_cut_clip_is_asked_for_again_from_its_beginning(tmp_path):
     seen = []
     with scripted.serving(CUT["length"], answer(b"whole", USDC)) as server:
         saved = save(server.address, tmp_path / "clip.usdc", retry=EAGER, progress=seen.append)
@@ -74,17 +62,7 @@ def test_a_cut_clip_is_asked_for_again_from_its_beginning(save, tmp_path):
     assert seen[-1] == Progress(5, 5)
 
 
-@BOTH
-@pytest.mark.parametrize("said", [answer(b"<html>", "text/html"), answer(b"no", "text/plain", 404)])
-def test_what_is_no_clip_is_not_written(said, save, tmp_path):
-    with scripted.serving(said, answer(b"{}")) as server:
-        with pytest.raises(errors.Unexpected):
-            save(server.address, tmp_path / "clip.usdc")
-    assert list(tmp_path.iterdir()) == []
-
-
-@BOTH
-def test_whoever_watches_may_end_it(save, tmp_path):
+def test_whoever_watches_may_end_it(tmp_path):
     def stop(progress):
         raise KeyboardInterrupt
 
@@ -126,8 +104,7 @@ def test_threads_share_a_client(address, controls, tmp_path):
     assert len(set(contents)) == 5
 
 
-@BOTH
-def test_without_the_folder_nothing_is_asked(save, tmp_path):
+def test_without_the_folder_nothing_is_asked(tmp_path):
     with scripted.serving() as server, pytest.raises(FileNotFoundError):
         save(server.address, tmp_path / "none/clip.usdc")
     assert server.asked == []
@@ -136,14 +113,14 @@ def test_without_the_folder_nothing_is_asked(save, tmp_path):
 @pytest.mark.parametrize("name", ["clip.fbx", "clip", ".usdc"])
 def test_another_ending_names_those_that_there_are(name, tmp_path):
     with pytest.raises(errors.WrongQuestion) as caught:
-        by_waiting("http://127.0.0.1:1", tmp_path / name)
+        save("http://127.0.0.1:1", tmp_path / name)
     assert str(caught.value).endswith(f", expected one of {', '.join(CLIP)}")
 
 
 @pytest.mark.parametrize("ending", ["usdc", "bvh", "npz"])
 def test_the_ending_is_the_format(ending, address, controls, tmp_path):
     path = tmp_path / f"clip.{ending}"
-    saved = by_waiting(address, path, lambda model: model.clip(fps=25, **controls))
+    saved = save(address, path, lambda model: model.clip(fps=25, **controls))
     with Client(address) as client:
         assert path.read_bytes() == client.model("reach").clip(fps=25, **controls).content(ending)
     assert saved.bytes == path.stat().st_size
@@ -153,21 +130,12 @@ def test_the_ending_is_the_format(ending, address, controls, tmp_path):
     assert saved.warnings == ()
 
 
-def test_warnings_come_with_the_file(address, controls, tmp_path):
-    far = {**controls, "turn": 90, "target_height": 3}
-    saved = by_waiting(address, tmp_path / "clip.glb", lambda model: model.clip(**far))
-    with Client(address) as client:
-        told = client.model("reach").pose(0, **far).trust.warnings
-    assert saved.warnings == told
-    assert len(told) == 2
-
-
 def test_what_was_chosen_and_what_is_missed_come_with_the_file(address, controls, tmp_path):
     given = {name: value for name, value in controls.items() if name != "hip_height"}
     far = {"joint": "RightHand", "position": (0, 1, 9), "at": "end"}
     high = {"joint": "Head", "position": (0, 9, 0), "at": "start"}
     held = {**given, "targets": [far, high]}
-    saved = by_waiting(address, tmp_path / "clip.bvh", lambda model: model.clip(**held))
+    saved = save(address, tmp_path / "clip.bvh", lambda model: model.clip(**held))
     with Client(address) as client:
         trust = client.model("reach").pose(0, **held).trust
     assert saved.inferred == {"hip_height": trust.controls["hip_height"]}
@@ -175,14 +143,13 @@ def test_what_was_chosen_and_what_is_missed_come_with_the_file(address, controls
         (met.what, met.unit) for met in trust.targets
     ]
     assert [each.miss for each in saved.missed] == pytest.approx([m.miss for m in trust.targets])
-    plain = by_waiting(address, tmp_path / "plain.bvh", lambda model: model.clip(**controls))
+    plain = save(address, tmp_path / "plain.bvh", lambda model: model.clip(**controls))
     assert (plain.inferred, plain.missed) == ({}, ())
     assert len({saved, plain}) == 2
 
 
-@BOTH
 @pytest.mark.parametrize("ending", ["zip", "tar"])
-def test_an_archive_says_how_far_it_is_and_what_is_in_it(save, ending, address, controls, tmp_path):
+def test_an_archive_says_how_far_it_is_and_what_is_in_it(ending, address, controls, tmp_path):
     clips = [
         {"controls": {**controls, "turn": float(turn)}, "name": f"t{turn}"} for turn in range(9)
     ]
@@ -217,8 +184,7 @@ def test_an_archive_that_breaks_off_anywhere_is_seen(archive, rng):
             saving.entries(io.BytesIO(content[:end]), ending, files)
 
 
-@BOTH
-def test_an_archive_that_is_not_whole_is_asked_for_again(save, archive, controls, tmp_path):
+def test_an_archive_that_is_not_whole_is_asked_for_again(archive, controls, tmp_path):
     ending, content = archive
     media_type = {"zip": "application/zip", "tar": "application/x-tar"}[ending]
     cut = content[: content.index(b"manifest.jsonl") - (30 if ending == "zip" else 0)]
@@ -231,8 +197,7 @@ def test_an_archive_that_is_not_whole_is_asked_for_again(save, archive, controls
     assert (len(saved.entries), len(server.asked)) == (3, 2)
 
 
-@BOTH
-def test_a_file_in_a_coding_that_was_not_asked_for_is_not_kept(save, tmp_path):
+def test_a_file_in_a_coding_that_was_not_asked_for_is_not_kept(tmp_path):
     cut = gzip.compress(bytes(100_000))[:-20]
     said = answer(cut, USDC, Content_Encoding="gzip"), answer(b"{}")
     with scripted.serving(*said) as server, pytest.raises(errors.Unexpected, match="in gzip"):
@@ -241,9 +206,8 @@ def test_a_file_in_a_coding_that_was_not_asked_for_is_not_kept(save, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@BOTH
 @pytest.mark.parametrize("said", [{"Posefield_Warning": '"half'}, {"Posefield_Sigma": "much"}])
-def test_headers_that_cannot_be_read_leave_nothing(said, save, tmp_path):
+def test_headers_that_cannot_be_read_leave_nothing(said, tmp_path):
     said = answer(b"whole", USDC, **said), answer(b"{}")
     with (
         scripted.serving(*said) as server,
@@ -255,7 +219,7 @@ def test_headers_that_cannot_be_read_leave_nothing(said, save, tmp_path):
 
 def saved_over(path):
     with scripted.serving(answer(b"whole", USDC)) as server:
-        by_waiting(server.address, path)
+        save(server.address, path)
     return server
 
 
@@ -266,20 +230,11 @@ def test_a_file_keeps_its_permissions(tmp_path):
     assert S_IMODE(path.stat().st_mode) == 0o600
 
 
-def test_a_link_stays_one(tmp_path):
-    (tmp_path / "there").mkdir()
-    link, path = tmp_path / "clip.usdc", tmp_path / "there/other.usdc"
-    link.symlink_to(path)
-    saved_over(link)
-    assert link.is_symlink()
-    assert path.read_bytes() == b"whole"
-
-
 def test_a_folder_is_no_file_and_nothing_is_asked(tmp_path):
     path = tmp_path / "clip.usdc"
     path.mkdir()
     with scripted.serving() as server, pytest.raises(IsADirectoryError):
-        by_waiting(server.address, path)
+        save(server.address, path)
     assert server.asked == []
     assert list(tmp_path.iterdir()) == [path]
 
@@ -292,18 +247,6 @@ def test_a_crowd_that_walks_is_a_file(address, tmp_path):
             walk.save(tmp_path / "crowd.glb")
     assert (tmp_path / "crowd.usdz").read_bytes()[:2] == b"PK"
     assert saved.model.startswith("walk@")
-
-
-def test_a_crowd_is_arrays(address, controls, tmp_path):
-    turns = np.linspace(-20, 20, 5, dtype=np.float32)
-    with Client(address) as client:
-        crowd = client.model("reach").crowd([0.1] * 5, **{**controls, "turn": turns})
-        found = crowd.numbers
-        crowd.save(tmp_path / "crowd.npz")
-    assert found.rotations.shape[:1] == found.levels.shape == (5,)
-    assert found.error_px is None
-    stored = np.load(tmp_path / "crowd.npz")
-    assert np.array_equal(stored["rotations"], found.rotations)
 
 
 def test_numbers_of_a_clip_are_those_of_its_file(address, controls):
