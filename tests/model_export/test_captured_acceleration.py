@@ -12,7 +12,7 @@ from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
 from posefield_train.graph.trained_card import captured_acceleration, clip_accelerations
-from posefield_train.report.provenance import Provenance
+from posefield_train.report import training_report
 
 ARM = 0.5
 PENDULUM = Skeleton(
@@ -136,11 +136,11 @@ def test_inspect_tells_of_the_accelerations(model_path, exported, tmp_path, pose
 
 def test_the_training_report_has_the_accelerations(exported):
     own = exported.card.captured_acceleration
-    told = dict(Provenance(exported, ()).figures())
+    told = dict(training_report.key_figures(exported, 0.0))
     assert told["acceleration of captured joints, median"] == f"{own.median:.1f} m/s²"
     assert told["the same, 99th percentile"] == f"{own.p99:.1f} m/s²"
     old = replace(exported, card=replace(exported.card, captured_acceleration=None))
-    assert len(Provenance(old, ()).figures()) == len(told) - 2
+    assert len(training_report.key_figures(old, 0.0)) == len(told) - 2
 
 
 @pytest.mark.parametrize(

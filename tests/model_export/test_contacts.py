@@ -14,7 +14,7 @@ from posefield.model_file import model_card, subgraph
 from posefield_train.contacts import contact_labels, contact_model, contact_table
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
-from posefield_train.report.provenance import Provenance
+from posefield_train.report import training_report
 
 # The graph computes in float32; a label rises within one canonical frame.
 SINGLE = 1e-4
@@ -279,7 +279,9 @@ def test_equal_questions_in_one_batch_have_equal_contacts(opened):
 
 def test_the_training_report_has_the_accuracy_of_contacts(walk_exported, exported):
     own = walk_exported.card.diagnostics["contacts"]
-    told = dict(Provenance(walk_exported, ()).figures())
+    told = dict(training_report.key_figures(walk_exported, 0.0))
     assert told["contacts of left-out clips that agree"] == f"{100 * own['agreement']:.1f} %"
     assert f"{own['brier']:.3f}" in told["their Brier score (of the mean clip)"]
-    assert not [name for name, _ in Provenance(exported, ()).figures() if "contacts" in name]
+    assert not [
+        name for name, _ in training_report.key_figures(exported, 0.0) if "contacts" in name
+    ]

@@ -119,7 +119,7 @@ def _write_report(
 ) -> None:
     # matplotlib takes a second to import, and only the report needs it.
     from posefield_train.report import levels_of_detail, training_report
-    from posefield_train.report.provenance import TrainingStep
+    from posefield_train.report.training_report import TrainingStep
 
     progress("measuring levels of detail")
     others = levels_of_detail.build_alternatives(recipe, trained, exported.card)

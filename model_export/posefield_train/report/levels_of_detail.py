@@ -5,7 +5,7 @@ the model file.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import zip_longest
 from typing import Any
@@ -24,8 +24,8 @@ from posefield.model_file.model_card import ModelCard
 from posefield_train.graph import levels
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report.drawing import significant_digits, svg_chart
-from posefield_train.report.drawing.html_page import Section, Table
+from posefield_train.report.drawing import svg_chart
+from posefield_train.report.drawing.html_page import Chapter, Section, Table
 from posefield_train.source.recipe import Recipe
 
 # Common resolution and field of view of games: 1080 lines, 60 degrees vertically.
@@ -63,10 +63,6 @@ class TimedLevels:
         """Return the times per pose, µs."""
         return [1e6 * seconds for seconds in self.seconds]
 
-    def facts(self) -> list[dict[str, Any]]:
-        """Return the figures of each level."""
-        return list(map(_facts, self.levels, self.seconds))
-
 
 @dataclass(frozen=True)
 class LevelCosts:
@@ -88,35 +84,50 @@ class LevelCosts:
         found = [CAMERA.pixels * own.pose for own in self.chosen.levels]
         return tuple(np.maximum.accumulate(found).tolist())
 
-    def facts(self) -> dict[str, Any]:
-        """Return the figures of the model's levels and of the alternatives."""
-        chosen = zip(self.chosen.facts(), self.distances, strict=True)
-        others = zip(self.others.facts(), self.times, strict=True)
-        return {
+    def chapter(self) -> Chapter:
+        """Return the use, size, time and error of each level, and a chart of all levels."""
+        chosen, others = (
+            list(map(_facts, timed.levels, timed.seconds)) for timed in (self.chosen, self.others)
+        )
+        for level, distance in zip(chosen, self.distances, strict=True):
+            level["one_pixel_from_m"] = distance
+        for level, times in zip(others, self.times, strict=True):
+            level["times_budget"] = times
+        facts = {
             "poses_a_call": cost_model.ROWS_PER_CALL,
             "image_lines": CAMERA.height,
-            "field_of_view_rad": significant_digits.round_number(CAMERA.fov),
-            "levels": [
-                {**facts, "one_pixel_from_m": significant_digits.round_number(distance)}
-                for facts, distance in chosen
-            ],
-            "others": [{**facts, "times_budget": times} for facts, times in others],
+            "field_of_view_rad": CAMERA.fov,
+            "levels": chosen,
+            "others": others,
         }
-
-    def section(self) -> Section:
-        """Return the use, size, time and error of each level, and a chart of all levels."""
-        drawn = svg_chart.draw(
+        summary = ", ".join(
+            f"level {number} {100 * level['rms_m']:.2f} cm at {level['numbers']} numbers"
+            for number, level in enumerate(chosen)
+        )
+        chart = svg_chart.draw(
             3.7,
             self._paint,
-            f"Error against numbers read and time per pose; chosen: {self._summary()}.",
+            f"Error against numbers read and time per pose; chosen: {summary}.",
             "Orange: the levels of this model. Blue: alternative levels, built for 1 to "
             f"{self.times[-1]:g} times the error limits of the finest level. The time has a lower "
             "bound: every level computes rotations and bone offsets of all joints.",
         )
-        tables = self._sizes(), self._errors()
-        return Section(
-            "levels", "Levels of detail", (_EXPLANATION, *self._uses()), tables, (drawn,)
+        sizes = ("ranks", "clips used", "joints that move", "numbers", "kB")
+        errors = ("RMS", "99th percentile", "RMS of the worst pose", "largest")
+        tables = (
+            Table(
+                "Size and time of each level",
+                ("level", *sizes, "multiply-adds per pose", "µs per pose"),
+                tuple(_sizes(number, level) for number, level in enumerate(chosen)),
+            ),
+            Table(
+                "Error of each level (cm)",
+                ("level", *errors, "effector at its event", "below a pixel from (m)"),
+                tuple(_errors(number, level) for number, level in enumerate(chosen)),
+            ),
         )
+        paragraphs = (_EXPLANATION, *self._uses())
+        return Chapter(facts, Section("levels", "Levels of detail", paragraphs, tables, (chart,)))
 
     def _uses(self) -> tuple[str, ...]:
         """Return one sentence per level on its use."""
@@ -134,24 +145,6 @@ class LevelCosts:
             f"pose is off by less than a pixel there, in {100 * share:.0f} % of the time of the "
             "finest level."
         )
-
-    def _summary(self) -> str:
-        return ", ".join(
-            f"level {number} {100 * own.rms:.2f} cm at {own.numbers} numbers"
-            for number, own in enumerate(self.chosen.levels)
-        )
-
-    def _sizes(self) -> Table:
-        heading = ("ranks", "clips used", "joints that move", "numbers", "kB")
-        cells = map(_sizes, self.chosen.levels, self.chosen.seconds)
-        titles = (*heading, "multiply-adds per pose", "µs per pose")
-        return _numbered("Size and time of each level", titles, cells)
-
-    def _errors(self) -> Table:
-        heading = ("RMS", "99th percentile", "RMS of the worst pose", "largest")
-        cells = map(_errors, self.chosen.levels, self.distances)
-        titles = (*heading, "effector at its event", "below a pixel from (m)")
-        return _numbered("Error of each level (cm)", titles, cells)
 
     def _paint(self, figure: Figure) -> None:
         left, right = figure.subplots(1, 2, sharey=True)
@@ -181,27 +174,23 @@ def _label_levels(ax: Axes, across: Sequence[float], errors: Sequence[float]) ->
         beside.set(ha="right", va="top", bbox=paper, zorder=3)
 
 
-def _numbered(caption: str, heading: tuple[str, ...], cells: Iterable[tuple[str, ...]]) -> Table:
-    rows = tuple((str(number), *row) for number, row in enumerate(cells))
-    return Table(caption, ("level", *heading), rows)
-
-
-def _sizes(level: Level, seconds: float) -> tuple[str, ...]:
+def _sizes(number: int, level: dict[str, Any]) -> tuple[str, ...]:
     return (
-        " × ".join(map(str, level.ranks)),
-        str(level.samples),
-        str(len(level.joints)),
-        f"{level.numbers:,}",
-        f"{level.bytes / 1000:.1f}",
-        f"{level.operations:,}",
-        f"{1e6 * seconds:.2f}",
+        str(number),
+        " × ".join(map(str, level["ranks"])),
+        str(level["clips_asked"]),
+        str(level["joints_that_move"]),
+        f"{level['numbers']:,}",
+        f"{level['bytes'] / 1000:.1f}",
+        f"{level['operations']:,}",
+        f"{1e6 * level['seconds_per_pose']:.2f}",
     )
 
 
-def _errors(level: Level, distance: float) -> tuple[str, ...]:
-    effector = "" if level.effector is None else f"{100 * level.effector:.2f}"
-    lengths = (level.rms, level.p99, level.pose, level.max)
-    return (*(f"{100 * length:.3g}" for length in lengths), effector, f"{distance:.0f}")
+def _errors(number: int, level: dict[str, Any]) -> tuple[str, ...]:
+    lengths = (f"{100 * level[f'{name}_m']:.3g}" for name in ("rms", "p99", "pose", "max"))
+    effector = "" if level["effector_m"] is None else f"{100 * level['effector_m']:.2f}"
+    return (str(number), *lengths, effector, f"{level['one_pixel_from_m']:.0f}")
 
 
 def _facts(level: Level, seconds: float) -> dict[str, Any]:
@@ -217,7 +206,7 @@ def _facts(level: Level, seconds: float) -> dict[str, Any]:
         "bytes": level.bytes,
         "operations": level.operations,
         **lengths,
-        "seconds_per_pose": significant_digits.round_number(seconds),
+        "seconds_per_pose": seconds,
     }
 
 

@@ -6,21 +6,10 @@ from dataclasses import dataclass
 
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report import (
-    calibration,
-    clip_errors,
-    coverage,
-    drawn_clips,
-    kriging_summary,
-    reliability,
-    spectra,
-    truncation,
-    variograms,
-    warps,
-)
-from posefield_train.report.drawing.html_page import Page, ReportChapter, Section, Table
+from posefield_train.report import clips, controls, kriging, tensor
+from posefield_train.report.drawing import significant_digits
+from posefield_train.report.drawing.html_page import Chapter, Page, Section, Table
 from posefield_train.report.levels_of_detail import LevelCosts
-from posefield_train.report.provenance import Provenance, TrainingStep
 
 REPORT_VERSION = 1
 """Version of the JSON: increased when a name or a unit changes."""
@@ -75,6 +64,14 @@ TERMS_SECTION = Section(
 
 
 @dataclass(frozen=True)
+class TrainingStep:
+    """A step of the training and its duration, s."""
+
+    name: str
+    seconds: float
+
+
+@dataclass(frozen=True)
 class RenderedReport:
     """Contents of the two files."""
 
@@ -89,33 +86,98 @@ def render(
     steps: Sequence[TrainingStep],
 ) -> RenderedReport:
     """Return the report of a model; equal arguments give equal bytes."""
-    provenance = Provenance(exported, tuple(steps))
-    chapters = _chapters(trained, levels, provenance)
-    facts = {"report": REPORT_VERSION, **{name: part.facts() for name, part in chapters.items()}}
     card = exported.card
-    sections = [*(part.section() for part in chapters.values()), TERMS_SECTION]
-    page = Page("training report", card.name, card.description, provenance.figures(), sections)
-    text = json.dumps(facts, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False)
+    chapters = {
+        "fields": kriging.quantity_chapter(trained, card.controls),
+        "clips": clips.error_chapter(trained, card.controls),
+        "figures": clips.drawn_chapter(trained),
+        "calibration": controls.calibration_chapter(trained),
+        "coverage": controls.coverage_chapter(trained, card.controls),
+        "trust": controls.trust_chapter(exported),
+        "variograms": kriging.variogram_chapter(trained, card.controls),
+        "spectra": tensor.spectra_chapter(trained),
+        "sizes": tensor.truncation_chapter(trained),
+        "levels": levels.chapter(),
+        "warps": tensor.warp_chapter(trained),
+        "about": provenance_chapter(exported, steps),
+    }
+    sections = [*(chapter.section for chapter in chapters.values()), TERMS_SECTION]
+    figures = key_figures(exported, sum(step.seconds for step in steps))
+    page = Page("training report", card.name, card.description, figures, sections)
+    parts = {name: significant_digits.round_all(own.facts) for name, own in chapters.items()}
+    text = json.dumps(
+        {"report": REPORT_VERSION, **parts},
+        indent=1,
+        sort_keys=True,
+        allow_nan=False,
+        ensure_ascii=False,
+    )
     return RenderedReport(page.html(), f"{text}\n".encode())
 
 
-def _chapters(
-    trained: TrainedModel, levels: LevelCosts, provenance: Provenance
-) -> dict[str, ReportChapter]:
-    """Return the parts of the report by their names in the JSON, in the order of the page."""
-    controls = provenance.exported.card.controls
-    errors = clip_errors.collect_clip_errors(trained, controls)
-    return {
-        "fields": kriging_summary.summarize_kriging(trained, controls),
-        "clips": errors,
-        "figures": drawn_clips.draw_clips(trained, errors.worst),
-        "calibration": calibration.measure_calibration(trained),
-        "coverage": coverage.measure_coverage(trained, controls),
-        "trust": reliability.measure_reliability(provenance.exported),
-        "variograms": variograms.measure_variograms(trained, controls),
-        "spectra": spectra.measure_spectra(trained),
-        "sizes": truncation.measure_truncation(trained),
-        "levels": levels,
-        "warps": warps.collect_warps(trained),
-        "about": provenance,
+def provenance_chapter(exported: ExportedModel, steps: Sequence[TrainingStep]) -> Chapter:
+    """Return the card's main entries, the size of the file, its notes, and the steps."""
+    card = exported.card
+    source = card.provenance
+    facts = {
+        "name": card.name,
+        "description": card.description,
+        "bytes": len(exported.content),
+        "clips": source["clips"],
+        "joints": len(card.skeleton),
+        "cyclic": card.cyclic,
+        "root": card.root,
+        "rate": card.rate,
+        "frames": card.frames,
+        "durations_s": card.durations,
+        "provenance": dict(source),
+        "diagnostics": dict(card.diagnostics),
+        "steps": [{"step": step.name, "seconds": step.seconds} for step in steps],
     }
+    versions = ", ".join(f"{name} {version}" for name, version in source["versions"].items())
+    sources = (
+        ("licence", source["licence"]),
+        ("clips", str(source["clips"])),
+        ("recipe (SHA-256)", source["recipe_sha256"]),
+        ("data (SHA-256)", source["data_sha256"]),
+        ("versions", versions),
+    )
+    notes = tuple((note,) for note in card.diagnostics["notes"] or ["none"])
+    total = ("total", f"{sum(step.seconds for step in steps):.2f}")
+    times = (*((step.name, f"{step.seconds:.2f}") for step in steps), total)
+    tables = (
+        Table("Sources", ("entry", "value"), sources),
+        Table("Notes on the data", ("note",), notes),
+        Table("Training time", ("step", "seconds"), times),
+    )
+    return Chapter(facts, Section("about", "Provenance and notes", (), tables))
+
+
+def key_figures(exported: ExportedModel, seconds: float) -> list[tuple[str, str]]:
+    """Return name and value of the key figures at the top of the page."""
+    card = exported.card
+    measured, acceleration = card.diagnostics, card.captured_acceleration
+    figures = [
+        (f"clips, {len(card.skeleton)} joints each", str(card.provenance["clips"])),
+        ("size of the model file", f"{len(exported.content) / 1000:.1f} kB"),
+        (f"ranks kept of {_times(measured['tensor'])}", _times(card.levels[0].ranks)),
+        ("error by truncation (RMS)", f"{100 * measured['truncation_rms_m']:.2f} cm"),
+        ("error of a left-out clip (RMS)", f"{100 * measured['leave_one_out_rms_m']:.2f} cm"),
+        ("of the motion explained by controls", f"{100 * measured['explained']['pose']:.0f} %"),
+    ]
+    if contacts := measured.get("contacts"):
+        scores = f"{contacts['brier']:.3f} ({contacts['climatology']:.3f})"
+        agreement = f"{100 * contacts['agreement']:.1f} %"
+        figures.append(("contacts of left-out clips that agree", agreement))
+        figures.append(("their Brier score (of the mean clip)", scores))
+    if acceleration:
+        median = f"{acceleration.median:.1f} m/s²"
+        figures.append(("acceleration of captured joints, median", median))
+        figures.append(("the same, 99th percentile", f"{acceleration.p99:.1f} m/s²"))
+    parity = f"{100 * measured['parity_m']:.5f} cm"
+    figures.append(("largest difference from the reference", parity))
+    return [*figures, ("training time", f"{seconds:.1f} s")]
+
+
+def _times(sizes: Sequence[int]) -> str:
+    return " × ".join(map(str, sizes))

@@ -8,7 +8,7 @@ import pytest
 @pytest.fixture(scope="session")
 def steps():
     """Training steps with their times."""
-    from posefield_train.report.provenance import TrainingStep
+    from posefield_train.report.training_report import TrainingStep
 
     return (TrainingStep("reading <recipe>", 0.25), TrainingStep("fitting the fields", 1.5))
 
@@ -35,11 +35,14 @@ def alternatives(small_recipe, trained, exported):
 
 
 @pytest.fixture(scope="session")
-def levels(exported, alternatives):
-    """The small model's levels of detail, measured once."""
-    from posefield_train.report import levels_of_detail
+def levels(exported):
+    """The small model's levels of detail with made times, themselves as alternatives."""
+    from posefield_train.report.levels_of_detail import LevelCosts, TimedLevels
 
-    return levels_of_detail.time_levels(exported, alternatives)
+    chosen = exported.card.levels
+    seconds = tuple(8e-6 / (1 + number) for number in range(len(chosen)))
+    timed = TimedLevels(chosen, seconds)
+    return LevelCosts(timed, timed, tuple(2.0**number for number in range(len(chosen))))
 
 
 @pytest.fixture(scope="session")

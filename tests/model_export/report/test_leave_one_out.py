@@ -5,7 +5,7 @@ import pytest
 
 from posefield_train.align import time_alignment
 from posefield_train.kriging import universal_kriging
-from posefield_train.report import drawn_clips
+from posefield_train.report import clips
 from posefield_train.report.drawing import left_out_clips
 
 # Two ways to one solution of the same equations differ by rounding, m.
@@ -78,8 +78,8 @@ def test_end_sites_keep_their_distance_from_their_joints(trained, clip):
 def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
     """Over the family, whose poses the metric is averaged over, within five per cent; a single clip
     may be a third off, for its joints hang otherwise than the family's do on average."""
-    clips = range(len(trained.examples))
-    drawn = np.array([drawn_clips.compare_clip(trained, clip).apart for clip in clips])
+    indices = range(len(trained.examples))
+    drawn = np.array([clips.compare_clip(trained, clip).rms for clip in indices])
     missed = np.sqrt(trained.left_out_errors)
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.sqrt(np.mean(missed**2)), rel=0.05)
     assert np.abs(drawn / missed - 1.0).max() < 1.0 / 3.0
@@ -87,12 +87,12 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
 
 
 def test_the_nearest_clip_is_the_nearest(trained, clip):
-    pair = drawn_clips.compare_clip(trained, clip)
+    pair = clips.compare_clip(trained, clip)
     points = trained.samples.half_ranges
     distances = np.linalg.norm(points - points[clip], axis=1)
     distances[clip] = np.inf
-    assert pair.nearest.distance == distances.min()
+    assert pair.nearest_distance == distances.min()
     other = int(np.argmin(distances))
     gap = np.sum(np.square(slices(trained)[clip] - slices(trained)[other]))
     shared = trained.tensor.weight * trained.tensor.values.shape[1]
-    assert pair.nearest.differs == pytest.approx(np.sqrt(gap / shared))
+    assert pair.nearest_rms == pytest.approx(np.sqrt(gap / shared))

@@ -44,12 +44,6 @@ def test_the_levels_are_those_of_the_card(facts, exported):
             assert found[f"{name}_m"] == getattr(level, name)
 
 
-def test_every_level_was_timed(facts):
-    for levels in (facts["levels"], facts["others"]):
-        seconds = [level["seconds_per_pose"] for level in levels]
-        assert min(seconds) > 0.0 and seconds == sorted(seconds, reverse=True)
-
-
 def test_a_pixel_is_as_large_as_the_error_at_its_distance(facts, exported):
     """By the tangent, along the ray to the image's upper edge: 540 pixels at 30 degrees."""
     for found, level in zip(facts["levels"], exported.card.levels, strict=True):
@@ -75,13 +69,18 @@ def test_every_level_is_said_what_it_is_for(page, levels):
 
 def test_a_model_of_one_level_has_a_report_too(levels):
     own = levels_of_detail.TimedLevels(levels.chosen.levels[:1], levels.chosen.seconds[:1])
-    section = replace(levels, chosen=own).section()
+    section = replace(levels, chosen=own).chapter().section
     assert section.paragraphs[1:] == ("Level 0 is for export and measurement.",)
     assert [len(table.rows) for table in section.tables] == [1, 1]
 
 
-def test_alternatives_go_from_fine_to_coarse(facts, small_recipe):
+@pytest.mark.system
+def test_alternatives_go_from_fine_to_coarse(exported, alternatives, small_recipe):
+    facts = levels_of_detail.time_levels(exported, alternatives).chapter().facts
     others = facts["others"]
+    for levels in (facts["levels"], others):
+        seconds = [level["seconds_per_pose"] for level in levels]
+        assert min(seconds) > 0.0 and seconds == sorted(seconds, reverse=True)
     assert [own["times_budget"] for own in others][:: len(others) - 1] == [
         1.0,
         levels_of_detail.FARTHEST,
@@ -99,6 +98,7 @@ def test_alternatives_go_from_fine_to_coarse(facts, small_recipe):
     assert not any(own["rms_m"] <= 0.5 * own["times_budget"] * budget for own in others[:5])
 
 
+@pytest.mark.system
 def test_an_alternative_answers_as_coarsely_as_its_figures_say(trained, exported, alternatives):
     found = alternatives
     low, high = exported.model.bank.low, exported.model.bank.high
@@ -121,17 +121,22 @@ def test_an_alternative_answers_as_coarsely_as_its_figures_say(trained, exported
 
 
 def test_two_reports_differ_only_in_seconds_per_pose(levels):
-    text, other = (json.dumps(one.facts()) for one in (levels, retimed(levels)))
+    text, other = (json.dumps(one.chapter().facts) for one in (levels, retimed(levels)))
     assert text != other and without_seconds(text) == without_seconds(other)
-    nearer = json.dumps(replace(levels, times=(0.5, *levels.times[1:])).facts())
+    nearer = json.dumps(replace(levels, times=(0.5, *levels.times[1:])).chapter().facts)
     assert without_seconds(text) != without_seconds(nearer)
 
 
 def test_times_on_the_page_are_those_measured(levels):
-    slower = retimed(levels).section()
+    slower = retimed(levels).chapter().section
     assert [row[-1] for row in slower.tables[0].rows] == ["4.00", "3.00", "2.00", "1.00"]
     assert "in 25 % of the time of the finest level" in slower.paragraphs[-1]
-    assert [row[-1] for row in levels.section().tables[0].rows] != ["4.00", "3.00", "2.00", "1.00"]
+    assert [row[-1] for row in levels.chapter().section.tables[0].rows] != [
+        "4.00",
+        "3.00",
+        "2.00",
+        "1.00",
+    ]
 
 
 def test_no_time_is_in_the_model(exported):

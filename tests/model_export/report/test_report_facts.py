@@ -8,21 +8,13 @@ import pytest
 
 from posefield.motion.measures import Measure
 from posefield_train.align.warp import FIT_TIMES
+from posefield_train.graph.trained_model import Outlier
 from posefield_train.kriging import variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.report import (
-    calibration,
-    clip_errors,
-    coverage,
-    spectra,
-    truncation,
-    variograms,
-    warps,
-)
-from posefield_train.report.calibration import Calibration
+from posefield_train.report import clips, kriging, tensor
+from posefield_train.report import controls as chapters
 from posefield_train.report.drawing import left_out_clips, significant_digits
-from posefield_train.report.reliability import Reliability
-from posefield_train.report.warps import TimeWarps
+from posefield_train.report.tensor import TimeWarps
 
 # JSON holds six digits.
 DIGITS = 1e-5
@@ -69,9 +61,9 @@ def test_every_clip_is_there_the_worst_first(facts, trained):
     assert facts["figures"]["worst"][0]["clip"] == left_out_clips.clip_label(worst)
 
 
-def test_performers_add_up_to_all_clips(trained, controls):
-    found = clip_errors.collect_clip_errors(trained, controls)
-    counts, means = np.array(list(found.by_performer.values())).T
+def test_performers_add_up_to_all_clips(trained):
+    rows = clips.errors_by_performer(trained)
+    counts, means = np.array([(row["clips"], row["rms_m"]) for row in rows]).T
     assert counts.sum() == len(trained.left_out_errors) and np.all(np.diff(means) <= 0.0)
     assert counts @ means**2 == pytest.approx(trained.left_out_errors.sum())
     assert counts @ means**2 != pytest.approx(len(counts) * trained.left_out_errors.mean())
@@ -79,30 +71,25 @@ def test_performers_add_up_to_all_clips(trained, controls):
 
 def test_spectra_add_up_to_the_tensor(trained):
     total = trained.tensor.rms(np.sum(np.square(trained.tensor.values))) ** 2
-    for carried in spectra.measure_spectra(trained).carried:
+    for carried in tensor.measure_spectra(trained):
         assert np.sum(np.square(carried)) == pytest.approx(total)
         assert np.sum(np.square(carried[1:])) != pytest.approx(total)
 
 
-def test_the_error_of_the_chosen_size_is_that_of_the_model(trained):
-    found = truncation.measure_truncation(trained)
-    gap = trained.tensor.values - trained.model.decoder.reduced.restored()
-    first, *others = found.chosen
-    error = found.error(found.chosen)
-    assert error == pytest.approx(float(trained.tensor.rms(np.sum(gap**2))))
-    assert found.error((first - 1, *others)) != pytest.approx(error)
-
-
-def test_no_smaller_size_has_as_little_error_as_the_chosen_one(trained):
+def test_the_chosen_size_has_the_models_error_and_no_smaller_one_has_as_little(trained):
     """It is chosen by true distances, and so not quite at the budget in the tensor's metric."""
-    found = truncation.measure_truncation(trained)
-    error = found.error(found.chosen)
-    assert found.smallest(error) == found.chosen
-    assert found.smallest(1.1 * error) != found.chosen
+    every = tensor.measure_truncation(trained)
+    gap = trained.tensor.values - trained.model.decoder.reduced.restored()
+    first, *others = every.chosen
+    error = every.facts(every.chosen)["rms_m"]
+    assert error == pytest.approx(float(trained.tensor.rms(np.sum(gap**2))))
+    assert every.facts((first - 1, *others))["rms_m"] != pytest.approx(error)
+    assert every.smallest(error) == every.chosen
+    assert every.smallest(1.1 * error) != every.chosen
 
 
 def test_nothing_lies_below_the_front(trained, rng):
-    found = truncation.measure_truncation(trained)
+    found = tensor.measure_truncation(trained)
     errors, marks = found.front()
     assert np.all(np.diff(errors) <= 0.0) and np.all(np.diff(marks) > 0.0)
     for flat in rng.integers(found.errors.size, size=200):
@@ -110,12 +97,12 @@ def test_nothing_lies_below_the_front(trained, rng):
         smaller = errors[marks >= stored]
         assert not len(smaller) or error >= smaller[0] - 1e-12
     # Negative control: a front of sizes half as large again would lie above some.
-    numbers = found.numbers(found.chosen)
-    assert found.error(found.chosen) < errors[marks >= numbers / 1.5][0]
+    chosen = found.facts(found.chosen)
+    assert chosen["rms_m"] < errors[marks >= chosen["numbers_stored"] / 1.5][0]
 
 
 def test_the_isotropic_variogram_is_that_of_scaled_controls(trained, controls):
-    found = variograms.measure_variograms(trained, controls).directions[-1]
+    found = kriging.measure_variograms(trained, controls)[-1]
     hyper, points = trained.pose.hyper, trained.samples.half_ranges
     left = variogram.residuals(points, trained.values["pose"], max(hyper.drifts))
     expected = variogram.experimental_variogram(points * hyper.scales, left)
@@ -128,7 +115,7 @@ def test_the_isotropic_variogram_is_that_of_scaled_controls(trained, controls):
 
 
 def test_along_a_control_stand_pairs_that_go_along_it(trained, controls):
-    found = variograms.measure_variograms(trained, controls).directions
+    found = kriging.measure_variograms(trained, controls)
     points = trained.samples.half_ranges
     for axis, direction in enumerate(found[:-1]):
         counted = 0
@@ -141,24 +128,24 @@ def test_along_a_control_stand_pairs_that_go_along_it(trained, controls):
 
 
 def test_a_control_of_three_values_has_too_few_lags_for_a_curve(trained, controls):
-    found = {d.name: d for d in variograms.measure_variograms(trained, controls).directions}
+    found = {d.name: d for d in kriging.measure_variograms(trained, controls)}
     assert found["stature"].fit is None
     assert found["turn"].fit is not None and found["all controls"].fit is not None
 
 
 def test_no_pairs_at_all_make_no_lags():
-    none = variograms.by_lag(np.zeros(0), np.zeros(0))
+    none = kriging.by_lag(np.zeros(0), np.zeros(0))
     assert len(none.pairs) == len(none.values) == 0
 
 
-def test_a_control_that_tells_performers_apart_is_said_so(trained, controls):
-    found = coverage.measure_coverage(trained, controls)
-    assert found.labels() == ("stature",)
+def test_a_control_with_one_value_a_performer_is_named(trained, controls):
+    values = np.stack([example.controls for example in trained.examples])
+    performers = [example.row.performer for example in trained.examples]
+    assert chapters.label_controls(controls, values, performers) == ("stature",)
+    assert chapters.label_controls(controls, values, [""] * len(values)) == ()
     # Negative control: one value changed, and it is a measurement like any other.
-    values = found.values.copy()
     values[0, 0] += 0.01
-    assert replace(found, values=values).labels() == ()
-    assert replace(found, performers=("",) * len(values)).labels() == ()
+    assert chapters.label_controls(controls, values, performers) == ()
 
 
 def test_trust_says_what_to_capture_and_which_joints_err(facts, exported):
@@ -172,10 +159,10 @@ def test_trust_says_what_to_capture_and_which_joints_err(facts, exported):
     assert 0.0 < found["support_limit"] < 1.0
     hand = Measure("height", (card.skeleton.names.index("RightHand"),), "end")
     told = replace(card, controls=(replace(card.controls[0], measure=hand), *card.controls[1:]))
-    held = Reliability(told, 0.5, ())
-    assert held.measured == {card.controls[0].name: "height of RightHand at end"}
-    assert "RightHand" in held.section().paragraphs[0]
-    assert "RightHand" not in Reliability(card, 0.5, ()).section().paragraphs[0]
+    limits = chapters.limits_chapter(told, 0.5, ())
+    assert limits.facts["measured"] == {card.controls[0].name: "height of RightHand at end"}
+    assert "RightHand" in limits.section.paragraphs[0]
+    assert "RightHand" not in chapters.limits_chapter(card, 0.5, ()).section.paragraphs[0]
 
 
 def test_coverage_says_where_nothing_is(facts, trained):
@@ -195,57 +182,74 @@ def test_the_largest_stretch_is_that_of_the_slope_or_its_inverse():
     maps = np.stack(
         [np.interp(FIT_TIMES, knees, [0.0, middle, 1.0]) for middle in (0.5, 0.25, 0.9)]
     )
-    found = TimeWarps(maps, ("even", "slow first", "fast first"), np.ones(3), np.zeros(3))
+    found = TimeWarps(maps)
     assert found.stretches == pytest.approx([1.0, 2.0, 5.0])
     assert found.change_times[1] == 0.0 and found.change_times[2] == pytest.approx(0.5)
     assert found.at_limit.tolist() == [False, False, False]
     steep = np.interp(FIT_TIMES, knees, [0.0, 0.95, 1.0])[None]
-    assert TimeWarps(steep, ("steep",), np.ones(1), np.zeros(1)).at_limit.tolist() == [True]
-    named = [clip["clip"] for clip in found.facts()["clips"]]
-    assert named == ["fast first", "slow first", "even"]
+    assert TimeWarps(steep).at_limit.tolist() == [True]
 
 
-def test_warps_lead_from_start_to_end(trained):
-    found = warps.collect_warps(trained)
-    assert np.abs(found.maps[:, [0, -1]] - [0.0, 1.0]).max() < 1e-12
-    assert np.all(found.stretches >= 1.0)
+def test_clips_are_listed_by_their_change_of_speed_with_the_shifts_of_cycles(trained):
+    first, *others = trained.examples
+    shifted = tensor.warp_chapter(
+        replace(trained, examples=(replace(first, shift=-0.125), *others))
+    )
+    stretches = [clip["largest_stretch"] for clip in shifted.facts["clips"]]
+    assert stretches == sorted(stretches, reverse=True) and stretches[-1] >= 1.0
+    assert f"{left_out_clips.clip_label(first)} by -12.5 %" in shifted.section.paragraphs[-1]
+    assert {clip["shift"] for clip in shifted.facts["clips"]} == {0.0, -0.125}
+    plain = tensor.warp_chapter(trained).section.paragraphs
+    assert len(plain) == len(shifted.section.paragraphs) - 1
 
 
 def test_sigma_is_right_on_average_by_construction(trained):
-    found = calibration.measure_calibration(trained)
-    assert found.measures["mean_squared_ratio"] == pytest.approx(1.0)
-    on_canonical_time = replace(found, actual=np.sqrt(trained.left_out_errors))
-    assert on_canonical_time.measures["mean_squared_ratio"] > 1.2
-    half = replace(found, predicted=0.5 * found.predicted)
-    assert half.measures["mean_squared_ratio"] == pytest.approx(4.0)
-
-
-def test_sigma_of_a_captured_point_is_the_graphs(trained):
-    """Check that sigma is less at a known clip than where it is left out."""
+    facts = chapters.calibration_chapter(trained).facts
+    assert facts["mean_squared_ratio"] == pytest.approx(1.0)
+    predicted, left_out = facts["predicted_m"], np.sqrt(trained.left_out_errors)
+    on_canonical_time = chapters.calibration_statistics(predicted, left_out)
+    assert on_canonical_time["mean_squared_ratio"] > 1.2
+    half = chapters.calibration_statistics(0.5 * predicted, facts["actual_m"])
+    assert half["mean_squared_ratio"] == pytest.approx(4.0)
+    # Sigma is less at a known clip than where it is left out.
     bank = trained.model.bank
-    sigma = bank.sigma(bank.numpy(bank.pose.samples)[VARIANCE])
-    assert np.all(sigma < calibration.measure_calibration(trained).predicted)
+    assert np.all(bank.sigma(bank.numpy(bank.pose.samples)[VARIANCE]) < predicted)
 
 
-def test_calibration_measures(rng):
+def test_calibration_statistics(rng):
     predicted, actual = rng.uniform(1.0, 2.0, (2, 50))
-    found = Calibration(predicted, actual).measures
-    assert found["within_one_sigma"] == np.mean(actual <= predicted)
-    assert -0.5 < found["rank_correlation"] < 0.5
-    assert Calibration(predicted, predicted**3).measures["rank_correlation"] == pytest.approx(1.0)
-    opposite = Calibration(predicted, 1.0 / predicted)
-    assert opposite.measures["rank_correlation"] == pytest.approx(-1.0)
-    assert Calibration(np.ones(50), actual).measures["rank_correlation"] == 0.0
+    statistics = chapters.calibration_statistics(predicted, actual)
+    assert statistics["within_one_sigma"] == np.mean(actual <= predicted)
+    for errors, sigma, expected in (
+        (predicted**3, predicted, 1.0),
+        (1.0 / predicted, predicted, -1.0),
+        (actual, np.ones(50), 0.0),
+    ):
+        correlation = chapters.calibration_statistics(sigma, errors)["rank_correlation"]
+        assert correlation == pytest.approx(expected)
 
 
-def test_clips_of_equal_distance_keep_their_order(trained, controls):
+def test_clips_of_equal_distance_keep_their_order(trained):
     even = replace(trained, left_out_errors=np.ones_like(trained.left_out_errors))
-    assert clip_errors.collect_clip_errors(even, controls).indices == tuple(
-        range(len(trained.left_out_errors))
-    )
+    assert clips.worst_first(even) == list(range(len(trained.left_out_errors)))
+
+
+def test_an_outlier_is_listed_with_the_evidence(trained, controls):
+    evidence = ("lies far away", "leaps")
+    outliers = tuple(Outlier(3, "far", text) for text in evidence)
+    odd = clips.error_chapter(replace(trained, outliers=outliers), controls)
+    first, chart = odd.section.tables[0], odd.section.charts[0]
+    assert first.caption == "Possible outliers" and "Outlined" in chart.caption
+    label = left_out_clips.clip_label(trained.examples[3])
+    assert first.rows == ((label, "lies far away; leaps"),)
+    assert [clip["clip"] for clip in odd.facts["clips"] if clip["against"]] == [label]
+    clean = clips.error_chapter(trained, controls)
+    assert clean.section.tables[0].caption == "Clips with the largest error"
+    assert "Outlined" not in clean.section.charts[0].caption
 
 
 def test_numbers_are_rounded_to_six_digits():
-    assert significant_digits.round_numbers(np.array([[1 / 3, 1e-9 / 3]])) == [
-        [0.333333, 3.33333e-10]
-    ]
+    assert significant_digits.round_all({"a": np.array([[1 / 3, 1e-9 / 3]]), "b": (7, None)}) == {
+        "a": [[0.333333, 3.33333e-10]],
+        "b": [7, None],
+    }

@@ -14,10 +14,11 @@ import matplotlib
 import numpy as np
 import pytest
 
-from posefield_train.report import clip_errors, coverage, training_report
+from posefield_train.report import clips, training_report
+from posefield_train.report import controls as control_chapters
 from posefield_train.report.drawing import left_out_clips, svg_chart
 from posefield_train.report.drawing.html_page import Page, Section, Table
-from posefield_train.report.provenance import TrainingStep
+from posefield_train.report.training_report import TrainingStep
 
 LOADING = {"src", "href", "xlink:href", "srcset", "action", "data", "poster", "background"}
 ACTIVE = {"script", "link", "iframe", "object", "embed", "base"}
@@ -158,10 +159,10 @@ def test_names_of_controls_are_shown_and_not_interpreted(trained, exported):
     first, *others = exported.card.controls
     controls = (replace(first, name=MARKUP), *others)
     chapters = (
-        coverage.measure_coverage(trained, controls),
-        clip_errors.collect_clip_errors(trained, controls),
+        control_chapters.coverage_chapter(trained, controls),
+        clips.error_chapter(trained, controls),
     )
-    page = Page("", "", "", (), [chapter.section() for chapter in chapters])
+    page = Page("", "", "", (), [chapter.section for chapter in chapters])
     found = Parsed(page.html())
     assert found.tags["script"] == 0 and found.tags["img"] == 2
     assert found.texts.count(MARKUP) >= 2
@@ -172,15 +173,15 @@ def test_a_long_name_leaves_space_for_the_charts(trained, exported):
     """matplotlib warns, which is an error here, where a label leaves no space."""
     long = "a" * 200
     first, *others = exported.card.controls
-    chapter = coverage.measure_coverage(trained, (replace(first, name=long), *others)).section()
+    chapter = control_chapters.coverage_chapter(
+        trained, (replace(first, name=long), *others)
+    ).section
     (svg,) = (drawn.svg.decode() for drawn in chapter.charts)
     assert f"{'a' * (svg_chart.LABEL - 1)}… (m)" in svg and long not in svg
     assert long in chapter.tables[0].rows[0]
     examples = [replace(e, row=replace(e.row, performer=long)) for e in trained.examples]
-    bars = clip_errors.collect_clip_errors(
-        replace(trained, examples=tuple(examples)), exported.card.controls
-    )
-    assert "a…" in bars.section().charts[0].svg.decode()
+    bars = clips.error_chapter(replace(trained, examples=tuple(examples)), exported.card.controls)
+    assert "a…" in bars.section.charts[0].svg.decode()
 
 
 def test_unescaped_text_would_be_found():

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -40,14 +40,12 @@ class Section:
     charts: tuple[Chart, ...] = ()
 
 
-class ReportChapter(Protocol):
-    """Part of a report, as JSON values and as a section of the page."""
+@dataclass(frozen=True)
+class Chapter:
+    """Part of a report. facts: JSON values, in metres, seconds and shares. section: of the page."""
 
-    def facts(self) -> dict[str, Any]:
-        """Return the figures: metres, seconds and shares."""
-
-    def section(self) -> Section:
-        """Return the figures as text, tables and charts, in centimetres."""
+    facts: Any
+    section: Section
 
 
 @dataclass(frozen=True)

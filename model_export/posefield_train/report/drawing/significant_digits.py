@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 
 def round_number(value: Any) -> float:
@@ -11,7 +10,12 @@ def round_number(value: Any) -> float:
     return float(f"{float(value):.6g}")
 
 
-def round_numbers(values: npt.ArrayLike) -> Any:
-    """Return an array as nested lists of rounded numbers."""
-    array = np.asarray(values, dtype=np.float64)
-    return [round_numbers(row) for row in array] if array.ndim else round_number(array)
+def round_all(values: Any) -> Any:
+    """Return nested dicts and sequences as JSON values, their floating-point numbers rounded."""
+    if isinstance(values, dict):
+        return {name: round_all(value) for name, value in values.items()}
+    if isinstance(values, np.ndarray | np.generic):
+        return round_all(values.tolist())
+    if isinstance(values, list | tuple):
+        return [round_all(value) for value in values]
+    return round_number(values) if isinstance(values, float) else values

@@ -1,0 +1,273 @@
+"""Coverage of the controls, limits of the predictions, and accuracy of sigma."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.stats import spearmanr
+
+from posefield.common.units import Floats
+from posefield.inference import session
+from posefield.kriging import support
+from posefield.model_file.model_card import Control, ModelCard
+from posefield.motion import measures
+from posefield.question.model_question import SuggestQuestion
+from posefield.question.results import Suggestion
+from posefield.synthesis import capture_suggestions
+from posefield.synthesis.synthesizer import Synthesizer
+from posefield_train.graph.onnx_export import ExportedModel
+from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.report.drawing import svg_chart
+from posefield_train.report.drawing.html_page import Chapter, Section, Table
+
+BINS = 16
+# Joints named, and captures suggested.
+LISTED_JOINTS, POINTS = 8, 8
+
+
+def coverage_chapter(trained: TrainedModel, controls: tuple[Control, ...]) -> Chapter:
+    """Return a table of the controls, warnings, and a scatter plot of each pair."""
+    values = np.stack([example.controls for example in trained.examples])
+    performers = [example.row.performer for example in trained.examples]
+    labels = label_controls(controls, values, performers)
+    correlation = np.atleast_2d(np.corrcoef(values.T))
+    ranges: list[dict[str, Any]] = [
+        {
+            "name": control.name,
+            "unit": control.unit,
+            "minimum": control.minimum,
+            "maximum": control.maximum,
+            "distinct": len(np.unique(column)),
+            "values": list(control.values),
+            "widest_gap": _widest_gap(column),
+        }
+        for control, column in zip(controls, values.T, strict=True)
+    ]
+    few = [
+        f"{control.name} has only {len(control.values)} distinct values "
+        f"({', '.join(f'{value:g}' for value in control.values)}): nothing was captured "
+        "between them."
+        for control in controls
+        if control.values
+    ]
+    paragraphs = (
+        "Where no clip was captured the model extrapolates. The charts show such regions; they "
+        "may lie within the range of every single control.",
+        *few,
+        *(
+            f"{name} has one value for each performer and so identifies the performer. The "
+            "leave-one-out error is then too small for new performers."
+            for name in labels
+        ),
+    )
+    rows = tuple(
+        (
+            control.name,
+            control.unit,
+            f"{control.minimum:.4g}",
+            f"{control.maximum:.4g}",
+            str(row["distinct"]),
+            "{:.4g} to {:.4g}".format(*row["widest_gap"]),
+            control.description,
+        )
+        for control, row in zip(controls, ranges, strict=True)
+    )
+    titles = ("minimum", "maximum", "distinct values", "widest gap", "description")
+    table = Table("Captured range of each control", ("control", "unit", *titles), rows)
+    names = ", ".join(control.name for control in controls)
+    errors = np.sqrt(trained.left_out_errors)
+    chart = svg_chart.draw(
+        max(3.0, min(9.0, 2.1 * len(controls))),
+        partial(_paint_pairs, controls, values, errors, correlation),
+        f"Scatter plots of each pair of the controls {names}, over {len(values)} clips.",
+        "Below the diagonal: the clips, coloured by their leave-one-out error. On the "
+        "diagonal: number of clips by value. Above the diagonal: correlation.",
+    )
+    facts = {
+        "controls": ranges,
+        "one_value_a_performer": list(labels),
+        "correlation": correlation,
+    }
+    return Chapter(
+        facts, Section("coverage", "Coverage of the controls", paragraphs, (table,), (chart,))
+    )
+
+
+def label_controls(
+    controls: Sequence[Control], values: Floats, performers: Sequence[str]
+) -> tuple[str, ...]:
+    """Return the controls that have one value for each performer, and so identify them.
+
+    values: (N, d). performers: names (N,), empty if the recipe has none.
+    """
+    whose = np.unique(performers, return_inverse=True)[1]
+    several = 1 < len(set(performers)) < len(performers)
+    return tuple(
+        control.name
+        for control, column in zip(controls, values.T, strict=True)
+        if several and all(np.ptp(column[whose == one]) == 0.0 for one in set(whose))
+    )
+
+
+def _widest_gap(values: Floats) -> tuple[float, float]:
+    """Return the ends of the widest range without a value."""
+    distinct = np.unique(values)
+    at = int(np.argmax(np.diff(distinct)))
+    return float(distinct[at]), float(distinct[at + 1])
+
+
+def _paint_pairs(
+    controls: Sequence[Control], values: Floats, errors: Floats, correlation: Floats, figure: Figure
+) -> None:
+    count = len(controls)
+    axes = figure.subplots(count, count, squeeze=False)
+    for (row, column), ax in np.ndenumerate(axes):
+        if row < column:
+            text = f"correlation\n{correlation[row, column]:+.2f}"
+            ax.text(0.5, 0.5, text, ha="center", va="center", color=svg_chart.GREY)
+            ax.set_axis_off()
+        elif row > column:
+            x, y = values[:, [column, row]].T
+            points = ax.scatter(x, y, c=100 * errors, s=16, cmap="viridis_r")
+        else:
+            ax.hist(values[:, row], bins=BINS, color=svg_chart.BLUE)
+            ax.grid(visible=False, axis="x")
+            ax.yaxis.get_major_locator().set_params(integer=True)
+    titles = [f"{svg_chart.label(c.name)} ({svg_chart.label(c.unit)})" for c in controls]
+    for at, title in enumerate(titles):
+        axes[-1, at].set_xlabel(title)
+        axes[at, 0].set_ylabel(title if at else "clips")
+    if count > 1:
+        figure.colorbar(points, ax=axes, label="leave-one-out error (cm)", shrink=0.6, aspect=30)
+
+
+def trust_chapter(exported: ExportedModel) -> Chapter:
+    """Return the limits of an exported model: measured controls, support, joints, captures."""
+    card = exported.card
+    opened = session.open_bytes(exported.content, card.name)
+    question = SuggestQuestion(count=POINTS)
+    suggested = capture_suggestions.suggest(Synthesizer(card.name, opened), question)
+    limit = support.fit_support(np.array(card.examples)).limit
+    return limits_chapter(card, limit, suggested.suggestions)
+
+
+def limits_chapter(card: ModelCard, limit: float, points: Sequence[Suggestion]) -> Chapter:
+    """Return the limits of a model's predictions.
+
+    limit: largest variance of supported controls. points: suggested captures, the one that reduces
+    the variance most first.
+    """
+    names = card.skeleton.names
+    measured = {
+        control.name: measures.describe(control.measure, names)
+        for control in card.controls
+        if control.measure
+    }
+    both = zip(names, card.joint_sigma, strict=True)
+    joints = dict(sorted(both, key=lambda pair: -pair[1]))
+    listed = ", ".join(f"{name} ({how})" for name, how in measured.items())
+    paragraphs = (
+        f"Answers match these measured controls exactly: {listed}."
+        if listed
+        else "No control is measured on the motion: answers match exactly only the targets of "
+        "a request.",
+        f"Controls count as supported up to {100 * support.RANGE_MARGIN:g} % "
+        "of a range beyond the "
+        f"captured clips, where the variance of the support model is at most {limit:.2f}. "
+        "Of the captured clips, each left out in turn, "
+        f"{100 * support.SUPPORT_QUANTILE:g} % are "
+        "within that limit.",
+        "Each suggested capture assumes that those above it were captured.",
+    )
+    controls = tuple(control.name for control in card.controls)
+    suggested = tuple(
+        (
+            str(place),
+            *(f"{point.controls[name]:.4g}" for name in controls),
+            f"{100 * point.gain:.1f} %",
+        )
+        for place, point in enumerate(points, start=1)
+    )
+    shares = tuple((name, f"{share:.2f}") for name, share in list(joints.items())[:LISTED_JOINTS])
+    tables = (
+        Table("Suggested captures", ("order", *controls, "mean variance falls by"), suggested),
+        Table("Joints with the largest error", ("joint", "sigma relative to pose"), shares),
+    )
+    facts = {
+        "measured": measured,
+        "support_limit": limit,
+        "joint_sigma": joints,
+        "suggestions": [
+            {"controls": dict(one.controls), "gain": one.gain, "lacking": one.lacking}
+            for one in points
+        ],
+    }
+    return Chapter(facts, Section("trust", "Limits of the answers", paragraphs, tables))
+
+
+def calibration_chapter(trained: TrainedModel) -> Chapter:
+    """Return statistics and charts of sigma against the error of left-out clips."""
+    predicted = np.sqrt(trained.model.bank.sill * trained.pose.variances)
+    actual = np.sqrt(trained.warped_errors)
+    statistics = calibration_statistics(predicted, actual)
+    paragraphs = (
+        "Sigma is the standard deviation that the model predicts for its own error. It is "
+        "scaled so that the mean of error² / sigma² over all left-out clips is 1, with motions "
+        "compared after time warping. The rank "
+        "correlation shows whether sigma also tells difficult motions from easy ones: near 0, "
+        "sigma is right only on average.",
+    )
+    rows = (
+        ("mean of error² / sigma²", f"{statistics['mean_squared_ratio']:.3f}"),
+        ("median of error / sigma", f"{statistics['median_ratio']:.2f}"),
+        ("clips with an error up to sigma", f"{100 * statistics['within_one_sigma']:.0f} %"),
+        ("clips with an error up to 2 sigma", f"{100 * statistics['within_two_sigma']:.0f} %"),
+        ("rank correlation of error and sigma", f"{statistics['rank_correlation']:+.2f}"),
+    )
+    chart = svg_chart.draw(
+        3.3,
+        partial(_paint_calibration, predicted, actual),
+        f"Scatter plot of error against sigma of {len(actual)} left-out clips, and a "
+        "histogram of their ratio.",
+        "Left: one point per left-out clip. Right: distribution of error / sigma.",
+    )
+    table = Table("Errors of left-out clips", ("measure", "value"), rows)
+    return Chapter(
+        {**statistics, "predicted_m": predicted, "actual_m": actual},
+        Section("calibration", "Accuracy of sigma", paragraphs, (table,), (chart,)),
+    )
+
+
+def calibration_statistics(predicted: Floats, actual: Floats) -> dict[str, float]:
+    """Return statistics of predicted standard deviations (N,) and errors (N,), m.
+
+    The rank correlation is Spearman's; 0 if one of both is constant.
+    """
+    ratios = actual / predicted
+    is_constant = np.ptp(predicted) == 0.0 or np.ptp(actual) == 0.0
+    return {
+        "mean_squared_ratio": float(np.mean(np.square(ratios))),
+        "median_ratio": float(np.median(ratios)),
+        "within_one_sigma": float(np.mean(ratios <= 1.0)),
+        "within_two_sigma": float(np.mean(ratios <= 2.0)),
+        "rank_correlation": 0.0 if is_constant else float(spearmanr(predicted, actual).statistic),
+    }
+
+
+def _paint_calibration(predicted: Floats, actual: Floats, figure: Figure) -> None:
+    left, right = figure.subplots(1, 2)
+    top = 108 * max(float(predicted.max()), float(actual.max()))
+    for times, style, label in ((1.0, "-", "error = sigma"), (2.0, ":", "error = 2 sigma")):
+        ends = [0.0, top / times]
+        left.plot(ends, [0.0, top], style, color=svg_chart.INK, linewidth=0.9, label=label)
+    left.plot(100 * predicted, 100 * actual, ".", color=svg_chart.BLUE, markersize=7)
+    left.set(xlabel="sigma (cm)", ylabel="error (cm)", xlim=(0, top), ylim=(0, top))
+    left.set_title("left-out clips")
+    left.legend(loc="upper left")
+    right.hist(actual / predicted, bins=20, color=svg_chart.BLUE)
+    right.axvline(1.0, color=svg_chart.INK, linewidth=0.9)
+    right.set(xlabel="error / sigma", ylabel="clips", title="error / sigma")
+    right.grid(visible=False, axis="x")
+    right.yaxis.get_major_locator().set_params(integer=True)

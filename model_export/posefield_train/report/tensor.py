@@ -1,0 +1,323 @@
+"""Compression of the motion tensor, and alignment of the clips in time."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from posefield.common.units import Booleans, Floats
+from posefield_train.align.warp import FIT_TIMES, MINIMUM_INCREMENT
+from posefield_train.graph import truncation_cost
+from posefield_train.graph.trained_model import TrainedModel
+from posefield_train.report.drawing import left_out_clips, svg_chart
+from posefield_train.report.drawing.html_page import Chapter, Section, Table
+from posefield_train.tensor import hosvd
+
+MODES = ("degrees of freedom", "frames", "samples")
+# Lower end of the logarithmic axis, m: invisible in an animation.
+SMALLEST_DISTANCE = 1e-6
+# Error limits, m, for which the smallest size is listed.
+BUDGETS = (0.0025, 0.005, 0.01, 0.02, 0.03, 0.05)
+STEPS = 240
+NAMED_CLIPS = 3
+# Share of the largest possible change of speed from which a clip counts as at the limit; the
+# increments that the limit applies to are smoothed.
+NEAR_LIMIT = 0.85
+# First and last share of a clip, where a large change of speed suggests another cut.
+END_SHARE = 0.1
+
+
+def measure_spectra(trained: TrainedModel) -> list[Floats]:
+    """Return the RMS joint distance, m, of each direction of each mode (section 2 of the paper)."""
+    core = trained.full.core
+    energies = [np.sum(np.square(hosvd.unfold(core, mode)), axis=1) for mode in range(3)]
+    return [trained.tensor.rms(energy) for energy in energies]
+
+
+def spectra_chapter(trained: TrainedModel) -> Chapter:
+    """Return the singular values of the three modes (Mukai & Kuriyama 2006, section 2)."""
+    ranks = trained.model.decoder.reduced.core.shape
+    modes = list(zip(MODES, ranks, measure_spectra(trained), strict=True))
+    sizes = ", ".join(f"{rank} of {len(carried)} {mode}" for mode, rank, carried in modes)
+    paragraphs = (
+        "The motion tensor holds all clips as one array of degrees of freedom × frames × "
+        f"samples. The model keeps {sizes}, as basis directions. The steeper a curve falls, "
+        "the better the motions compress.",
+    )
+
+    def paint(figure: Figure) -> None:
+        axes = figure.subplots(1, 3, sharey=True)
+        for ax, (mode, rank, carried) in zip(axes, modes, strict=True):
+            at = np.arange(1, len(carried) + 1)
+            seen = carried > SMALLEST_DISTANCE
+            kept = seen & (at <= rank)
+            ax.semilogy(at[seen & ~kept], 100 * carried[seen & ~kept], ".", color=svg_chart.FAINT)
+            ax.semilogy(at[kept], 100 * carried[kept], ".", color=svg_chart.BLUE)
+            ax.axvline(rank + 0.5, color=svg_chart.ORANGE, linewidth=1.0)
+            ax.set(title=f"{mode}: {rank} of {len(carried)}", xlabel="direction")
+        axes[0].set_ylabel("RMS joint distance (cm)")
+        svg_chart.plain_logarithm(axes[0].yaxis)
+
+    chart = svg_chart.draw(
+        3.2,
+        paint,
+        f"Singular values of the three modes on a logarithmic scale; kept: {sizes}.",
+        "Contribution of each basis direction to the motions, as RMS joint distance. Blue "
+        "directions are kept, grey ones are dropped.",
+    )
+    facts = {mode: {"kept": rank, "carried_m": carried} for mode, rank, carried in modes}
+    title = "Spectra of the motion tensor"
+    return Chapter(facts, Section("spectra", title, paragraphs, (), (chart,)))
+
+
+@dataclass(frozen=True)
+class Truncation:
+    """Error and size of every truncation (Mukai & Kuriyama 2006, table 1).
+
+    errors: (D', T, N), m. stored: numbers stored (D', T, N). chosen: ranks of the model.
+    """
+
+    errors: Floats
+    stored: Floats
+    chosen: tuple[int, int, int]
+
+    def smallest(self, allowed: float) -> tuple[int, ...]:
+        """Return the ranks of fewest numbers stored within an error, m."""
+        fits = self.errors <= max(allowed, float(self.errors.min()))
+        best = int(np.argmin(np.where(fits, self.stored, np.inf)))
+        return tuple(int(i) + 1 for i in np.unravel_index(best, self.errors.shape))
+
+    def front(self) -> tuple[Floats, Floats]:
+        """Return the Pareto front: errors, m, and the fewest numbers stored that reach them."""
+        order = np.lexsort((self.errors.ravel(), self.stored.ravel()))
+        sizes, best = self.stored.ravel()[order], self.errors.ravel()[order]
+        best = np.minimum.accumulate(best)
+        top = np.searchsorted(-best, -best[0] / 1000.0)
+        marks = np.geomspace(sizes[0], sizes[min(top, len(sizes) - 1)], STEPS)
+        at = np.searchsorted(sizes, marks, side="right") - 1
+        return best[at], marks
+
+    def facts(self, ranks: tuple[int, ...]) -> dict[str, Any]:
+        """Return the error and size of some ranks."""
+        index, core = tuple(rank - 1 for rank in ranks), int(np.prod(ranks))
+        stored = int(self.stored[index])
+        return {
+            "ranks": list(ranks),
+            "rms_m": float(self.errors[index]),
+            "numbers_stored": stored,
+            "core_numbers": core,
+            "compression_all_in": self.errors.size / stored,
+            "compression_core_only": self.errors.size / core,
+        }
+
+
+def measure_truncation(trained: TrainedModel) -> Truncation:
+    """Return every truncation of a trained model's tensor."""
+    core, reduced = trained.full.core, trained.model.decoder.reduced.core
+    price = truncation_cost.storage_cost(trained.tensor, len(trained.model.bank.low))
+    stored = price.evaluate(*np.ix_(*(np.arange(1, size + 1) for size in core.shape)))
+    r1, r2, r3 = reduced.shape
+    return Truncation(trained.tensor.rms(hosvd.squared_errors(core)), stored, (r1, r2, r3))
+
+
+def truncation_chapter(trained: TrainedModel) -> Chapter:
+    """Return the Pareto front of error and size, and the errors around the chosen size."""
+    every = measure_truncation(trained)
+    chosen = every.facts(every.chosen)
+    smallest = [{"budget_m": b, **every.facts(every.smallest(b))} for b in BUDGETS]
+    error, numbers = 100 * chosen["rms_m"], chosen["numbers_stored"]
+    paragraphs = (
+        f"The chosen ranks {_times(every.chosen)} cause an error of {error:.2f} cm (RMS over "
+        f"joints, frames and clips in the training metric). The model stores {numbers:,} "
+        f"numbers in place of {every.errors.size:,}: a compression of "
+        f"{chosen['compression_all_in']:.1f} with "
+        f"bases and kriging weights, and of {chosen['compression_core_only']:.1f} for the core "
+        "alone.",
+    )
+    named = [("chosen", chosen), *((f"{100 * one['budget_m']:g} cm", one) for one in smallest)]
+    rows = tuple(
+        (
+            name,
+            _times(one["ranks"]),
+            f"{100 * one['rms_m']:.2f}",
+            f"{one['numbers_stored']:,}",
+            _ratio(one["compression_all_in"]),
+            _ratio(one["compression_core_only"]),
+        )
+        for name, one in named
+    )
+    titles = ("ranks", "error (cm)", "numbers stored", "compression", "of the core alone")
+    table = Table("Smallest size for an error limit", ("error limit", *titles), rows)
+    missed = 100 * float(np.sqrt(trained.left_out_errors.mean()))
+    chart = svg_chart.draw(
+        3.7,
+        partial(_paint_sizes, every, (numbers, error), missed),
+        f"Truncation error against numbers stored, and against ranks; chosen: {error:.2f} cm "
+        f"at {numbers} numbers.",
+        "Left: the smallest error for each size, over all combinations of ranks. Right: error "
+        "against two of the ranks, the third as chosen. The orange dot is the chosen size.",
+    )
+    facts = {"tensor_numbers": every.errors.size, "chosen": chosen, "smallest": smallest}
+    return Chapter(facts, Section("sizes", "Error against size", paragraphs, (table,), (chart,)))
+
+
+def _times(ranks: Any) -> str:
+    return " × ".join(map(str, ranks))
+
+
+def _ratio(value: float) -> str:
+    return f"{value:,.0f}" if value >= 100 else f"{value:.1f}"
+
+
+def _paint_sizes(
+    every: Truncation, chosen: tuple[int, float], missed: float, figure: Figure
+) -> None:
+    """Draw the front with the chosen size, and the error over two ranks. missed: error, cm."""
+    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+    errors, marks = every.front()
+    left.loglog(marks, 100 * errors, color=svg_chart.BLUE, label="smallest error at this size")
+    left.plot(*chosen, "o", color=svg_chart.ORANGE, label="chosen", zorder=3)
+    label = f"error of a left-out clip: {missed:.1f} cm"
+    left.axhline(missed, color=svg_chart.FAINT, linestyle="--", label=label)
+    left.set(xlabel="numbers stored", ylabel="error (cm)", title="size")
+    svg_chart.plain_logarithm(left.xaxis)
+    svg_chart.plain_logarithm(left.yaxis)
+    left.legend(loc="lower left")
+    r1, r2, r3 = every.chosen
+    shown = 100 * every.errors[:, r2 - 1, :].T
+    extent = (0.5, shown.shape[1] + 0.5, 0.5, shown.shape[0] + 0.5)
+    image = right.imshow(shown, origin="lower", aspect="auto", extent=extent, cmap="Blues")
+    at = np.arange(1, shown.shape[1] + 1), np.arange(1, shown.shape[0] + 1)
+    levels = [level for level in (0.5, 1, 2, 5, 10) if shown.min() < level < shown.max()]
+    if levels:
+        lines = right.contour(*at, shown, levels, colors=svg_chart.INK, linewidths=0.7)
+        right.clabel(lines, fmt="%g cm", fontsize=8)
+    right.plot(r1, r3, "o", color=svg_chart.ORANGE, clip_on=False)
+    right.grid(visible=False)
+    title = f"ranks, with {r2} of frames"
+    right.set(xlabel="rank of degrees of freedom", ylabel="rank of samples", title=title)
+    figure.colorbar(image, ax=right, label="error (cm)")
+
+
+@dataclass(frozen=True)
+class TimeWarps:
+    """Maps (N, 501) from uniform shares of the time of N clips to canonical time."""
+
+    maps: Floats
+
+    @property
+    def _factors(self) -> Floats:
+        """Return the change of speed (N, 500) relative to the clip's mean, at least 1."""
+        slopes = np.diff(self.maps, axis=1) / np.diff(FIT_TIMES)
+        return np.maximum(slopes, 1.0 / slopes)
+
+    @property
+    def stretches(self) -> Floats:
+        """Return the largest change of speed (N,) of each clip, as a factor."""
+        return self._factors.max(axis=1)
+
+    @property
+    def change_times(self) -> Floats:
+        """Return the place (N,) of the largest change, as a share of the clip's time."""
+        return FIT_TIMES[np.argmax(self._factors, axis=1)]
+
+    @property
+    def at_limit(self) -> Booleans:
+        """Return a mask (N,) of clips with a change of speed at the limit of the alignment."""
+        return self.stretches > NEAR_LIMIT / MINIMUM_INCREMENT
+
+
+def warp_chapter(trained: TrainedModel) -> Chapter:
+    """Return a chart of the time maps, and the clips with the largest change of speed."""
+    warps = TimeWarps(trained.model.timing.basis.evaluate(trained.aligned.logs, FIT_TIMES))
+    order = np.argsort(-warps.stretches, kind="stable")
+    clips = [
+        {
+            "clip": left_out_clips.clip_label(trained.examples[i]),
+            "duration_s": float(trained.aligned.durations[i]),
+            "largest_stretch": float(warps.stretches[i]),
+            "at_share": float(warps.change_times[i]),
+            "at_the_bound": bool(warps.at_limit[i]),
+            "shift": trained.examples[i].shift,
+        }
+        for i in order
+    ]
+    durations, worst = trained.aligned.durations, clips[:NAMED_CLIPS]
+    summary = (
+        f"The clips last {durations.min():.2f} to {durations.max():.2f} s. Alignment "
+        "maps the time of each clip to a canonical time, at which all clips are in the same "
+        "phase of the motion. The largest change of speed by this map is a factor of "
+        f"{worst[0]['largest_stretch']:.2f}, in {worst[0]['clip']}."
+    )
+    rows = tuple(
+        (
+            one["clip"],
+            f"{one['duration_s']:.2f}",
+            f"{one['largest_stretch']:.2f}",
+            f"{100 * one['at_share']:.0f} %",
+        )
+        for one in worst
+    )
+    heading = ("clip", "duration (s)", "factor", "at")
+    table = Table("Clips with the largest change of speed", heading, rows)
+    chart = svg_chart.draw(
+        3.5,
+        partial(_paint_maps, warps.maps[order], clips),
+        f"Time maps of {len(clips)} clips, and the largest change of speed of each; "
+        f"largest: {worst[0]['clip']}.",
+        "Left: canonical time against the time of each clip; on the dashed diagonal the speed "
+        "is unchanged. Right: largest change of speed of each clip, sorted. Orange: the clips "
+        "in the table.",
+    )
+    paragraphs = (summary, _limit_text(warps), *_shift_text(trained))
+    section = Section("warps", "Alignment in time", paragraphs, (table,), (chart,))
+    return Chapter({"clips": clips}, section)
+
+
+def _shift_text(trained: TrainedModel) -> tuple[str, ...]:
+    shifts = np.array([example.shift for example in trained.examples])
+    if not shifts.any():
+        return ()
+    most = int(np.argmax(np.abs(shifts)))
+    return (
+        "Before the alignment the start of each cycle was moved to a common phase, by "
+        f"{100 * np.sqrt(np.mean(np.square(shifts))):.1f} % of a cycle (RMS), and of "
+        f"{left_out_clips.clip_label(trained.examples[most])} by {100 * shifts[most]:+.1f} %. The "
+        "end of the cycle and its landmarks moved with it.",
+    )
+
+
+def _limit_text(warps: TimeWarps) -> str:
+    met = int(warps.at_limit.sum())
+    rule = (
+        f"The alignment limits the speed to at least about {MINIMUM_INCREMENT:g} of the clip's "
+        "mean speed"
+    )
+    if not met:
+        return f"{rule}. No clip is near this limit."
+    ends = int(np.sum(warps.at_limit & (np.abs(warps.change_times - 0.5) > 0.5 - END_SHARE)))
+    return (
+        f"{rule}. {met} of {len(warps.maps)} clips are at this limit, {ends} of them in the "
+        "first or last tenth. There it usually means that the clip was cut at another phase "
+        "than the others, and elsewhere that it pauses where the others do not."
+    )
+
+
+def _paint_maps(maps: Floats, clips: list[dict[str, Any]], figure: Figure) -> None:
+    """Draw the maps of clips, the largest change of speed first, and the changes."""
+    left, right = figure.subplots(1, 2)
+    for row in maps[NAMED_CLIPS:]:
+        left.plot(FIT_TIMES, row, color=svg_chart.FAINT, linewidth=0.8)
+    left.plot([0, 1], [0, 1], color=svg_chart.INK, linewidth=0.8, linestyle="--")
+    for row, one, style in zip(maps, clips, ("-", "--", ":"), strict=False):
+        label = svg_chart.label(one["clip"])
+        left.plot(FIT_TIMES, row, style, color=svg_chart.ORANGE, label=label)
+    left.legend(loc="lower right", fontsize=7.5)
+    left.set(xlabel="share of the clip's time", ylabel="canonical time", title="time maps")
+    at = np.arange(len(clips))
+    colours = [svg_chart.ORANGE if i < NAMED_CLIPS else svg_chart.BLUE for i in at]
+    right.bar(at, [one["largest_stretch"] for one in clips], width=0.72, color=colours)
+    right.set(ylabel="largest change of speed (factor)", title="clips", ylim=(1.0, None))
+    right.set_xticks([])
