@@ -19,7 +19,7 @@ from posefield_train.adapt import (
     adaptation,
     canonical_clips,
     model_reconstruction,
-    new_curves,
+    new_clips,
 )
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export
@@ -177,12 +177,12 @@ def test_curves_lie_beside_files_that_are_given_without_a_table(tmp_path, base, 
     motion = tmp_path / "one.bvh"
     shutil.copy(table.parent / "0.bvh", motion)
     if alone:
-        assert new_curves.place_beside(reopened.card, motion) is None
+        assert new_clips.place_beside(reopened.card, motion) is None
         return
     with pytest.raises(RecipeError, match=r"no one\.curves\.csv beside it"):
-        new_curves.place_beside(reopened.card, motion)
+        new_clips.place_beside(reopened.card, motion)
     shutil.copy(table.parent / "0.curves.csv", tmp_path / "one.curves.csv")
-    assert new_curves.place_beside(reopened.card, motion).name == "one.curves.csv"
+    assert new_clips.place_beside(reopened.card, motion).name == "one.curves.csv"
 
 
 def test_curves_alone_need_a_rate_and_a_head_needs_a_column(

@@ -14,7 +14,7 @@ from posefield.motion import bvh_writer
 from posefield.motion.contacts import contact_detection
 from posefield.motion.contacts.contact_detection import ContactThresholds
 from posefield_train import train
-from posefield_train.adapt import canonical_clips, contact_extension
+from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.adapt.adaptation import adapt
 from posefield_train.adapt.model_reconstruction import reconstruct
 from posefield_train.align import phase_alignment
@@ -251,11 +251,11 @@ def test_adapting_leaves_out_contacts_of_the_table_with_a_note(rail):
     adapted = adapt(known, examples[:3], "new")
     assert [one.joint for one in adapted.contacts.statistics] == [3, 6]
     assert adapted.model.contacts.values.shape[1] == 2
-    (note,) = contact_extension.contact_notes(known, adapted.contacts)
+    (note,) = adaptation.contact_notes(known, adapted.contacts)
     assert note.startswith("contacts of Hips were left out")
     handless = replace(known, feet=())
     assert adapt(handless, examples[:3], "new").contacts is None
-    (note,) = contact_extension.contact_notes(known, None)
+    (note,) = adaptation.contact_notes(known, None)
     assert "LeftFoot, RightFoot, Hips" in note
 
 

@@ -11,17 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from posefield.common.units import Floats
-from posefield_train.adapt import (
-    canonical_clips,
-    contact_extension,
-    extended_models,
-    tensor_extension,
-)
+from posefield.motion.foot_contacts import FootContact
+from posefield_train.adapt import canonical_clips, extended_models, tensor_extension
 from posefield_train.adapt.canonical_clips import AdaptableModel, CanonicalClips
-from posefield_train.adapt.contact_extension import ExtendedContacts
 from posefield_train.adapt.extended_models import ExtendedSamples
 from posefield_train.adapt.tensor_extension import ExtendedTensor
 from posefield_train.align import travel as travels
+from posefield_train.contacts import contact_labels, contact_table
+from posefield_train.contacts.contact_labels import ContactSettings
+from posefield_train.contacts.contact_table import ContactTable
 from posefield_train.graph.float_model import FloatModel
 from posefield_train.kriging import universal_kriging
 from posefield_train.kriging.kriging_bank import KrigingBank
@@ -32,6 +30,18 @@ from posefield_train.tensor import event_blend
 from posefield_train.tensor.decoder import Decoder
 from posefield_train.tensor.event_blend import EventBlend
 from posefield_train.tensor.hosvd import TuckerTensor
+
+
+@dataclass(frozen=True)
+class ExtendedContacts:
+    """Contacts of a model's samples followed by those of new clips.
+
+    statistics: of each joint, by the clips that the model was trained on.
+    """
+
+    table: ContactTable
+    kriging: UniversalKriging
+    statistics: tuple[FootContact, ...]
 
 
 @dataclass(frozen=True)
@@ -55,23 +65,13 @@ def adapt(known: AdaptableModel, examples: Sequence[Example], performer: str) ->
     return solve(known, canonical_clips.to_canonical(known, begun), performer)
 
 
+@single_thread.single_threaded()
 def solve(known: AdaptableModel, moved: CanonicalClips, performer: str) -> AdaptedModel:
     """Return the adapted model for examples that are already in the model's canonical time."""
-    with single_thread.single_threaded():
-        parents, weights = known.skeleton.parents, known.joint_weights
-        extended = tensor_extension.extend(
-            known.model, parents, weights, moved.numbers, known.truncation
-        )
-        laid = extended_models.extend_samples(
-            known.model.bank, known.groups, moved.examples, performer
-        )
-        return _solve(known, moved, extended, laid)
-
-
-def _solve(
-    known: AdaptableModel, moved: CanonicalClips, extended: ExtendedTensor, laid: ExtendedSamples
-) -> AdaptedModel:
     model, law = known.model, known.model.bank.power_law
+    parents, weights = known.skeleton.parents, known.joint_weights
+    extended = tensor_extension.extend(model, parents, weights, moved.numbers, known.truncation)
+    laid = extended_models.extend_samples(model.bank, known.groups, moved.examples, performer)
     reduced = extended.full.truncated(extended.ranks)
     pose = universal_kriging.solve(
         laid.hyper(model.bank.pose.hyper), laid.samples.points, reduced.bases[2]
@@ -92,7 +92,7 @@ def _solve(
     missed, sill = _left_out_errors(known, laid, moved, extended)
     ends = laid.low, laid.high
     event, blend = _event(laid, model, reduced)
-    contacts = contact_extension.extend_contacts(known, moved, laid)
+    contacts = _extend_contacts(known, moved, laid)
     field, table = (contacts.kriging, contacts.table) if contacts else (None, None)
     bank = KrigingBank(*ends, laid.labels, pose, others, sill, (), law, event, field)
     own = extended.tensor
@@ -144,3 +144,39 @@ def _travel_residuals(old: KrigingBank, laid: ExtendedSamples, new: Floats) -> F
         left_out = universal_kriging.leave_out(hyper, laid.samples.points, groups)
         return left_out[-len(new) :] @ both
     return laid.samples.from_mean(both)[-len(new) :]
+
+
+def _extend_contacts(
+    known: AdaptableModel, moved: CanonicalClips, laid: ExtendedSamples
+) -> ExtendedContacts | None:
+    """Return the contacts of a model's samples and of new clips; None without any.
+
+    Joints whose contacts came from a table of clips are left out, for new clips have none.
+    """
+    field, table, timing = known.model.bank.contacts, known.model.contacts, known.model.timing
+    kept = [place for place, own in enumerate(known.contacts) if own.joint in known.feet]
+    if field is None or table is None or not kept:
+        return None
+    statistics = tuple(known.contacts[place] for place in kept)
+    joints = tuple(own.joint for own in statistics)
+    asked = ContactSettings(joints, {}, known.model.travel is not None, known.in_place)
+    clips = [contact_labels.clip_contacts(example, asked) for example in moved.examples]
+    logs, frames = moved.aligned.logs, timing.frames
+    new = contact_labels.canonical_labels(clips, logs, timing.basis, frames)
+    labels = np.concatenate([table.labels(field.values)[..., kept], new])
+    longer, coefficients = contact_table.reduce_labels(labels)
+    hyper = laid.hyper(known.model.bank.pose.hyper)
+    solved = universal_kriging.solve(hyper, laid.samples.points, coefficients)
+    return ExtendedContacts(longer, solved, statistics)
+
+
+def contact_notes(known: AdaptableModel, kept: ExtendedContacts | None) -> list[str]:
+    """Return a note on joints whose contacts the adapted model lacks."""
+    there = kept.statistics if kept else ()
+    lost = [known.skeleton.names[own.joint] for own in known.contacts if own not in there]
+    if not lost:
+        return []
+    return [
+        f"contacts of {', '.join(lost)} were left out: they came from the table of clips, which "
+        "new clips have none of"
+    ]

@@ -13,7 +13,7 @@ from posefield.common.units import Floats
 from posefield.inference import residual_covariance
 from posefield.model_file.level_of_detail import Level
 from posefield.model_file.model_card import PERFORMER, Control, LabelSet, ModelCard, rounded
-from posefield_train.adapt import adaptation, canonical_clips, contact_extension, new_clips
+from posefield_train.adapt import adaptation, canonical_clips, new_clips
 from posefield_train.adapt.adaptation import AdaptedModel
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
 from posefield_train.graph import levels, onnx_export, trained_card, truncation_cost
@@ -280,7 +280,7 @@ def _notes(
         adapting,
         *newcomer.notes,
         *trained_card.finding_notes(moved.findings, moved.examples, names),
-        *contact_extension.contact_notes(reopened.known, adapted.contacts),
+        *adaptation.contact_notes(reopened.known, adapted.contacts),
     ]
 
 

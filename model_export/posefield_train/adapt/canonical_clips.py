@@ -121,13 +121,9 @@ def align_phase(adaptable: AdaptableModel, examples: Sequence[Example]) -> tuple
         )
 
 
+@single_thread.single_threaded()
 def to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> CanonicalClips:
     """Warp examples, already at the model's phase, to its canonical time and chart."""
-    with single_thread.single_threaded():
-        return _to_canonical(adaptable, examples)
-
-
-def _to_canonical(adaptable: AdaptableModel, examples: Sequence[Example]) -> CanonicalClips:
     references = _references(adaptable, examples)
     aligned = time_alignment.align_to(examples, references, adaptable.canonical_time)
     distances = _distances(adaptable, examples, aligned.logs, references)

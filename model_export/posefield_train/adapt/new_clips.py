@@ -4,7 +4,7 @@ Controls with a measure on the card are measured from the clip; all others come 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +12,16 @@ import numpy as np
 from posefield.common.errors import RecipeError
 from posefield.common.name_suggestion import did_you_mean
 from posefield.common.units import Floats
-from posefield.model_file.model_card import PERFORMER, Control
+from posefield.model_file.model_card import PERFORMER, Control, ModelCard
 from posefield.motion import measures
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.adapt import new_curves
 from posefield_train.adapt.model_reconstruction import ReconstructedModel
-from posefield_train.adapt.new_curves import NewFiles
 from posefield_train.source import (
     canonical,
     clip_joints,
     clip_table,
+    curve_files,
     data_folder,
     facing,
     ingest,
@@ -33,10 +32,25 @@ from posefield_train.source.clip_table import ClipRow, ClipTable
 from posefield_train.source.control_sources import TIME_NAMES
 from posefield_train.source.data_folder import FileLocation
 from posefield_train.source.ingest import Example
+from posefield_train.source.motion_file import MotionFile
 from posefield_train.source.recipe_sections import Source
+
+COLUMN, SUFFIX = "curves", ".curves.csv"
+"""Column of a table with the file of a clip's curves, and how it ends beside a motion file."""
 
 Labels = Mapping[str, str]
 """Names of clips by label set."""
+
+
+@dataclass(frozen=True)
+class NewFiles:
+    """Conventions of the files of new clips.
+
+    source: of motion files. rate: frames a second of files of curves without a skeleton.
+    """
+
+    source: Source
+    rate: float | None = None
 
 
 def examples_of_files(
@@ -49,7 +63,7 @@ def examples_of_files(
     """Return examples of whole files, with all controls measured, and notes on assumptions.
 
     labels: name of all clips in each label set; the performer's is required. Curves are in a file
-    beside each motion file, as `new_curves.SUFFIX` says. rate: frames a second of files of curves
+    beside each motion file, as `SUFFIX` says. rate: frames a second of files of curves
     alone.
 
     Raises RecipeError for a control that cannot be measured, a file given twice, and a clip of
@@ -87,7 +101,7 @@ def examples_of_table(
     landmarks, controls = _landmark_columns(reopened), reopened.card.controls
     typed = [control.name for control in controls if control.measure is None]
     sets = _open_sets(reopened, labels)
-    curves = [new_curves.COLUMN] * new_curves.have_files(reopened.card)
+    curves = [COLUMN] * have_files(reopened.card)
     own.require(
         {
             "file": "the motion file",
@@ -130,7 +144,7 @@ def _label(
 
 def _row(reopened: ReconstructedModel, path: Path, labels: Mapping[str, str]) -> ClipRow:
     who, others = _split(labels)
-    beside = new_curves.place_beside(reopened.card, path)
+    beside = place_beside(reopened.card, path)
     own = ClipRow(path, str(path), None, who, 0, None, np.zeros(0), (), other_labels=others)
     return replace(own, curve_place=beside)
 
@@ -172,11 +186,11 @@ def _examples(
     conventions: NewFiles,
     given: Sequence[Mapping[str, float]],
 ) -> tuple[list[Example], list[str]]:
-    alone = new_curves.are_alone(reopened.card)
+    alone = are_alone(reopened.card)
     files = {} if alone else ingest.read_files(rows, conventions.source)
     examples, notes, stretches = [], list[str](), []
     for row, values in zip(rows, given, strict=True):
-        whole, left_out = new_curves.whole_clip(reopened.card, row, files, conventions)
+        whole, left_out = whole_clip(reopened.card, row, files, conventions)
         example, said, stretch = _example(reopened, row, whole)
         controls = _controls(reopened, example, values)
         examples.append(replace(example, controls=controls))
@@ -311,3 +325,51 @@ def _landmark(reopened: ReconstructedModel, control: Control, example: Example) 
     names = [*_landmark_columns(reopened), *_found_names(reopened)]
     times = np.array([reopened.making.landmarks[name] for name in names])
     return example.landmarks[int(np.argmin(np.abs(times - control.measure.share)))]
+
+
+def are_alone(card: ModelCard) -> bool:
+    """Return whether the clips of a model are curves without a skeleton."""
+    return bool(card.curves) and card.skeleton.names == (curve_files.RESTING_JOINT,)
+
+
+def have_files(card: ModelCard) -> bool:
+    """Return whether clips of a model have a file of curves beside their motion file."""
+    return bool(card.curves) and not are_alone(card)
+
+
+def place_beside(card: ModelCard, motion: Path) -> Path | None:
+    """Return the file of curves beside a motion file; None for a model without such files.
+
+    Raises RecipeError if there is none.
+    """
+    if not have_files(card):
+        return None
+    place = motion.with_suffix(SUFFIX)
+    if not place.is_file():
+        raise RecipeError(
+            str(motion),
+            f"found no {place.name} beside it, expected the file of its curves, which the model "
+            f"has; or a table with a column {COLUMN!r}",
+        )
+    return place
+
+
+def whole_clip(
+    card: ModelCard, row: ClipRow, files: Mapping[str, MotionFile], conventions: NewFiles
+) -> tuple[Clip, list[str]]:
+    """Return the clip of all frames of a row with the model's curves, and notes.
+
+    files: motion files by place. Raises RecipeError for curves that do not fit the model or the
+    motion, and without a rate where files have none.
+    """
+    if not card.curves:
+        return ingest.clip_of_file(files[row.motion], conventions.source), []
+    values, others = curve_files.read_known(row.curve_file, card.curves)
+    said = f"{row.curve_file}: curves {others}, which the model does not have, were left out"
+    notes = [said] if others else []
+    if not are_alone(card):
+        clip = ingest.clip_of_file(files[row.motion], conventions.source)
+        return curve_files.with_curves(clip, values, row), notes
+    if conventions.rate is None:
+        raise row.error("nothing says the frames a second of its curves, expected --rate")
+    return curve_files.resting_clip(values, conventions.rate), notes
