@@ -12,7 +12,7 @@ from pxr import Usd, UsdGeom, UsdSkel, UsdValidation
 
 from posefield.batch import performance_crowd
 from posefield.batch.performance_crowd import PerformanceCrowd, View
-from posefield.batch.scripts import open_models
+from posefield.batch.scripts import open_models, read_scripts
 from posefield.common.errors import InvalidField
 from posefield.inference.level_selection import Camera, pixels_per_metre
 from posefield.performance import composition
@@ -41,7 +41,7 @@ def rows(tmp_path):
 def written(folder, scripts):
     path = folder / "scripts.jsonl"
     path.write_text("".join(json.dumps(script) + "\n" for script in scripts))
-    return scripts.read_scripts(path)
+    return read_scripts(path)
 
 
 def performed(models, script):
