@@ -27,7 +27,7 @@ The contract is `api/openapi.yaml` (OpenAPI 3.1), version {version}. A running s
 |---|---|
 | `/docs` | the contract as a page; each operation can be tried |
 | `/openapi.yaml`, `/openapi.json` | the contract |
-| `/problems` | every error, with cause and remedy; also [here](problems.md) |
+| `/problems` | every error, with its remedy; also [here](problems.md) |
 
 ```sh
 curl -s http://127.0.0.1:8000/openapi.json -o openapi.json
