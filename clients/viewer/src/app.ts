@@ -10,7 +10,7 @@ import * as crowd from "./crowd.ts";
 import { KeyDialog, Notice, understood } from "./faults.ts";
 import * as feet from "./feet.ts";
 import * as files from "./files.ts";
-import { type Address, address, follow, restored } from "./hash.ts";
+import { type Address, address, follow, restored, written } from "./hash.ts";
 import { Header, mountJumps, mountWelcome } from "./header.ts";
 import * as levels from "./levels.ts";
 import * as map from "./map.ts";
@@ -216,19 +216,13 @@ class App {
   }
 
   /** Show the new version of a model, with the state as far as it fits. */
-  async #replace({ model: name, store }: Open, models: readonly ModelSummary[]): Promise<void> {
-    const open = this.#open;
+  async #replace(open: Open, models: readonly ModelSummary[]): Promise<void> {
+    const { model: name, store } = open;
     const model = await this.#fetch(name);
     if (open !== this.#open || this.#wanted) return;
-    const known = new Set(model.card.controls.map(({ name }) => name));
-    const entries = Object.entries(store.state.controls)
-      .filter(([control]) => known.has(control))
-      .map(([control, value]) => [control, String(value)] as const);
-    const { state } = restored({ model: name, entries }, name, model.card);
-    const { playing, body, fan, ghost, feet, loop, speed } = store.state;
-    const { script, take, variety, view } = store.state;
-    const kept = { playing, body, fan, ghost, feet, loop, speed, script, take, variety, view };
-    this.#show(name, model, new Store({ ...state, ...kept }), models);
+    const { state } = restored(address(written(store.state, open.card)), name, model.card);
+    // A long script is not in the address.
+    this.#show(name, model, new Store({ ...state, script: store.state.script }), models);
     this.#notice.remark("model", `${name} has been replaced on the service: this is the new one.`);
   }
 

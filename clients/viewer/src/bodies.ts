@@ -1,7 +1,8 @@
 /** Bodies on the stage: the motion that is shown, the nearest captured clip and other takes. */
 
-import type { ModelCard, Motion } from "@posefield/client";
+import type { Motion } from "@posefield/client";
 
+import { ladder } from "./detail.ts";
 import { el } from "./dom.ts";
 import { Figure } from "./figure.ts";
 import { Latest } from "./latest.ts";
@@ -11,8 +12,8 @@ import { clip, otherTakes } from "./questions.ts";
 import { has, type State } from "./state.ts";
 import * as theme from "./theme.ts";
 
-/** Largest extent of a person's joints at rest, m. */
-const PERSON = 1.5;
+/** Radius about the root of a person's joints at rest, m. */
+const PERSON = 0.9;
 /** Number of other takes, and their opacity, which lets the body be seen. */
 const [TAKES, PALE] = [5, 0.2];
 
@@ -33,7 +34,7 @@ function mountBody({ card, character, player, scene, signal, store }: Session): 
     scene.redraw();
   };
   dress();
-  const scale = extent(card.skeleton) / PERSON;
+  const scale = ladder(card).radius / PERSON;
   let unusual = scale < 0.5 || scale > 1.5;
   player.watch((shown) => {
     figure.show(shown);
@@ -49,18 +50,6 @@ function mountBody({ card, character, player, scene, signal, store }: Session): 
   });
   theme.listen(() => figure.tint(), signal);
   signal.addEventListener("abort", () => figure.dispose());
-}
-
-/** Return the largest extent of the joints at rest, m. */
-function extent({ parents, offsets }: ModelCard["skeleton"]): number {
-  const points: number[][] = [];
-  for (const [joint, parent] of parents.entries())
-    points.push(offsets[joint]!.map((part, axis) => part + (points[parent]?.[axis] ?? 0)));
-  const sizes = [0, 1, 2].map((axis) => {
-    const values = points.map((point) => point[axis]!);
-    return Math.max(...values) - Math.min(...values);
-  });
-  return Math.max(0.05, ...sizes);
 }
 
 /** A pale body, with its own clip. */

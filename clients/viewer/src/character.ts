@@ -38,7 +38,7 @@ interface Document {
 const WIDTHS: Readonly<Record<string, number>> = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 const KINDS = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
 
-/** What `character.glb` says (service/posefield/encode/character_file.py). */
+/** Read `character.glb` (service/posefield/encode/character_file.py). */
 export function read(content: Uint8Array<ArrayBuffer>): Character {
   const view = new DataView(content.buffer, content.byteOffset);
   const size = view.getUint32(12, true);
@@ -56,7 +56,7 @@ export function read(content: Uint8Array<ArrayBuffer>): Character {
     Primitive,
     Primitive,
   ];
-  const found = {
+  const character = {
     points: numbers(attributes["POSITION"]!),
     normals: numbers(attributes["NORMAL"]!),
     joints: numbers(attributes["JOINTS_0"]!),
@@ -66,16 +66,16 @@ export function read(content: Uint8Array<ArrayBuffer>): Character {
     fine: numbers(indices),
     coarse: numbers(coarse.indices),
   };
-  return found as unknown as Character;
+  return character as unknown as Character;
 }
 
 /** The skin with these corners; whoever draws it may write its positions. */
-export function geometry(own: Character, corners: Character["fine"]): BufferGeometry {
+export function geometry(character: Character, corners: Character["fine"]): BufferGeometry {
   return new BufferGeometry()
-    .setAttribute("position", new BufferAttribute(own.points.slice(), 3))
-    .setAttribute("normal", new BufferAttribute(own.normals, 3))
-    .setAttribute("skinIndex", new BufferAttribute(own.joints, 4))
-    .setAttribute("skinWeight", new BufferAttribute(own.weights, 4, true))
+    .setAttribute("position", new BufferAttribute(character.points.slice(), 3))
+    .setAttribute("normal", new BufferAttribute(character.normals, 3))
+    .setAttribute("skinIndex", new BufferAttribute(character.joints, 4))
+    .setAttribute("skinWeight", new BufferAttribute(character.weights, 4, true))
     .setIndex(new BufferAttribute(corners, 1));
 }
 
@@ -97,12 +97,12 @@ export function fitted(
   }
 }
 
-/** Where joints are when none is turned (J × 3, m); the root is where the card has it. */
+/** Return the joints at rest (J × 3, m); the root is where the card has it. */
 export function standing({ skeleton }: ModelCard, offsets: Float32Array): Float32Array {
-  const found = Float32Array.from(offsets);
-  found.set(skeleton.offsets[0]!);
+  const joints = Float32Array.from(offsets);
+  joints.set(skeleton.offsets[0]!);
   skeleton.parents.forEach((parent, joint) => {
-    if (parent >= 0) for (let i = 0; i < 3; i++) found[3 * joint + i]! += found[3 * parent + i]!;
+    if (parent >= 0) for (let i = 0; i < 3; i++) joints[3 * joint + i]! += joints[3 * parent + i]!;
   });
-  return found;
+  return joints;
 }

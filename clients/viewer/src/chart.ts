@@ -56,9 +56,9 @@ function share(control: Control, value: number): number {
 
 function valued(control: Control, place: number): number {
   const size = control.maximum - control.minimum;
-  const found =
+  const unrounded =
     control.minimum + size * (Math.min(1, Math.max(0, place)) * (1 + 2 * MARGIN) - MARGIN);
-  return rounded(found, size);
+  return rounded(unrounded, size);
 }
 
 /** To a thousandth of the range, so that numbers stay short. */
@@ -268,10 +268,10 @@ export interface Veil {
 
 export function veil(grid: SigmaGrid): Veil {
   const supported = captured(grid);
-  const found = shape(supported);
+  const part = shape(supported);
   const [area, edge] = [new Path2D(), new Path2D()];
-  for (const points of found.area) trace(area, points).closePath();
-  for (const side of found.edges) trace(edge, side);
+  for (const points of part.area) trace(area, points).closePath();
+  for (const side of part.edges) trace(edge, side);
   return { area, edge, columns: supported[0]!.length, rows: supported.length };
 }
 
@@ -319,9 +319,9 @@ function hatch(pen: CanvasRenderingContext2D, frame: Frame, veil: Veil): void {
 /** Transform from columns and rows to a canvas, on which rows go down. */
 function onCanvas(path: Path2D, frame: Frame, { columns, rows }: Veil): Path2D {
   const [right, up] = [frame.width / (columns - 1), frame.height / (rows - 1)];
-  const found = new Path2D();
-  found.addPath(path, new DOMMatrix([right, 0, 0, -up, frame.left, frame.top + frame.height]));
-  return found;
+  const onMap = new Path2D();
+  onMap.addPath(path, new DOMMatrix([right, 0, 0, -up, frame.left, frame.top + frame.height]));
+  return onMap;
 }
 
 // Viridis (van der Walt and Smith, 2015): even steps look even, to the colour-blind too.

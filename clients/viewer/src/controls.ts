@@ -76,7 +76,7 @@ function presets(all: readonly Preset[], { store, signal }: Session): HTMLElemen
     for (const [i, element] of buttons.entries())
       element.setAttribute("aria-pressed", String(isAt(state, all[i]!)));
   }, signal);
-  return el("div", { class: "presets", role: "group", "aria-label": "Presets" }, ...buttons);
+  return el("div", { class: "presets row", role: "group", "aria-label": "Presets" }, ...buttons);
 }
 
 /** Tell whether the state is at a preset. */

@@ -20,17 +20,21 @@ const [TRIED, SHARPEST] = [120, 0.2];
 /** Square metres to a character. */
 const ROOM = 9;
 
-/** Motions as they are asked for, with their poses at each level. */
+/** Arc that a clip follows: s, m/s, rad to the left of the heading, and rad/s. */
+interface Path {
+  readonly seconds: number;
+  readonly speed: number;
+  readonly drift: number;
+  readonly turning: number;
+}
+
+/** Motions with their poses at each level. */
 export interface Motions {
   readonly levels: number;
-  readonly count: number;
   /** Characters walk; else they stay and repeat their clip forwards and backwards. */
   readonly walks: boolean;
-  /** Of each motion: s, m/s, rad to the left of the heading, and rad/s. */
-  readonly seconds: Float32Array;
-  readonly speeds: Float32Array;
-  readonly drifts: Float32Array;
-  readonly turning: Float32Array;
+  /** Of each motion. */
+  readonly paths: readonly Path[];
   /** SIZE numbers for each level, motion, frame (FRAMES + 1) and joint: they move the skin. */
   readonly poses: Float32Array;
 }
@@ -74,7 +78,7 @@ export async function fetchMotions(
   const tried = spread(examples, TRIED);
   const paths = await fetchPaths(tried, ask);
   const all = tried.map((_, i) => i);
-  const gentle = all.filter((i) => Math.abs(paths.turning[i]!) <= SHARPEST);
+  const gentle = all.filter((i) => Math.abs(paths[i]!.turning) <= SHARPEST);
   const fitting = spread(walks && gentle.length >= 6 ? gentle : all, MOTIONS);
   // Takes last and travel as the prediction does, so that several may share a captured clip.
   const chosen = takes
@@ -96,17 +100,7 @@ export async function fetchMotions(
       writeMatrices(poses.subarray(level * size, (level + 1) * size), rest, answer, walks);
     }),
   );
-  const pick = (values: Float32Array) => Float32Array.from(chosen, (i) => values[i]!);
-  return {
-    levels: card.levels.length,
-    count: chosen.length,
-    walks,
-    seconds: pick(paths.seconds),
-    speeds: pick(paths.speeds),
-    drifts: pick(paths.drifts),
-    turning: pick(paths.turning),
-    poses,
-  };
+  return { levels: card.levels.length, walks, paths: chosen.map((i) => paths[i]!), poses };
 }
 
 /** Return so many items of a list, evenly. */
@@ -130,32 +124,21 @@ function columns(
 }
 
 /** Fetch the arcs that clips follow, evenly (as service/posefield/locomotion/stride.py has them). */
-async function fetchPaths(
-  rows: readonly Row[],
-  ask: Ask,
-): Promise<Pick<Motions, "seconds" | "speeds" | "drifts" | "turning">> {
+async function fetchPaths(rows: readonly Row[], ask: Ask): Promise<Path[]> {
   const start = await ask(rows, { time: 0 });
   const end = await ask(rows, { time: [...start.duration] });
   const joints = start.names.length;
-  const paths = rows.map((_, i) => {
+  return rows.map((_, i) => {
+    const seconds = start.duration[i]!;
     const turn = turnBetween(start.rotations, end.rotations, 4 * joints * i);
     const [x, z] = [0, 2].map(
       (axis) => end.rootPosition[3 * i + axis]! - start.rootPosition[3 * i + axis]!,
     ) as [number, number];
     // The chord of an arc of the turn h is sin(h/2) / (h/2) of its length, and h/2 to the left.
     const chord = Math.abs(turn) < 1e-6 ? 1 : Math.sin(turn / 2) / (turn / 2);
-    return {
-      turn,
-      speed: Math.hypot(x, z) / chord / start.duration[i]!,
-      drift: Math.atan2(x, z) - turn / 2,
-    };
+    const speed = Math.hypot(x, z) / chord / seconds;
+    return { seconds, speed, drift: Math.atan2(x, z) - turn / 2, turning: turn / seconds };
   });
-  return {
-    seconds: start.duration,
-    speeds: Float32Array.from(paths, ({ speed }) => speed),
-    drifts: Float32Array.from(paths, ({ drift }) => drift),
-    turning: Float32Array.from(paths, ({ turn }, i) => turn / start.duration[i]!),
-  };
 }
 
 /** Return the angle about +Y between two roots' rotations. */
@@ -251,23 +234,23 @@ export class Crowd {
       this.z[i] = ((i % side) + 0.2 + 0.6 * random()) * cell - this.half;
       this.#heading[i] = 2 * Math.PI * random();
       this.#phase[i] = random();
-      this.#motion[i] = Math.floor(random() * motions.count);
+      this.#motion[i] = Math.floor(random() * motions.paths.length);
     }
   }
 
   /** Move all for some seconds; those who leave the field enter it at its other side. */
   step(seconds: number): void {
-    const { seconds: lasting, speeds, drifts, turning, walks } = this.#motions;
+    const { paths, walks } = this.#motions;
     const [half, side] = [this.half, 2 * this.half];
     for (let i = 0; i < this.count; i++) {
-      const motion = this.#motion[i]!;
-      const phase = this.#phase[i]! + seconds / lasting[motion]!;
+      const path = paths[this.#motion[i]!]!;
+      const phase = this.#phase[i]! + seconds / path.seconds;
       // Forwards and backwards takes two.
       this.#phase[i] = phase % (walks ? 1 : 2);
       if (!walks) continue;
-      const heading = this.#heading[i]! + turning[motion]! * seconds;
-      const direction = heading + drifts[motion]!;
-      const far = speeds[motion]! * seconds;
+      const heading = this.#heading[i]! + path.turning * seconds;
+      const direction = heading + path.drift;
+      const far = path.speed * seconds;
       this.#heading[i] = heading;
       const x = this.x[i]! + far * Math.sin(direction);
       const z = this.z[i]! + far * Math.cos(direction);
@@ -299,7 +282,7 @@ export class Crowd {
     standing[4 * at + 1] = this.z[i]!;
     standing[4 * at + 2] = this.#heading[i]!;
     standing[4 * at + 3] = phase > 1 ? 2 - phase : phase;
-    motion[2 * at] = level * this.#motions.count + this.#motion[i]!;
+    motion[2 * at] = level * this.#motions.paths.length + this.#motion[i]!;
     motion[2 * at + 1] = level;
   }
 }

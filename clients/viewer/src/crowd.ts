@@ -196,14 +196,14 @@ class CrowdView {
     this.#frustum.setFromProjectionMatrix(
       this.#projection.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse),
     );
-    const found: (readonly [number, boolean])[] = [];
+    const visible: (readonly [number, boolean])[] = [];
     for (let i = 0; i < count; i++) {
       this.#sphere.center.set(x[i]!, 0.9, z[i]!);
       if (!this.#frustum.intersectsSphere(this.#sphere)) continue;
       const [dx, dz] = [x[i]! - camera.position.x, z[i]! - camera.position.z];
-      found.push([i, dx * dx + dz * dz < near * near]);
+      visible.push([i, dx * dx + dz * dz < near * near]);
     }
-    return found;
+    return visible;
   }
 
   #showNumbers(begun: number, seen: number): void {

@@ -91,7 +91,7 @@ class Files {
         el("h2", {}, "Download"),
         el(
           "div",
-          { class: "files-main" },
+          { class: "files-main row" },
           this.#get,
           videoButton(session, (text) => this.#say(text)),
         ),
@@ -101,7 +101,7 @@ class Files {
         el("h3", {}, "The same from a program"),
         el(
           "div",
-          { class: "files-kinds", role: "group", "aria-label": "Ask for it by" },
+          { class: "files-kinds row", role: "group", "aria-label": "Ask for it by" },
           ...[...texts, copy],
         ),
         this.#code,

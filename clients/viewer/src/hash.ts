@@ -221,9 +221,9 @@ function readLabels(text: string, card: ModelCard): State["labels"] | undefined 
 
 /** Read three numbers between commas. */
 function point(text: string): State["target"] | undefined {
-  const found = text.split(",").map(number);
-  const [x, y, z] = found;
-  const good = found.length === 3 && found.every((value) => typeof value === "number");
+  const numbers = text.split(",").map(number);
+  const [x, y, z] = numbers;
+  const good = numbers.length === 3 && numbers.every((value) => typeof value === "number");
   return good ? [x as number, y as number, z as number] : undefined;
 }
 

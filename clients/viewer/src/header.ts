@@ -147,7 +147,7 @@ export function mountWelcome(host: HTMLElement, { signal, store }: Session): voi
   host.append(
     el(
       "div",
-      { class: "welcome", role: "note" },
+      { class: "welcome title", role: "note" },
       el("div", {}, el("h2", {}, "Motion from a few sliders"), el("p", {}, hint)),
       button("Close", "Close this hint", close),
     ),

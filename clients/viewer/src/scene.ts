@@ -21,7 +21,7 @@ import * as theme from "./theme.ts";
 /** Called before each drawing with the seconds since the last; true asks to be called again. */
 export type Step = (seconds: number) => boolean;
 
-/** How far the body may be from where the camera looks before the camera goes along, m. */
+/** Distance of the body from the camera's target from which on the camera follows it, m. */
 const LEASH = 0.15;
 
 export class Scene {
@@ -264,11 +264,11 @@ class Quality {
   constructor(renderer: WebGLRenderer, software: boolean, redraw: () => void) {
     this.#renderer = renderer;
     this.#redraw = redraw;
-    this.#moving = software ? 1 : this.#own;
+    this.#moving = software ? 1 : this.#screen;
     this.#finest = software ? 2 : 1;
   }
 
-  get #own(): number {
+  get #screen(): number {
     return Math.min(devicePixelRatio, 2);
   }
 
@@ -281,7 +281,7 @@ class Quality {
     }
     // Tells tests that nothing has moved since.
     this.#renderer.domElement.toggleAttribute("data-rest", this.#resting);
-    this.#use(this.#resting ? Math.max(this.#own, this.#finest) : this.#moving);
+    this.#use(this.#resting ? Math.max(this.#screen, this.#finest) : this.#moving);
     this.#resting = false;
   }
 
@@ -293,11 +293,11 @@ class Quality {
   #judge(since: number): void {
     this.#mean += 0.15 * (Math.min(since, 150) - this.#mean);
     if (this.#mean > SLOW && this.#moving > COARSEST) this.#change(0.8);
-    else if (this.#mean < FAST && this.#moving < this.#own) this.#change(1.1);
+    else if (this.#mean < FAST && this.#moving < this.#screen) this.#change(1.1);
   }
 
   #change(factor: number): void {
-    this.#moving = Math.min(this.#own, Math.max(COARSEST, this.#moving * factor));
+    this.#moving = Math.min(this.#screen, Math.max(COARSEST, this.#moving * factor));
     this.#mean = (SLOW + FAST) / 2;
   }
 

@@ -23,9 +23,9 @@ export function place(
   const first = 4 * parents.length * frame;
   for (let joint = 0; joint < parents.length; joint++) {
     const parent = parents[joint]!;
-    const own = first + 4 * joint;
+    const at = first + 4 * joint;
     if (parent < 0) {
-      for (let i = 0; i < 4; i++) r[4 * joint + i] = rotations[own + i]!;
+      for (let i = 0; i < 4; i++) r[4 * joint + i] = rotations[at + i]!;
       for (let i = 0; i < 3; i++) p[3 * joint + i] = roots[3 * frame + i]!;
       continue;
     }
@@ -36,10 +36,10 @@ export function place(
       r[4 * parent + 3]!,
     ];
     const [e, f, g, h] = [
-      rotations[own]!,
-      rotations[own + 1]!,
-      rotations[own + 2]!,
-      rotations[own + 3]!,
+      rotations[at]!,
+      rotations[at + 1]!,
+      rotations[at + 2]!,
+      rotations[at + 3]!,
     ];
     r[4 * joint] = a * e - b * f - c * g - d * h;
     r[4 * joint + 1] = a * f + b * e + c * h - d * g;

@@ -61,7 +61,7 @@ class Target {
       ),
       el(
         "div",
-        { class: "point" },
+        { class: "point row" },
         ...this.#fields.map((field, i) =>
           el(
             "span",

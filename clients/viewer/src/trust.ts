@@ -71,14 +71,14 @@ export function mount(host: HTMLElement, session: Session): void {
     feet.hidden = view === "crowd";
   }, signal);
   player.onTrust((trust) => {
-    const found = marks(trust);
+    const facts = marks(trust);
     const text = trustSentence(trust);
     sigma.textContent = written.centimetres(trust.sigma);
     band.textContent = trust.band ? bandName(trust.band) : "";
     meter.value = Math.min(1, trust.sigma / SCALE);
     // The signs differ in shape, for users who do not tell the colours apart.
     known.replaceChildren(
-      ...found.map(({ of, yes, words }) =>
+      ...facts.map(({ of, yes, words }) =>
         el(
           "li",
           { "data-mark": of, "data-held": yes ? "yes" : "no" },
@@ -93,7 +93,7 @@ export function mount(host: HTMLElement, session: Session): void {
     clearTimeout(timer);
     timer = setTimeout(() => {
       why.ask(null);
-      const spoken = [text, ...found.map(({ words }) => `${words}.`), ...trust.warnings];
+      const spoken = [text, ...facts.map(({ words }) => `${words}.`), ...trust.warnings];
       aloud.textContent = spoken.join(" ");
     }, CALM);
   });
@@ -123,18 +123,18 @@ export function marks({
   performer_seen: seen,
   performer,
 }: Pick<Trust, "supported" | "performer_seen" | "performer">): Mark[] {
-  const found: Mark[] = [];
+  const facts: Mark[] = [];
   if (supported !== undefined) {
     const words = supported ? "Captured near here" : "Nothing like it was captured";
-    found.push({ of: "support", yes: supported, words });
+    facts.push({ of: "support", yes: supported, words });
   }
   if (seen !== undefined) {
     const words = seen
       ? `${performer ?? "The performer"} was captured`
       : "Moves as an unseen performer";
-    found.push({ of: "performer", yes: seen, words });
+    facts.push({ of: "performer", yes: seen, words });
   }
-  return found;
+  return facts;
 }
 
 /** A captured clip with its share in the answer, as a button that goes there. */

@@ -103,8 +103,8 @@ export function lineOf(text: string, offset: number): number {
 
 /** Return the index of the segment that a pointer leads into; null for other places. */
 export function segmentOf(pointer: string): number | null {
-  const found = /^\/?segments\/(\d+)(?:\/|$)/.exec(pointer);
-  return found ? Number(found[1]) : null;
+  const match = /^\/?segments\/(\d+)(?:\/|$)/.exec(pointer);
+  return match ? Number(match[1]) : null;
 }
 
 /** Return the faults of a script with their places; null for a fault that is not the script's. */

@@ -93,13 +93,13 @@ export function joinWords(join: PerformanceReport["joins"][number]): string {
 
 /** Return when each foot stands; empty for feet as predicted. */
 export function lanes({ duration, feet }: PerformanceReport) {
-  const found = new Map<string, Span[]>();
+  const feetSpans = new Map<string, Span[]>();
   for (const { joint, begin, end } of feet?.stances ?? []) {
-    const spans = found.get(joint) ?? [];
+    const spans = feetSpans.get(joint) ?? [];
     spans.push(spanOf(begin, end, duration));
-    found.set(joint, spans);
+    feetSpans.set(joint, spans);
   }
-  return [...found].map(([joint, spans]) => ({ joint, spans }));
+  return [...feetSpans].map(([joint, spans]) => ({ joint, spans }));
 }
 
 function spanOf(begin: number, end: number, duration: number): Span {
