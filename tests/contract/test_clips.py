@@ -49,17 +49,6 @@ def test_each_file_is_what_its_own_path_answers(extension, kind, ask, questions)
     assert len(set(contents)) == len(contents)
 
 
-def test_an_archive_has_one_convention_and_clips_their_own_names_and_roots(ask, controls):
-    clips = [{"controls": controls, "root": "in_place"}, {"controls": controls, "names": "vrm"}]
-    measures = {"unit": "cm", "up": "z"}
-    answer = ask("POST", f"{CLIPS}.tar", json=asked("bvh", clips) | measures)
-    contents = [*unpacked("tar", answer.content).values()][:2]
-    alone = [ask("POST", "/v1/models/reach/clip.bvh", json=each | measures) for each in clips]
-    assert [each.content for each in alone] == contents
-    plain = ask("POST", f"{CLIPS}.tar", json=asked("bvh", clips)).content
-    assert contents[0] not in plain and contents[1] not in plain
-
-
 def test_what_a_format_or_model_forbids_is_refused_before_the_answer_begins(ask, controls):
     still = {"controls": controls}
     metres = ask("POST", f"{CLIPS}.zip", json=asked("glb", [still]) | {"unit": "cm"})
@@ -165,8 +154,6 @@ def test_controls_outside_the_samples_can_be_refused(ask, controls):
 WRONG = {
     "no clips": ({"format": "usdc", "clips": []}, 422, "/clips"),
     "an unknown format": ({"format": "fbx", "clips": [{"controls": {}}]}, 400, "/format"),
-    "no format": ({"clips": [{"controls": {}}]}, 400, "/format"),
-    "an unknown field": ({"format": "usdc", "clips": [], "names": []}, 400, "/names"),
     "a clip that is none": ({"format": "usdc", "clips": [5]}, 400, "/clips/0"),
     "one clip, not in a list": ({"format": "usdc", "clips": {"controls": {}}}, 400, "/clips"),
 }

@@ -55,13 +55,6 @@ def test_a_layout_holds_for_all_files(ask):
     assert contents == [ask("POST", path, json=alone(own)).content for own in SCRIPTS[:2]]
 
 
-def test_scripts_have_conventions_of_their_own(ask):
-    scripts = [{**FIRST, "unit": "m"}, {**FIRST, "up": "z"}]
-    answer = ask("POST", f"{BATCH}.tar", json=asked("bvh", scripts))
-    contents = [*unpacked("tar", answer.content).values()][:2]
-    assert contents == [ask("POST", "/v1/performances.bvh", json=own).content for own in scripts]
-
-
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_the_manifest_says_what_each_file_is(kind, ask, spec):
     answer = ask("POST", f"{BATCH}.{kind}", json=asked("json", SCRIPTS))
@@ -121,13 +114,8 @@ def test_a_script_at_fault_is_named(ask, scripts, status):
 WRONG = {
     "no scripts": (asked("usdc", []), 422, "/scripts"),
     "an unknown format": (asked("fbx", [FIRST]), 400, "/format"),
-    "no format": ({"scripts": [FIRST]}, 400, "/format"),
-    "an unknown field": (asked("usdc", [FIRST], unit="m"), 400, "/unit"),
-    "an unknown layout": (asked("usdc", [FIRST], layout="parts"), 400, "/layout"),
     "no such layout": (asked("glb", [FIRST], layout="segments"), 422, "/layout"),
-    "a unit of glTF": (asked("glb", [FIRST, {**FIRST, "unit": "cm"}]), 422, "/scripts/1/unit"),
     "a script that is none": (asked("usdc", [5]), 400, "/scripts/0"),
-    "one script": (asked("usdc", FIRST), 400, "/scripts"),
     "a path for a name": (asked("usdc", [{**FIRST, "name": "../up"}]), 400, "/scripts/0/name"),
     "a name twice": (
         asked("usdc", [{**FIRST, "name": "Performance-000001"}, FIRST]),
@@ -192,16 +180,6 @@ def test_performances_are_made_as_they_are_requested(loaded):
         assert len(made) == count
     name, _ = next(members)
     assert name == "manifest.jsonl" and len(made) == 3
-
-
-@pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
-def test_other_methods_media_types_and_archives_are_refused(kind, ask):
-    for method in ("GET", "HEAD", "PUT"):
-        answer = ask(method, f"{BATCH}.{kind}")
-        assert (answer.status_code, answer.headers["allow"]) == (405, "OPTIONS, POST")
-    assert ask("POST", f"{BATCH}.{kind}", content=b"{}").status_code == 415
-    unknown = ask("POST", f"{BATCH}.rar", json={})
-    assert unknown.status_code == 404 and "there are zip, tar" in unknown.json()["detail"]
 
 
 def test_a_named_script_is_a_script_with_a_name(spec):

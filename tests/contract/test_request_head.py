@@ -51,10 +51,9 @@ def test_addresses_and_localhost_are_answered(host, ask):
     assert ask("GET", "/livez", headers={"host": host}).status_code == 200
 
 
-@pytest.mark.parametrize("path", ["/livez", "/", "/v1/models", "/nowhere", "/metrics"])
 @pytest.mark.parametrize("host", FOREIGN)
-def test_a_name_that_is_not_listed_is_refused(host, path, ask):
-    answer = ask("GET", path, headers={"host": host.encode()})
+def test_a_name_that_is_not_listed_is_refused(host, ask):
+    answer = ask("GET", "/v1/models", headers={"host": host.encode()})
     assert kind(answer) == (421, "unknown-host")
     assert "POSEFIELD_HOSTS" in answer.json()["detail"]
 

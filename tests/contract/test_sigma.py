@@ -67,18 +67,11 @@ def supported(ask, found, across, along):
 
 REFUSED = [
     ("along=turn", 400, "across"),
-    ("across=turn", 400, "along"),
     ("across=turn&along=turn", 422, "along"),
-    ("across=turn&along=spin", 422, "along"),
     (f"{ASKED}&rows=3", 400, "rows"),
-    ("across=turn&along=stature&rows=2.5", 400, "rows"),
     ("across=turn&along=stature&rows=1", 422, "rows"),
-    ("across=turn&along=stature&rows=1024&columns=1024", 422, "rows"),
     ("across=turn&along=stature&margin=2", 422, "margin"),
-    ("across=turn&along=stature&margin=x", 400, "margin"),
     ("across=turn&along=stature&turn=3", 422, "turn"),
-    ("across=turn&along=stature&spin=3", 422, "spin"),
-    ("across=turn&along=stature&performer=me", 422, "performer"),
 ]
 
 
@@ -94,12 +87,8 @@ def test_a_wrong_parameter_is_named(query, status, parameter, ask):
     [
         ({"across": None}, 400, "/across"),
         ({"rows": 2.5}, 400, "/rows"),
-        ({"rows": True}, 400, "/rows"),
-        ({"rows": 1e30}, 422, "/rows"),
-        ({"margin": None}, 400, "/margin"),
         ({"controls": {"stature": "x"}}, 400, "/controls/stature"),
         ({"controls": {"turn": 1}}, 422, "/controls/turn"),
-        ({"level": 1}, 400, "/level"),
     ],
 )
 def test_a_wrong_body_is_pointed_at(change, status, pointer, ask):

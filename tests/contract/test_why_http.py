@@ -47,10 +47,7 @@ def test_what_lies_outside_is_warned_of_or_refused(ask, controls):
     ("change", "status", "pointer"),
     [
         ({"nearest": 0}, 422, "/nearest"),
-        ({"nearest": 1.5}, 400, "/nearest"),
-        ({"nearest": "all"}, 400, "/nearest"),
         ({"performer": "nobody"}, 422, "/performer"),
-        ({"time": 0}, 400, "/time"),
         ({"controls": {"spin": 1}}, 422, "/controls/spin"),
     ],
 )
