@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from posefield_train.graph.onnx_export import ExportedModel
 from posefield_train.graph.trained_model import TrainedModel
-from posefield_train.report import clips, controls, kriging, tensor
+from posefield_train.report import clip_errors, controls, kriging, tensor
 from posefield_train.report.drawing import significant_digits
 from posefield_train.report.drawing.html_page import Chapter, Page, Section, Table
 from posefield_train.report.levels_of_detail import LevelCosts
@@ -89,8 +89,8 @@ def render(
     card = exported.card
     chapters = {
         "fields": kriging.quantity_chapter(trained, card.controls),
-        "clips": clips.error_chapter(trained, card.controls),
-        "figures": clips.drawn_chapter(trained),
+        "clips": clip_errors.error_chapter(trained, card.controls),
+        "figures": clip_errors.drawn_chapter(trained),
         "calibration": controls.calibration_chapter(trained),
         "coverage": controls.coverage_chapter(trained, card.controls),
         "trust": controls.trust_chapter(exported),

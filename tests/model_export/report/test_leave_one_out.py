@@ -5,7 +5,7 @@ import pytest
 
 from posefield_train.align import time_alignment
 from posefield_train.kriging import universal_kriging
-from posefield_train.report import clips
+from posefield_train.report import clip_errors
 from posefield_train.report.drawing import left_out_clips
 
 # Two ways to one solution of the same equations differ by rounding, m.
@@ -79,7 +79,7 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
     """Over the family, whose poses the metric is averaged over, within five per cent; a single clip
     may be a third off, for its joints hang otherwise than the family's do on average."""
     indices = range(len(trained.examples))
-    drawn = np.array([clips.compare_clip(trained, clip).rms for clip in indices])
+    drawn = np.array([clip_errors.compare_clip(trained, clip).rms for clip in indices])
     missed = np.sqrt(trained.left_out_errors)
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.sqrt(np.mean(missed**2)), rel=0.05)
     assert np.abs(drawn / missed - 1.0).max() < 1.0 / 3.0
@@ -87,7 +87,7 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
 
 
 def test_the_nearest_clip_is_the_nearest(trained, clip):
-    pair = clips.compare_clip(trained, clip)
+    pair = clip_errors.compare_clip(trained, clip)
     points = trained.samples.half_ranges
     distances = np.linalg.norm(points - points[clip], axis=1)
     distances[clip] = np.inf

@@ -11,7 +11,7 @@ from posefield_train.align.warp import FIT_TIMES
 from posefield_train.graph.trained_model import Outlier
 from posefield_train.kriging import variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
-from posefield_train.report import clips, kriging, tensor
+from posefield_train.report import clip_errors, kriging, tensor
 from posefield_train.report import controls as chapters
 from posefield_train.report.drawing import left_out_clips, significant_digits
 from posefield_train.report.tensor import TimeWarps
@@ -62,7 +62,7 @@ def test_every_clip_is_there_the_worst_first(facts, trained):
 
 
 def test_performers_add_up_to_all_clips(trained):
-    rows = clips.errors_by_performer(trained)
+    rows = clip_errors.errors_by_performer(trained)
     counts, means = np.array([(row["clips"], row["rms_m"]) for row in rows]).T
     assert counts.sum() == len(trained.left_out_errors) and np.all(np.diff(means) <= 0.0)
     assert counts @ means**2 == pytest.approx(trained.left_out_errors.sum())
@@ -231,19 +231,19 @@ def test_calibration_statistics(rng):
 
 def test_clips_of_equal_distance_keep_their_order(trained):
     even = replace(trained, left_out_errors=np.ones_like(trained.left_out_errors))
-    assert clips.worst_first(even) == list(range(len(trained.left_out_errors)))
+    assert clip_errors.worst_first(even) == list(range(len(trained.left_out_errors)))
 
 
 def test_an_outlier_is_listed_with_the_evidence(trained, controls):
     evidence = ("lies far away", "leaps")
     outliers = tuple(Outlier(3, "far", text) for text in evidence)
-    odd = clips.error_chapter(replace(trained, outliers=outliers), controls)
+    odd = clip_errors.error_chapter(replace(trained, outliers=outliers), controls)
     first, chart = odd.section.tables[0], odd.section.charts[0]
     assert first.caption == "Possible outliers" and "Outlined" in chart.caption
     label = left_out_clips.clip_label(trained.examples[3])
     assert first.rows == ((label, "lies far away; leaps"),)
     assert [clip["clip"] for clip in odd.facts["clips"] if clip["against"]] == [label]
-    clean = clips.error_chapter(trained, controls)
+    clean = clip_errors.error_chapter(trained, controls)
     assert clean.section.tables[0].caption == "Clips with the largest error"
     assert "Outlined" not in clean.section.charts[0].caption
 

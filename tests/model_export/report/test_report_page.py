@@ -14,7 +14,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-from posefield_train.report import clips, training_report
+from posefield_train.report import clip_errors, training_report
 from posefield_train.report import controls as control_chapters
 from posefield_train.report.drawing import left_out_clips, svg_chart
 from posefield_train.report.drawing.html_page import Page, Section, Table
@@ -160,7 +160,7 @@ def test_names_of_controls_are_shown_and_not_interpreted(trained, exported):
     controls = (replace(first, name=MARKUP), *others)
     chapters = (
         control_chapters.coverage_chapter(trained, controls),
-        clips.error_chapter(trained, controls),
+        clip_errors.error_chapter(trained, controls),
     )
     page = Page("", "", "", (), [chapter.section for chapter in chapters])
     found = Parsed(page.html())
@@ -180,7 +180,9 @@ def test_a_long_name_leaves_space_for_the_charts(trained, exported):
     assert f"{'a' * (svg_chart.LABEL - 1)}… (m)" in svg and long not in svg
     assert long in chapter.tables[0].rows[0]
     examples = [replace(e, row=replace(e.row, performer=long)) for e in trained.examples]
-    bars = clips.error_chapter(replace(trained, examples=tuple(examples)), exported.card.controls)
+    bars = clip_errors.error_chapter(
+        replace(trained, examples=tuple(examples)), exported.card.controls
+    )
     assert "a…" in bars.section.charts[0].svg.decode()
 
 
