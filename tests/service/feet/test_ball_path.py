@@ -9,7 +9,6 @@ from few_feet import change_smoothly, plan_path
 from posefield.feet import smooth_change, stances
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
-from posefield.motion import foot_skate
 from posefield.motion.foot_contacts import FootContact
 
 RATE = 60.0
@@ -59,15 +58,6 @@ def test_a_foot_keeps_one_place_in_each_stance(rng):
     assert (found.positions[:, 1] >= FOOT.height).all()
 
 
-def test_a_stance_over_the_end_of_a_cycle_is_one_place():
-    cycle = Cycle(0.9 + 0.2j, 0.3)
-    phase = np.linspace(0.0, 1.0, 50, endpoint=False)
-    positions = floor_plane.at_height(phase * cycle.way, 0.04 + 0.05 * np.sin(np.pi * phase))
-    found = plan_path(FootPath(positions, RATE, cycle), [Interval(40, 60)], FOOT)
-    planned = FootPath(found.positions, RATE, cycle)
-    assert np.ptp(np.abs(planned.places(range(40, 60)) - planned.places([40])[0])) < 1e-12
-
-
 def test_a_long_path_is_that_of_its_parts():
     # 20,000 frames: as a dense system they would take 3 GB.
     frames, period = 20_000, 80
@@ -79,11 +69,6 @@ def test_a_long_path_is_that_of_its_parts():
     # A change falls by e every 0.14 s: four seconds from an end it is the same.
     assert whole[8240:9120] == pytest.approx(part[240:-480], abs=1e-9)
     assert np.abs(whole[8000:8040] - part[:40]).max() > 1e-6
-
-
-def test_a_path_without_stances_is_as_predicted(rng):
-    path = rng.normal(size=40) + 0j
-    assert (change_smoothly(path, [], RATE, FOOT) == path).all()
 
 
 def test_a_dragged_swing_is_lifted_and_a_lifted_one_is_not():
@@ -110,32 +95,6 @@ def test_a_swing_at_an_end_of_the_clip_is_lifted(ends):
     still = replace(FOOT, clearance=0.0)
     low = plan_path(path, held, still).positions[swing, 1]
     assert np.abs(low - FOOT.height).max() < 1e-12
-
-
-def test_locking_a_dragged_foot_without_swing_rules_makes_it_slide_faster():
-    """Negative control: a foot that is only locked goes its way in less time, as low as before."""
-    ahead = np.linspace(0.0, 0.4, 60) + 0j
-    path = FootPath(floor_plane.at_height(ahead, np.full(60, FOOT.height)), RATE)
-    held = [Interval(0, 22), Interval(38, 60)]
-    locked = change_smoothly(path.floor, held, RATE, FOOT)
-    planned = plan_path(path, held, FOOT).positions
-    slid, lock, plan = (
-        foot_skate.mean_skate_speed(found[:, None], RATE)
-        for found in (path.positions, floor_plane.at_height(locked, path.heights), planned)
-    )
-    moving = np.abs(np.diff(locked))[22:37].mean() * RATE
-    assert moving > 1.5 * slid
-    assert plan < 0.1 * lock
-
-
-@pytest.mark.parametrize(("frames", "most"), [(6, 0.014), (30, FOOT.clearance)])
-def test_a_foot_is_lifted_less_in_a_short_swing(frames, most):
-    count = 40 + frames
-    places = np.zeros((count, 3))
-    places[:, 1], places[:, 2] = FOOT.height, np.repeat([0.0, 0.0, 0.3], [20, frames, 20])
-    found = [Interval(0, 20), Interval(20 + frames, count)]
-    planned = plan_path(FootPath(places, RATE), found, FOOT).positions
-    assert planned[:, 1].max() - FOOT.height == pytest.approx(most, rel=0.05)
 
 
 def test_a_foot_leaves_the_floor_and_comes_back_at_rest():

@@ -98,21 +98,6 @@ def test_only_limbs_above_the_wanted_joints_are_turned():
     assert not np.array_equal(whole.rotations[:, :4], motion.rotations[:, :4])
 
 
-def test_a_join_of_two_motions_is_planned_as_one():
-    """Contacts of one motion until the join, of the other from then on."""
-    before, after = sliding(speed=0.3), sliding(speed=-0.2)
-    half = FRAMES // 2
-    roots = np.concatenate([before.roots[:half], after.roots[half:]])
-    roots[half:, 2] += before.roots[half, 2] - after.roots[half, 2]
-    motion = SampledMotion(before.rotations, roots, RATE)
-    likely = np.ones((FRAMES, 4))
-    likely[half - 10 : half + 10, :2] = 0.0
-    plan = body_plans.plan_feet(body(), motion, [contact(motion, f) for f in FEET], likely)
-    assert [len(steps.stances) for steps in plan.steps][2:] == [1, 1]
-    feet = feet_of(placed(motion, plan))
-    assert np.ptp(feet[:, 2:], axis=0).max() < 1e-9
-
-
 @pytest.mark.parametrize("floats", [-0.04, 0.04])
 def test_a_character_that_floats_is_moved_to_the_floor(floats):
     motion = sliding()
@@ -203,15 +188,6 @@ def test_a_kept_limb_keeps_its_path_while_the_pelvis_is_lowered():
     assert plan.lowered.max() > 0.0
     kept = feet_of(placed(motion, plan))[:, 2] - feet_of(motion)[:, 2]
     assert np.abs(kept).max() < 1e-9
-
-
-def test_a_motion_of_a_trunk_target_keeps_its_height():
-    motion = sliding(speed=0.8)
-    character = body(held={0})
-    plan = body_plans.plan_feet(
-        character, motion, [contact(motion, foot) for foot in FEET], np.ones((FRAMES, 4))
-    )
-    assert character.fixed and not plan.lowered.any()
 
 
 def test_the_cover_is_smooth_and_nowhere_below(rng):

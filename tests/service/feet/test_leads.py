@@ -62,15 +62,6 @@ def test_a_foot_that_is_led_on_the_floor_stands_there():
     assert planned(motion).steps[0].anchors[0] != pytest.approx(wanted, abs=1e-3)
 
 
-def test_a_foot_that_is_led_below_the_floor_goes_there():
-    motion = sliding()
-    motion.roots[:, 1] -= 0.05 * np.exp(-0.5 * np.square((np.arange(FRAMES) - KICK) / 4.0))
-    plan = planned(motion, led_at([KICK]))
-    feet, wanted = feet_of(placed(motion, plan))[:, 0], feet_of(motion)[:, 0]
-    assert np.linalg.norm(feet[KICK] - wanted[KICK]) < 1e-9
-    assert np.abs(np.diff(feet[:, 1], 2)).max() < 0.02
-
-
 def test_the_pelvis_is_lowered_no_more_than_a_led_limb_reaches():
     motion = kicking()
     plan = planned(motion, led_at([KICK]))
@@ -110,16 +101,6 @@ def line(heights, speed=0.0):
     heights = np.asarray(heights, float)
     gone = speed * np.arange(len(heights)) / RATE
     return FootPath(np.stack([0.0 * gone, heights, gone], axis=1), RATE)
-
-
-def test_stances_end_where_a_foot_is_led_into_the_air():
-    heights = np.full(100, 0.04)
-    heights[40:70] = 0.3
-    path, led = line(heights), np.arange(100) == 50
-    found = leads.lead_stances([Interval(0, 100)], path, FOOT, leads.goals(path, led))
-    assert found == [Interval(0, 40), Interval(70, 100)]
-    none = leads.goals(path, np.zeros(100, bool))
-    assert leads.lead_stances([Interval(0, 100)], path, FOOT, none) == [Interval(0, 100)]
 
 
 def test_a_foot_steps_between_two_places_to_which_it_is_led():

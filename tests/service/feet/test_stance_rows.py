@@ -2,7 +2,6 @@
 
 import numpy as np
 import one_foot
-import pytest
 from few_feet import foot_rows, frame_rows
 from hypothesis import given
 from hypothesis import strategies as st
@@ -77,18 +76,6 @@ def test_of_a_stance_out_of_reach_the_longest_part_stays(down, beyond, cyclic):
         for own, far, path in zip(each(down), each(beyond), feet(0, cyclic), strict=True)
     ]
     assert listed(found) == expected
-
-
-@pytest.mark.parametrize("cyclic", [False, True])
-def test_rows_can_be_chosen(cyclic):
-    every, one = foot_rows(feet(0, cyclic), FOOT), foot_rows(feet(0, cyclic)[1:], FOOT)
-    chosen = every.select(np.array([1, 2]))
-    assert (chosen.positions == one.positions).all()
-    assert chosen.rows.counts.tolist() == list(LENGTHS[1:])
-    down = np.arange(FRAMES) % 20 < 12
-    whole = stance_rows.runs(down, every.rows)
-    assert whole.of_rows(np.array([1, 2])).by_row(2) == whole.by_row(3)[1:]
-    assert stance_rows.from_intervals(whole.by_row(3)).by_row(3) == whole.by_row(3)
 
 
 def test_rows_that_lost_frames_are_found():

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from posefield.model_file.captured_acceleration import RATE, mean_accelerations
-from posefield.performance.passages import passage
+from posefield.model_file.captured_acceleration import mean_accelerations
 
 SIZE, FREQUENCY = 0.2, 2.0 * np.pi * 1.5
 """Amplitude, m, and angular frequency, rad/s, of the wave of a joint."""
@@ -46,7 +45,3 @@ def test_the_motion_of_the_root_does_not_count():
 @pytest.mark.parametrize("frames", [0, 1, 2])
 def test_less_than_three_frames_have_no_acceleration(frames):
     assert len(mean_accelerations(np.zeros((frames, 4, 3)), 60.0)) == 0
-
-
-def test_captured_clips_and_joins_are_measured_at_one_rate():
-    assert RATE == passage.RATE

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefield.kriging import acquisition
-from posefield.kriging.support import NUGGET, Support, covariances
+from posefield.kriging.support import NUGGET, covariances
 
 CLOSE = 1e-9
 
@@ -50,25 +50,3 @@ def test_progress_counts_the_ranked_candidates(samples, candidates):
     ranked = []
     acquisition.rank_candidates(candidates, samples, 3, lambda *done: ranked.append(done))
     assert ranked == [(1, 3), (2, 3), (3, 3)]
-
-
-def test_what_is_far_from_all_that_was_captured_comes_first(samples):
-    gap = np.array([[0.9, 0.9, 0.9]])
-    known = samples[np.max(samples, axis=1) < 0.3]
-    beside = known + 0.01
-    (at, found), *_ = acquisition.rank_candidates(np.vstack([beside, gap]), known, 1)
-    assert at == len(beside)
-    assert found.variance > 3.0 * variances(beside, known).max()
-
-
-def test_suggested_points_lower_the_variance_more_than_random_ones(rng, samples, candidates):
-    chosen = [at for at, _ in acquisition.rank_candidates(candidates, samples, 10)]
-    suggested = variances(candidates, np.vstack([samples, candidates[chosen]])).mean()
-    for _ in range(20):
-        some = candidates[rng.choice(len(candidates), 10, replace=False)]
-        assert suggested < variances(candidates, np.vstack([samples, some])).mean()
-
-
-def test_the_field_is_that_of_the_support_flag(samples, candidates):
-    own = Support(-np.ones(3), np.ones(3), samples)
-    assert np.allclose(own.variance(candidates), variances(candidates, samples), atol=CLOSE)

@@ -42,11 +42,6 @@ def test_content_arrives_and_replaces_what_was_there(tmp_path):
     assert list(tmp_path.iterdir()) == [target]
 
 
-def test_folders_on_the_way_are_made(tmp_path):
-    atomic_files.write(b"x", tmp_path / "a" / "b" / "clip.usda")
-    assert (tmp_path / "a" / "b" / "clip.usda").read_bytes() == b"x"
-
-
 @pytest.mark.parametrize("mask", [0o077, 0o022, 0o000])
 def test_everyone_may_read_and_the_owner_write_whatever_the_mask(tmp_path, mask):
     before = os.umask(mask)
@@ -64,14 +59,6 @@ def test_disk_that_fills_up_leaves_the_old_file_and_nothing_else(tmp_path):
     assert said == f"{target}: cannot be written: File too large"
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]
-
-
-def test_plain_write_on_the_same_disk_leaves_half_a_file(tmp_path):
-    target = tmp_path / "model.onnx"
-    target.write_bytes(b"old")
-    said = on_a_full_disk("target.write_bytes(b'x' * 5000)", target)
-    assert said == "[Errno 27] File too large"
-    assert target.read_bytes() == b"x" * 1000
 
 
 def test_place_that_cannot_be_taken_leaves_nothing_behind(tmp_path):

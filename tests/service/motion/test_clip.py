@@ -24,12 +24,6 @@ def still(frames=5, rate=10.0, **changes):
     return Clip(CHAIN, rate=rate, **{**given, **changes})
 
 
-def test_duration_runs_from_the_first_frame_to_the_last():
-    assert still(frames=5, rate=10.0).duration == 0.4
-    assert still(frames=1).duration == 0.0
-    assert len(still(frames=5)) == 5
-
-
 def test_positions_follow_the_root_and_its_turn():
     rotations = np.tile(quat.IDENTITY, (3, 2, 1))
     rotations[1:, 0] = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(np.pi / 2))
@@ -39,16 +33,6 @@ def test_positions_follow_the_root_and_its_turn():
     assert np.max(np.abs(moving.positions()[:, 1] - expected)) < 1e-12
     assert np.array_equal(moving.positions()[:, 0], path)
     assert np.array_equal(moving.root_path, path)
-
-
-def test_assembled_clip_keeps_its_bones_and_leaves_what_it_was_given_alone():
-    offsets = np.array([[7.0, 7.0, 7.0], [0.0, 0.4, 0.0]])
-    before = offsets.copy()
-    path = np.zeros((4, 3))
-    moving = clip.assemble(CHAIN, np.tile(quat.IDENTITY, (4, 2, 1)), path, offsets, 30.0)
-    assert np.array_equal(moving.translations[:, 1], np.tile(offsets[1], (4, 1)))
-    assert np.array_equal(moving.translations[:, 0], path)
-    assert np.array_equal(offsets, before)
 
 
 @pytest.mark.parametrize(

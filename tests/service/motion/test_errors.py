@@ -5,7 +5,7 @@ import pickle
 import pytest
 
 from posefield.common import errors
-from posefield.common.errors import FileError, InvalidField, MotionError, WorkerDied
+from posefield.common.errors import FileError, WorkerDied
 
 
 def every(kind):
@@ -26,21 +26,3 @@ def test_errors_are_the_same_in_another_process(error):
     told = pickle.loads(pickle.dumps(error))
     assert type(told) is type(error)
     assert (str(told), vars(told)) == (str(error), vars(error))
-
-
-def test_what_says_nothing_of_it_would_not_arrive():
-    """Negative control: without a word on how it is made anew, an error of two arguments fails."""
-
-    class Plain(MotionError):
-        def __init__(self, path, message):
-            super().__init__(f"{path}: {message}")
-
-    globals()["Plain"] = Plain
-    Plain.__qualname__ = "Plain"
-    content = pickle.dumps(Plain("a", "b"))
-    with pytest.raises(TypeError):
-        pickle.loads(content)
-
-
-def test_a_field_keeps_its_index():
-    assert pickle.loads(pickle.dumps(InvalidField("fps", "no", 4))).index == 4

@@ -25,29 +25,6 @@ def test_every_convention_has_a_name_of_its_own_for_every_role():
         assert len(set(table.values())) == len(joint_roles.ROLES) == 22
 
 
-@pytest.mark.parametrize(
-    ("names", "hips", "upper_chest", "left_arm", "right_toes"),
-    [
-        ("mixamo", *(f"mixamorig:{n}" for n in ("Hips", "Spine2", "LeftArm", "RightToeBase"))),
-        ("ue5", "pelvis", "spine_05", "upperarm_l", "ball_r"),
-        ("vrm", "hips", "upperChest", "leftUpperArm", "rightToes"),
-        ("humanik", "Hips", "Spine2", "LeftArm", "RightToeBase"),
-    ],
-)
-def test_conventions_name_joints_as_their_users_do(names, hips, upper_chest, left_arm, right_toes):
-    found = [
-        joint_roles.NAMES_BY_CONVENTION[names][r]
-        for r in ("hips", "upperChest", "leftUpperArm", "rightToes")
-    ]
-    assert found == [hips, upper_chest, left_arm, right_toes]
-
-
-@pytest.mark.parametrize("names", CONVENTIONS)
-def test_joints_without_a_role_keep_their_names(names):
-    found = joint_roles.rename_joints(chain("root", "thorax", "thumb"), {"hips": "root"}, names)
-    assert found.names == (joint_roles.NAMES_BY_CONVENTION[names]["hips"], "thorax", "thumb")
-
-
 def test_own_names_need_no_roles():
     own = chain("root", "thorax")
     assert joint_roles.rename_joints(own, {}, "own") is own
@@ -74,13 +51,6 @@ def test_a_joint_whose_name_was_taken_gets_an_ending_that_nobody_has():
         "Spine_2",
         "Spine",
     )
-
-
-def test_nothing_but_names_changes():
-    given = chain("a", "b", "c")
-    found = joint_roles.rename_joints(given, {"hips": "a", "spine": "b"}, "vrm")
-    assert found.parents == given.parents
-    assert found.offsets is given.offsets and found.tip_joints is given.tip_joints
 
 
 def test_without_roles_a_convention_is_refused():

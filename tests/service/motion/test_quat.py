@@ -36,22 +36,11 @@ def test_product_turns_by_the_second_first(rng, turns, vectors):
     assert not near(quat.rotate(quat.mul(other, turns), vectors), twice)
 
 
-def test_conjugate_turns_back(turns, vectors):
-    there = quat.rotate(turns, vectors)
-    assert near(quat.rotate(quat.conj(turns), there), vectors)
-    assert not near(there, vectors)
-
-
 def test_quaternion_and_its_negative_turn_alike(turns, vectors):
     assert near(quat.rotate(-turns, vectors), quat.rotate(turns, vectors))
     assert near(quat.log(-turns), quat.log(turns))
     assert near(quat.to_matrix(-turns), quat.to_matrix(turns))
     assert not near(quat.rotate(quat.conj(turns), vectors), quat.rotate(turns, vectors))
-
-
-def test_exponential_of_nothing_is_the_identity():
-    assert np.array_equal(quat.exp(np.zeros((2, 3))), np.tile(quat.IDENTITY, (2, 1)))
-    assert np.array_equal(quat.log(quat.IDENTITY), np.zeros(3))
 
 
 @settings(derandomize=True, database=None, max_examples=200)
@@ -101,27 +90,11 @@ def test_unrolled_rotations_are_the_same_and_lie_close(rng):
     assert np.array_equal(unrolled[0], (path * signs)[0])
 
 
-def test_mean_is_blind_to_signs(rng):
-    middle = quat.normalize(rng.normal(size=(3, 4)))
-    spread = quat.mul(middle, quat.exp(0.3 * rng.normal(size=(40, 3, 3))))
-    flipped = spread * rng.choice([-1.0, 1.0], size=(40, 3, 1))
-    assert near(quat.mean(flipped), quat.mean(spread))
-    assert not near(quat.normalize(flipped.mean(axis=0)), quat.mean(spread))
-    assert np.all(quat.mean(flipped)[:, 0] >= 0)
-
-
 def test_mean_turns_with_what_is_averaged(rng, turns):
     spread = quat.mul(turns[:1], quat.exp(0.3 * rng.normal(size=(40, 1, 3))))
     turned = quat.to_matrix(quat.mean(quat.mul(turns[1], spread)))
     assert near(turned, quat.to_matrix(quat.mul(turns[1], quat.mean(spread))))
     assert not near(turned, quat.to_matrix(quat.mean(spread)))
-
-
-def test_mean_of_opposite_deviations_is_the_middle(rng, turns):
-    away = rng.normal(size=(20, 1, 3))
-    pairs = quat.mul(turns[0], quat.exp(np.concatenate([away, -away])))
-    assert near(quat.to_matrix(quat.mean(pairs)), quat.to_matrix(turns[:1]))
-    assert not near(quat.to_matrix(quat.mean(pairs[:20])), quat.to_matrix(turns[:1]))
 
 
 @pytest.mark.parametrize("axis", np.eye(3), ids=list("XYZ"))
@@ -178,8 +151,3 @@ def test_locked_euler_angles_mean_the_same_rotation_and_end_in_zero(order, middl
     assert np.array_equal(found[:, 2], np.zeros(50))
     dropped = quat.from_euler(angles * [1.0, 1.0, 0.0], order)
     assert np.max(np.abs(quat.to_matrix(dropped) - quat.to_matrix(q))) > 1e-2
-
-
-def test_euler_angles_of_one_axis_are_a_turn_about_it():
-    turn = quat.from_euler(np.array([[0.7]]), "Y")
-    assert near(turn, quat.from_axis_angle(np.array([0.0, 1.0, 0.0]), np.array([0.7])))

@@ -112,13 +112,6 @@ def test_a_seed_is_one_smooth_function_of_the_controls(samples):
     assert np.abs(np.diff(jumping, axis=0)).max() > 10.0 * step
 
 
-def test_equal_seeds_are_equal_fields(samples):
-    weights = KrigingWeights(HYPER, samples)
-    again = random_field.simulate(weights, 7, FIELDS).evaluate(samples)
-    assert np.array_equal(random_field.simulate(weights, 7, FIELDS).evaluate(samples), again)
-    assert not np.array_equal(random_field.simulate(weights, 8, FIELDS).evaluate(samples), again)
-
-
 def test_fields_of_many_seeds_are_those_of_each_alone(samples):
     weights, seeds = KrigingWeights(HYPER, samples), np.array([4, 9, 5])
     paths = np.stack([samples[:6], samples[2:8], samples[4:10]])
@@ -128,13 +121,6 @@ def test_fields_of_many_seeds_are_those_of_each_alone(samples):
         assert np.abs(values - alone).max() <= 1.1e-9
         other = random_field.simulate(weights, seed + 10, FIELDS).evaluate(path)
         assert np.abs(values - other).max() > 0.1
-
-
-def test_parameters_without_labels_have_fields(rng):
-    hyper = replace(HYPER, labels=())
-    samples = rng.uniform(-1.0, 1.0, (10, 2))
-    field = random_field.simulate(KrigingWeights(hyper, samples), 3, 2)
-    assert field.evaluate(samples).shape == (10, 2)
 
 
 def test_a_covariance_without_frequencies_is_refused(samples):

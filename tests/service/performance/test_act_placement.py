@@ -42,14 +42,6 @@ def test_a_world_target_is_met_where_the_segment_is_placed(reach):
     assert np.linalg.norm(hand(reach, act_placement.PlacedAct(local, by)) - wanted) > 10.0 * EXACT
 
 
-def test_a_target_in_the_segment_moves_with_it(reach):
-    place = (-0.1, 1.5, 0.5)
-    by = FloorMotion(0.9, 3.0 - 2.0j)
-    act = act_placement.act_at(reach, hand_to(place), by)
-    found = hand(reach, act_placement.PlacedAct(act, by))
-    assert np.linalg.norm(found - by.place(np.array(place))) < EXACT
-
-
 @pytest.mark.parametrize("facing", [0.0, 2.5])
 def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
     position = 1.0 + 2.0j
@@ -64,13 +56,6 @@ def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
     # One round is not enough: the target moves the first pose.
     once = act_placement.act_at(reach, asked, near, [0]).passage.placed(near)
     assert abs(floor_plane.project(once.roots)[0] - position) > 1e-4
-
-
-def test_an_act_without_world_targets_begins_at_its_place(reach):
-    found = act_placement.act_from(reach, MotionQuestion(controls={}), 1.0 - 1.0j, 0.3)
-    first = found.act.passage.placed(found.by).part(0, 1)
-    assert floor_plane.project(first.roots)[0] == pytest.approx(1.0 - 1.0j)
-    assert first.heading() == pytest.approx(0.3)
 
 
 def test_a_target_that_contradicts_the_place_is_missed(reach):
@@ -94,24 +79,6 @@ def test_a_free_act_takes_place_where_its_target_is(reach):
         assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
         first = found.act.passage.placed(found.by)
         assert first.heading() == pytest.approx(facing)
-
-
-def test_a_free_act_does_not_depend_on_the_place_but_on_the_height(reach):
-    here, there, higher = (
-        act_placement.place_by_target(reach, hand_to(place)).act.passage
-        for place in ((0.0, 1.5, 0.0), (2.0, 1.5, -3.0), (2.0, 1.6, -3.0))
-    )
-    assert np.array_equal(here.rotations, there.rotations)
-    assert np.array_equal(here.roots, there.roots)
-    shared = min(len(there), len(higher))
-    assert not np.allclose(there.roots[:shared], higher.roots[:shared], atol=1e-4)
-
-
-def test_a_free_act_keeps_its_hand_where_the_motion_without_the_target_takes_it(reach):
-    free = MotionQuestion(controls={"target_height": 1.5})
-    expected = acting.joint_path(reach, act_segment.act_passage(reach, free), "RightHand")[-1]
-    found = act_placement.place_by_target(reach, hand_to((2.0, 1.5, -3.0)))
-    assert abs(found.point - floor_plane.project(expected)) < EXACT
 
 
 def test_a_target_at_a_time_places_an_act(reach):
@@ -146,12 +113,6 @@ def test_a_height_out_of_reach_is_refused_with_the_captured_heights(reach, extra
     text = r"^targets/0: .* out of reach; captured clips have heights of 0\.\d\d to 1\.\d\d m"
     with pytest.raises(OutOfReach, match=text):
         act_placement.place_by_target(reach, asked)
-
-
-def test_a_height_out_of_reach_may_be_approached(reach):
-    asked = hand_to((2.0, 3.5, -3.0), extrapolate="ok")
-    found = act_placement.place_by_target(reach, asked)
-    assert not found.act.trust.targets[0].reached
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,11 @@ import acting
 import numpy as np
 import pytest
 
-from posefield.common.errors import InvalidField, OutOfReach
+from posefield.common.errors import InvalidField
 from posefield.feet import contact_estimates
 from posefield.feet.stances import FootPath
 from posefield.inference import session
 from posefield.inference.graph_ports import CONTACTS
-from posefield.locomotion import floor_plane
 from posefield.model_file.model_card import Event
 from posefield.performance.acts import act_segment
 from posefield.performance.passages.passage import RATE
@@ -37,11 +36,6 @@ def test_times_pass_through_the_moment_at_the_rate():
         assert np.allclose(np.diff(times), 1.0 / RATE, atol=1e-12)
         assert 0.0 <= times[0] < 1.0 / RATE
         assert duration - 1.0 / RATE < times[-1] <= duration
-
-
-def test_a_moment_on_the_grid_keeps_the_first_and_the_last_frame():
-    times, frame = act_segment.times_through(20 / RATE, 50 / RATE)
-    assert (len(times), frame) == (51, 20)
 
 
 def test_a_motion_of_one_frame_is_refused():
@@ -85,14 +79,6 @@ def test_an_event_within_the_motion_is_a_frame_of_its_canonical_time(reach):
     assert found.event < len(found.passage) - 1
 
 
-def test_a_model_without_event_has_none(reach):
-    found = act_segment.act_passage(
-        acting.with_card(reach, event=None), MotionQuestion(controls=HIGH)
-    )
-    assert found.event is None
-    assert found.begins + (len(found.passage) - 1) / RATE == pytest.approx(found.trust.duration)
-
-
 def test_contacts_are_detected_where_the_model_has_none(reach):
     found = act_segment.act_passage(reach, MotionQuestion(controls=HIGH))
     toes = acting.joint_path(reach, found, "RightToeBase")
@@ -113,33 +99,6 @@ def test_contacts_are_those_of_the_model_in_the_order_of_its_feet(walker):
     assert not np.allclose(found.passage.contacts, likely[0], atol=1e-2)
 
 
-def test_a_takes_seed_changes_the_act_and_is_told(reach):
-    own, other = (
-        act_segment.act_passage(reach, MotionQuestion(controls=HIGH, take=take)) for take in (0, 7)
-    )
-    assert not np.allclose(own.passage.rotations, other.passage.rotations, atol=1e-3)
-    assert other.trust.take["seed"] == 7
-
-
-def test_motion_to_places_the_first_frame(reach):
-    found = act_segment.act_passage(reach, MotionQuestion(controls=HIGH))
-    by = found.motion_to(2.0 - 1.0j, 0.8)
-    placed = found.passage.placed(by)
-    assert floor_plane.project(placed.roots[0]) == pytest.approx(2.0 - 1.0j)
-    assert placed.heading() == pytest.approx(0.8)
-
-
 def test_a_cyclic_model_is_refused(walker):
     with pytest.raises(InvalidField, match=r"act: stroll is a cycle, expected a model of another"):
         act_segment.act_passage(walker, MotionQuestion(controls={}))
-
-
-def test_a_target_out_of_reach_is_told_or_refused(reach):
-    far = (Target("RightHand", (0.0, 4.0, 0.0), at="event"),)
-    found = act_segment.act_passage(reach, MotionQuestion(controls={}, targets=far))
-    assert not found.trust.targets[0].reached
-    assert any("out of reach" in text for text in found.trust.warnings)
-    with pytest.raises(OutOfReach, match=r"^targets/0"):
-        act_segment.act_passage(
-            reach, MotionQuestion(controls={}, targets=far, extrapolate="refuse")
-        )

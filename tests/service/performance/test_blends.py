@@ -58,17 +58,6 @@ def test_a_join_begins_and_ends_as_its_passages(kind):
     assert found.phases is None
 
 
-def test_a_blend_converges_to_the_velocity_of_the_passage_before():
-    # The difference to it falls with the time step of the blend: halved once, and once more.
-    gaps = []
-    for step in (4, 2, 1):
-        before, _, cut, found = joined("dead", seconds=0.5)
-        own = (before.roots[cut.exit + 1] - before.roots[cut.exit - 1]) * RATE / 2.0
-        gone = (found.roots[cut.exit + step] - found.roots[cut.exit]) * RATE / step
-        gaps.append(np.linalg.norm(gone - own))
-    assert gaps[0] > gaps[1] > gaps[2]
-
-
 def test_a_motion_that_goes_on_into_itself_is_kept():
     whole = smooth(7, 120)
     cut = cut_search.find_cut(character(), whole, whole.part(50, 120), range(50, 90), range(1, 2))
@@ -101,16 +90,6 @@ def test_offsets_of_more_than_half_a_turn_do_not_flip():
     steps = np.abs(np.sum(found.rotations[1:, 7] * found.rotations[:-1, 7], axis=-1))
     # Neighbours are at most 20 degrees apart.
     assert steps.min() > np.cos(np.radians(10.0))
-
-
-def test_phases_stay_if_all_passages_have_them():
-    before, after, cut, _ = joined("cut")
-    rising = [replace(own, phases=np.arange(len(own)) / 100) for own in (before, after)]
-    found = blends.join(rising[0], rising[1], cut, "hermite")
-    assert found.phases[cut.exit - 1 : cut.exit + 1] == pytest.approx(
-        [(cut.exit - 1) / 100, cut.entry / 100]
-    )
-    assert blends.join(rising[0], after, cut, "hermite").phases is None
 
 
 def test_a_blend_ends_with_a_short_passage():

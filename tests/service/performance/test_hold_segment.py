@@ -7,7 +7,7 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.motion import quat
-from posefield.performance.acts import act_segment, hold_segment, sway
+from posefield.performance.acts import act_segment, hold_segment
 from posefield.performance.acts.hold_segment import Hold
 from posefield.performance.passages.passage import RATE, Passage, concatenate
 from posefield.question.motion_question import MotionQuestion
@@ -67,11 +67,6 @@ def test_a_motion_comes_to_rest_in_its_last_pose():
     assert np.allclose(turned, found.roots[:, 2], atol=1e-9)
 
 
-def test_a_motion_of_few_frames_comes_to_rest_in_as_few():
-    assert len(hold_segment.come_to_rest(line(4))) == 7
-    assert len(hold_segment.come_to_rest(line(1))) == 1
-
-
 def test_frames_between_frames_lie_on_the_curve():
     times = np.arange(30) / RATE
 
@@ -101,13 +96,6 @@ def test_a_held_hand_stays_while_the_body_sways(reach, act, rested, body):
     free = hold_segment.hold_passage(rested, Hold(3.0, seed=3), body).passage
     moved = path(reach, act, free, "RightHand")
     assert np.linalg.norm(moved - place, axis=-1).max() > 10.0 * STILL
-
-
-def test_a_held_finger_stays_with_its_hand(reach, act, rested, body):
-    found = hold_segment.hold_passage(rested, Hold(2.0, "RightHand", seed=3), body).passage
-    finger = path(reach, act, found, "RightIndex1")
-    place = path(reach, act, rested, "RightIndex1")[-1]
-    assert np.linalg.norm(finger - place, axis=-1).max() < STILL
 
 
 def test_a_stretched_arm_holds_its_hand(reach, act, rested, body):
@@ -143,29 +131,6 @@ def test_a_hold_begins_and_ends_in_its_pose_without_a_jump(reach, act, rested, b
     stopped = concatenate(cut, hold_segment.hold_passage(cut, asked, body).passage)
     x = acting.positions(reach, stopped, act.bones)
     assert np.linalg.norm(np.diff(x, 2, axis=0), axis=-1).mean(axis=-1).max() * RATE**2 > own
-
-
-def test_contacts_and_sigmas_go_on(rested, body):
-    found = hold_segment.hold_passage(rested, Hold(0.5), body).passage
-    assert np.all(found.contacts == rested.contacts[-1])
-    assert np.all(found.sigmas == rested.sigmas[-1])
-    assert found.phases is None
-
-
-def test_equal_seeds_sway_equally(rested, body):
-    own, same, other = (
-        hold_segment.hold_passage(rested, Hold(1.0, seed=seed), body).passage for seed in (1, 1, 2)
-    )
-    assert np.array_equal(own.rotations, same.rotations)
-    assert not np.allclose(own.rotations, other.rotations, atol=1e-5)
-
-
-def test_waves_have_the_stated_moments():
-    found = np.stack([sway.waves(600, RATE, 50, seed) for seed in range(20)])
-    assert abs(found.mean()) < 0.05
-    assert found.var() == pytest.approx(1.0, abs=0.1)
-    # Smooth: the largest step is that of the fastest wave.
-    assert np.abs(np.diff(found, axis=1)).max() < 2.0 * np.pi * 0.61 / RATE * 4.0
 
 
 @pytest.mark.parametrize(

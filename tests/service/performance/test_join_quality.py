@@ -33,14 +33,6 @@ def test_accelerations_are_second_differences_relative_to_the_root():
     assert len(join_quality.accelerations(character(), passage.part(0, 2), 0, 2)) == 0
 
 
-def test_the_usual_acceleration_is_that_of_the_faster_passage():
-    calm, fast = smooth(1, size=0.1), smooth(1)
-    both = join_quality.usual_acceleration(character(), [calm, fast])
-    assert both == join_quality.usual_acceleration(character(), [fast])
-    assert both > 2.0 * join_quality.usual_acceleration(character(), [calm])
-    assert join_quality.usual_acceleration(character(), []) == 0.0
-
-
 def judged(before, after, kind, motion=None):
     cut = cut_search.find_cut(character(), before, after, range(30, 50), range(8), motion)
     after = after.placed(cut.motion)
@@ -157,17 +149,3 @@ def test_a_hard_join_is_told_with_found_and_expected(facts, said):
     assert facts.hard
     assert facts.reasons == (said,)
     assert not EASY.hard
-
-
-def test_the_limit_is_three_times_the_usual_acceleration():
-    assert not replace(EASY, peak=11.9).hard
-    assert replace(EASY, peak=12.1).hard
-    calmer = replace(CUT, usual=UsualMotion(3.9, "captured"))
-    assert JoinFacts(calmer, 11.9).hard
-
-
-def test_a_squat_does_not_go_on_into_a_stoop():
-    before, after = smooth(5), smooth(5)
-    low = replace(after, roots=after.roots - np.array([0.0, 0.2, 0.0]))
-    facts, _ = judged(before, low, "dead")
-    assert [reason[:8] for reason in facts.reasons] == ["the root"]

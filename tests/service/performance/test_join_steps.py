@@ -96,32 +96,6 @@ def test_a_foot_that_swings_lands_when_it_is_near_its_place():
     assert (step.foot, step.begin) == (1, lands)
 
 
-def test_a_swing_of_the_other_foot_waits_for_the_step():
-    before, after = standing(), standing()
-    after = after.placed(FloorMotion(0.0, 0.2))
-    only = replace(CUT, exit=60)
-    before.contacts[:, 1] = 1.0
-    after.contacts[10:40, 1] = 0.0
-    after = replace(after, roots=after.roots.copy())
-    found, steps = joined(before, after, only)
-    first = steps[0]
-    other = 1 - first.foot
-    assert (found.contacts[first.begin : first.end, other] == 1.0).all()
-    assert (found.contacts[first.begin : first.end, first.foot] == 0.0).all()
-
-
-def test_steps_do_not_depend_on_the_passages_after_the_join():
-    before, after = standing(), standing(0.1).placed(FloorMotion(0.0, 0.1))
-    found, steps = joined(before, after)
-    again, same = joined(before, after)
-    assert steps == same
-    assert np.array_equal(found.contacts, again.contacts)
-    assert np.array_equal(found.contacts[:60], before.contacts[:60])
-    short, clipped = joined(before, after.part(0, 10))
-    assert len(short) == 70
-    assert clipped[0].begin == 60
-
-
 def test_a_passage_is_brought_to_the_floor():
     raised = replace(standing(), roots=standing().roots + np.array([0.0, 0.03, 0.0]))
     found, by = join_steps.on_floor(character(), raised, CONTACTS)

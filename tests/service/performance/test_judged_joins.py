@@ -65,13 +65,6 @@ def test_joins_of_earlier_files_are_compared_with_their_motions(walk):
     assert join.peak == known.peak
 
 
-def test_one_earlier_file_decides_for_all_joins(walk):
-    models = {"walk": walk, "old": without(walk, "old")}
-    old = {**WALK, "model": "old"}
-    found = performed([WALK, HOLD, WALK, HOLD, old], models).joins
-    assert [join.reference for join in found] == ["synthesised"] * 2
-
-
 def test_the_larger_of_two_models_counts(walk):
     models = {"walk": known(walk, 7.0), "fast": known(walk, 11.0, "fast")}
     fast = {**WALK, "model": "fast"}
@@ -86,13 +79,6 @@ def test_a_hard_join_has_one_warning_of_the_answer_itself(walk):
     told = [each.message for each in found.script_warnings if each.pointer == "/segments/2"]
     (hard,) = [message for message in told if "accelerate" in message or "apart" in message]
     assert f"joints accelerate by {join.peak:.0f} m/s2" in hard
-
-
-def test_a_join_that_is_not_hard_has_no_warning(walk):
-    """Control: the same script whose limit is higher."""
-    found = performed([WALK, HOLD, CUT], {"walk": known(walk, 1e4)})
-    assert not found.joins[0].hard
-    assert not any("accelerate" in each for each in found.warnings)
 
 
 def test_only_feet_as_they_are_sent_count(walk):

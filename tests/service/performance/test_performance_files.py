@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd
+from pxr import Sdf
 
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
@@ -64,12 +64,3 @@ def test_archives_and_json_have_the_report(answer):
     with np.load(io.BytesIO(encoded(answer, "npz"))) as found:
         assert json.loads(str(found["trust"])) == report
     assert json.loads(encoded(answer, "json"))["trust"] == report
-
-
-def test_one_animation_has_all_frames(answer, tmp_path):
-    path = tmp_path / "performance.usdc"
-    path.write_bytes(encoded(answer, "usdc"))
-    stage = Usd.Stage.Open(str(path))
-    found = [each for each in stage.Traverse() if each.GetTypeName() == "SkelAnimation"]
-    assert len(found) == 1
-    assert len(found[0].GetAttribute("rotations").GetTimeSamples()) == answer.trust.frames

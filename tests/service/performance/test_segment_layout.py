@@ -8,12 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from pxr import Sdf, Usd, UsdGeom, UsdSkel, UsdValidation
+from pxr import Sdf, Usd, UsdSkel, UsdValidation
 
 from posefield.common.errors import InvalidField
 from posefield.encode import performance_files
 from posefield.encode.formats import CLIP_ENCODERS
-from posefield.encode.usd import performance_layer
 from posefield.encode.usd.performance_layer import segment_frames
 from posefield.inference import session
 from posefield.performance import composition
@@ -98,13 +97,6 @@ def test_a_segment_has_the_samples_of_the_whole_at_its_times(stage, answer, rng)
         assert one[-1] >= other[0] and one[-1] - other[0] <= 1.0
 
 
-def test_a_segment_of_other_frames_would_be_seen(stage):
-    whole, last = stage.GetPrimAtPath("/Character/Anim"), segments(stage)[-1]
-    time = last.GetAttribute("rotations").GetTimeSamples()[0]
-    shifted = values(whole, "rotations", time + 10.0)
-    assert np.abs(values(last, "rotations", time) - shifted).max() > 1e-2
-
-
 def test_skeletons_resolve_the_whole_alone(stage, answer, tmp_path):
     alone = opened(answer, tmp_path / "whole.usdc", layout="whole")
     assert not alone.GetPrimAtPath("/Performance")
@@ -172,12 +164,6 @@ def test_contacts_are_the_stances_of_the_report(stage, answer):
     assert seen == {False, True}
 
 
-def test_feet_as_predicted_have_no_contacts(perform, tmp_path):
-    stage = opened(perform(feet="as_predicted"), tmp_path / "predicted.usdc")
-    assert not stage.GetPrimAtPath("/Performance").GetAttribute("posefield:contact")
-    assert len(segments(stage)) == 3
-
-
 @pytest.mark.parametrize(("rate", "frames"), [(1.0, 9), (29.97, 200), (60.0, 400), (240.0, 1700)])
 def test_frames_enclose_their_segment(rate, frames, rng):
     for _ in range(200):
@@ -190,28 +176,9 @@ def test_frames_enclose_their_segment(rate, frames, rng):
         assert found[-1] >= last / 60.0 * rate - 1e-9
 
 
-def test_a_segment_beyond_the_last_frame_has_the_last_frame():
-    assert segment_frames(2.0, 2.01, 24.0, 49) == range(48, 49)
-    assert segment_frames(3.0, 4.0, 24.0, 49) == range(48, 49)
-
-
-def test_equal_samples_are_stored_once(answer):
-    whole, parts = (len(encoded(answer, "usdc", layout)) for layout in ("whole", "segments"))
-    assert whole < parts < 1.1 * whole
-    text = [len(encoded(answer, "usda", layout)) for layout in ("whole", "segments")]
-    assert text[1] > 1.3 * text[0]
-
-
 def test_equal_answers_give_equal_bytes(answer, perform):
     for name in performance_files.SEGMENTED:
         assert encoded(answer, name) == encoded(perform(fps=24.0), name)
-
-
-def test_segments_follow_unit_and_axis(answer, tmp_path):
-    stage = opened(answer, tmp_path / "other.usdc", unit="cm", up="z")
-    assert UsdGeom.GetStageUpAxis(stage) == "Z"
-    whole, first = stage.GetPrimAtPath("/Character/Anim"), segments(stage)[0]
-    assert np.array_equal(values(first, "translations", 5), values(whole, "translations", 5))
 
 
 def faults(stage):
@@ -226,20 +193,9 @@ def test_the_stage_complies(stage):
     assert stage.GetDefaultPrim().GetPath() == Sdf.Path("/Character")
 
 
-def test_a_source_bound_outside_of_the_character_would_be_a_fault(stage):
-    group = stage.GetPrimAtPath("/Performance/Segments")
-    bound = group.CreateRelationship("skel:animationSource", custom=False)
-    bound.SetTargets([group.GetChildren()[0].GetPath()])
-    assert faults(stage) != []
-
-
 @pytest.mark.parametrize("name", sorted(set(CLIP_ENCODERS) - set(performance_files.SEGMENTED)))
 def test_formats_without_layouts_refuse_them(name, answer):
     with pytest.raises(InvalidField) as caught:
         encoded(answer, name)
     assert caught.value.field == "layout" and f"{name} files have no layouts" in str(caught.value)
     assert encoded(answer, name, "whole") == CLIP_ENCODERS[name].encode(answer)
-
-
-def test_names_of_segments_are_few(answer):
-    assert performance_layer.segment_name(255) == "s255"

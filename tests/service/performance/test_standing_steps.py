@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from posefield.inference import session
-from posefield.locomotion import floor_plane
-from posefield.motion import quat, skeleton
+from posefield.motion import skeleton
 from posefield.performance import approach, composition, walk_entries
 from posefield.performance.acts.act_segment import Act
 from posefield.performance.acts.staged_act import StagedAct
@@ -83,22 +82,6 @@ def test_the_standing_pose_has_its_feet_beside_each_other():
     # The root is between the feet, and ahead of the ankles by less than the balls are.
     assert feet[:, 0].mean() == pytest.approx(own.place.imag, abs=1e-9)
     assert 0.03 < feet[0, 2] - own.place.real < 0.15
-
-
-def test_its_knees_are_bent_as_those_of_a_walker_who_stands_on_one_leg():
-    _, steady = walked(WalkRequest(0.5, seconds=4.0))
-    own = bends(walk_passage.still(pose()))[0]
-    usual = bends(steady).min(axis=1)
-    assert usual.min() < own.min() < own.max() < usual.max() + 10.0
-    assert bends(steady).max() > own.max() + 20.0
-
-
-def test_a_pose_is_made_once_for_each_walker():
-    again = standing_pose.find_standing_pose(find_walker(walk().gait, {}, {}))
-    assert again is pose()
-    named = walk().session.card.performers[0]
-    other = standing_pose.find_standing_pose(find_walker(walk().gait, {"performer": named}, {}))
-    assert np.abs(other.rotations - pose().rotations).max() > 0.01
 
 
 def test_a_model_without_contacts_has_none_and_slows_down():
@@ -213,36 +196,6 @@ def test_a_walk_too_short_for_a_step_stops_in_double_support_and_says_so():
     assert "feet-apart" not in [note.code for note in whole.notes]
 
 
-def test_feet_that_cannot_be_beside_each_other_have_the_root_between_them():
-    said = []
-    for length in np.linspace(0.6, 1.2, 7):
-        plan, made = walked(WalkRequest(0.8, to=(0.0, length), stop="standing"))
-        if not plan.closes:
-            continue
-        feet = balls(made)[-1]
-        apart = abs(feet[0, 2] - feet[1, 2])
-        told = "stops-in-mid-stride" in [note.code for note in plan.notes]
-        assert told if apart > 0.05 else not told or apart > 0.02
-        ahead = feet[:, 2].mean() - made.roots[-1, 2]
-        assert ahead == pytest.approx(pose().balls.real.mean() - pose().place.real, abs=0.01)
-        said.append(apart)
-    assert max(said) > 0.1 > 0.02 > min(said)
-
-
-def test_the_path_of_a_walk_from_its_standing_pose_begins_below_the_root():
-    who = find_walker(walk().gait, {}, {})
-    begin, phase = standing_pose.path_start(who, pose())
-    plan = plan_walk(walk().gait, WalkRequest(0.8, seconds=4.0, start="standing"), begin, phase)
-    made = walk_passage.walk_passage(walk(), plan)
-    still = walk_passage.still(pose())
-    assert np.abs(balls(made)[0] - balls(still)[0]).max() < 0.02
-    turned = quat.mul(quat.conj(made.rotations[0]), still.rotations[0])
-    assert np.abs(quat.log(turned)).max() < 0.05
-    apart = plan_walk(walk().gait, WalkRequest(0.8, seconds=4.0), begin, phase)
-    moved = balls(walk_passage.walk_passage(walk(), apart))[0] - balls(still)[0]
-    assert np.abs(moved).max() > 0.05
-
-
 def performed(*segments):
     document = {"fps": RATE, "segments": [{"model": "cmu_walk", **own} for own in segments]}
     asked = json_decoding.decode_question(PerformanceQuestion, msgspec.json.encode(document))
@@ -269,11 +222,6 @@ def test_a_walk_goes_on_from_where_another_one_stands():
     rolling = performed(first, then).trust
     assert len(rolling.joins) == 1
     assert rolling.joins[0].distance > join.distance
-
-
-def test_floor_points_of_a_pose_are_those_of_its_feet():
-    feet = balls(walk_passage.still(pose()))[0]
-    assert np.abs(floor_plane.project(feet) - pose().balls).max() < 1e-9
 
 
 @pytest.mark.parametrize("way", [6.0, 6.5, 7.0, 7.5])

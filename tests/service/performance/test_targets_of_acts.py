@@ -79,12 +79,6 @@ def test_an_act_is_left_after_its_last_target(find, own_hand):
     assert performed(find, PLAIN, PLAIN).trust.segments[1].begins < seconds - 0.1
 
 
-def test_an_act_is_entered_before_its_first_target(find, own_hand):
-    answer = performed(find, PLAIN, reach(own_hand[2], time=2 / 60))
-    assert answer.trust.segments[1].targets[0].reached
-    assert answer.trust.script_warnings == ()
-
-
 @pytest.mark.parametrize("when", ["highest", "lowest", "farthest"])
 def test_a_target_at_a_moment_of_the_motion_is_met_by_the_character(find, own_hand, when):
     frame = {"highest": 86, "lowest": 0, "farthest": 86}[when]

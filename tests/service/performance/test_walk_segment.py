@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.inference.takes import TakeSettings
-from posefield.locomotion import floor_plane, gait, stride, walking_crowd
+from posefield.locomotion import floor_plane, gait, stride
 from posefield.motion import quat, skeleton
 from posefield.performance.passages.passage import RATE, FloorMotion
 from posefield.performance.walks import path_following, walk_passage
@@ -110,14 +110,6 @@ def test_walks_follow_their_paths(walk, walking, name):
     assert np.degrees(path_following.measure(plan, crabs, made.rotations).heading) > 0.5
 
 
-def test_a_walk_without_a_whole_cycle_has_no_errors(walk, walking):
-    plan = planned(walking, WalkRequest(1.0, seconds=0.5))
-    made = walk_passage.walk_passage(walk, plan)
-    found = path_following.measure(plan, made.roots, made.rotations)
-    assert found.cycles < 1.0
-    assert found.lateral == found.speed == 0.0
-
-
 @pytest.mark.parametrize("name", WALKS)
 def test_the_phase_advances_by_the_distance_over_the_stride(walking, name):
     plan = planned(walking, replace(WALKS[name], stop="rolling"))
@@ -146,16 +138,6 @@ def test_feet_slide_no_more_in_starts_and_stops(walk, walking):
     assert slide_per_metre(walk, timed, made) > 2.0 * steady
 
 
-def test_skate_with_start_and_stop_is_that_of_a_steady_walk(walk, walking):
-    def skate(request):
-        plan = planned(walking, request)
-        feet = feet_of(walk, plan, walk_passage.walk_passage(walk, plan))
-        return walking_crowd.measure_skate_of_feet(walk.session.card, feet[None], RATE).mean()
-
-    for own in (WALKS["changes"], WALKS["circle"]):
-        assert skate(replace(own, **BOTH)) < 1.1 * skate(own)
-
-
 def test_a_walk_stops_where_a_foot_passes_the_other_one(walking):
     for length in (6.0, 6.3, 6.6, 6.9, 7.2):
         plan = planned(walking, WalkRequest(1.2, to=(0.0, length), **BOTH))
@@ -168,28 +150,6 @@ def test_a_walk_stops_where_a_foot_passes_the_other_one(walking):
         ways = np.abs(plan.walker.strides(plan.controls).travels)
         shares = np.diff(plan.phases) * ways[1:] / np.diff(plan.distances)
         assert np.abs(shares[5:-5] - 1.0).max() < 0.065
-
-
-def test_double_support_is_where_both_feet_stand(walk, walking):
-    plan = planned(walking, WalkRequest(1.0, seconds=2.0))
-    quiet = plan.walker.double_supports
-    assert len(quiet) == 2
-    controls = plan.controls[:1].repeat(2, axis=0)
-    labels = plan.walker.labels(2)
-    likely = stride.contact_probabilities(walk.session, controls, labels, quiet)
-    assert likely.min() > 0.5
-    swings = stride.contact_probabilities(walk.session, controls, labels, (quiet + 0.25) % 1.0)
-    assert swings.min() < 0.5
-
-
-def test_a_walk_too_short_to_stop_with_its_feet_beside_each_other_says_so(walking):
-    notes = [
-        note.code
-        for length in np.linspace(1.5, 2.1, 7)
-        for note in planned(walking, WalkRequest(0.8, to=(0.0, length), stop="standing")).notes
-    ]
-    assert "stops-in-mid-stride" in notes
-    assert notes.count("synthesised-stop") == 7
 
 
 def test_speeds_are_those_of_the_curve_over_distance_and_over_time(walking):
@@ -273,19 +233,6 @@ def test_a_steady_cycle_closes_and_is_that_of_a_walk(walk, walking):
     assert np.abs(cycle.rotations[15, 1:] - walked.rotations[at, 1:]).max() > 0.1
 
 
-def test_a_placed_walk_is_the_same_walk(walk, walking):
-    request = WalkRequest(1.1, to=(0.0, 8.0))
-    own = walk_passage.walk_passage(walk, planned(walking, request))
-    by = FloorMotion(0.7, 2.0 - 3.0j)
-    moved = complex(by.shift + 8.0 * np.exp(0.7j))
-    there = plan_walk(walking, replace(request, to=(moved.imag, moved.real)), by, 0.1)
-    found = walk_passage.walk_passage(walk, there)
-    assert np.allclose(found.roots, own.placed(by).roots, atol=1e-4)
-    same = np.abs(np.sum(found.rotations * own.placed(by).rotations, axis=-1))
-    # A quarter of a degree: phases are found to a part of a frame.
-    assert same.min() > 1.0 - 2e-6
-
-
 REFUSED = [
     (WalkRequest(2.5, to=(0, 5)), "speed", "2.5 m/s, expected 0.4"),
     (WalkRequest(0.1, to=(0, 5)), "speed", "0.1 m/s"),
@@ -333,11 +280,6 @@ def test_a_walk_that_cannot_be_is_refused_with_its_field(walking, request_, fiel
         planned(walking, request_)
     assert caught.value.field == field
     assert said in str(caught.value)
-
-
-def test_a_path_beside_an_obstacle_is_walked(walking):
-    clear = WalkRequest(1.0, to=(0.0, 9.0), obstacles=(Disc(0.7, 4.0, 0.5),))
-    assert planned(walking, clear).end.shift == pytest.approx(9.0)
 
 
 def test_a_walk_leads_around_obstacles(walking):

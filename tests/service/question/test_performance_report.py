@@ -27,10 +27,3 @@ def test_feet_as_predicted_are_left_out():
     document = reported(None)
     CHECK.validate(document)
     assert "feet" not in document
-
-
-def test_feet_with_a_field_too_few_would_be_seen():
-    """Negative control of the schema."""
-    document = reported(FeetResult())
-    del document["feet"]["left"]
-    assert not CHECK.is_valid(document)

@@ -14,32 +14,6 @@ from posefield.question import json_decoding, text_decoding
 from posefield.question.motion_question import FileQuestion, PoseQuestion
 
 
-def test_a_query_and_a_body_are_one_pose_question():
-    expected = PoseQuestion(
-        controls={"turn": 20.0, "stature": 1.7},
-        times=[0.0, 0.5],
-        extrapolate="refuse",
-        performer="12",
-    )
-    pairs = [("turn", "20"), ("time", "0"), ("stature", "1.7"), ("time", "0.5")]
-    # A name may look like a number.
-    rest = [("extrapolate", "refuse"), ("performer", "12")]
-    assert text_decoding.decode_question(PoseQuestion, [*pairs, *rest]) == expected
-    content = (
-        b'{"controls": {"turn": 20, "stature": 1.7}, "times": [0, 5e-1], '
-        b'"extrapolate": "refuse", "performer": "12"}'
-    )
-    assert json_decoding.decode_question(PoseQuestion, content) == expected
-
-
-def test_a_query_and_a_body_are_one_clip_question():
-    expected = FileQuestion(controls={"turn": -2.0}, fps=60.0, start=0.1, end=0.9, performer="ada")
-    pairs = [("turn", "-2"), ("fps", "60"), ("start", "0.1"), ("end", "0.9"), ("performer", "ada")]
-    assert text_decoding.decode_question(FileQuestion, pairs) == expected
-    content = b'{"controls": {"turn": -2}, "fps": 60, "start": 0.1, "end": 0.9, "performer": "ada"}'
-    assert json_decoding.decode_question(FileQuestion, content) == expected
-
-
 def test_a_query_and_a_body_say_alike_how_a_file_is_made():
     said = {"names": "ue5", "root": "in_place", "unit": "cm", "up": "z"}
     expected = FileQuestion(controls={"turn": -2.0}, loop=True, **said)
