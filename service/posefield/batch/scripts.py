@@ -22,7 +22,7 @@ import msgspec
 import orjson
 
 from posefield import __version__
-from posefield.batch import checkpoint, manifest, process_pool
+from posefield.batch import checkpoint, manifest, process_pool, tables
 from posefield.batch.job import VERSIONED_PACKAGES
 from posefield.batch.target import (
     STATE_FOLDER,
@@ -118,9 +118,10 @@ def _contents(path: Path) -> Iterator[tuple[str, str, bytes]]:
             for file in sorted(path.glob("*.json")):
                 yield file.name, file.stem, file.read_bytes()
             return
-        for number, line in enumerate(path.read_bytes().splitlines(), 1):
-            if line.strip():
-                yield f"{path.name}:{number}", f"{number:06d}", line
+        with path.open("rb") as lines:
+            for number, line in enumerate(tables.read_rows(path, lines.readline), start=1):
+                if line.strip():
+                    yield f"{path.name}:{number}", f"{number:06d}", line
     except OSError as fault:
         raise FileError(path, f"{fault.strerror}, expected scripts in JSON") from fault
 

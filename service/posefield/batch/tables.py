@@ -193,7 +193,7 @@ def _stamp(path: Path) -> tuple[int, int]:
     return found.st_size, found.st_mtime_ns
 
 
-def _lines(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
+def read_rows(path: Path, readline: Callable[[int], AnyStr]) -> Iterator[AnyStr]:
     """Yield the lines of an open file; FileError for a line that is too long."""
     for number, line in enumerate(iter(partial(readline, MAX_LINE_LENGTH), readline(0)), start=1):
         if len(line) == MAX_LINE_LENGTH:
@@ -243,7 +243,7 @@ def _open_csv(path: Path) -> TextIO:
 
 def _csv_cells(path: Path, file: TextIO) -> Iterator[tuple[int, list[str] | QueryError]]:
     """Yield the first line and the cells of each row that is not blank."""
-    reader = csv.reader(_lines(path, file.readline), strict=True, skipinitialspace=True)
+    reader = csv.reader(read_rows(path, file.readline), strict=True, skipinitialspace=True)
     while True:
         line = reader.line_num + 1
         try:
@@ -267,7 +267,7 @@ def _json_lines(path: Path, columns: Columns) -> RawRows:
 
     def rows() -> Iterator[RawRow]:
         with path.open("rb") as file:
-            for number, line in enumerate(_lines(path, file.readline), start=1):
+            for number, line in enumerate(read_rows(path, file.readline), start=1):
                 text = line.removeprefix(BOM) if number == 1 else line
                 if not text.strip():
                     continue
