@@ -61,17 +61,6 @@ def test_durations_stay_within_the_margin_of_the_captured_ones(model):
                     )
 
 
-def test_the_graph_alone_would_run_away(walk):
-    """Negative control of the bounds: what the file answers without them."""
-    speed = walk.session.card.control("speed")
-    typical = {c.name: c.default for c in walk.session.card.controls}
-    point = np.array([list({**typical, "speed": at(speed, 9.0)}.values())], np.float32)
-    feed = {"controls": point, "time": np.zeros((1, 1), np.float32)}
-    raw = walk.session.graph.run(["duration"], feed, 0)[0][0]
-    least = walk.session.bounds.duration_limits[0]
-    assert raw < 0.6 * least <= walk.session.durations(point)[0] * (1 + NEAR)
-
-
 def test_a_measured_control_is_given_monotonically_and_never_passed(model):
     for performer in (None, *model.session.card.performers):
         for control, values, answers in swept(model, performer):
@@ -85,18 +74,6 @@ def test_a_measured_control_is_given_monotonically_and_never_passed(model):
                     assert found <= value + room
                 if value < control.minimum:
                     assert found >= value - room
-
-
-def test_travel_stays_near_the_captured_one(walk):
-    examples = np.array(walk.session.card.examples)
-    ends = np.full((len(examples), 1), 1e9)
-    captured = np.linalg.norm(walk.session.run(examples, ends, "travel")[0][:, 0, :2], axis=1)
-    room = answer_bounds.MARGIN
-    for control in walk.session.card.controls:
-        for share in SHARES:
-            answer = trust(walk, {control.name: at(control, share)})
-            length = answer.measured["speed"] * answer.duration
-            assert captured.min() * (1 - room) <= length <= captured.max() * (1 + room)
 
 
 def test_what_was_asked_and_given_is_told_with_its_side(walk):
@@ -115,15 +92,6 @@ def test_what_was_asked_and_given_is_told_with_its_side(walk):
         assert facts["side"] == side and facts["captured"] == [speed.minimum, speed.maximum]
     assert trust(walk, {"speed": at(speed, 0.5)}).deviations == ()
     assert "deviations" not in trust(walk, {"speed": at(speed, 0.5)}).facts()
-
-
-def test_warnings_are_one_for_each_control_in_the_card_s_order(labelled_path):
-    model = Synthesizer("labelled", session.load(labelled_path))
-    known = model.session.card.controls
-    shares = dict(zip([c.name for c in known], (3.0, 1.1, -3.0, -0.1), strict=True))
-    found = trust(model, {c.name: at(c, shares[c.name]) for c in known})
-    assert [text.split()[0].rstrip(":") for text in found.warnings] == list(shares)
-    assert ["asked" in text for text in found.warnings] == [True, False, True, False]
 
 
 def test_a_control_that_is_not_measured_acts_as_at_the_limit(labelled_path):
@@ -190,21 +158,6 @@ def test_poses_clips_and_states_agree_outside(model):
             assert last == pytest.approx(card.frames - 1.0, abs=1e-3)
 
 
-def test_bounds_are_continuous_at_the_ends_of_the_ranges(model):
-    """A step over the end of a range changes a duration as little as one before it."""
-    card = model.session.card
-    labels = np.zeros((1, len(card.performers)))
-    ends = [(c.minimum, c.maximum) for c in card.controls]
-    for corner in np.stack(np.meshgrid(*ends), axis=-1).reshape(-1, len(ends)):
-        for column, (low, high) in enumerate(ends):
-            step = np.zeros(len(ends))
-            step[column] = 2e-6 * (high - low) * (1 if corner[column] == high else -1)
-            inside, outside = (
-                model.session.durations((corner + s)[None], labels) for s in (0, step)
-            )
-            assert outside[0] == pytest.approx(inside[0], rel=1e-4)
-
-
 def test_weights_are_those_of_the_answer_and_shares_positive(model):
     card = model.session.card
     for share in (-3.0, 0.3, 0.8, 4.0):
@@ -224,35 +177,8 @@ def test_weights_are_those_of_the_answer_and_shares_positive(model):
     assert {c.source: c.weight for c in one.nearest} == {c.source: c.weight for c in other.nearest}
 
 
-def test_a_weight_may_be_negative_where_a_share_is_not(model):
-    """Negative control of the shares."""
-    card = model.session.card
-    asked = {c.name: at(c, 1.2) for c in card.controls}
-    found = explain_result(model, WhyQuestion(controls=asked, nearest=10_000))
-    assert min(clip.weight for clip in found.nearest) < 0.0
-    assert sum(max(clip.weight, 0.0) for clip in found.nearest) > 1.0
-
-
 def test_bands_are_one_scale_for_all_models(model):
     names = [band(sigma) for sigma in (0.0, 0.03, 0.0301, 0.075, 0.0751, 0.15, 0.1501, 9.0)]
     assert names == ["close", "close", "near", "near", "rough", "rough", "guess", "guess"]
     answer = trust(model, {})
     assert answer.document() == {**answer.facts(), "band": band(answer.sigma)}
-
-
-def test_the_defaults_are_the_controls_of_one_captured_clip(model):
-    card = model.session.card
-    defaults = tuple(control.default for control in card.controls)
-    places = np.array(card.examples)
-    places = (places - places.min(axis=0)) / np.ptp(places, axis=0)
-    totals = [float(np.linalg.norm(places - own, axis=1).sum()) for own in places]
-    assert totals[card.examples.index(defaults)] == pytest.approx(min(totals), abs=1e-9)
-    assert max(totals) > min(totals) + 0.1
-    assert tuple(trust(model, {}).controls.values()) == defaults
-
-
-def test_medians_of_each_control_are_no_captured_clip(labelled_path):
-    """Negative control of the defaults."""
-    card = session.load(labelled_path).card
-    medians = tuple(np.sort(column)[len(column) // 2] for column in np.transpose(card.examples))
-    assert medians not in card.examples

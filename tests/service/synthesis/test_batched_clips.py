@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from posefield.common.errors import InvalidField, QueryError
+from posefield.common.errors import QueryError
 from posefield.inference import session
 from posefield.question.floor import Floor
 from posefield.question.motion_question import ClipQuestion, Target
@@ -77,13 +77,3 @@ def test_a_clip_has_the_same_bytes_alone_and_in_a_batch(pair, places):
         assert found.clip.rotations.tobytes() == alone.clip.rotations.tobytes()
         assert found.clip.translations.tobytes() == alone.clip.translations.tobytes()
         assert found.trust == alone.trust
-
-
-def test_a_question_that_is_refused_does_not_refuse_the_others(pair):
-    model, _ = pair
-    plain = question(model, ((0.5,) * 4, 0), 0)
-    wrong = msgspec.structs.replace(plain, fps=0.0)
-    first, refused, last = clips.synthesize_clips(model, [plain, wrong, plain])
-    assert isinstance(refused, InvalidField) and "fps" in str(refused)
-    assert first.clip.rotations.tobytes() == last.clip.rotations.tobytes()
-    assert clips.synthesize_clips(model, []) == []

@@ -63,12 +63,6 @@ def test_the_last_question_of_a_batch_gets_the_same_bytes(model, count):
             assert [a.tobytes() for a in last] == [a.tobytes() for a in own]
 
 
-def test_every_level_is_known_to_be_exact(model):
-    assert all(
-        poses.is_batch_exact(model, level) for level in range(len(model.session.card.levels))
-    )
-
-
 def test_a_graph_whose_rows_depend_on_each_other_is_found_out(model_path, tmp_path):
     """One whose softmax is over the questions, not over each question's own numbers."""
     graph = onnx.load(model_path)

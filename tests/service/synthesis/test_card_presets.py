@@ -1,6 +1,5 @@
 """Tests of presets on a model card: optional, complete points within the sampled ranges."""
 
-import json
 import re
 from dataclasses import replace
 
@@ -66,9 +65,3 @@ def test_a_file_without_presets_keeps_its_bytes_and_is_read():
 def test_a_wrong_preset_is_refused(preset, said):
     with pytest.raises(ValueError, match=re.escape(said)):
         card_reader.decode(entries((PRESETS[0], preset)))
-
-
-def test_a_preset_of_another_form_is_refused():
-    odd = entries(()) | {"posefield.presets": json.dumps([{"name": "Near"}]).encode()}
-    with pytest.raises(ValueError, match="'presets' is wrong"):
-        card_reader.decode(odd)

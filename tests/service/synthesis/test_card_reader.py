@@ -1,7 +1,6 @@
 """Tests of the card reader: round trip, and errors with path and value."""
 
 import json
-import re
 
 import pytest
 from model_cards import CARD
@@ -88,13 +87,6 @@ def test_a_value_of_the_wrong_kind_is_refused_by_its_path(path, value, said):
     assert refusal(changed(path, value)).startswith(expected)
 
 
-def test_a_key_that_is_missing_is_named():
-    plain = json.loads(WRITTEN["posefield.skeleton"])
-    del plain["parents"]
-    found = refusal(WRITTEN | {"posefield.skeleton": json.dumps(plain).encode()})
-    assert found.endswith("Object missing required field `parents`")
-
-
 @pytest.mark.parametrize("found", ["0", "4", "99", '"5"', "null", "5.0", ""])
 def test_another_format_is_refused_before_anything_else_is_read(found):
     expected = f"model format {found}, this version reads format 5"
@@ -125,13 +117,6 @@ def test_deep_nesting_is_refused(name, inner):
     for text in (deep, f'{{"names": {deep}}}', f'{{"other": {deep}}}'):
         found = refusal(WRITTEN | {f"posefield.{name}": text.encode()})
         assert found.startswith(f"its card's entry {name!r} is wrong: ") and len(found) < 250
-
-
-@pytest.mark.parametrize("number", ["1e400", "-1e400", "1" + "0" * 400])
-def test_numbers_that_no_float_holds_are_refused(number):
-    for entry in ("rate", "frames"):
-        found = refusal(WRITTEN | {f"posefield.{entry}": number.encode()})
-        assert re.search("is wrong: (Number out of range|Expected `int`)", found)
 
 
 def test_a_card_of_too_many_bytes_is_refused():

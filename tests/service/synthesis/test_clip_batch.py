@@ -2,25 +2,13 @@
 
 import numpy as np
 import onnx
-import pytest
 import recorded
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from model_files import written
 
-from posefield.common.errors import QueryError
 from posefield.inference import session
 from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clip_batch, clips
 from posefield.synthesis.synthesizer import Synthesizer
-
-KINDS = ("model_path", "labelled_path", "walk_path")
-
-
-@pytest.fixture(scope="module", params=KINDS)
-def model(request):
-    path = request.getfixturevalue(request.param)
-    return Synthesizer(path.stem, session.load(path))
 
 
 def question(model, place, level, **more):
@@ -33,13 +21,6 @@ def question(model, place, level, **more):
     return ClipQuestion(**{**known, "level": level, **more})
 
 
-def alone(model, asked, most):
-    try:
-        return clips.synthesize_clip(model, asked, most)
-    except QueryError as fault:
-        return fault
-
-
 def facts(found):
     """All of an answer, or of an error, for comparison."""
     if isinstance(found, Exception):
@@ -47,44 +28,6 @@ def facts(found):
     own = found.clip
     names, arrays = own.skeleton.names, (own.rotations, own.translations, own.curve_values)
     return names, own.rate, found.trust, [array.tobytes() for array in arrays]
-
-
-MORE = (
-    {},
-    {"start": 0.2},
-    {"end": 0.0},
-    {"end": 50.0},
-    {"loop": True},
-    {"root": "in_place"},
-    {"extrapolate": "refuse"},
-    {"feet": "stand"},
-    {"names": "mixamo"},
-    {"fps": 2000.0},
-)
-
-
-@settings(max_examples=12, deadline=None, derandomize=True)
-@given(count=st.integers(2, 20), seed=st.integers(0, 1000))
-def test_a_question_gets_the_same_answer_whatever_it_is_asked_with(model, count, seed):
-    rng = np.random.default_rng(seed)
-    level = seed % len(model.session.card.levels)
-    # Beyond what was sampled too; one frame a second gives clips of a single frame or two.
-    asked = [
-        question(
-            model,
-            (rng.uniform(-0.1, 1.1, 4), rng.uniform(1.0, 60.0), rng.integers(10)),
-            level,
-            # Half of them without further fields.
-            **MORE[max(0, rng.integers(-len(MORE), len(MORE)))],
-        )
-        for _ in range(count)
-    ]
-    found = clips.synthesize_clips(model, asked, most=150)
-    assert [facts(each) for each in found] == [facts(alone(model, each, 150)) for each in asked]
-
-
-def test_every_level_is_known_to_be_exact(model):
-    assert all(clip_batch.is_exact(model, level) for level in range(len(model.session.card.levels)))
 
 
 def counted(path):

@@ -38,10 +38,3 @@ def test_the_first_miss_is_named(met, field):
         synthesizer.check_targets(GOALS, met)
     assert caught.value.field == field
     assert caught.value.message == "; ".join(synthesizer.miss_warnings(met))
-
-
-def test_what_is_met_is_not_refused():
-    assert (
-        synthesizer.check_targets(GOALS, [ConstraintResult("speed", 0.0, "m/s", True), FINE])
-        is None
-    )

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from posefield.inference import cost_model, session
-from posefield.inference.level_selection import Camera, LevelCriteria, LevelTable, select_levels
 
 
 @pytest.fixture(scope="module")
@@ -56,12 +55,6 @@ def test_a_cost_is_that_of_its_level_by_the_pose(paced):
     assert found != pytest.approx([0.25e-3, 0.5e-3, 1e-3])
 
 
-def test_every_level_is_asked_as_often(paced):
-    own = paced(3, 2, 1)
-    cost_model.seconds_per_pose(own)
-    assert own.graph.calls == [cost_model.ROUNDS + 1] * 3
-
-
 def test_a_coarser_level_that_is_slower_costs_what_the_finer_one_does(paced):
     assert cost_model.seconds_per_pose(paced(512, 600, 128)) == pytest.approx([1e-3, 1e-3, 0.25e-3])
 
@@ -81,35 +74,8 @@ def test_a_round_that_something_else_slowed_down_does_not_count(paced):
     assert next(disturbed, None) is None
 
 
-def test_levels_of_several_files_are_told_as_they_are_found(paced):
-    one, other = paced(512, 600), paced(64)
-    found = cost_model.benchmark_levels([(one, 1), (other, 0), (one, 0)], 3)
-    assert found == pytest.approx([600 / 512e3, 64 / 512e3, 1e-3])
-
-
-def test_progress_counts_the_rounds_and_the_one_that_warms_up(paced):
-    rounds = []
-    cost_model.benchmark_levels([(paced(512), 0)], 3, lambda *done: rounds.append(done))
-    assert rounds == [(1, 4), (2, 4), (3, 4), (4, 4)]
-
-
 def test_costs_never_grow(rng):
     costs = rng.uniform(1.0, 2.0, 20)
     found = np.array(cost_model.monotone_costs(costs))
     assert np.all(np.diff(found) <= 0.0) and np.all(found <= costs)
     assert np.any(np.diff(costs) > 0.0)
-
-
-def test_a_view_takes_them_as_they_are(opened):
-    """Fit all into a budget of the finest level's cost, and none into less than the last's."""
-    errors = np.array([level.pose for level in opened.card.levels])
-    costs = np.array(cost_model.seconds_per_pose(opened))
-    camera = Camera(np.zeros(3), 1.0, 1080.0)
-
-    def chosen(budget):
-        return select_levels(
-            LevelTable(errors, costs), np.full(10, 1e3), LevelCriteria(camera, 1e-3, budget, None)
-        )
-
-    assert chosen(11 * costs[0]).levels.tolist() == [0] * 10
-    assert chosen(9 * costs[-1]).limit is None

@@ -5,18 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import recorded
 
 from posefield.common.errors import InvalidField, OutsideSamples
 from posefield.common.units import UP
 from posefield.inference.level_selection import Camera, LevelCriteria
-from posefield.locomotion import stride
 from posefield.motion import quat, skeleton
 from posefield.motion.crowd_clip import Placement
 from posefield.question.motion_question import PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import crowd_synthesis, poses
-from posefield.synthesis.synthesizer import Synthesizer
 from posefield.validation.crowd_question import Blending, CrowdQuestion
 
 COUNT = 60
@@ -103,21 +100,6 @@ def test_each_character_is_what_it_would_be_alone_where_it_stands(model):
     assert np.array_equal(changed, question.detail > 0)
 
 
-def test_a_large_crowd_is_computed_in_calls_of_a_bounded_size(model):
-    opened, calls = recorded.session(model.session)
-    question = asked(model, 10_000, detail=np.zeros(10_000, dtype=int))
-    crowd_synthesis.synthesize_crowd(Synthesizer("labelled", opened), question)
-    sizes = [len(feed["time"]) for feed in calls if "time" in feed]
-    assert sum(sizes) == 10_000 and max(sizes) == 10_000 // crowd_synthesis.CALLS
-
-
-@pytest.mark.parametrize("rows", [1, 1000, 1001, 2001, 2002])
-def test_the_rows_of_walking_characters_are_split_without_single_ones(rows):
-    sizes = [part.stop - part.start for part in stride.batches(rows)]
-    last = rows - sum(sizes[:-1])
-    assert max(sizes) <= stride.ROWS_PER_CALL and 0 < last and (rows == 1 or last > 1)
-
-
 def test_a_crowd_larger_than_a_call_is_answered_like_its_parts(model):
     most = crowd_synthesis.MOST_ROWS
     question = asked(model, 3 * most + 7)
@@ -166,31 +148,6 @@ def test_in_place_a_cycle_goes_nowhere(walk):
     assert card.cyclic and np.abs(gone.root_position - end.root_position).max(axis=1).min() > 0.3
 
 
-def test_levels_are_those_that_the_camera_asks_for(model):
-    camera = Camera(np.array([0.0, 1.7, 0.0]), math.radians(60.0), 1080.0)
-    far = np.linspace(3.0, 2000.0, COUNT)
-    positions = np.column_stack([far, np.zeros((COUNT, 2))])
-    question = asked(
-        model,
-        placement=Placement(positions, np.zeros(COUNT)),
-        detail=LevelCriteria(camera, 1.0, None, None),
-    )
-    found = crowd_synthesis.synthesize_crowd(model, question)
-    assert found.levels.tolist() == sorted(found.levels.tolist())
-    assert {0, 3} < set(found.levels)
-    errors = np.array([level.pose for level in model.session.card.levels])
-    nearest = (
-        np.linalg.norm(positions + model.rest_position - camera.position, axis=1) - model.radius
-    )
-    shown = errors[found.levels] * camera.pixels / nearest
-    assert found.error_px == pytest.approx(shown, rel=1e-5)
-    assert np.all((shown <= 1.0) | (found.levels == 0))
-    # The next level would show; but for the coarsest, after which there is none.
-    coarser = np.minimum(found.levels + 1, len(errors) - 1)
-    would = errors[coarser] * camera.pixels / nearest
-    assert np.all((would > 1.0) | (found.levels == len(errors) - 1))
-
-
 def test_what_the_viewer_sees_of_a_level_is_less_than_the_limit(model):
     """Check that each character is within a pixel of the finest level, and 98 % of the joints."""
     camera = Camera(np.array([0.0, 1.7, 0.0]), math.radians(60.0), 1080.0)
@@ -213,23 +170,6 @@ def test_what_the_viewer_sees_of_a_level_is_less_than_the_limit(model):
     coarsest = crowd_synthesis.synthesize_crowd(model, replace(question, detail=np.full(count, 3)))
     gaps = np.linalg.norm(of(model, coarsest) - of(model, finest), axis=-1)
     assert np.mean(gaps / distances * camera.pixels > 1.0) > 0.04
-
-
-def test_a_budget_is_kept_and_said(model):
-    camera = Camera(np.array([0.0, 1.7, -20.0]), math.radians(60.0), 1080.0)
-    view = LevelCriteria(camera, 0.01, None, None)
-    question = asked(model, placement=Placement(np.zeros((COUNT, 3)), np.zeros(COUNT)), detail=view)
-    free = crowd_synthesis.synthesize_crowd(model, question)
-    assert set(free.levels) == {0}
-    costs = model.level_table.costs
-    if costs[-1] == costs[0]:
-        pytest.skip("this machine takes as long for every level")
-    tight = COUNT * float(costs[-1]) * 1.001
-    bound = crowd_synthesis.synthesize_crowd(
-        model, replace(question, detail=replace(view, budget=tight))
-    )
-    assert float(np.sum(costs[bound.levels])) <= tight
-    assert len(bound.warnings) == 1 and "budget" in bound.warnings[0]
 
 
 def test_who_is_between_two_levels_is_between_their_poses(model):
@@ -264,23 +204,6 @@ def test_who_is_between_two_levels_is_between_their_poses(model):
     ) == pytest.approx(1.0, abs=1e-5)
 
 
-def test_who_is_on_the_way_goes_to_no_third_level(model):
-    camera = Camera(np.array([0.0, 1.7, -3.0]), math.radians(60.0), 1080.0)
-    held = np.full(COUNT, 2)
-    view = LevelCriteria(camera, 1.0, None, held)
-    placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
-    shares = np.where(np.arange(COUNT) % 2, 1.0, 0.4)
-    question = asked(
-        model,
-        placement=placed,
-        detail=view,
-        blending=Blending(np.full(COUNT, 3), shares),
-    )
-    found = crowd_synthesis.synthesize_crowd(model, question)
-    assert set(found.levels[shares < 1.0]) == {2}
-    assert set(found.levels[shares == 1.0]) == {0}
-
-
 def broken(model, field, row, value):
     question = asked(model)
     if field.startswith("controls/"):
@@ -313,17 +236,6 @@ def test_what_is_wrong_with_one_character_names_it(model, field, value, said):
     assert (caught.value.field, caught.value.index) == (field, 17)
 
 
-def test_controls_that_make_no_sense_name_the_first_character(model):
-    card = model.session.card
-    turn = card.control("turn")
-    far = turn.maximum + 99.0 * (turn.maximum - turn.minimum)
-    question = broken(model, "controls/turn", 5, far)
-    try:
-        crowd_synthesis.synthesize_crowd(model, question)
-    except OutsideSamples as refusal:
-        assert refusal.index == 5
-
-
 def test_missing_and_unknown_controls_are_named(model):
     question = asked(model)
     fewer = {name: values for name, values in question.controls.items() if name != "turn"}
@@ -348,71 +260,3 @@ def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     with pytest.raises(OutsideSamples, match="the first is character 9") as caught:
         crowd_synthesis.synthesize_crowd(model, replace(question, extrapolate="refuse"))
     assert (caught.value.field, caught.value.index) == ("controls/stature", 9)
-
-
-def test_gaps_alone_are_refused_too(model):
-    question = replace(asked(model), extrapolate="refuse")
-    first = int(np.argmin(crowd_synthesis.synthesize_crowd(model, asked(model)).supported))
-    with pytest.raises(OutsideSamples, match="in a gap") as caught:
-        crowd_synthesis.synthesize_crowd(model, question)
-    assert (caught.value.field, caught.value.index) == ("controls", first)
-
-
-def test_a_heading_of_many_turns_is_the_one_within_a_turn(model):
-    question = asked(model)
-    turns = 2.0 * np.pi * np.arange(COUNT)
-    wound = replace(question.placement, headings=question.placement.headings + 1e4 * turns)
-    found = crowd_synthesis.synthesize_crowd(model, replace(question, placement=wound))
-    assert (
-        np.abs(
-            of(model, found) - of(model, crowd_synthesis.synthesize_crowd(model, question))
-        ).max()
-        < 10 * FLOAT32
-    )
-    endless = replace(question.placement, headings=np.full(COUNT, 1e300))
-    far = crowd_synthesis.synthesize_crowd(model, replace(question, placement=endless))
-    assert np.isfinite(far.rotations).all()
-
-
-def test_who_lets_the_camera_choose_need_not_know_the_levels_end(model):
-    camera = Camera(np.array([0.0, 1.7, -4.0]), math.radians(60.0), 1080.0)
-    placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
-    seen = asked(model, placement=placed, detail=LevelCriteria(camera, 1.0, None, None))
-    late = 1.05 * crowd_synthesis.synthesize_crowd(model, seen).duration.astype(float)
-    assert set(crowd_synthesis.synthesize_crowd(model, replace(seen, times=late)).levels) == {0}
-    numbered = replace(seen, times=late, detail=np.zeros(COUNT, dtype=int))
-    with pytest.raises(InvalidField, match="s, expected 0 to"):
-        crowd_synthesis.synthesize_crowd(model, numbered)
-    with pytest.raises(InvalidField, match="s, expected 0 to"):
-        crowd_synthesis.synthesize_crowd(model, replace(seen, times=1.2 * late))
-
-
-def test_a_budget_counts_who_is_on_the_way(model):
-    camera = Camera(np.array([0.0, 1.7, -20.0]), math.radians(60.0), 1080.0)
-    held = np.zeros(COUNT, dtype=int)
-    view = LevelCriteria(camera, 1.0, 1e-9, held)
-    blending = Blending(np.ones(COUNT, dtype=int), np.full(COUNT, 0.5))
-    placed = Placement(np.zeros((COUNT, 3)), np.zeros(COUNT))
-    found = crowd_synthesis.synthesize_crowd(
-        model, asked(model, placement=placed, detail=view, blending=blending)
-    )
-    assert set(found.levels) == {0} and found.warnings == ()
-    shares = np.where(np.arange(COUNT) % 2, 1.0, 0.5)
-    some = replace(blending, shares=shares)
-    found = crowd_synthesis.synthesize_crowd(
-        model, asked(model, placement=placed, detail=view, blending=some)
-    )
-    assert set(found.levels[shares == 1.0]) == {3} and "budget" in found.warnings[0]
-
-
-def test_a_camera_in_a_character_names_it(model):
-    inside = Camera(model.rest_position + np.array([0.0, 0.0, 0.2]), 1.0, 1080.0)
-    positions = np.full((COUNT, 3), 40.0)
-    positions[23] = 0.0
-    question = asked(
-        model,
-        placement=Placement(positions, np.zeros(COUNT)),
-        detail=LevelCriteria(inside, 1.0, None, None),
-    )
-    with pytest.raises(InvalidField, match="inside character 23"):
-        crowd_synthesis.synthesize_crowd(model, question)

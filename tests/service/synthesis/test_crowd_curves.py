@@ -6,7 +6,6 @@ import fixture_models
 import numpy as np
 import pytest
 
-from posefield.encode.tables import crowd_tables
 from posefield.inference import graph_ports, session
 from posefield.locomotion import gait, level_transitions, locomotion_plan, stride, walking_crowd
 from posefield.motion.crowd_clip import Placement
@@ -82,24 +81,6 @@ def test_curves_blend_between_levels_and_stay_within_their_limits(face):
     assert np.abs(found - (coarse + shares[:, None] * (fine - coarse))).max() < FLOAT32
     assert np.abs(found - fine).max() > 0.01
     assert found.min() >= 0.0 and found.max() <= 1.0
-
-
-def test_tables_name_the_curves_only_of_a_model_that_has_some(face, labelled):
-    with_curves = crowd_tables.table(crowd_synthesis.synthesize_crowd(face, asked(face)))
-    assert with_curves.columns["curves"].shape == (COUNT, len(face.session.card.curves))
-    assert with_curves.columns["curves"].dtype == np.float32
-    assert with_curves.facts["curve_names"][0] == "jawOpen"
-    card = labelled.session.card
-    low = {c.name: np.full(COUNT, c.default) for c in card.controls}
-    without = crowd_tables.table(
-        crowd_synthesis.synthesize_crowd(labelled, replace(asked(face), controls=low))
-    )
-    assert "curves" not in without.columns and "curve_names" not in without.facts
-
-
-@pytest.fixture(scope="module")
-def labelled(models_trained):
-    return opened(models_trained, "labelled")
 
 
 @pytest.fixture(scope="module")

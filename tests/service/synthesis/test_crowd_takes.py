@@ -77,13 +77,6 @@ def test_a_character_has_the_pose_of_its_take(reach):
         assert np.abs(pose.root_position[0] - found.root_position[row]).max() < 2e-6
 
 
-def test_takes_are_blended_between_levels(walk):
-    asked = {"take": "index", "from_level": [1] * COUNT}
-    ends = [crowd(walk, take="index", level=level) for level in (1, 0)]
-    for share, expected in zip((0, 1), ends, strict=True):
-        assert apart(crowd(walk, **asked, blend=share), expected).max() < 1e-6
-
-
 def test_detail_is_sampled_by_each_seed(walk):
     opened = walk.session
     stored = reduced_motion.to_bytes(np.full((3, opened.card.levels[0].ranks[0]), 0.01))

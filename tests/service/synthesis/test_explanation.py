@@ -1,14 +1,10 @@
 """Tests of `why`: the reported weights reproduce the answer."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from msgspec import structs
 
 from posefield.common.errors import InvalidField, OutsideSamples
-from posefield.inference import session
-from posefield.kriging.kriging_model import KrigingWeights
 from posefield.question.model_question import WhyQuestion
 from posefield.question.results import Explanation
 from posefield.registry import model_registry
@@ -87,14 +83,6 @@ def test_the_file_s_poses_are_the_weighted_sum_of_the_captured_clips(case, rng):
         other = in_the_card_s_order(card, explain_result(model, asked(card, 0.98 * point)))
         wrong, _ = stages.decoder.numpy(np.hstack([(other @ captured)[None], more]), place)
         assert np.abs(wrong - turns).max() > 1e-3
-
-
-def test_without_a_nugget_a_clip_is_made_of_itself_alone(labelled_path):
-    weigher = session.load(labelled_path).kriging_weights
-    exact = KrigingWeights(replace(weigher.hyper, nugget=0.0), weigher.samples)
-    own = np.eye(len(weigher.samples))
-    np.testing.assert_allclose(exact.weights(weigher.samples), own, atol=1e-6)
-    assert np.abs(weigher.weights(weigher.samples) - own).max() > 1e-2
 
 
 def test_the_nearest_come_first_and_a_clip_is_nearest_to_itself(case):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
+from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -59,18 +59,6 @@ def test_a_duration_as_float32_is_the_duration(model, rng):
         assert len(last) == 1
     # Negative control: without slack these would have been refused.
     assert above > POINTS / 10
-
-
-def test_a_held_motion_takes_its_duration_as_float32(model, rng):
-    feet = model.session.card.skeleton.names[-1]
-    hold = {"exact": "none", "targets": (Target(feet, (0.0, 0.3, 0.3), at="start"),)}
-    for controls in (sampled(model, rng) for _ in range(4)):
-        duration = pose(model, controls, 0.0, **hold).trust.duration
-        written = np.nextafter(duration, np.inf)
-        assert_same_poses(
-            pose(model, controls, float(written), **hold),
-            pose(model, controls, duration, **hold),
-        )
 
 
 @pytest.mark.parametrize("field", ["times/1", "end", "start"])

@@ -27,24 +27,8 @@ def test_an_arc_is_many_small_steps():
     assert abs(floor_plane.arc_displacement(np.array(way), np.array(turn)) - expected) < 1e-10
 
 
-def test_an_arc_in_two_parts_is_the_arc():
-    way, turn = np.array(1.2 + 0.1j), np.array(0.9)
-    half = floor_plane.arc_displacement(0.3 * way, 0.3 * turn)
-    rest = floor_plane.arc_displacement(0.7 * way, 0.7 * turn) * floor_plane.unit_vectors(
-        0.3 * turn
-    )
-    assert abs(half + rest - floor_plane.arc_displacement(way, turn)) < ROUNDING
-
-
 @pytest.mark.parametrize("turn", [-2.0, 0.0, 1e-9, 0.4])
 def test_straightened_undoes_it(turn):
     way = np.array(0.8 - 0.2j)
     gap = floor_plane.arc_displacement(way, np.array(turn))
     assert abs(floor_plane.inverse_arc(gap, np.array(turn)) - way) < ROUNDING
-
-
-def test_only_the_root_is_turned(rng):
-    rotations = quat.normalize(rng.normal(size=(5, 3, 4)))
-    turned = floor_plane.turn_roots(rotations, rng.uniform(-1.0, 1.0, 5))
-    assert np.array_equal(turned[:, 1:], rotations[:, 1:])
-    assert np.abs(turned[:, 0] - rotations[:, 0]).max() > 0.1

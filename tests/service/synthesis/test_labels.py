@@ -3,15 +3,12 @@
 import re
 
 import numpy as np
-import onnx
 import pytest
 from asking import asker
 
 from posefield.common.errors import InvalidField
-from posefield.encode.formats import CLIP_ENCODERS, POSE_ENCODERS
 from posefield.http.api.settings import Settings
 from posefield.http.app import create_app
-from posefield.locomotion import gait, stride
 from posefield.model_file import card_reader, model_card
 from posefield.question.model_question import SigmaQuestion, SuggestQuestion, WhyQuestion
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
@@ -152,37 +149,6 @@ def test_grids_and_suggestions_depend_on_the_labels(model):
     assert {each.nearest for each in found.suggestions} <= own
     every = capture_suggestions.suggest(model, SuggestQuestion(count=3))
     assert not {each.nearest for each in every.suggestions} <= own
-
-
-def test_walkers_have_captured_combinations_of_labels(model):
-    rows = stride.label_rows(model.session.card)
-    assert len(rows) == 6 and {"performer": "ben", "style": "plain"} in rows
-    weights = stride.labels(model.session, np.arange(-1, 6))
-    assert weights.sum(axis=1).tolist() == [0.0, *[2.0] * 6]
-    assert len(np.unique(stride.clip_performers(model.session.card))) == 6
-    assert gait.fit_gait(model.session).performer_offsets.shape == (7, 2)
-
-
-def test_the_graph_has_one_input_of_weights_and_one_number_a_sample_and_set(styled_path):
-    weights = {each.name: each for each in onnx.load(styled_path).graph.initializer}
-    assert list(weights["labels"].dims) == [1, 5]
-    assert [list(weights[f"whose_{i}"].dims) for i in range(2)] == [[36], [36]]
-    assert "whose_2" not in weights
-
-
-@pytest.mark.parametrize("form", CLIP_ENCODERS)
-def test_files_of_all_formats_hold_names_and_weights(model, form):
-    labels = {"style": {"marching": 0.75, "plain": 0.25}, "performer": "ann"}
-    found = clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=10.0, labels=labels))
-    other = clips.synthesize_clip(model, ClipQuestion(controls=POINT, fps=10.0))
-    encode = CLIP_ENCODERS[form].encode
-    assert encode(found) and encode(found) != encode(other)
-
-
-@pytest.mark.parametrize("form", POSE_ENCODERS)
-def test_poses_of_all_formats_hold_names_and_weights(model, form):
-    found = posed(model, labels={"style": {"marching": 0.75, "plain": 0.25}})
-    assert POSE_ENCODERS[form].encode(found)
 
 
 def test_over_http_labels_are_parameters_bodies_and_answers(styled_path):

@@ -95,19 +95,6 @@ def test_what_is_seen_keeps_the_budget_and_is_no_worse_than_need_be(scene, budge
         assert ladder.costs[found.levels].sum() <= budget / 8
 
 
-def test_of_levels_that_are_equally_good_the_cheapest_is_taken():
-    assert level_selection.select_by_error(ERRORS, np.array([100.0]), 1.0).tolist() == [3]
-
-
-def test_where_no_level_is_good_enough_the_finest_is_taken():
-    assert level_selection.select_by_error(ERRORS[1:], np.array([1e6]), 1.0).tolist() == [0]
-
-
-def test_a_level_counts_as_no_better_than_a_finer_one():
-    bent = np.array([0.0, 0.05, 0.01])
-    assert level_selection.select_by_error(bent, np.array([40.0]), 1.0).tolist() == [0]
-
-
 def switches(levels):
     return sum(a != b for a, b in pairwise(levels))
 
@@ -157,14 +144,6 @@ def test_without_the_levels_before_a_budget_does(rng):
     assert budgeted(rng, holds=False) > 30
 
 
-def test_hysteresis_never_holds_what_the_limit_forbids(rng):
-    scale, held = rng.uniform(1, 1000, 500), rng.integers(0, len(ERRORS), 500)
-    levels = level_selection.select_by_error(ERRORS, scale, 1.0, held)
-    assert (level_selection.error_pixels(ERRORS, scale, levels) <= 1.0).all()
-    assert (level_selection.error_pixels(ERRORS, scale, held) > 1.0).any()
-    assert (levels <= level_selection.select_by_error(ERRORS, scale, 1.0)).all()
-
-
 def test_an_error_covers_what_a_pinhole_camera_shows():
     camera = Camera(np.array([0.0, 1.0, 0.0]), math.radians(60), 1080.0)
     centres = np.array([[0.0, 1.0, 10.0], [0.0, 1.0, -10.0], [6.0, 1.0, 8.0]])
@@ -202,16 +181,6 @@ def test_a_camera_that_cannot_be_is_refused(position, fov, height, field):
     with pytest.raises(InvalidField) as caught:
         Camera(np.array(position, float), fov, height)
     assert caught.value.field == f"camera/{field}"
-
-
-def test_a_hundred_thousand_characters_are_chosen_for(rng):
-    """The sizes that a loop is too slow for, by the property that defines the answer."""
-    scale = rng.uniform(1, 1000, 100_000)
-    found = level_selection.select_by_budget(LADDER, scale, 0.2 + ROUNDING)
-    assert found.limit is not None
-    assert COSTS[found.levels].sum() <= 0.2 + ROUNDING
-    below = level_selection.select_by_error(ERRORS, scale, np.nextafter(found.limit, 0.0))
-    assert COSTS[below].sum() > 0.2 + ROUNDING
 
 
 @pytest.mark.parametrize(

@@ -74,11 +74,6 @@ def test_who_trembles_about_a_threshold_does_not_flicker():
     )
 
 
-def test_one_level_for_all_is_never_mixed():
-    shown = level_transitions.constant_schedule(2, (3, 5))
-    assert np.all(shown.levels == 2) and np.all(shown.shares == 1.0)
-
-
 # --- a real walk ----------------------------------------------------------------------------------
 
 
@@ -143,13 +138,3 @@ def test_a_camera_changes_levels_and_hardly_the_walk(model, own):
         for a, b in zip(far.batches, near.batches, strict=True)
     ]
     assert 0.0 < max(gaps) < 0.2
-
-
-def test_characters_may_share_motions(model, own):
-    made = crowd_order.build_crowd(model, own, CrowdOrder(count=25, motions=4, seconds=0.5))
-    assert len(made.placement) == 25 and made.shared
-    assert np.array_equal(made.motion, np.arange(25) % 4)
-    assert sum(len(batch) for batch in made.batches) == 4
-    gaps = made.placement.positions[:, None] - made.placement.positions
-    apart = np.linalg.norm(gaps, axis=-1)[~np.eye(25, dtype=bool)]
-    assert apart.min() > 1.0

@@ -18,7 +18,7 @@ from posefield.locomotion import (
     walking_crowd,
 )
 from posefield.locomotion.routes import Route
-from posefield.motion import foot_skate, skeleton
+from posefield.motion import skeleton
 
 # float32 of places some metres away, and of phases after some strides.
 SINGLE = 2e-5
@@ -181,31 +181,6 @@ def test_feet_slide_no_more_than_in_the_models_own_strides(own):
     assert walking_crowd.measure_foot_skate(own.session.card, slid, RATE).mean() > 2.0 * strides
 
 
-def test_the_measure_is_that_of_the_evaluation(own, strides):
-    plan = held(own, 200.0, 34, RATE)
-    made = finest(own.session, plan)
-    feet = joints(own, plan)[0][:, list(own.session.card.feet)]
-    length = round(float(np.mean(own.session.card.durations)) * RATE) + 1
-    assert walking_crowd.measure_foot_skate(own.session.card, made, RATE)[0, 0] == pytest.approx(
-        float(foot_skate.mean_skate_speed(feet[:length], RATE))
-    )
-    clips = [
-        foot_skate.mean_skate_speed(e.clip.positions()[:, [3, 6]], e.clip.rate) for e in strides
-    ]
-    # Closing the cycle moves a planted foot by less than a millimetre a second.
-    assert np.max(clips) < 1e-3
-
-
-def test_a_straight_route_is_walked_at_its_speed(own):
-    route = Route(np.array([[2.0, 1.0], [2.0, 9.0]]), 1.2)
-    ways = routes.paths_through(own, [route])
-    plan = locomotion_plan.plan_along_paths(own, ways, ANN, np.zeros(1), 121, RATE)
-    gone = plan.places[0, -1] - plan.places[0, 0]
-    assert gone.real == pytest.approx(1.2 * 4.0, rel=2e-3)
-    assert abs(gone.imag) < 1e-9
-    assert plan.places[0, 0] == 1.0 + 2.0j
-
-
 def test_a_way_that_ends_too_soon_is_refused(own):
     ways = routes.paths_through(own, [Route(np.array([[0.0, 0.0], [0.0, 3.0]]), 1.0)])
     with pytest.raises(InvalidField, match=r"paths/0: 3\.00 m long, .* less than 4 s"):
@@ -223,15 +198,3 @@ def test_the_root_alone_is_where_it_is_in_whole_poses_bit_for_bit(own, count):
     assert found.tobytes() == posed.places.reshape(count, 8).tobytes()
     later = stride.synthesize_poses(opened, controls[rows], labels[rows], np.roll(whole, 1))
     assert found.tobytes() != later.places.tobytes()
-
-
-def test_contacts_at_known_durations_are_the_same_bit_for_bit(own):
-    opened, phases = own.session, np.arange(9) / 9
-    controls = np.array(opened.card.examples[:3]).repeat(3, axis=0)
-    labels = np.zeros((9, len(opened.card.clip_labels[0])))
-    done = stride.strides(opened, controls, labels)
-    found = stride.contact_probabilities(opened, controls, labels, phases)
-    known = stride.contact_probabilities(opened, controls, labels, phases, 0, done.durations)
-    assert known.tobytes() == found.tobytes()
-    longer = stride.contact_probabilities(opened, controls, labels, phases, 0, 1.1 * done.durations)
-    assert longer.tobytes() != found.tobytes()

@@ -20,7 +20,7 @@ from posefield.inference.trial_process import TrialLimits
 from posefield.model_file import checked_file
 from posefield.registry.model_loading import ModelLoader
 from posefield.registry.model_registry import VersionLimits
-from posefield.registry.model_reload import SETTLE_SECONDS, FixedRegistry, ReloadingRegistry
+from posefield.registry.model_reload import ReloadingRegistry
 
 ROOM = VersionLimits()
 
@@ -68,15 +68,6 @@ def test_a_file_that_was_replaced_is_newest_and_the_old_answers_under_its_hash(p
     assert [m.identity for m in after.versions("walk")] == [f"walk@{new}", f"walk@{old}"]
 
 
-def test_a_library_that_was_taken_stays_what_it_was(put, tmp_path):
-    old = put("walk.onnx", 1)
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    taken = shelf.registry
-    put("walk.onnx", 2)
-    assert followed(shelf) is not taken
-    assert taken.find("walk").identity == f"walk@{old}"
-
-
 def test_nothing_new_leaves_the_very_same_library(put, tmp_path):
     put("walk.onnx", 1)
     shelf = ReloadingRegistry([tmp_path], ROOM)
@@ -122,18 +113,6 @@ def test_a_broken_file_leaves_the_old_one_and_is_told_until_it_changes(
     assert shelf.reloads.faults == () and shelf.reloads.last_error == str(fault.error)
 
 
-def test_what_was_put_back_is_newest_again_and_not_opened_twice(put, tmp_path):
-    first = put("walk.onnx", 1)
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    model = shelf.registry.find("walk")
-    put("walk.onnx", 2)
-    followed(shelf)
-    put("walk.onnx", 1)
-    assert followed(shelf).find("walk") is model
-    assert identities(shelf) == [f"walk@{first}"]
-    assert shelf.reloads.opened == 2
-
-
 def test_older_versions_are_bounded_and_the_oldest_goes(put, tmp_path):
     digests = [put("walk.onnx", 0)]
     shelf = ReloadingRegistry([tmp_path], VersionLimits(older=2))
@@ -176,18 +155,6 @@ def test_what_is_held_no_longer_is_freed(put, tmp_path):
     assert [model() is None for model in models] == [True, True, True, False]
 
 
-def test_a_version_that_had_no_room_is_opened_when_it_is_the_newest(put, tmp_path):
-    old, new = put("walk/1.onnx", 1), put("walk/2.onnx", 2)
-    shelf = ReloadingRegistry([tmp_path], VersionLimits(older=2, memory=0))
-    assert identities(shelf) == [f"walk@{new}"] and not shelf.registry.older
-    for _ in range(3):
-        shelf.scan()
-    assert shelf.reloads.opened == 2
-    (tmp_path / "walk/2.onnx").unlink()
-    followed(shelf)
-    assert identities(shelf) == [f"walk@{old}"]
-
-
 def test_a_folder_of_versions_answers_with_the_highest_and_holds_the_next(put, tmp_path):
     digests = {n: put(f"walk/{n}.onnx", n) for n in (2, 10, 9, 1)}
     shelf = ReloadingRegistry([tmp_path], ROOM)
@@ -208,24 +175,6 @@ def test_versions_as_model_servers_lay_them_out(put, tmp_path):
     (tmp_path / "walk/config.pbtxt").write_text('name: "walk"')
     shelf = ReloadingRegistry([tmp_path], ROOM)
     assert [m.session.digest for m in shelf.registry.versions("walk")] == [new, old]
-
-
-def test_a_broken_newest_version_leaves_the_one_before(put, tmp_path):
-    good = put("walk/1.onnx", 1)
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    (tmp_path / "walk/2.onnx").write_bytes(b"broken")
-    followed(shelf)
-    assert identities(shelf) == [f"walk@{good}"]
-    (fault,) = shelf.reloads.faults
-    assert (fault.name, fault.version) == ("walk", "2")
-
-
-def test_a_new_file_is_a_new_model(put, tmp_path):
-    walk = put("walk.onnx", 1)
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    run = put("run.onnx", 2)
-    followed(shelf)
-    assert sorted(identities(shelf)) == [f"run@{run}", f"walk@{walk}"]
 
 
 def test_a_deleted_name_goes_with_all_its_versions(put, tmp_path):
@@ -256,14 +205,6 @@ def test_a_source_without_any_model_left_keeps_what_it_had(put, tmp_path):
     assert shelf.reloads.failed == 1
 
 
-def test_a_file_given_by_itself_is_followed_too(put, tmp_path):
-    put("walk.onnx", 1)
-    shelf = ReloadingRegistry([tmp_path / "walk.onnx"], ROOM)
-    new = put("walk.onnx", 2)
-    followed(shelf)
-    assert identities(shelf) == [f"walk@{new}"]
-
-
 def test_a_link_that_is_turned_is_a_change(put, tmp_path):
     """As Kubernetes does it with what it mounts."""
     put("..1/walk.onnx", 1)
@@ -277,13 +218,6 @@ def test_a_link_that_is_turned_is_a_change(put, tmp_path):
     (tmp_path / "..turned").rename(tmp_path / "..data")
     followed(shelf)
     assert identities(shelf) == [f"walk@{new}"]
-
-
-def test_two_places_of_one_name_are_refused_at_the_start(put, tmp_path):
-    put("walk.onnx", 1)
-    put("walk/1.onnx", 2)
-    with pytest.raises(ModelError, match="a second model named 'walk'"):
-        ReloadingRegistry([tmp_path], ROOM).check()
 
 
 def test_a_second_place_of_a_name_leaves_the_first(put, tmp_path):
@@ -314,22 +248,6 @@ def test_it_follows_by_itself_while_watched(put, tmp_path):
         while identities(shelf) != [f"walk@{new}"] and time.monotonic() < until:
             time.sleep(0.01)
         assert identities(shelf) == [f"walk@{new}"]
-
-
-def test_it_does_not_follow_when_told_never_to(put, tmp_path):
-    put("walk.onnx", 1)
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    with shelf.watch(0):
-        put("walk.onnx", 2)
-        time.sleep(2 * SETTLE_SECONDS)
-        assert shelf.reloads.looks == 1
-
-
-def test_fixed_models_are_a_library_that_stays(put, tmp_path):
-    put("walk.onnx", 1)
-    library = ReloadingRegistry([tmp_path], ROOM).registry
-    assert FixedRegistry(library).registry is library
-    assert FixedRegistry(library).reloads.looks == 0
 
 
 # --- files that are meant to do harm --------------------------------------------------------------
@@ -374,28 +292,6 @@ def test_files_that_cannot_be_served_do_not_keep_others_from_being_taken(
     assert (shelf.reloads.failed, len(caplog.records)) == (len(hostile), before)
     assert len(shelf.reloads.faults) == len(hostile)
     assert time.process_time() - start < 60
-
-
-def test_a_file_that_was_refused_is_tried_again_when_it_changes(put, hostile, tmp_path):
-    put("a.onnx", 1)
-    (tmp_path / "b.onnx").write_bytes(hostile["large"][0])
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    assert [fault.name for fault in shelf.reloads.faults] == ["b"]
-    new = put("b.onnx", 2)
-    assert followed(shelf).find("b").identity == f"b@{new}"
-    assert not shelf.reloads.faults
-
-
-def test_a_fault_of_the_start_is_logged_at_the_next_look_and_then_no_more(put, tmp_path, caplog):
-    """A process that takes the place of another one starts with the models that are left."""
-    put("a.onnx", 1)
-    (tmp_path / "b.onnx").write_bytes(b"broken")
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    assert not caplog.records
-    shelf.scan()
-    shelf.scan()
-    (record,) = caplog.records
-    assert "b.onnx: does not end with its checksum" in record.getMessage()
 
 
 def address_space_but(room):

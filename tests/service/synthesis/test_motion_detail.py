@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from posefield.inference import reduced_motion, session
-from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
-from posefield.synthesis import clips, poses
+from posefield.question.motion_question import ClipQuestion, Target
+from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 
 SEED = 7
@@ -40,12 +40,6 @@ def clip(model, **more):
     return answer.clip.positions(), answer.trust
 
 
-def test_a_card_stores_deviations_in_half_precision(walk):
-    found = reduced_motion.deviations(walk.session.card)
-    assert found.shape == DEVIATIONS.shape
-    assert np.allclose(found, DEVIATIONS, rtol=1e-3, atol=0.0)
-
-
 def test_samples_have_the_deviations_and_close(rng):
     frames, seeds = 41, 400
     drawn = np.array([reduced_motion.sample(DEVIATIONS, frames, seed) for seed in range(seeds)])
@@ -68,27 +62,10 @@ def test_detail_is_sampled_by_the_seed_of_the_take(walk):
     assert own.warnings == ()
 
 
-def test_detail_accelerates_joints(walk):
-    def acceleration(found):
-        return np.linalg.norm(np.diff(found - found[:, :1], 2, axis=0), axis=-1).mean()
-
-    mean = acceleration(clip(walk)[0])
-    sampled = [acceleration(clip(walk, take=0, detail=True)[0])]
-    sampled += [acceleration(clip(walk, take=seed, variety=0.0, detail=True)[0]) for seed in (1, 2)]
-    assert min(sampled) > 1.05 * mean
-
-
 def test_a_loop_with_detail_closes(walk):
     found, _ = clip(walk, detail=True, loop=True, root="in_place")
     assert np.abs(found[-1] - found[0]).max() < 1e-9
     assert np.abs(found - clip(walk, loop=True, root="in_place")[0]).max() > 0.005
-
-
-def test_a_pose_with_detail_is_the_frame_of_its_clip(walk):
-    answer = clips.synthesize_clip(walk, asked(walk, detail=True))
-    question = PoseQuestion(controls=asked(walk).controls, times=[0.2], exact="none", detail=True)
-    pose = poses.synthesize_poses(walk, question)
-    assert np.allclose(pose.rotations[0], answer.clip.rotations[10], rtol=0.0, atol=1e-12)
 
 
 def test_targets_are_met_with_detail(walk):

@@ -44,13 +44,6 @@ def test_models_are_named_as_in_a_folder(put, url):
     assert sorted(model_registry.load([f"{url}/"]).models) == ["reach", "walk"]
 
 
-def test_one_object_is_a_model(put, url):
-    digest = put("walk.onnx", 1)
-    put("reach.onnx", 2)
-    (model,) = model_registry.load([f"{url}/walk.onnx"]).models.values()
-    assert model.identity == f"walk@{digest}"
-
-
 @pytest.mark.parametrize("ending", ["", "/walk.onnx"])
 def test_what_is_put_there_is_followed(ending, put, url):
     old = put("walk.onnx", 1)
@@ -80,17 +73,6 @@ def test_a_bucket_that_is_not_there_is_refused(url):
         model_registry.load([url])
 
 
-def test_a_store_that_has_become_empty_leaves_what_there_was(put, url):
-    old = put("walk.onnx", 1)
-    shelf = ReloadingRegistry([url], VersionLimits())
-    connect(url).delete("walk.onnx")
-    shelf.scan()
-    shelf.scan()
-    assert shelf.registry.find("walk").session.digest == old
-    (fault,) = shelf.reloads.faults
-    assert fault.name == "" and fault.error.path == url
-
-
 def test_a_store_that_cannot_be_reached_leaves_what_there_was(model_path, tmp_path, monkeypatch):
     with stores.serving(tmp_path / "said") as address:
         for name, value in stores.told(address).items():
@@ -102,11 +84,6 @@ def test_a_store_that_cannot_be_reached_leaves_what_there_was(model_path, tmp_pa
     assert list(shelf.registry.models) == ["walk"]
     (fault,) = shelf.reloads.faults
     assert fault.error.message.startswith("cannot be read: ")
-
-
-def test_a_url_of_no_store_is_refused():
-    with pytest.raises(ModelError, match="cannot be read"):
-        model_registry.load(["nonsense://somewhere/models"])
 
 
 def test_a_url_of_a_file_is_a_path(model_path):

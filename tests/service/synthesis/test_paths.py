@@ -33,12 +33,6 @@ def test_even_turns_are_a_circle_between_places_too():
     assert ways.curvatures == pytest.approx(0.5)
 
 
-def test_values_are_met_at_known_places_and_halved_between():
-    values = np.arange(200.0)[None, :, None] * [1.0, -2.0]
-    found = circle(2.0).interpolate(values, np.array([[0.0, 3.0, 3.05]]))
-    assert found[0] == pytest.approx(np.array([[0.0, 0.0], [30.0, -60.0], [30.5, -61.0]]))
-
-
 BEND = np.array([[1.0, -2.0], [1.0, 3.0], [2.0, 8.0], [5.0, 12.0], [9.0, 14.0]])
 
 
@@ -103,11 +97,6 @@ def test_what_is_no_route_is_refused(plain, field):
     with pytest.raises(InvalidField) as refusal:
         routes.parse_routes(plain)
     assert refusal.value.field == field
-
-
-def test_routes_are_read_as_they_are_written():
-    (route,) = routes.parse_routes([{"waypoints": [[0, 1], [2, 3]], "speed": 1}])
-    assert (route.waypoints.tolist(), route.speed) == ([[0.0, 1.0], [2.0, 3.0]], 1.0)
 
 
 def test_characters_that_wander_stay_within_what_was_sampled(own):

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posefield.model_file import protobuf_wire
-from posefield.model_file.protobuf_wire import LENGTH, VARINT
 
 
 @given(st.lists(st.integers(0, 2**63 - 1)), st.text(), st.integers(0, 2**31 - 1))
@@ -28,12 +27,6 @@ def test_google_reads_what_is_written(kind, numbers, name):
     )
     tensor = onnx.TensorProto.FromString(content)
     assert (tensor.data_type, tensor.raw_data, tensor.name) == (kind, numbers, name)
-
-
-def test_numbers_of_a_fixed_size_are_bytes():
-    tensor = onnx.AttributeProto(f=1.5).SerializeToString()
-    (field,) = protobuf_wire.fields(tensor)
-    assert (field.number, field.kind, field.content) == (2, 5, tensor[1:])
 
 
 @given(st.binary(max_size=200))
@@ -61,8 +54,3 @@ def test_any_bytes_are_fields_or_refused(content):
 def test_a_message_that_is_cut_or_none_is_refused(content, said):
     with pytest.raises(ValueError, match=said):
         list(protobuf_wire.fields(content))
-
-
-def test_kinds_are_those_of_the_format():
-    message = onnx.AttributeProto(name="axis", i=3).SerializeToString()
-    assert [(f.number, f.kind) for f in protobuf_wire.fields(message)] == [(1, LENGTH), (3, VARINT)]

@@ -46,29 +46,6 @@ def test_each_point_is_the_sigma_of_an_answer(model):
     assert found.inside.any() and not found.inside.all()
 
 
-@pytest.mark.parametrize("stature", [1.62, 1.75])
-def test_support_is_what_an_answer_says_of_itself(model, stature):
-    asked = structs.replace(ASKED, columns=25, rows=21, controls={"stature": stature})
-    found = grid(model, asked)
-    told = [
-        [supported(model, found, across, along) for across in found.across.values]
-        for along in found.along.values
-    ]
-    assert found.supported.tolist() == told
-    # Negative control: gaps inside, and a little beyond, where the box alone would say otherwise;
-    # and with another stature it would not be.
-    assert (found.inside & ~found.supported).any() and (found.supported & ~found.inside).any()
-    other = grid(model, structs.replace(asked, controls={"stature": 1.88}))
-    assert other.supported.tolist() != told
-
-
-def supported(model, found, across, along):
-    controls = {**found.controls, "turn": across, "target_height": along}
-    return poses.synthesize_poses(
-        model, PoseQuestion(controls=controls, times=[0.0], extrapolate="ok")
-    ).trust.supported
-
-
 def test_the_whole_graph_says_the_same(model):
     asked = structs.replace(ASKED, columns=60, rows=40)
     assert len(asked) > 2 * BATCH
@@ -92,18 +69,6 @@ def test_axes_go_as_far_as_was_sampled_and_no_farther(model):
         ends = axis.control.minimum, axis.control.maximum
         assert (axis.values[0], axis.values[-1]) == ends
     assert found.inside.all()
-
-
-def test_what_is_not_said_is_the_default(model):
-    found, card = grid(model, ASKED), model.session.card
-    hips = next(c for c in card.controls if c.name == "hip_height")
-    assert found.controls == {"stature": 1.7, "hip_height": hips.default}
-
-
-def test_nobody_is_surer_of_who_was_never_seen(model):
-    """A performer who is known is nearer to his own clips."""
-    known, nobody = (grid(model, structs.replace(ASKED, performer=p)) for p in ("tall", None))
-    assert known.sigma.mean() < nobody.sigma.mean()
 
 
 @pytest.mark.parametrize(

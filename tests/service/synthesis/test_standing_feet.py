@@ -86,20 +86,6 @@ def test_feet_as_predicted_have_the_bytes_of_a_model_without_contacts(walker):
     assert ours.trust == theirs.trust and ours.trust.feet is None
 
 
-def test_models_with_contacts_stand_unless_told_otherwise(walker):
-    assert walker.session.card.contacts
-    usual, told = made(walker), made(walker, feet="stand")
-    assert usual.clip.rotations.tobytes() == told.clip.rotations.tobytes()
-    assert usual.trust.facts()["feet"]["swings"] == told.trust.feet.swings > 0
-
-
-def test_a_part_of_a_clip_is_a_slice_of_the_whole(walker):
-    whole, part = made(walker, feet="stand"), made(walker, feet="stand", start=0.2)
-    # The same frames, computed at times that differ in the last digits.
-    assert np.abs(whole.clip.rotations[6:] - part.clip.rotations).max() < 1e-4
-    assert part.trust.feet == whole.trust.feet
-
-
 @pytest.mark.parametrize("root", ["travelling", "in_place"])
 def test_a_loop_closes(walker, root):
     answer = made(walker, feet="stand", loop=True, root=root, fps=60.0)
@@ -110,13 +96,6 @@ def test_a_loop_closes(walker, root):
     steps = np.abs(np.diff(np.concatenate([rotations, rotations[1:3]])[:, 1:], n=2, axis=0))
     seam = len(rotations) - 2
     assert steps[seam].max() < 1.5 * np.delete(steps, seam, axis=0).max()
-
-
-def test_in_place_is_the_travelling_clip_without_its_travel(walker):
-    there, here = made(walker, feet="stand"), made(walker, feet="stand", root="in_place")
-    assert here.trust.feet == there.trust.feet
-    assert (here.clip.rotations[:, 1:] == there.clip.rotations[:, 1:]).all()
-    assert (here.clip.root_path @ UP == there.clip.root_path @ UP).all()
 
 
 def test_exact_targets_and_controls_stay_met(reach):
@@ -147,21 +126,6 @@ def test_a_foot_with_a_target_is_as_predicted_and_told(reach):
     assert {stance.joint for stance in placed.trust.feet.stances} == {"RightFoot"}
 
 
-def test_a_target_of_the_root_keeps_its_height(reach):
-    free = made(reach, exact="none", fps=60.0)
-    root = reach.session.card.skeleton.names[0]
-    goal = np.add(joint(reach, free, root)[-1], [0.01, 0.01, 0.0])
-    asked = {"exact": "none", "targets": (Target(root, tuple(goal), at="end"),), "fps": 60.0}
-    placed, plain = made(reach, feet="stand", **asked), made(reach, **asked)
-    assert (placed.clip.root_path == plain.clip.root_path).all()
-
-
-def test_feet_without_contacts_stand_if_they_are_asked_to(reach):
-    assert made(reach).trust.feet is None
-    told = made(reach, feet="stand").trust.feet
-    assert told.stances and told.skate < told.skate_before
-
-
 def test_feet_that_cannot_stand_are_refused(reach, walker):
     for model, said in (
         (with_card(reach, feet=()), "names no feet"),
@@ -174,11 +138,3 @@ def test_feet_that_cannot_stand_are_refused(reach, walker):
             assert fault.value.field == "feet"
         usual = clips.synthesize_clip(model, structs.replace(question, feet=None))
         assert usual.trust.feet is None
-
-
-def test_feet_without_legs_are_told(reach):
-    names = reach.session.card.skeleton.names
-    model = with_card(reach, feet=(names.index("LeftUpLeg"),))
-    told = made(model, feet="stand")
-    assert told.trust.feet.left == ("LeftUpLeg is as predicted: no two bones lead to it",)
-    assert (told.clip.rotations == made(model).clip.rotations).all()

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.encode.tables import model_tables
 from posefield.question.model_question import SuggestQuestion
 from posefield.registry import model_registry
 from posefield.synthesis.capture_suggestions import DRAWN_CANDIDATES, suggest
@@ -78,14 +77,6 @@ def test_what_cannot_be_ranked_is_named(model, asked, field):
     with pytest.raises(InvalidField) as caught:
         suggest(model, asked())
     assert caught.value.field == field
-
-
-def test_they_are_said_in_a_line_each(model):
-    found = suggest(model, SuggestQuestion(count=3))
-    heading, *lines = model_tables.suggestions_text(found).splitlines()
-    assert heading.split()[:2] == ["gain", "variance"] and len(lines) == 3
-    assert lines[0].startswith(f"{100 * found.suggestions[0].gain:.1f} %")
-    assert model_tables.suggestions(found)["suggestions"][0]["lacking"] in lines[0]
 
 
 @pytest.mark.parametrize(

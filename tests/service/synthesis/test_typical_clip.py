@@ -5,20 +5,12 @@ import pytest
 
 from posefield.kriging import typical_clip
 
-NO_COST = np.zeros(9)
-
 
 @pytest.fixture
 def clusters(rng):
     """Places of sixty clips in two clusters, of forty and of twenty."""
     near = rng.normal((0.0, 0.0), 0.1, (40, 2))
     return np.vstack([near, rng.normal((3.0, 1.0), 0.1, (20, 2))])
-
-
-def test_the_medoid_on_a_line_is_the_median():
-    line = np.array([5.0, 1.0, 9.0, 2.0, 4.0])[:, None]
-    assert typical_clip.medoid(line) == 4
-    assert typical_clip.medoid(line[:4]) in (0, 3)
 
 
 def test_the_medoid_has_the_least_sum_of_distances(rng):
@@ -47,10 +39,6 @@ def test_costs_choose_the_clips_that_count(clusters):
     assert typical_clip.typical_row(clusters, costs) == 7
 
 
-def test_equal_clips_are_chosen_in_their_order():
-    assert typical_clip.typical_row(np.zeros((9, 2)), NO_COST) == 0
-
-
 def test_a_neighbourhood_holds_the_clips_and_not_the_gap(clusters):
     around = typical_clip.neighbourhood(clusters)
     assert all(around.contains(own) for own in clusters)
@@ -66,9 +54,3 @@ def test_a_point_in_the_gap_is_pulled_in_to_its_own_cluster(clusters):
     assert np.linalg.norm(found - clusters[:40], axis=1).min() < 0.3
     inside = clusters[0] + 1e-3
     assert around.pull_in(start, inside) is inside
-
-
-def test_a_value_that_never_varies_has_no_surroundings():
-    still = np.full((5, 1), 2.0)
-    around = typical_clip.neighbourhood(still)
-    assert around.contains(still[0]) and not around.contains(still[0] + 1e-9)

@@ -36,17 +36,6 @@ def made(own, asked, count=COUNT, seed=3):
     return crowd.facts, np.concatenate([each.rotations for each in crowd.batches])
 
 
-def test_without_labels_the_crowd_is_the_same(own):
-    facts, rotations = made(own, {})
-    plan = walking_crowd.plan_random(own, COUNT, 1.0, RATE, 3)
-    shown = level_transitions.constant_schedule(0, plan.phases.shape)
-    crowd = walking_crowd.build_crowd(own.session, plan, shown)
-    assert facts == crowd.facts
-    assert np.array_equal(rotations, np.concatenate([each.rotations for each in crowd.batches]))
-    assert set(facts["performers"]) == {"ann", "ben"}
-    assert set(facts["labels"]["style"]) == {"plain", "marching", "sneaking"}
-
-
 def test_a_name_holds_for_all_and_the_other_sets_vary(own):
     facts, _ = made(own, {"style": "marching"})
     assert facts["labels"] == {"style": ["marching"] * COUNT}
@@ -105,12 +94,6 @@ def test_a_mixture_draws_its_names_by_their_weights(own):
     assert np.mean([own.labels.rows[who]["style"] == "plain" for who in free]) > 0.3
     facts, _ = made(own, MIXED, count=2)
     assert facts["labels"] == {"style": [MIXED["style"]] * 2}
-
-
-def test_a_mixture_of_performers_is_among_the_labels(own):
-    facts, _ = made(own, {"performer": {"ann": 0.5, "ben": 0.5}}, count=2)
-    assert facts["performers"] == [None, None]
-    assert facts["labels"]["performer"] == [{"ann": 0.5, "ben": 0.5}] * 2
 
 
 def test_a_combination_that_was_not_captured_has_clips_of_either_label(own):

@@ -79,17 +79,6 @@ def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
     )
 
 
-def test_motions_are_made_some_at_a_time(own):
-    together = walking_crowd.POSES_PER_BATCH // 4
-    crowd, motions = made(own, together + 3, seconds=0.1)
-    assert [len(some) for some in motions] == [together, 3]
-    assert not crowd.shared
-    assert crowd.frames == 4
-    assert motions[0].rotations.dtype == np.float32
-    assert motions[1].levels.shape == (3, 4)
-    assert np.linalg.norm(motions[0].rotations, axis=-1) == pytest.approx(1.0, abs=1e-6)
-
-
 def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
     seconds = (walking_crowd.POSES_PER_CALL + 500) / RATE
     _, motions = made(own, 1, seed=0, seconds=seconds)
@@ -101,14 +90,6 @@ def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
     assert np.abs(found - near.rotations[:, 1:]).max() < 1e-6
     # Another frame's pose is another.
     assert np.abs(found[:-1] - near.rotations[1:, 1:]).max() > 1e-4
-
-
-def test_phases_and_walkers_differ(own):
-    plan = walking_crowd.plan_random(own, 100, 1.0, RATE, 0)
-    assert np.ptp(plan.phases[:, 0]) > 0.9
-    assert sorted(set(plan.who)) == [0, 1]
-    assert plan.roots.shape == (100, 31, 3)
-    assert not plan.roots[..., 1].any()
 
 
 @pytest.mark.parametrize(

@@ -7,12 +7,9 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.inference.level_selection import Camera
 from posefield.locomotion import (
-    crowd_order,
     gait,
     level_transitions,
-    routes,
     walking_crowd,
 )
 from posefield.locomotion.crowd_order import CrowdOrder
@@ -22,7 +19,6 @@ from posefield.synthesis.synthesizer import Synthesizer
 
 RATE = 30.0
 PARTS = ("rotations", "root_position", "bone_offsets", "levels")
-TURNS = [[0, 0], [0, 5], [2, 10], [0, 15], [-2, 20]]
 
 
 @pytest.fixture(scope="module")
@@ -103,39 +99,6 @@ def test_only_legs_turn_and_only_the_height_of_the_root_changes(model, own):
     assert np.array_equal(stood["bone_offsets"], free["bone_offsets"])
 
 
-def test_as_predicted_is_the_crowd_of_before(model, own):
-    order = CrowdOrder(count=5, seconds=2.0, feet="as_predicted")
-    plain = crowd_order.build_crowd(model, own, order)
-    made = walking_feet.build_crowd(model, own, order)
-    assert made.facts == {**plain.facts, "feet_stand": False}
-    for one, other in zip(made.batches, plain.batches, strict=True):
-        assert all(np.array_equal(getattr(one, name), getattr(other, name)) for name in PARTS)
-
-
-def test_feet_stand_on_routes_with_turns(model, own):
-    ways = routes.parse_routes(
-        [
-            {"waypoints": TURNS, "speed": 1.0},
-            {"waypoints": [[3, 0], [3, 30]], "speed": 1.2},
-        ]
-    )
-    asked = {"count": 2, "routes": ways, "seconds": 12.0}
-    _, stood, feet = built(model, own, **asked)
-    _, free, _ = built(model, own, feet="as_predicted", **asked)
-    card = model.session.card
-    assert skate(card, stood) < 0.2 * skate(card, free)
-    assert feet[0].drift.max() < 1e-6
-
-
-def test_feet_stand_while_levels_change(model, own):
-    camera = Camera(np.array([-4.0, 1.7, 0.0]), 1.0472, 1080.0)
-    asked = {"count": 20, "camera": camera, "pixels": 1.0}
-    _, stood, feet = built(model, own, **asked)
-    assert (np.diff(stood["levels"], axis=1) != 0).any()
-    assert skate(model.session.card, stood) < 0.05
-    assert max(own.drift.max() for own in feet) < 1e-6
-
-
 def test_contacts_are_those_of_the_level(model, own):
     plan = walking_crowd.plan_random(own, 4, 2.0, RATE, 0)
     who, shape = np.arange(4), plan.phases.shape
@@ -156,31 +119,10 @@ def test_contacts_are_those_of_the_level(model, own):
     assert fine.min() >= 0.0 and fine.max() <= 1.0
 
 
-def test_fewer_walkers_step_as_the_first_of_more(model, own):
-    _, few, _ = built(model, own, count=3)
-    _, many, _ = built(model, own, count=12)
-    for name in PARTS:
-        # The runtime's sums may go in another order in a batch of another size.
-        assert np.abs(few[name] - many[name][:3]).max() < 1e-5
-
-
 def test_the_same_crowd_has_the_same_bytes(model, own):
     _, once, _ = built(model, own)
     _, again, _ = built(model, own)
     assert all(once[name].tobytes() == again[name].tobytes() for name in PARTS)
-
-
-def test_walkers_that_share_motions_stand(model, own):
-    made = walking_feet.build_crowd(model, own, CrowdOrder(count=9, motions=2, seconds=2.0))
-    (motions,) = made.batches
-    assert made.shared and len(motions) == 2 and motions.feet is not None
-
-
-@pytest.mark.parametrize("fps", [20.0, 120.0])
-def test_feet_stand_at_other_rates(model, own, fps):
-    _, stood, feet = built(model, own, count=4, seconds=3.0, fps=fps)
-    assert skate(model.session.card, stood, fps) < 0.03
-    assert feet[0].drift.max() < 1e-6
 
 
 def with_card(model, **changed):

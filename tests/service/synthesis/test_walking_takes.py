@@ -20,7 +20,7 @@ from posefield.locomotion.crowd_order import CrowdOrder
 from posefield.motion import skeleton
 from posefield.registry import shipped_models
 from posefield.synthesis import crowd_takes, walking_feet, walking_takes
-from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
+from posefield.synthesis.synthesizer import Synthesizer
 from posefield.synthesis.walking_takes import WalkerTakes
 from posefield.validation.crowd_question import CharacterTakes
 
@@ -140,20 +140,6 @@ def test_a_walker_has_the_poses_of_its_take_in_a_crowd(model, twins):
     assert np.abs(found.rotations[:, 1:] - wrong[:, 1:]).max() > 1e-2
 
 
-def test_a_walker_depends_on_itself_alone(model, walk):
-    order = CrowdOrder(count=9, seconds=2.0, take="index", detail=True)
-    crowds = [walking_feet.build_crowd(model, walk, order) for _ in range(2)]
-    first, again = (next(iter(made.batches)) for made in crowds)
-    assert np.array_equal(first.rotations, again.rotations)
-    assert np.array_equal(first.root_position, again.root_position)
-
-
-def test_part_of_a_crowd_moves_as_in_the_whole(model, twins):
-    whole = taken(model, twins, [1, 2, 3], detail=True)
-    alone = taken(model, twins, [1, 2, 3], detail=True, who=np.array([1]))
-    assert np.abs(whole.rotations[1] - alone.rotations[0]).max() < 1e-6
-
-
 def test_walkers_stay_on_their_paths(model, walk):
     card = model.session.card
     _, mean = built(model, walk, feet="as_predicted")
@@ -187,14 +173,6 @@ def _paths(model, walk, order, apart):
     )
 
 
-@pytest.mark.parametrize("level", range(4))
-def test_each_level_has_takes(model, walk, level):
-    card = model.session.card
-    _, mean = built(model, walk, level=level)
-    _, varied = built(model, walk, level=level, take="index")
-    assert apart(joints(card, varied), joints(card, mean)) > 0.1
-
-
 def test_takes_do_not_jump_while_levels_change(model, walk):
     card = model.session.card
     near = Camera(np.array([-8.0, 1.7, 0.0]), 1.0472, 1080.0)
@@ -207,22 +185,6 @@ def test_takes_do_not_jump_while_levels_change(model, walk):
         for made in (varied, mean)
     ]
     assert steps[0] < 1.5 * steps[1]
-
-
-def test_detail_adds_acceleration(model, walk):
-    card = model.session.card
-    sizes = []
-    for detail in (False, True):
-        _, made = built(model, walk, take="index", detail=detail)
-        jumps = np.diff(joints(card, made), 2, axis=1) * RATE**2
-        sizes.append(np.sqrt(np.mean(np.square(jumps))))
-    assert 1.03 * sizes[0] < sizes[1] < 1.3 * sizes[0]
-
-
-def test_shared_motions_have_a_seed_each(model, walk):
-    order = CrowdOrder(count=9, motions=3, seconds=1.0, take="index")
-    takes = walking_takes.of_order(model.session.card, order)
-    assert takes.seeds.tolist() == [1, 2, 3]
 
 
 @pytest.mark.parametrize(
@@ -245,14 +207,6 @@ def test_a_model_without_takes_refuses_them(model):
     with pytest.raises(InvalidField, match="spherical kriging"):
         walking_takes.of_order(spherical, CrowdOrder(count=2, take="index"))
     assert walking_takes.of_order(spherical, CrowdOrder(count=2)) is None
-
-
-def test_a_model_without_detail_says_so(walk_path):
-    own = Synthesizer("stroll", session.load(walk_path))
-    bare = replace(own.session.card, making=replace(own.session.card.making, detail=b""))
-    plain = Synthesizer("stroll", replace(own.session, card=bare))
-    facts, _ = built(plain, gait.fit_gait(plain.session), detail=True)
-    assert facts["warnings"] == [NO_DETAIL] and "take" not in facts
 
 
 def test_variances_of_deviations_are_those_of_kriging(model, twins):

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield.common.errors import InvalidField
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
 from posefield.inference import session
 from posefield.inference.session import Session
-from posefield.model_file.model_card import Event
 from posefield.motion import skeleton
 from posefield.motion.measures import Measure
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
@@ -78,14 +76,6 @@ def test_a_measured_control_is_met_unless_asked_otherwise(reach):
     assert [met.what for met in held.trust.targets] == ["target_height"]
 
 
-def test_what_is_measured_is_what_the_clip_shows(reach):
-    answer = clips.synthesize_clip(reach, ClipQuestion(controls=middle(reach), fps=240.0, **FREE))
-    shown = joint(reach, answer, "RightHand")[-1, 1]
-    # The last frame of 240 a second is up to 4 ms before the end.
-    assert answer.trust.measured["target_height"] == pytest.approx(shown, abs=5e-3)
-    assert abs(joint(reach, answer, "LeftHand")[-1, 1] - shown) > 5e-2
-
-
 def test_poses_and_clips_of_a_held_motion_agree(reach):
     controls = middle(reach)
     hold = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=0.5),)}
@@ -114,48 +104,6 @@ def test_every_level_of_detail_meets_its_targets(reach, level):
     )
     assert np.linalg.norm(held.root_position[0] - root - [0.003, -0.003, 0.002]) < 1e-4
     assert held.trust.level == level
-
-
-def test_a_time_after_the_end_is_refused(reach):
-    late = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=5.0),)}
-    with pytest.raises(InvalidField, match="expected 0 to") as fault:
-        clips.synthesize_clip(reach, ClipQuestion(controls=middle(reach), **late))
-    assert fault.value.field == "targets/0/time"
-    endless = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=1e300),)}
-    with pytest.raises(InvalidField, match="expected 0 to"):
-        clips.synthesize_clip(reach, ClipQuestion(controls=middle(reach), **endless))
-
-
-@pytest.mark.parametrize("moment", ["start", "end"])
-def test_a_time_that_is_another_targets_moment_is_refused(reach, moment):
-    controls = middle(reach)
-    duration = clips.synthesize_clip(reach, ClipQuestion(controls=controls, **FREE)).trust.duration
-    time = duration if moment == "end" else 0.0
-    twins = Target("LeftHand", (0.3, 1.0, 0.3), moment), Target("LeftHand", (0.3, 1.1, 0.3), time)
-    with pytest.raises(InvalidField, match="has a target already") as fault:
-        clips.synthesize_clip(reach, ClipQuestion(controls=controls, exact="none", targets=twins))
-    assert fault.value.field == "targets/1"
-    apart = twins[0], Target("LeftHand", (0.3, 1.1, 0.3), 0.5 * duration)
-    both = clips.synthesize_clip(
-        reach, ClipQuestion(controls=controls, exact="none", targets=apart)
-    )
-    assert len(both.trust.targets) == 2
-
-
-def test_a_target_at_the_time_of_a_control_is_the_nearer_word(reach):
-    controls = middle(reach)
-    free = clips.synthesize_clip(reach, ClipQuestion(controls=controls, fps=200.0, **FREE))
-    place = np.add(joint(reach, free, "RightHand")[-1], [0.0, 0.01, 0.0])
-    target = Target("RightHand", tuple(place), free.trust.duration)
-    (met,) = clips.synthesize_clip(
-        reach, ClipQuestion(controls=controls, targets=(target,))
-    ).trust.targets
-    assert met.reached and met.what.startswith("RightHand at")
-    earlier = Target("RightHand", tuple(place), time=0.5)
-    both = clips.synthesize_clip(
-        reach, ClipQuestion(controls=controls, targets=(earlier,))
-    ).trust.targets
-    assert [each.what for each in both] == ["target_height", "RightHand at 0.5 s"]
 
 
 def test_what_is_met_already_does_not_hinder_what_is_out_of_reach(reach):
@@ -206,18 +154,6 @@ def test_a_held_cycle_closes(walk):
     assert np.abs(free.positions() - loop.positions()).max() > 1e-3
 
 
-def test_what_is_held_to_nothing_is_what_the_graph_says(reach, labelled_path):
-    controls = middle(reach)
-    plain = Synthesizer("reach", session.load(labelled_path))
-    graph, own = (
-        clips.synthesize_clip(model, ClipQuestion(controls=controls, **FREE)).clip
-        for model in (plain, reach)
-    )
-    assert np.array_equal(graph.rotations, own.rotations)
-    held = clips.synthesize_clip(reach, ClipQuestion(controls=controls)).clip
-    assert not np.array_equal(graph.rotations, held.rotations)
-
-
 def test_the_same_question_gives_the_same_numbers(reach, labelled_path):
     hold = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), at="event"),)}
     names = session.load(labelled_path).card.skeleton.names
@@ -243,15 +179,3 @@ def test_an_extreme_is_met_where_it_is(reach):
     )
     assert joint(reach, held, "LeftHand")[:, 1].max() == pytest.approx(top[1] + 0.03, abs=2e-3)
     assert held.trust.targets[0].reached
-
-
-def test_the_event_needs_no_landmark(reach):
-    card = replace(reach.session.card, event=Event(0, 0.5))
-    model = Synthesizer("reach", replace(reach.session, card=card))
-    hold = {"exact": "none", "targets": (Target("LeftHand", (0.3, 1.1, 0.2), at="event"),)}
-    assert (
-        clips.synthesize_clip(model, ClipQuestion(controls=middle(model), **hold))
-        .trust.targets[0]
-        .what
-        == "LeftHand at event"
-    )

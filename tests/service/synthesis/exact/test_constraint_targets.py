@@ -43,11 +43,6 @@ def test_auto_holds_to_what_is_measured_on_the_motion(card):
     assert not found(card, exact="none")
 
 
-def test_auto_does_not_hold_to_what_nobody_gave(card):
-    inferred = question(card, inferred=("target_height",))
-    assert not goals.from_question(card, inferred, MotionQuestion(controls={}))
-
-
 @pytest.mark.parametrize(
     ("exact", "said"),
     [
@@ -60,12 +55,6 @@ def test_a_control_that_cannot_be_exact_is_named(card, exact, said):
     with pytest.raises(InvalidField, match=said) as fault:
         found(card, exact=exact)
     assert fault.value.field == "exact"
-
-
-def test_a_control_that_was_not_given_cannot_be_exact(card):
-    inferred = question(card, inferred=("target_height",))
-    with pytest.raises(InvalidField, match="was not given"):
-        goals.from_question(card, inferred, MotionQuestion(controls={}, exact=("target_height",)))
 
 
 @pytest.mark.parametrize(
@@ -132,14 +121,3 @@ def test_the_event_is_the_cards_own(card):
     with pytest.raises(InvalidField, match="names none") as fault:
         found(replace(card, event=None), asked)
     assert fault.value.field == "targets/0/at"
-
-
-def test_a_target_at_a_time_leaves_a_landmarks_control_alone(card):
-    hand = card.skeleton.names.index("RightHand")
-    marked = Measure("height", (hand,), "landmark", 0.6)
-    controls = tuple(
-        replace(c, measure=marked) if c.name == "target_height" else c for c in card.controls
-    )
-    own = replace(card, controls=controls, event=Event(hand, 0.6))
-    assert len(found(own, Target("RightHand", PLACE, time=0.05)).controls) == 1
-    assert len(found(own, Target("RightHand", PLACE, at="event")).controls) == 0

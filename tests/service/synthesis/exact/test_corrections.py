@@ -122,18 +122,6 @@ def test_contradicting_aims_share_the_miss(reaching, apart):
     assert (roughness(reaching, jerked) > 2.5 * before) == (apart > 0.0)
 
 
-def test_the_order_of_aims_says_nothing(reaching):
-    aims = [
-        reaching.place("RightHand", 20.0, (0.01, 0.0, 0.0)),
-        reaching.place("LeftHand", 30.0, (0.0, 0.5, 0.0)),
-    ]
-    one = reaching.solve(reaching.held, aims)
-    other = reaching.solve(reaching.held, aims[::-1])
-    assert np.abs(one.numbers - other.numbers).max() < 1e-8
-    assert [met.what for met in one.results] == ["RightHand", "LeftHand"]
-    assert [met.miss for met in one.results] == pytest.approx([m.miss for m in other.results[::-1]])
-
-
 def test_only_the_axes_that_are_asked_for_are_held(reaching):
     joint = reaching.joint("RightHand")
     now, _ = reaching.held.scene.position_and_gradient(reaching.held.numbers, joint, 20.0)

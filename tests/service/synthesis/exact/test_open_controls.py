@@ -66,13 +66,6 @@ def test_a_control_that_the_target_is_about_is_read_off_it(reach):
     assert other.controls["target_height"] != place[1]
 
 
-def test_what_is_given_stays(reach):
-    truth, place = captured(reach, 12)
-    found = asked(reach, place, hip_height=truth["hip_height"])
-    assert found.controls["hip_height"] == truth["hip_height"]
-    assert "hip_height" not in found.inferred and len(found.inferred) == 3
-
-
 def test_the_chosen_controls_give_the_same_clip(reach):
     _, place = captured(reach, 30)
     hold = {"targets": (Target("RightHand", tuple(place), at="end"),)}

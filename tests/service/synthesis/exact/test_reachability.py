@@ -84,12 +84,3 @@ def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
     assert np.ptp(shares[[0, 2]]) < 1e-9 and np.ptp(shares[3:]) < 1e-9
     assert np.all((0.0 <= shares) & (shares <= 1.0))
     assert shares[5] < 0.5
-
-
-def test_the_worth_of_values_does_not_hang_on_their_units():
-    """Metres and degrees: what is missed counts in its own scatter."""
-    mixed = judged(np.array([0.1, 5.0]), np.diag([0.01, 25.0]), np.eye(2))
-    (counted,) = mixed.weights * np.square(mixed.differences)
-    assert counted[0] == pytest.approx(counted[1])
-    alike = judged(mixed.differences[0], mixed.covariance[0], np.ones((2, 1)))
-    assert alike.weights[0, 0] == alike.weights[0, 1]

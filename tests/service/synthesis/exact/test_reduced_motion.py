@@ -85,16 +85,3 @@ def test_positions_are_those_of_the_poses(name, request):
         # Negative control: a hundredth of a frame later they are elsewhere.
         later = scene.positions(numbers, joint, frames + np.array([0.01, 0.01, -0.01]))
         assert np.abs(later - positions[0, :, joint]).max() > 1e-6
-
-
-def test_places_among_motions_are_those_of_each(walking):
-    """With the travel and the body of the motion that they are compared with."""
-    scene, numbers, spread = walking.held.scene, walking.held.numbers, walking.bench.spread
-    joint, size = walking.joint("LeftFoot"), spread.captured.shape[1]
-    found = scene.evaluate_motions(numbers, spread.captured, joint, 11.5)
-    for motion, place in zip(spread.captured, found, strict=True):
-        own = np.concatenate([motion, numbers[size:]])
-        assert np.allclose(
-            place, scene.position_and_gradient(own, joint, 11.5)[0], rtol=0, atol=1e-12
-        )
-    assert np.ptp(found, axis=0).max() > 1e-3

@@ -1,7 +1,5 @@
 """Tests of the residual covariance: from the model file, equal to that of training."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,6 @@ from posefield.constraints import constrained_motion
 from posefield.inference import residual_covariance, session
 from posefield.kriging import leave_one_out
 from posefield.model_file import subgraph
-from posefield_train import train
-from posefield_train.graph import onnx_export
 
 
 def strays(trained) -> np.ndarray:
@@ -61,30 +57,6 @@ def test_residuals_have_the_covariance_of_training(labelled, labelled_exported):
     # Negative control: residuals of clips in another order have another.
     mixed = (own.captured - own.predicted[::-1]) / own.sigmas[:, None]
     assert np.abs(mixed.T @ mixed - expected).max() > 0.1 * np.abs(expected).max()
-
-
-def test_clips_at_the_same_controls_are_not_confused(labelled_recipe, examples):
-    """Two that differ in nothing but their motion lie in the file in one order or the other."""
-    twice = [*examples[:-1], replace(examples[-1], controls=examples[-2].controls)]
-    twice[-1] = replace(twice[-1], row=replace(twice[-1].row, performer=twice[-2].row.performer))
-    trained = train.train(labelled_recipe, twice, lambda _: None)
-    found = read(onnx_export.export_finest(labelled_recipe, trained))
-    assert gap(found, trained) < 1e-3
-
-
-@pytest.mark.parametrize("level", [1, 2, 3])
-def test_a_coarser_level_strays_by_what_it_keeps(reaching, level):
-    """Its residuals are those of the finest, in the leading parts that it has."""
-    whole = reaching.bench
-    own = constrained_motion.build_corrector(reaching.opened, level)
-    t, d, _ = own.reduced.core.shape
-    r2, r1, _ = whole.reduced.core.shape
-    kept = whole.spread.captured.reshape(-1, r2, r1)[:, :t, :d]
-    gaps = own.spread.captured.reshape(-1, t, d) - kept
-    cut = np.linalg.norm(gaps) / np.linalg.norm(kept)
-    # What is missing is what the coarser rank of samples leaves out.
-    assert cut < 0.3
-    assert own.spread.sigmas == pytest.approx(whole.spread.sigmas)
 
 
 def test_the_metric_is_a_covariance(walking, rng):

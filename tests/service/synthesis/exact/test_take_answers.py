@@ -1,16 +1,13 @@
 """Tests of takes: conditional simulations of a motion, as clips and as poses."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.constraints.targets import NO_CONSTRAINTS
 from posefield.inference import session
-from posefield.inference.takes import EVENTFUL_TIMES, TakeSampler, TakeSettings
+from posefield.inference.takes import TakeSampler
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
@@ -143,51 +140,6 @@ def test_a_target_within_reach_of_the_mean_is_within_reach_of_every_take(reach):
     assert not reached(farthest + 0.05)
     assert all(reached(farthest, take=seed, variety=1.0) for seed in range(1, 9))
     assert not any(reached(farthest + 0.05, take=seed, variety=1.0) for seed in range(1, 9))
-
-
-def test_a_reach_varies_in_its_first_time_functions_alone(reach):
-    question = reach.question(ClipQuestion(controls=middle(reach)))
-    begun = reach.solver.solve(question, NO_CONSTRAINTS)
-    settings = TakeSettings(SEED, 1.0, detail=False)
-    taken = reach.solver.solve(question, replace(NO_CONSTRAINTS, take=settings))
-    change = taken.scene.motion(taken.numbers) - begun.scene.motion(begun.numbers)
-    assert np.abs(change[:EVENTFUL_TIMES]).max() > 1e-3
-    assert np.abs(change[EVENTFUL_TIMES:]).max() == 0.0
-
-
-def test_a_coarse_level_varies_less_but_alike(walk):
-    asked = {"variety": 1.0, "end": 0.5}
-
-    def change(level, seed):
-        mean = clip(walk, level=level, **asked)[0]
-        return (clip(walk, level=level, take=seed, **asked)[0] - mean).ravel()
-
-    def cosine(a, b):
-        return float(a @ b / np.sqrt((a @ a) * (b @ b)))
-
-    fine, coarse = ([change(level, seed) for seed in range(1, 13)] for level in (0, 1))
-    same = [cosine(a, b) for a, b in zip(fine, coarse, strict=True)]
-    other = [cosine(a, b) for a, b in zip(fine, coarse[1:], strict=False)]
-    assert np.mean(same) > 0.6 and abs(np.mean(other)) < 0.4
-
-
-def test_other_processes_answer_with_the_same_bytes(walk, walk_path):
-    mean = middle(walk)
-    question = f"PoseQuestion(controls={mean!r}, times=[0.3], take={SEED}, detail=True)"
-    drawn = (
-        "from pathlib import Path\n"
-        "from posefield.inference import session\n"
-        "from posefield.question.motion_question import PoseQuestion\n"
-        "from posefield.synthesis import poses\n"
-        "from posefield.synthesis.synthesizer import Synthesizer\n"
-        f"model = Synthesizer('walk', session.load(Path({str(walk_path)!r})))\n"
-        f"print(poses.synthesize_poses(model, {question}).rotations.tobytes().hex())"
-    )
-    said = subprocess.run([sys.executable, "-c", drawn], capture_output=True, check=True, text=True)
-    here = poses.synthesize_poses(
-        walk, PoseQuestion(controls=mean, times=[0.3], take=SEED, detail=True)
-    )
-    assert said.stdout.strip() == here.rotations.tobytes().hex()
 
 
 @pytest.mark.parametrize(
