@@ -22,9 +22,7 @@ MAIN = "from posefield.cli import main; main()"
 # As where the extra is not installed.
 WITHOUT = f"import sys; sys.modules['distributed'] = None; {MAIN}"
 # Workers lack the version that is here.
-OTHER = (
-    f"from posefield.common import dask_cluster as d; d.package_version = lambda name: '0'; {MAIN}"
-)
+OTHER = f"from posefield.common import dask_cluster as d; d.version = lambda name: '0'; {MAIN}"
 
 
 @pytest.fixture(scope="module")
