@@ -66,35 +66,16 @@ def amc(old, new):
     [
         (asf("angle deg", "angle rad"), r"asf:7: found 'angle rad', expected angle deg, once"),
         (asf("RX RY RZ", "RZ RY RX"), r"asf:11: .*expected order TX TY TZ RX RY RZ"),
-        (asf("axis XYZ", "axis ZYX"), r"asf:12: .*expected axis XYZ"),
-        (asf("position 0 0 0", "position 0 1 0"), r"asf:13: .*expected position 0 0 0"),
-        (asf("90 XYZ", "90 ZYX"), r"asf:21: .*in the order XYZ"),
         (asf("dof rx rz", "dof rz rx"), r"asf:22: .*some of rx, ry and rz, in this order"),
-        (asf("dof rx rz", "dof rx l"), r"asf:22: found 'dof rx l'"),
-        (asf("dof rx rz", "dof tx"), r"asf:22: found 'dof tx'"),
         (asf("direction 1 0 0", "direction 1 0"), r"asf:19: .*expected direction and 3 words"),
-        (asf("length 2", "length nan"), r"asf:20: .*expected length and a number"),
         (asf("length 2", "length 2e99"), r"asf:20: .*numbers of at most 1e\+09"),
         (asf("name upper", "name lower"), r"asf:32: found bone 'lower' twice"),
-        (asf("    name upper\n", ""), r"asf:16: found a bone without name, expected one"),
         (asf("upper lower", ""), r"asf:37: found no way from the root to lower, expected one"),
-        (asf("upper lower", "upper lower lower"), r"asf:36: found child 'lower', expected a bone"),
-        (asf("upper lower", "other lower"), r"asf:36: found 'other lower', expected each bone"),
-        (asf("root upper", "root upper upper"), r"asf:35: found child 'upper'"),
-        (asf(":units", ":unit"), r"asf:4: found ':unit', expected each of the sections"),
         (asf(ARM_ASF[ARM_ASF.index(":hier") :], ""), r"asf: found no entry of section :hierarchy"),
-        (asf("  id 2", "  colour 2"), r"asf:27: .*expected begin, an entry of a bone, or end"),
-        (asf(":version", "version"), r"asf:2: .*expected a section, such as :version"),
-        (amc(":DEGREES\n", ""), r"amc: found the header \[':fully-specified'\], expected"),
         (amc(":DEGREES", ":RADIANS"), r"amc:3: found ':RADIANS', expected"),
         (amc("\n2\n", "\n3\n"), r"amc:7: found '3', expected frame 2"),
-        (amc("upper 90 0\n", ""), r"amc:4: found no values of upper, expected them in each frame"),
         (amc("upper 90 0", "upper 90"), r"amc:6: found 'upper 90', expected upper and 2 numbers"),
-        (amc("upper 90 0", "lower 90 0"), r"amc:6: .*each bone of the skeleton that moves"),
-        (amc("upper 90 0", "upper 90 0\nupper 90 0"), r"amc:7: .*the number of the next frame"),
-        (amc("root 1 2 3 0 0 0", "upper 90 0"), r"amc:6: .*once a frame"),
         (amc("\n1\n", "\n" + "#" * 10_000 + "\n1\n"), r"amc:4: found more bytes than allowed"),
-        (amc("upper 90 0", "upper 1e400 0"), r"amc:6: .*numbers of at most"),
         (amc(ARM_AMC[ARM_AMC.index("\n1\n") :], "\n"), r"amc: found no frame, expected at least"),
     ],
 )
@@ -116,10 +97,7 @@ def reaches(real_data):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        *("bd_depositFloorR_001", "bk_grabHighR_008", "dg_grabHighR_013"),
-        *("mm_depositFloorR_022", "tr_grabHighR_029"),
-    ],
+    ["bd_depositFloorR_001", "tr_grabHighR_029"],
 )
 def test_clips_are_those_of_the_given_bvh_files(reaches, name):
     skeleton = acclaim.read_asf(reaches(f"asf_amc/HDM_{name[:2]}.asf"))

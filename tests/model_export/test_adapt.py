@@ -17,12 +17,10 @@ from posefield_train.adapt import (
     model_reconstruction,
     tensor_extension,
 )
-from posefield_train.align import phase_alignment
 from posefield_train.evaluate import compared_motion, motion_errors, predictions
 from posefield_train.evaluate.predictions import Queries
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
-from posefield_train.kriging.kriging_bank import ConstantModel
 from posefield_train.source import canonical, ingest
 from posefield_train.tensor import hosvd
 
@@ -91,12 +89,6 @@ def test_a_newcomer_is_met_by_name_and_nobody_else_is(recipe, trained, known, ad
     assert misses(recipe, trained, others.model, "cy") > 2.0 * own
 
 
-def test_more_clips_are_nearer(recipe, trained, known, adapted):
-    one = adaptation.adapt(known, examples(trained, "cy", SHOWN[1:2]), "cy")
-    three = misses(recipe, trained, adapted.model, "cy")
-    assert three < misses(recipe, trained, one.model, "cy")
-
-
 def test_the_newcomer_has_bones_of_their_own(trained, adapted):
     labels = np.eye(4)[[adapted.model.bank.labels["performer"].index(who) for who in ("cy", "a")]]
     found = adapted.model.evaluate(np.array([[6.0]] * 2), np.zeros((2, 1)), labels).bone_offsets
@@ -155,17 +147,6 @@ def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(kno
     assert lost(extended.tensor.numbers(fewer)) > lost(numbers)
 
 
-def test_a_model_that_was_cut_nowhere_takes_up_no_rounding_errors(known, adapted):
-    whole = replace(known, truncation=0.0)
-    moved, parents = adapted.new_clips, known.skeleton.parents
-    found = tensor_extension.extend(whole.model, parents, known.joint_weights, moved.numbers, 0.0)
-    gaps = (moved.numbers - found.tensor.mean) @ found.tensor.whiten.T
-    said = found.full.truncated(found.ranks).restored()[:, :, -len(SHOWN) :]
-    assert np.sqrt(np.mean(np.sum((gaps - said.transpose(2, 1, 0)) ** 2, axis=-1))) < 1e-3
-    freedoms = np.count_nonzero(np.ptp(moved.numbers, axis=(0, 1)) > 1e-9)
-    assert adapted.extended.ranks[0] < found.ranks[0] <= freedoms
-
-
 def test_no_sign_hangs_on_the_machine(known, adapted, monkeypatch):
     def extended():
         numbers = adapted.new_clips.numbers
@@ -215,34 +196,6 @@ def test_a_range_that_grows_moves_no_field(trained, known):
     assert np.abs(after(bank.pose.hyper) - before).max() > 1e-3
 
 
-def test_what_the_controls_do_not_explain_is_the_mean_of_all(trained, known):
-    bank = known.model.bank
-    others = bank.others | {"duration": ConstantModel(np.array([0.5]))}
-    flat = replace(bank, others=others)
-    laid = extended_models.extend_samples(flat, known.groups, examples(trained, "cy", SHOWN), "cy")
-    field = extended_models.solve_extended(laid, flat, "duration", np.array([[1.0], [1.5], [2.0]]))
-    assert field.mean == pytest.approx((newcomers.CLIPS * 0.5 + 4.5) / (newcomers.CLIPS + 3))
-
-
-@pytest.mark.parametrize("size", [1.0, 1.2])
-def test_bones_that_were_all_alike_are_told_apart_by_name(trained, known, size):
-    mean = trained.model.proportions.mean
-    bank = replace(known.model.bank, others=known.model.bank.others | {"offsets": flat(trained)})
-    laid = extended_models.extend_samples(bank, known.groups, examples(trained, "cy", SHOWN), "cy")
-    own = np.repeat((size * mean)[None], len(SHOWN), axis=0)
-    field, longer = extended_models.solve_bones(laid, bank, trained.model.proportions, own)
-    assert isinstance(field, ConstantModel) == (size == 1.0)
-    points = np.array([[-0.5, 0, 1, 0, 0], [-0.5, 0, 0, 1, 0]], dtype=float)
-    found = longer.numpy(field.predict(points))
-    assert np.abs(found[1] - own[0]).max() < 1e-3
-    assert np.abs(found[0] - mean).max() < 1e-3
-
-
-def flat(trained):
-    """A field of bones that are the mean everywhere."""
-    return ConstantModel(np.zeros(len(trained.model.proportions.directions)))
-
-
 def test_sigma_says_that_the_newcomer_is_known(adapted):
     model, who = adapted.model, adapted.model.bank.labels["performer"].index("cy")
     point, time = np.array([[7.0]]), np.zeros((1, 1))
@@ -261,7 +214,7 @@ def test_a_clip_of_another_action_is_refused_with_the_numbers(trained, known):
         canonical_clips.refuse_outliers(known, canonical_clips.to_canonical(known, strange))
 
 
-@pytest.mark.parametrize("size", [0.18, 0.6, 1.6, 5.6])
+@pytest.mark.parametrize("size", [0.6, 1.6])
 def test_a_clip_in_another_unit_is_refused_by_its_bones(trained, known, size):
     good = canonical_clips.to_canonical(known, examples(trained, "cy", SHOWN))
     canonical_clips.refuse_outliers(known, good)
@@ -326,17 +279,3 @@ def test_a_newcomers_cycle_closes_and_gets_as_far_as_it_did(walkers):
         assert np.abs(ends[0] - ends[1]).max() < 1e-9
         middle = model.evaluate(example.controls[None], np.array([[seconds / 2]]), who)
         assert np.abs(middle.rotations[0, 0, 1:] - ends[0]).max() > 0.1
-
-
-def test_a_cycle_that_was_cut_elsewhere_is_begun_with_the_family(walkers):
-    recipe, trained, shown = walkers
-    known = canonical_clips.adaptable(recipe, trained)
-    late = [phase_alignment.shift_start(example, 0.3) for example in shown]
-    assert canonical_clips.align_phase(replace(known, in_phase=False), late) == tuple(late)
-    found = canonical_clips.align_phase(replace(known, in_phase=True), late)
-    cut, begun, right = (
-        canonical_clips.to_canonical(known, clips) for clips in (late, found, shown)
-    )
-    assert begun.distances.max() < 1.5 * right.distances.max()
-    assert cut.distances.min() > 2.0 * begun.distances.max()
-    assert [round(example.shift, 1) for example in begun.examples] == [-0.3] * 3

@@ -72,9 +72,7 @@ def test_one_style_of_all_clips_may_be_an_option(posefield, styled_path, table, 
     ("option", "said"),
     [
         ("stile=plain", "label: 'stile' (did you mean 'style'?), expected one of style"),
-        ("style=plane", "label: style=plane (did you mean 'plain'?), expected one of marching,"),
         ("style", "label: 'style', expected SET=NAME"),
-        ("performer=ann", "label: 'performer', expected one of style"),
     ],
 )
 def test_labels_that_the_model_lacks_are_refused(

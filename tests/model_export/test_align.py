@@ -16,7 +16,6 @@ from posefield_train.align.warp import FIT_TIMES, WarpBasis
 from posefield_train.kriging import kriging_tuning
 from posefield_train.kriging.sample_points import SamplePoints
 from posefield_train.kriging.tuning_loss import TuningProblem
-from posefield_train.source import canonical
 from posefield_train.source.clip_table import ClipRow
 from posefield_train.source.ingest import Example
 
@@ -145,22 +144,6 @@ def test_mean_warp_is_the_identity(found, logs):
     assert np.max(np.abs(mean_inverse(logs) - FIT_TIMES)) > 0.02
 
 
-def test_where_nothing_moves_landmarks_say_what_time_it_is(rng):
-    marks = rng.uniform(0.35, 0.65, CLIPS)
-    still = [example(1.0, np.full(80, 0.9), (mark,)) for mark in marks]
-    unmarked = [replace(e, landmarks=()) for e in still]
-
-    def spread(family):
-        logs = aligned(family).logs
-        return np.ptp(
-            [BASIS.evaluate(o, np.array([m]))[0] for o, m in zip(logs, marks, strict=True)]
-        )
-
-    # Six increments bend for a landmark to within two frames of 100.
-    assert spread(still) < 0.02
-    assert spread(unmarked) > 0.2
-
-
 def acceleration(positions):
     return np.sqrt(np.mean(np.square(np.diff(positions, n=2, axis=1))))
 
@@ -183,84 +166,12 @@ def test_alignment_does_not_multiply_acceleration(family, found):
     assert acceleration(np.stack(by_path)) > 1.2 * acceleration(truth)
 
 
-def test_aligned_clips_differ_by_their_controls_and_no_longer_by_their_timing(family):
-    found = aligned(family)
-    offsets = np.tile(JOINTS.offsets, (CLIPS, 1, 1))
-    uniform = np.stack(
-        [
-            clip.assemble(
-                JOINTS, *time_alignment.resample(e.clip, CANONICAL), JOINTS.offsets, 1.0
-            ).positions()
-            for e in family
-        ]
-    )
-
-    def scatter(joints):
-        """Root-mean-square distance of hands from the line through them by size, m."""
-        hands = joints[:, :, 3] - joints[:, :, 0]
-        sizes = np.stack([np.ones(CLIPS), np.linspace(-1.0, 1.0, CLIPS)], axis=1)
-        flat = hands.reshape(CLIPS, -1)
-        left = flat - sizes @ np.linalg.lstsq(sizes, flat, rcond=None)[0]
-        return np.sqrt(np.mean(np.sum(left.reshape(hands.shape) ** 2, axis=-1)))
-
-    assert scatter(time_alignment.joint_positions(found, PARENTS, offsets)) < 0.2 * scatter(uniform)
-
-
-def test_rounds_to_the_mean_better_the_one_to_the_medoid(family, logs):
-    none, four = (disagreement(aligned(family, rounds).logs, logs) for rounds in (0, 4))
-    assert four < none
-
-
-def test_durations_are_the_clips_own(family):
-    assert aligned(family).durations.tolist() == [e.clip.duration for e in family]
-
-
 def test_order_of_clips_does_not_matter(family, rng):
     order = rng.permutation(CLIPS)
     first, second = aligned(family), aligned([family[i] for i in order])
     assert np.max(np.abs(second.logs - first.logs[order])) < 1e-6
     assert np.max(np.abs(second.logs - first.logs)) > 1e-2
     assert order[second.reference] == first.reference
-
-
-def turned(family, angle, shift):
-    """Every clip somewhere else, facing elsewhere."""
-    return [
-        replace(e, clip=canonical.place(e.clip, -np.array(shift), np.array(-angle))) for e in family
-    ]
-
-
-def placed(family):
-    """Place clips as ingest does: the first frame over the origin, facing straight ahead."""
-    return [
-        replace(
-            e,
-            clip=canonical.place(
-                e.clip, e.clip.root_path[0] * (1.0 - UP), canonical.heading(e.clip)[0]
-            ),
-        )
-        for e in family
-    ]
-
-
-def test_half_a_turn_of_all_clips_changes_nothing(family):
-    away = turned(family, np.radians(178.0), [3.0, 0.0, -2.0])
-    first, second = aligned(placed(family)), aligned(placed(away))
-    assert np.max(np.abs(second.logs - first.logs)) < 1e-6
-    assert np.max(np.abs(second.root_path - first.root_path)) < 1e-9
-    matrices = quat.to_matrix(second.rotations) - quat.to_matrix(first.rotations)
-    assert np.max(np.abs(matrices)) < 1e-9
-    unplaced = aligned(away)
-    assert np.max(np.abs(unplaced.root_path - first.root_path)) > 1.0
-
-
-def test_resampled_clip_meets_its_frames_and_keeps_within_its_ends(family):
-    own = family[0].clip
-    rotations, path = time_alignment.resample(own, np.linspace(0.0, 1.0, len(own)))
-    assert np.max(np.abs(path - own.root_path)) < 1e-12
-    assert np.max(np.abs(quat.to_matrix(rotations) - quat.to_matrix(own.rotations))) < 1e-12
-    _, outside = time_alignment.resample(own, np.array([-1.0, 2.0]))
-    assert np.array_equal(outside, own.root_path[[0, -1]])
 
 
 def test_weights_of_joints_decide_what_is_aligned(rng):

@@ -73,16 +73,6 @@ Frame Time: 0.0333333
 """
 
 
-def matrix(channel, value):
-    """One channel as a 4x4 matrix."""
-    step = np.eye(4)
-    if channel.lower().endswith("position"):
-        step["XYZ".index(channel[0].upper()), 3] = value
-    else:
-        step[:3, :3] = Rotation.from_euler(channel[0].upper(), value, degrees=True).as_matrix()
-    return step
-
-
 def local(offset, channels, values, add):
     """Local matrix of a joint: its positions replace the OFFSET's components, or follow them."""
     moved, turned = np.array(offset, dtype=float), np.eye(4)
@@ -91,7 +81,8 @@ def local(offset, channels, values, add):
             axis = "XYZ".index(channel[0].upper())
             moved[axis] = value + (moved[axis] if add else 0.0)
         else:
-            turned = turned @ matrix(channel, value)
+            step = Rotation.from_euler(channel[0].upper(), value, degrees=True)
+            turned[:3, :3] = turned[:3, :3] @ step.as_matrix()
     turned[:3, 3] = moved
     return turned
 
@@ -158,28 +149,16 @@ def test_plain_file():
     assert clip.rate == 30.0
 
 
-def test_one_frame():
-    short = PLAIN.replace("Frames: 2", "Frames: 1").rsplit("\n", 2)[0] + "\n"
-    assert_positions(clip_of(short), worlds(JOINTS, ROWS[:1]))
-
-
 def stripped(text):
     """The text without indentation."""
     return "\n".join(line.strip() for line in text.split("\n"))
 
 
 SPELLINGS = {
-    "carriage returns": lambda text: text.replace("\n", "\r\n"),
     "lines of old Macintoshes": lambda text: text.replace("\n", "\r"),
     "no final newline": lambda text: text.rstrip("\n"),
-    "blank lines at the end": lambda text: text + "\n  \n\t\n\r\n",
-    "blank lines around the section": lambda text: text.replace("MOTION\n", "\nMOTION\n\n").replace(
-        "0.0333333\n", "0.0333333\n\n"
-    ),
     "blank lines between frames": lambda text: text.replace("\n-1.5 90", "\n\n-1.5 90"),
-    "tabs": lambda text: stripped(text).replace(" ", "\t").replace("\n", "\t\n"),
     "several blanks": lambda text: stripped(text).replace(" ", " \t ").replace("\n", " \t \n"),
-    "a brace behind the name": lambda text: stripped(text).replace("\n{", " {"),
     "braces without blanks": lambda text: stripped(text).replace("\n{\n", "{"),
     "frames over several lines": lambda text: text.replace(" 10 20 30 -40", " 10 20\n30 -40"),
     "signs, exponents and bare points": lambda text: text.replace(
@@ -195,18 +174,10 @@ def test_spellings_of_the_same_file(spelling):
     assert assert_plain(text).skeleton.names == ("hips", "spine", "head", "arm", "hand")
 
 
-@pytest.mark.parametrize("change", [str.lower, str.upper])
-def test_channel_names_in_any_case(change):
+def test_words_in_any_case():
     text = PLAIN
     for name in [*ZXY.split(), *XYZ_POSITION.split()]:
-        text = text.replace(name, change(name))
-    assert_plain(text)
-    channels = bvh.loads(text.encode(), "case.bvh").joints[0].channels
-    assert channels == tuple(f"{XYZ_POSITION} {ZXY}".split())
-
-
-def test_keywords_in_any_case():
-    text = PLAIN
+        text = text.replace(name, name.upper())
     for word in ("HIERARCHY", "ROOT", "OFFSET", "JOINT", "End Site", "MOTION", "Frame Time"):
         text = text.replace(word, word.lower())
     assert_plain(text)
@@ -224,48 +195,18 @@ def test_japanese_names_in_cp932_even_where_a_byte_is_a_brace():
     assert clip.skeleton.names[0] == name
 
 
-def test_japanese_names_in_utf8_keep_their_wide_space():
-    clip = assert_plain(PLAIN.replace("hips", "左　腕"))
-    assert clip.skeleton.names[0] == "左　腕"
-
-
 def test_names_in_latin1_where_neither_unicode_nor_cp932_decodes():
     clip = assert_plain(PLAIN.replace("hips", "H\xfcfte \xff").encode("latin-1"))
     assert clip.skeleton.names[0] == "Hüfte ÿ"
 
 
-@pytest.mark.parametrize("name", ["Left Upper Arm", "mixamorig:Hips", "a:b c.d-e_f|g", "42"])
-def test_names_with_blanks_colons_and_signs(name):
-    clip = assert_plain(PLAIN.replace("ROOT hips", f"ROOT {name}"))
-    assert clip.skeleton.names[0] == name
-
-
 @pytest.mark.parametrize(
     "name",
-    [
-        "OFFSET_ctrl",
-        "MOTION_head",
-        "MOTION",
-        "Frames: 3",
-        "JOINT",
-        "End Site",
-        "CHANNELS 3",
-        "Frame Time:",
-    ],
+    ["OFFSET_ctrl", "MOTION", "Frames: 3", "End Site"],
 )
 def test_names_that_hold_keywords(name):
     clip = assert_plain(PLAIN.replace("JOINT arm", f"JOINT {name}"))
     assert clip.skeleton.names[3] == name
-
-
-def test_different_euler_order_in_each_joint():
-    joints, text = chain(
-        f"{XYZ_POSITION} Yrotation Xrotation Zrotation",
-        "Xrotation Zrotation Yrotation",
-        "Zrotation Yrotation Xrotation",
-        rows=(rows := [[1, 2, 3, 40, 50, 60, 70, -80, 90, 10, 20, 30]]),
-    )
-    assert_positions(clip_of(text), worlds(joints, rows))
 
 
 def test_every_euler_order():
@@ -285,23 +226,10 @@ def test_six_channels_on_every_joint_replace_the_offset():
     np.testing.assert_array_equal(clip.skeleton.offsets[1], [0, 10, 0])
 
 
-def test_rotation_channels_before_position():
-    joints, text = chain(f"{ZXY} {XYZ_POSITION}", ZXY, "", rows=(rows := [[*range(7, 70, 7)]]))
-    assert_positions(clip_of(text), worlds(joints, rows))
-
-
 def test_rotation_and_position_channels_mixed():
     mixed = "Zrotation Yposition Xrotation Zposition Yrotation Xposition"
     joints, text = chain(mixed, ZXY, "", rows=(rows := [[*range(7, 70, 7)]]))
     assert_positions(clip_of(text), worlds(joints, rows))
-
-
-def test_positions_in_the_order_z_x_y():
-    root = f"Zposition Xposition Yposition {ZXY}"
-    joints, text = chain(root, ZXY, "", rows=(rows := [[3, 1, 2, 10, 20, 30, 40, 50, 60]]))
-    clip = clip_of(text)
-    assert_positions(clip, worlds(joints, rows))
-    np.testing.assert_array_equal(clip.root_path, [[1, 2, 3]])
 
 
 def test_no_one_and_two_rotation_channels():
@@ -313,11 +241,6 @@ def test_no_one_and_two_rotation_channels():
         f"{XYZ_POSITION} Yrotation", "Xrotation", "", rows=(rows := [[1, 2, 3, 30, 40]])
     )
     assert_positions(clip_of(text), worlds(joints, rows))
-
-
-def test_joint_without_a_channels_line():
-    joints, text = chain("Yrotation", "", "", rows=(rows := [[30]]))
-    assert_positions(clip_of(text.replace("CHANNELS 0 \n", "")), worlds(joints, rows))
 
 
 def test_root_without_position_channels_stays_at_its_offset():
@@ -352,14 +275,6 @@ def test_root_offset_is_replaced_or_added_as_asked(root_offset, height):
     assert clip.root_path[0, 1] == height
 
 
-def test_no_end_site():
-    joints, text = chain(f"{XYZ_POSITION} {ZXY}", ZXY, "", rows=(rows := [[*range(9)]]))
-    clip = clip_of(text)
-    assert_positions(clip, worlds(joints, rows))
-    assert clip.skeleton.tip_joints == ()
-    assert clip.skeleton.tip_offsets.shape == (0, 3)
-
-
 def test_several_end_sites_on_one_joint_and_beside_children():
     site = "End Site\n{\nOFFSET 0 15 1\n}\n"
     more = site + "End Site\n{\nOFFSET 7 8 9\n}\n"
@@ -379,13 +294,6 @@ def test_z_up_stands_upright_and_moves_alike():
     np.testing.assert_array_equal(clip.skeleton.tip_offsets, [[0, 1, -15], [-5, 0, 0]])
 
 
-def test_z_up_rest_pose_is_the_identity():
-    text = text_of([("a", -1, (0, 0, 0), ZXY), ("b", 0, (0, 0, 30), "")], [[0, 0, 0]])
-    clip = clip_of(text, up="z")
-    np.testing.assert_array_equal(clip.rotations, [[[1, 0, 0, 0]] * 2])
-    np.testing.assert_array_equal(clip.positions()[0, 1], [0, 30, 0])
-
-
 def test_unit_scales_every_length_and_no_angle():
     clip = clip_of(PLAIN, metres_per_unit=0.01)
     assert_positions(clip, 0.01 * worlds(JOINTS, ROWS))
@@ -394,7 +302,7 @@ def test_unit_scales_every_length_and_no_angle():
     np.testing.assert_array_equal(clip.rotations, clip_of(PLAIN).rotations)
 
 
-@pytest.mark.parametrize("unit", [0.0, -1.0, np.nan, np.inf])
+@pytest.mark.parametrize("unit", [-1.0, np.nan])
 def test_a_unit_that_is_no_length_is_refused(unit):
     with pytest.raises(ValueError, match="expected a positive number"):
         clip_of(PLAIN, metres_per_unit=unit)
@@ -410,18 +318,9 @@ def test_an_unknown_choice_is_refused(choice):
     ("written", "rate"),
     [
         ("0.033333", 30.0),
-        ("0.0333333", 30.0),
-        (".0083333", 120.0),
         ("0.008333", 120.0),
-        ("0.016667", 60.0),
-        ("0.041667", 24.0),
-        ("0.04", 25.0),
         ("0.0416667", 24.0),
-        ("0.0417083", 24000 / 1001),
         ("0.033367", 30000 / 1001),
-        ("0.0166833", 60000 / 1001),
-        ("0.00834167", 120000 / 1001),
-        ("1", 1.0),
         ("2.5", 0.4),
         ("0.0333", 1 / 0.0333),
         ("1e-2", 100.0),

@@ -65,7 +65,6 @@ JOINT_PLACES = "expected OFFSET, CHANNELS, JOINT, End Site or '}' in joint"
 OWN_LINES = "each frame on lines of its own"
 
 HIERARCHY_FAULTS = {
-    "empty file": ("", 1, "found the end of the file, expected HIERARCHY"),
     "another format": ("; FBX 7.3\n", 1, "found ';', expected HIERARCHY"),
     "no root": (line_changed(2, "JOINT hips"), 2, "found 'JOINT', expected ROOT"),
     "root without a name": (
@@ -73,7 +72,6 @@ HIERARCHY_FAULTS = {
         2,
         "found no name, expected a joint's name on this line",
     ),
-    "no opening brace": (line_changed(3, ""), 4, "found 'OFFSET', expected {"),
     "unknown statement": (
         line_changed(9, "SCALE 1"),
         9,
@@ -89,11 +87,6 @@ HIERARCHY_FAULTS = {
         9,
         "found a second OFFSET in joint 'spine', expected one",
     ),
-    "second channels": (
-        line_changed(4, "OFFSET 0 0 0\nCHANNELS 0"),
-        6,
-        "found a second CHANNELS in joint 'hips', expected one",
-    ),
     "channels after a child": (
         line_changed(9, "End Site { OFFSET 0 0 0 }\nCHANNELS 1 Xrotation"),
         10,
@@ -103,11 +96,6 @@ HIERARCHY_FAULTS = {
         line_changed(8, "OFFSET 0 10"),
         9,
         "found 'CHANNELS', expected a number, the Z of an OFFSET of three",
-    ),
-    "offset of four numbers": (
-        line_changed(8, "OFFSET 0 10 0 3"),
-        8,
-        f"found '3', {JOINT_PLACES} 'spine' of line 6",
     ),
     "offset with a decimal comma": (
         line_changed(8, "OFFSET 0 10,5 0"),
@@ -119,8 +107,6 @@ HIERARCHY_FAULTS = {
         8,
         "found '1e999', expected an OFFSET of at most 1e+09",
     ),
-    "end without site": (line_changed(10, "End Effector"), 10, "found 'Effector', expected Site"),
-    "end site without offset": (line_changed(12, ""), 13, "found '}', expected OFFSET"),
     "end site with channels": (
         line_changed(12, "OFFSET 0 5 0\nCHANNELS 1 Xrotation"),
         13,
@@ -142,21 +128,10 @@ HIERARCHY_FAULTS = {
         9,
         "found 3 channel names, expected CHANNELS 2",
     ),
-    "channels without a number": (
-        changed("CHANNELS 3 Z", "CHANNELS Z"),
-        9,
-        "found 'Zrotation', expected the number of CHANNELS",
-    ),
     "duplicate joint name": (
         changed("JOINT spine", "JOINT hips"),
         6,
         "joint name 'hips' stands at line 2 and again at line 6, "
-        "expected every joint to have its own name",
-    ),
-    "duplicate joint name in one line": (
-        line_changed(9, "JOINT a { OFFSET 0 0 0 } JOINT a { OFFSET 0 0 0 }"),
-        9,
-        "joint name 'a' stands at line 9 and again at line 9, "
         "expected every joint to have its own name",
     ),
     "brace missing before motion": (
@@ -179,20 +154,10 @@ HIERARCHY_FAULTS = {
         16,
         "one root expected, found a second at line 16",
     ),
-    "text before motion": (
-        line_changed(15, "}\nSCALE 1"),
-        16,
-        "found 'SCALE', expected a line MOTION after the root's closing brace",
-    ),
     "no motion": (
         VALID[: VALID.index("MOTION")],
         16,
         "found the end of the file, expected a line MOTION after the root's closing brace",
-    ),
-    "motion not alone in its line": (
-        line_changed(16, "MOTION Frames: 3"),
-        16,
-        "found 'MOTION', expected a line MOTION after the root's closing brace",
     ),
     "no channel at all": (
         "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 999999999999\nFrame Time: 1\n",
@@ -204,36 +169,16 @@ HIERARCHY_FAULTS = {
 FRAME_TIME = "expected a positive number of seconds from 1e-06 to 1e+06"
 
 MOTION_FAULTS = {
-    "ends after motion": (
-        VALID[: VALID.index("Frames")],
-        17,
-        "found the end of the file, expected 'Frames: N', N a whole number",
-    ),
     "no frames line": (
         line_changed(17, ""),
         18,
         "found 'Frame Time: 0.0333333', expected 'Frames: N', N a whole number",
-    ),
-    "negative frames": (
-        line_changed(17, "Frames: -3"),
-        17,
-        "found 'Frames: -3', expected 'Frames: N', N a whole number",
     ),
     "zero frames": (line_changed(17, "Frames: 0"), 17, "found 0 frames, expected at least 1"),
     "no frame time": (
         line_changed(18, ""),
         19,
         f"found '{ROW.strip()}', expected 'Frame Time: seconds'",
-    ),
-    "frame time not a number": (
-        line_changed(18, "Frame Time: nan"),
-        18,
-        "found 'Frame Time: nan', expected 'Frame Time: seconds'",
-    ),
-    "zero frame time": (
-        line_changed(18, "Frame Time: 0"),
-        18,
-        f"found frame time 0, {FRAME_TIME}",
     ),
     "frame time whose inverse overflows": (
         line_changed(18, "Frame Time: 1e-320"),
@@ -250,20 +195,10 @@ MOTION_FAULTS = {
         21,
         "found 27 numbers in 3 lines, expected 2 frames x 9 channels = 18, " + OWN_LINES,
     ),
-    "no frame at all": (
-        VALID.replace(ROW, ""),
-        19,
-        "found 0 numbers in 0 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
-    ),
     "cut in a frame": (
         VALID[: -len(" 7 8 9\n")],
         21,
         "found 24 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
-    ),
-    "a number too few in a line": (
-        line_changed(20, "1 2 3 4 5 6 7 8"),
-        20,
-        "found 26 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
     ),
     "one too few made up by one too many": (
         "\n".join([*VALID.split("\n")[:18], "1 2 3 4 5 6 7 8", ROW + "1 2 3 4 5 6 7 8 9 10", ""]),
@@ -284,16 +219,6 @@ MOTION_FAULTS = {
         line_changed(20, "1 2 3 4 5 6 7 8 9_0"),
         20,
         "found '9_0', expected a number",
-    ),
-    "wide digits, which Python's float takes": (
-        line_changed(20, "1 2 3 4 5 6 7 8 ９"),
-        20,
-        "found '９', expected a number",
-    ),
-    "two numbers run together": (
-        line_changed(19, "1 2-3 4 5 6 7 8 9"),
-        19,
-        "found '2-3', expected a number",
     ),
     "text after the data": (
         VALID + "\nNotes by hand\n",
@@ -375,8 +300,8 @@ def test_joints_that_cost_the_file_nothing_are_bounded():
     )
 
 
-@pytest.mark.parametrize("digits", ["1" * 200_000 + "x", "1." + "1" * 200_000 + "x"])
-def test_a_long_word_is_refused_in_linear_time_and_cut_in_the_message(digits):
+def test_a_long_word_is_refused_in_linear_time_and_cut_in_the_message():
+    digits = "1." + "1" * 200_000 + "x"
     error = refused(line_changed(20, digits))
     assert (error.line, len(error.message)) == (20, len("found '', expected a number") + 40)
     assert refused(line_changed(8, f"OFFSET 0 0 {digits}")).line == 8
@@ -388,9 +313,7 @@ def test_a_long_blank_line_is_passed_in_linear_time():
     assert refused(line_changed(17, " " * 1_000_000 + "Frames")).line == 17
 
 
-@pytest.mark.parametrize(
-    ("line", "blank"), [(2, "\n"), (12, "\r\n"), (16, " \n"), (17, "\n"), (18, "\n"), (19, " \n")]
-)
+@pytest.mark.parametrize(("line", "blank"), [(12, "\r\n"), (17, "\n"), (19, " \n")])
 def test_blank_lines_take_no_memory(line, blank):
     lines = VALID.split("\n")
     count = 1_000_000
@@ -464,7 +387,7 @@ def test_far_too_many_numbers_are_not_counted_to_the_end():
     assert file.given < 6_000_000
 
 
-@pytest.mark.parametrize("row", [0, 60_000, 199_999])
+@pytest.mark.parametrize("row", [60_000, 199_999])
 def test_faults_are_found_in_every_block(row):
     line = f"\n{row} 2 3 4 5 6 7 8 9\n"
     whole = "\n" + ALIKE
@@ -484,22 +407,12 @@ def test_faults_are_found_in_every_block(row):
     assert (error.line, error.message) == (19 + 5, f"found 1800000 numbers {lines}, {expected}")
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_binary_garbage_is_refused(seed):
-    content = np.random.default_rng(seed).bytes(5000)
-    assert "expected HIERARCHY" in refused(content).message
-
-
-@pytest.mark.parametrize("content", [b"\0" * 100_000, b"Kaydara FBX Binary  \0\x1a\0", b"\xff\xfe"])
+@pytest.mark.parametrize("content", [b"\0" * 100_000, VALID.encode("utf-16")])
 def test_binary_formats_are_refused_at_the_first_line(content):
     error = refused(content)
     assert error.line == 1
     assert "expected HIERARCHY" in error.message
     assert len(error.message) < 200
-
-
-def test_utf16_is_refused():
-    assert "expected HIERARCHY" in refused(VALID.encode("utf-16")).message
 
 
 @pytest.mark.parametrize("name", ["none.bvh", "."])
