@@ -95,10 +95,7 @@ def reaches(real_data):
     return lambda name: data_folder.find(real_data, f"hdm05_reach/{name}")
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["bd_depositFloorR_001", "tr_grabHighR_029"],
-)
+@pytest.mark.parametrize("name", ["bd_depositFloorR_001", "tr_grabHighR_029"])
 def test_clips_are_those_of_the_given_bvh_files(reaches, name):
     skeleton = acclaim.read_asf(reaches(f"asf_amc/HDM_{name[:2]}.asf"))
     motion = acclaim.read_amc(reaches(f"asf_amc/HDM_{name}_120.amc"), skeleton)

@@ -15,12 +15,7 @@ from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
-from posefield_train.adapt import (
-    adaptation,
-    canonical_clips,
-    model_reconstruction,
-    new_clips,
-)
+from posefield_train.adapt import adaptation, canonical_clips, model_reconstruction, new_clips
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import sample_points

@@ -200,10 +200,7 @@ def test_names_in_latin1_where_neither_unicode_nor_cp932_decodes():
     assert clip.skeleton.names[0] == "Hüfte ÿ"
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["OFFSET_ctrl", "MOTION", "Frames: 3", "End Site"],
-)
+@pytest.mark.parametrize("name", ["OFFSET_ctrl", "MOTION", "Frames: 3", "End Site"])
 def test_names_that_hold_keywords(name):
     clip = assert_plain(PLAIN.replace("JOINT arm", f"JOINT {name}"))
     assert clip.skeleton.names[3] == name

@@ -64,182 +64,128 @@ def test_the_unchanged_file_is_read():
 JOINT_PLACES = "expected OFFSET, CHANNELS, JOINT, End Site or '}' in joint"
 OWN_LINES = "each frame on lines of its own"
 
-HIERARCHY_FAULTS = {
-    "another format": ("; FBX 7.3\n", 1, "found ';', expected HIERARCHY"),
-    "no root": (line_changed(2, "JOINT hips"), 2, "found 'JOINT', expected ROOT"),
-    "root without a name": (
-        line_changed(2, "ROOT"),
-        2,
-        "found no name, expected a joint's name on this line",
-    ),
-    "unknown statement": (
-        line_changed(9, "SCALE 1"),
-        9,
-        f"found 'SCALE', {JOINT_PLACES} 'spine' of line 6",
-    ),
-    "missing offset": (
+HIERARCHY_FAULTS = [
+    ("; FBX 7.3\n", 1, "found ';', expected HIERARCHY"),
+    (line_changed(2, "JOINT hips"), 2, "found 'JOINT', expected ROOT"),
+    (line_changed(2, "ROOT"), 2, "found no name, expected a joint's name on this line"),
+    (line_changed(9, "SCALE 1"), 9, f"found 'SCALE', {JOINT_PLACES} 'spine' of line 6"),
+    (
         line_changed(8, ""),
         14,
         "found the end of joint 'spine' of line 6, expected its OFFSET first",
     ),
-    "second offset": (
-        line_changed(9, "OFFSET 1 2 3"),
-        9,
-        "found a second OFFSET in joint 'spine', expected one",
-    ),
-    "channels after a child": (
+    (line_changed(9, "OFFSET 1 2 3"), 9, "found a second OFFSET in joint 'spine', expected one"),
+    (
         line_changed(9, "End Site { OFFSET 0 0 0 }\nCHANNELS 1 Xrotation"),
         10,
         "found CHANNELS of joint 'spine' after a child, expected it before",
     ),
-    "offset of two numbers": (
+    (
         line_changed(8, "OFFSET 0 10"),
         9,
         "found 'CHANNELS', expected a number, the Z of an OFFSET of three",
     ),
-    "offset with a decimal comma": (
+    (
         line_changed(8, "OFFSET 0 10,5 0"),
         8,
         "found '10,5', expected a number, the Y of an OFFSET of three",
     ),
-    "offset past all floats": (
-        line_changed(8, "OFFSET 1e999 10 0"),
-        8,
-        "found '1e999', expected an OFFSET of at most 1e+09",
-    ),
-    "end site with channels": (
-        line_changed(12, "OFFSET 0 5 0\nCHANNELS 1 Xrotation"),
-        13,
-        "found 'CHANNELS', expected }",
-    ),
-    "unknown channel": (
+    (line_changed(8, "OFFSET 1e999 10 0"), 8, "found '1e999', expected an OFFSET of at most 1e+09"),
+    (line_changed(12, "OFFSET 0 5 0\nCHANNELS 1 Xrotation"), 13, "found 'CHANNELS', expected }"),
+    (
         changed("3 Zrotation Xrotation", "3 Zrotation Wrotation"),
         9,
         "found 'Wrotation', expected a channel, one of "
         "Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation",
     ),
-    "duplicate channel": (
+    (
         changed("3 Zrotation Xrotation", "3 Zrotation zROTATION"),
         9,
         "found channel Zrotation a second time in one joint, expected once",
     ),
-    "more channels than declared": (
-        changed("CHANNELS 3", "CHANNELS 2"),
-        9,
-        "found 3 channel names, expected CHANNELS 2",
-    ),
-    "duplicate joint name": (
+    (changed("CHANNELS 3", "CHANNELS 2"), 9, "found 3 channel names, expected CHANNELS 2"),
+    (
         changed("JOINT spine", "JOINT hips"),
         6,
         "joint name 'hips' stands at line 2 and again at line 6, "
         "expected every joint to have its own name",
     ),
-    "brace missing before motion": (
-        line_changed(15, ""),
-        16,
-        f"found MOTION, {JOINT_PLACES} 'hips' of line 2",
-    ),
-    "brace too many": (
+    (line_changed(15, ""), 16, f"found MOTION, {JOINT_PLACES} 'hips' of line 2"),
+    (
         line_changed(15, "} }"),
         15,
         "found '}', expected a line MOTION after the root's closing brace",
     ),
-    "file cut in the hierarchy": (
+    (
         VALID[: VALID.index("    End Site")],
         10,
         f"found the end of the file, {JOINT_PLACES} 'spine' of line 6",
     ),
-    "second root": (
+    (
         line_changed(15, "}\nROOT prop\n{\nOFFSET 0 0 0\nCHANNELS 0\n}"),
         16,
         "one root expected, found a second at line 16",
     ),
-    "no motion": (
+    (
         VALID[: VALID.index("MOTION")],
         16,
         "found the end of the file, expected a line MOTION after the root's closing brace",
     ),
-    "no channel at all": (
+    (
         "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 999999999999\nFrame Time: 1\n",
         6,
         "found no channel in 1 joints, expected at least one",
     ),
-}
+]
 
 FRAME_TIME = "expected a positive number of seconds from 1e-06 to 1e+06"
 
-MOTION_FAULTS = {
-    "no frames line": (
+MOTION_FAULTS = [
+    (
         line_changed(17, ""),
         18,
         "found 'Frame Time: 0.0333333', expected 'Frames: N', N a whole number",
     ),
-    "zero frames": (line_changed(17, "Frames: 0"), 17, "found 0 frames, expected at least 1"),
-    "no frame time": (
-        line_changed(18, ""),
-        19,
-        f"found '{ROW.strip()}', expected 'Frame Time: seconds'",
-    ),
-    "frame time whose inverse overflows": (
-        line_changed(18, "Frame Time: 1e-320"),
-        18,
-        f"found frame time 1e-320, {FRAME_TIME}",
-    ),
-    "fewer frames than declared": (
+    (line_changed(17, "Frames: 0"), 17, "found 0 frames, expected at least 1"),
+    (line_changed(18, ""), 19, f"found '{ROW.strip()}', expected 'Frame Time: seconds'"),
+    (line_changed(18, "Frame Time: 1e-320"), 18, f"found frame time 1e-320, {FRAME_TIME}"),
+    (
         changed("Frames: 3", "Frames: 4"),
         21,
         "found 27 numbers in 3 lines, expected 4 frames x 9 channels = 36, " + OWN_LINES,
     ),
-    "more frames than declared": (
+    (
         changed("Frames: 3", "Frames: 2"),
         21,
         "found 27 numbers in 3 lines, expected 2 frames x 9 channels = 18, " + OWN_LINES,
     ),
-    "cut in a frame": (
+    (
         VALID[: -len(" 7 8 9\n")],
         21,
         "found 24 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
     ),
-    "one too few made up by one too many": (
+    (
         "\n".join([*VALID.split("\n")[:18], "1 2 3 4 5 6 7 8", ROW + "1 2 3 4 5 6 7 8 9 10", ""]),
         19,
         "found 27 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
     ),
-    "not a number": (
-        line_changed(20, "1 2 3 nan 5 6 7 8 9"),
-        20,
-        "found 'nan', expected a number",
-    ),
-    "past all lengths": (
-        line_changed(20, "1 2 3 4 -1e300 6 7 8 9"),
-        20,
-        "found '-1e300', expected at most 1e+09",
-    ),
-    "underscore, which Python's float takes": (
-        line_changed(20, "1 2 3 4 5 6 7 8 9_0"),
-        20,
-        "found '9_0', expected a number",
-    ),
-    "text after the data": (
-        VALID + "\nNotes by hand\n",
-        23,
-        "found 'Notes' after the last frame, expected nothing",
-    ),
-}
+    (line_changed(20, "1 2 3 nan 5 6 7 8 9"), 20, "found 'nan', expected a number"),
+    (line_changed(20, "1 2 3 4 -1e300 6 7 8 9"), 20, "found '-1e300', expected at most 1e+09"),
+    (line_changed(20, "1 2 3 4 5 6 7 8 9_0"), 20, "found '9_0', expected a number"),
+    (VALID + "\nNotes by hand\n", 23, "found 'Notes' after the last frame, expected nothing"),
+]
 
-FAULTS = HIERARCHY_FAULTS | MOTION_FAULTS
+FAULTS = HIERARCHY_FAULTS + MOTION_FAULTS
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_fault_is_named_with_its_line(fault):
-    content, line, message = FAULTS[fault]
+@pytest.mark.parametrize(("content", "line", "message"), FAULTS)
+def test_fault_is_named_with_its_line(content, line, message):
     error = refused(content)
     assert (error.line, error.message) == (line, message)
 
 
-@pytest.mark.parametrize("fault", list(FAULTS)[::9])
-def test_line_is_the_same_with_carriage_returns(fault):
-    content, line, message = FAULTS[fault]
+@pytest.mark.parametrize(("content", "line", "message"), FAULTS[::9])
+def test_line_is_the_same_with_carriage_returns(content, line, message):
     error = refused(content.replace("\n", "\r\n"))
     assert (error.line, error.message) == (line, message)
 

@@ -11,14 +11,12 @@ from posefield.common.errors import RecipeError
 from posefield.inference import session
 from posefield.inference.graph_ports import CONTACTS
 from posefield.motion import bvh_writer
-from posefield.motion.contacts import contact_detection
-from posefield.motion.contacts.contact_detection import ContactThresholds
 from posefield_train import train
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.adapt.adaptation import adapt
 from posefield_train.adapt.model_reconstruction import reconstruct
 from posefield_train.align import phase_alignment
-from posefield_train.contacts import contact_labels, contact_statistics
+from posefield_train.contacts import contact_labels
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
@@ -68,40 +66,6 @@ def test_four_feet_of_a_quadruped_are_labelled(tmp_path):
         # Three paws stand most of the time, two at least, and each swings.
         assert standing.sum(axis=1).min() >= 2
         assert 0.6 < standing.mean() < 0.95 and not standing.all(axis=0).any()
-
-
-def test_loose_thresholds_give_wrong_labels(strides):
-    """Negative control: swings of a foot that hardly lifts are taken for contacts."""
-    own = walk_recipe()
-    shares = [np.linspace(0.0, 1.0, len(clip.contacts)) for clip in labelled(own, strides)]
-
-    def wrong(clips):
-        parts = []
-        for clip, at in zip(clips, shares, strict=True):
-            for foot, (_, landing) in enumerate(sample_walk.SIDES.values()):
-                sure, stands = stance(at, landing)
-                parts.append(clip.contacts[sure, foot] != stands[sure])
-        return float(np.mean(np.concatenate(parts)))
-
-    loose = ContactThresholds(speed=3.0, grown_speed=5.0, height=0.1, grown_height=0.2)
-    right = labelled(own, strides)
-    detect = contact_detection.detect_contacts
-    wide = []
-    for example, clip in zip(strides, right, strict=True):
-        paths = np.moveaxis(feet_paths(example, clip), 1, 0)
-        found = [detect(path, clip.rate, True, thresholds=loose) for path in paths]
-        wide.append(replace(clip, contacts=np.stack(found, axis=1)))
-    assert wrong(right) < 0.01
-    assert wrong(wide) > 0.1
-
-
-def feet_paths(example, clip):
-    """Paths (F, 2, 3) of the feet at the frames of labels."""
-    places = np.linspace(0.0, len(example.clip) - 1, len(clip.contacts))
-    positions = example.clip.positions()[:, [3, 6]]
-    before = np.minimum(places.astype(int), len(positions) - 2)
-    share = (places - before)[:, None, None]
-    return (1.0 - share) * positions[before] + share * positions[before + 1]
 
 
 def test_a_walk_in_place_has_the_contacts_of_the_walk(models_trained, strides):
@@ -158,7 +122,7 @@ def test_contacts_of_the_table_follow_a_shifted_cycle(rail):
     assert np.mean(clip.contacts[:-1] == shifted.contacts[:-1]) < 0.8
 
 
-@pytest.mark.parametrize("cell", ["10", "10-", "20-10", "10-20-30", "1-5 4-9", "a-b", "-5-6"])
+@pytest.mark.parametrize("cell", ["20-10", "1-5 4-9", "a-b"])
 def test_a_cell_that_is_no_intervals_is_refused(rail, cell):
     folder, own = rail
     table = folder / "strides.csv"
@@ -189,25 +153,6 @@ def test_a_joint_that_contacts_nothing_is_noted_and_left_out(rail):
     assert "contacts nothing" in " ".join(
         onnx_export.export_model(own, trained, []).card.diagnostics["notes"]
     )
-
-
-def test_a_joint_without_a_whole_swing_takes_those_of_the_others():
-    moves = np.zeros((60, 2), bool)
-    moves[:20], moves[40:, 1] = True, True
-    clip = contact_labels.ClipContacts(moves, np.where(moves, 0.1, 0.3), 120.0)
-    one, other = contact_statistics.contact_statistics([clip], (4, 7), cyclic=False)
-    assert other.swing == pytest.approx(20 / 120.0, rel=1e-3)
-    assert (one.swing, one.longest_swing, one.clearance) == (
-        other.swing,
-        other.longest_swing,
-        other.clearance,
-    )
-    assert contact_statistics.without_swings([clip], 0, cyclic=False)
-    assert not contact_statistics.without_swings([clip], 1, cyclic=False)
-    (alone,) = contact_statistics.contact_statistics(
-        [replace(clip, contacts=moves[:, :1], heights=clip.heights[:, :1])], (4,), cyclic=False
-    )
-    assert alone.swing == contact_statistics.USUAL_SWING
 
 
 def newcomers():

@@ -115,18 +115,3 @@ def test_one_take_cannot_be_left_out():
     alone = FamilyClips(own.motions, own.joints, own.performers, ("a",) * len(own.takes), False)
     with pytest.raises(ValueError, match="clips of one take, expected two takes or more"):
         control_proposals.propose_controls(alone)
-
-
-def test_motions_are_compared_at_equal_steps_of_time():
-    own = reaching(0, count=6)
-    slower = []
-    for motion in own.motions:
-        at = np.linspace(0.0, 39.0, 79)
-        before = np.minimum(at.astype(int), 38)
-        share = (at - before)[:, None, None]
-        places = motion.positions[before] * (1 - share) + motion.positions[before + 1] * share
-        slower.append(MeasuredMotion(places, 2.6, motion.travel, motion.parents, motion.offsets))
-    one, other = (control_proposals.motion_coefficients(each) for each in (own.motions, slower))
-    apart = [np.linalg.norm(each[:, None] - each, axis=-1) for each in (one, other)]
-    np.testing.assert_allclose(apart[0], apart[1], atol=0.05)
-    assert apart[0].max() > 0.5

@@ -8,9 +8,7 @@ from families import face_files
 from minimal import plain_recipe, recipe_with, small_clip, write_clips
 from pydantic import ValidationError
 
-from posefield.common.errors import RecipeError, TrainingError
-from posefield_train import train
-from posefield_train.align import phase_alignment
+from posefield.common.errors import RecipeError
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
 
@@ -73,13 +71,6 @@ def test_curves_without_a_skeleton_move_one_joint_that_rests(folder):
         assert np.abs(example.clip.curve_values - values(clip)).max() < WRITTEN
 
 
-def test_the_order_of_the_columns_does_not_count(folder):
-    swapped = face_files.curve_text(NAMES[::-1], values(1)[:, ::-1])
-    (folder / "1.curves.csv").write_text(swapped)
-    found = read(folder)[1].clip
-    assert np.abs(found.curve_values - values(1)).max() < WRITTEN
-
-
 def test_curves_are_cut_with_their_clip(folder):
     (folder / "clips.csv").write_text("file,v,a,b\n0.bvh,0,3,12\n1.bvh,1,0,20\n")
     cut = recipe_with(
@@ -98,13 +89,6 @@ def test_a_cycle_closes_its_curves_within_their_range(folder):
         assert found.min() >= 0.0 and found.max() <= 1.0
 
 
-def test_a_shifted_cycle_shifts_its_curves(folder):
-    cyclic = recipe_with(motion={"cyclic": True}, curves={"suffix": ".curves.csv"})
-    example = ingest.ingest(cyclic, folder)[0][0]
-    own, later = example.clip.curve_values, phase_alignment.shift_start(example, 0.25).clip
-    assert np.array_equal(later.curve_values, np.concatenate([own[5:], own[1:6]]))
-
-
 def test_of_named_curves_the_others_are_left_out(folder):
     found = read(folder, names=["smile"])[0].clip
     assert found.curves.names == ["smile"]
@@ -118,7 +102,7 @@ def test_a_curve_has_its_own_range_and_distance(folder):
     assert (smile.minimum, smile.maximum, smile.distance) == (0.0, 5.0, pytest.approx(0.07))
 
 
-@pytest.mark.parametrize("cell", ["nan", "", "inf", "high"])
+@pytest.mark.parametrize("cell", ["nan", "high"])
 def test_a_cell_that_is_no_number_is_refused(folder, cell):
     edit(folder, f"{values(1)[0, 1]:.4f}", cell)
     said = re.escape(f"1.curves.csv:2: column 'smile': {cell!r}, expected a number")
@@ -130,8 +114,6 @@ def test_a_cell_that_is_no_number_is_refused(folder, cell):
     "old, new, said",
     [
         ("\n7,", "\n8,", "frame 8 after 6, expected 7"),
-        ("\n0,", "\n1,", "frame 1 first, expected 0"),
-        ("\n7,", "\n7.5,", "column 'frame': '7.5', expected a frame from 0"),
         ("frame,", "image,", "no column 'frame' (number of the frame, from 0)"),
         ("jawOpen", "jawOpn", "no curves ['jawOpen'] (did you mean 'jawOpn'?)"),
         ("frame,", "frame,brow,", "not the 4 cells of the heading"),
@@ -170,12 +152,6 @@ def test_keys_of_an_unknown_curve_are_refused(folder):
         read(folder, of={"smil": {"distance_cm": 3.0}})
 
 
-def test_a_file_that_is_not_there_is_refused(folder):
-    (folder / "2.curves.csv").unlink()
-    with pytest.raises(RecipeError, match=r"clips\.csv:4: column 'file'"):
-        read(folder)
-
-
 def test_a_file_without_curves_is_refused(folder):
     (folder / "0.curves.csv").write_text("frame\n0\n1\n")
     with pytest.raises(RecipeError, match="found no column beside 'frame', expected curves"):
@@ -188,22 +164,8 @@ def test_a_file_without_curves_is_refused(folder):
         ({}, "found none, expected one of column, suffix, rate"),
         ({"column": "c", "rate": 30.0}, "found column, rate, expected one of"),
         ({"rate": 30.0, "range": [1.0, 0.0]}, "expected the smaller end first"),
-        ({"rate": 30.0, "names": ["a", "a"]}, "curves named twice"),
-        ({"rate": 30.0, "distance_cm": 0.0}, "greater than 0"),
     ],
 )
 def test_keys_that_contradict_each_other_are_refused(keys, said):
     with pytest.raises(ValidationError, match=re.escape(said)):
         Recipe.model_validate({**plain_recipe(), "curves": keys})
-
-
-def test_curves_that_never_change_are_no_motion(folder):
-    rows = "\n".join(f"{clip}.curves.csv,{clip}" for clip in range(3))
-    (folder / "clips.csv").write_text(f"file,v\n{rows}\n")
-    for clip in range(3):
-        still = face_files.curve_text(NAMES, np.full((FRAMES, 2), 0.25))
-        (folder / f"{clip}.curves.csv").write_text(still)
-    recipe = recipe_with(curves={"rate": 25.0})
-    examples = ingest.ingest(recipe, folder)[0]
-    with pytest.raises(TrainingError, match="all 3 clips have the same motion"):
-        train.train(recipe, examples, lambda _: None)

@@ -65,21 +65,13 @@ def test_what_is_not_there_is_refused_with_every_place_that_was_tried(tmp_path):
     assert tried == [f"{tmp_path / NAME}", f"{archive}/{NAME}", f"{archive}/bvh/walk.bvh"]
 
 
-def test_without_a_zip_only_the_folder_was_tried(tmp_path):
-    with pytest.raises(RecipeError) as caught:
-        data_folder.find(tmp_path, NAME)
-    assert caught.value.message.endswith(f"tried {tmp_path / NAME}")
-
-
 def test_a_folder_is_no_file(filled):
     folder, _ = filled
     with pytest.raises(RecipeError, match="no file"):
         data_folder.find(folder, "takes/bvh")
 
 
-@pytest.mark.parametrize(
-    "name", ["../secret.bvh", "takes/../../secret.bvh", "takes/..", "/etc/hostname", "", "."]
-)
+@pytest.mark.parametrize("name", ["takes/../../secret.bvh", "/etc/hostname", ""])
 def test_paths_that_leave_the_folder_are_refused(tmp_path, name):
     (tmp_path / "data").mkdir()
     (tmp_path / "secret.bvh").write_text("secret")
@@ -162,11 +154,8 @@ def test_the_member_that_the_faults_below_spoil_is_read(tmp_path):
     ("changed", "said"),
     [
         ({"method": 99}, f"found compression method 99, {STORED_OR_DEFLATED}"),
-        ({"method": 12}, f"found compression method 12, {STORED_OR_DEFLATED}"),
         ({"flags": 1}, "found an encrypted member, expected no password"),
-        ({"flags": 0x20}, f"{CANNOT} (compressed patched data (flag bit 5)), expected a whole"),
         ({"crc": 1}, f"{CANNOT} (Bad CRC-32 for file 'takes/bvh/walk.bvh'), expected a whole"),
-        ({"size": len(PLAIN) - 1}, f"{CANNOT} (Bad CRC-32 for file"),
         ({"packed": 5}, f"{CANNOT} ("),
     ],
     ids=str,
@@ -175,14 +164,6 @@ def test_a_member_that_cannot_be_unpacked_is_refused_by_name(tmp_path, changed, 
     with pytest.raises(RecipeError) as refused:
         text(plainly(tmp_path, **changed))
     assert str(refused.value).startswith(f"{tmp_path}/takes.zip/{NAME}: {said}")
-
-
-def test_damaged_data_is_refused_by_name(tmp_path):
-    spoiled = bytearray(deflated(bytes(range(256)) * 8))
-    spoiled[10] ^= 0xFF
-    with pytest.raises(RecipeError) as refused:
-        text(raw(tmp_path, bytes(spoiled), size=2048))
-    assert str(refused.value).startswith(f"{tmp_path}/takes.zip/{NAME}: {CANNOT} (Error -3 while")
 
 
 def bomb(folder, piece, times, entry=NAME):
@@ -219,10 +200,7 @@ def test_a_table_that_unpacks_to_gigabytes_is_refused_before_it_is_held(tmp_path
     ("piece", "said"),
     [
         (b"\0" * 1_000_000, "walk.bvh:1: found '"),
-        (
-            b"\n" * 1_000_000,
-            "walk.bvh:4000001: found 4 MB without a line MOTION, expected",
-        ),
+        (b"\n" * 1_000_000, "walk.bvh:4000001: found 4 MB without a line MOTION, expected"),
     ],
     ids=["zeros", "blank lines"],
 )

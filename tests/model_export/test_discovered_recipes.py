@@ -14,7 +14,6 @@ from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer
 from posefield_train.families import found_families, recipe_folder
 from posefield_train.families.found_families import FamilyRow
-from posefield_train.probe import recipe_draft
 from posefield_train.source import clip_table, ingest, recipe
 
 LICENCE = ("--licence", "CC BY 4.0, by us")
@@ -129,18 +128,6 @@ def table_of(folder, family):
     return (folder / f"family_{family['number']:02d}.csv").read_text()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("-o", "x.csv"), "expected a folder of recipes"),
-        (("-o", "x.csv", "--strides", "--overwrite"), "expected no option of recipes for a table"),
-    ],
-)
-def test_outputs_that_do_not_fit_are_refused(posefield, takes, words, said):
-    code, _, err = posefield("discover", takes, *words)
-    assert code == 2 and said in err
-
-
 def test_performers_are_told_by_bones_and_named_by_files():
     one, other = np.array([0.4, 0.3]), np.array([0.4, 0.3008])
     files = ["day/ann_1.bvh", "day/bob_1.bvh", "day/ann_2.bvh"]
@@ -178,15 +165,3 @@ def test_a_table_beside_the_recipe_counts_if_the_data_folder_has_none(made, take
     lines = (made / "family_01.csv").read_text().splitlines()
     (data / "family_01.csv").write_text("\n".join(lines[:3]) + "\n")
     assert len(clip_table.read(own, data)) == 2 < len(beside)
-
-
-def test_a_rate_is_written_where_it_is_stated(takes):
-    files = sorted(path.name for path in takes.iterdir())
-
-    def source(rate):
-        stated = found_families.FileStatements(None, None, {}, rate)
-        return recipe_draft.source_lines(found_families.find_kinds(takes, files, stated)[0].report)
-
-    assert f"rate = {rigid_takes.RATE}" in source(rigid_takes.RATE)
-    # Files that state their rate need none.
-    assert not any("rate" in line for line in source(None))

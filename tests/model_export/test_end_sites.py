@@ -33,11 +33,7 @@ def tips(clip):
 def test_end_sites_are_named_after_their_joints():
     assert clip_joints.end_site_names(SKELETON) == ["Head_end", "LeftHand_end"]
     forked = Skeleton(
-        ("a", "b", "b_end"),
-        (-1, 0, 1),
-        np.zeros((3, 3)),
-        (0, 1, 0, 2),
-        np.zeros((4, 3)),
+        ("a", "b", "b_end"), (-1, 0, 1), np.zeros((3, 3)), (0, 1, 0, 2), np.zeros((4, 3))
     )
     assert clip_joints.end_site_names(forked) == ["a_end", "", "a_end_2", "b_end_end"]
 
@@ -62,12 +58,10 @@ def test_an_end_joint_is_where_the_end_site_was_and_changes_nothing_else():
     "sections",
     [
         {"motion": {"feet": ["LeftHand_end"]}},
-        {"motion": {"end_sites": ["LeftHand_end"]}},
-        {"motion": {"joint_weights": {"LeftHand_end": 2.0}}},
         {"event": {"joint": "LeftHand_end", "at": "end"}},
         {"roles": {"leftHand": "LeftHand_end"}},
     ],
-    ids=["a foot", "listed", "a weight", "an event", "a role"],
+    ids=["a foot", "an event", "a role"],
 )
 def test_every_key_that_names_joints_takes_end_sites(tmp_path, sections):
     write_clips(tmp_path, [CLIP, small_clip(0.2)])

@@ -9,13 +9,7 @@ from families import face_motion
 from joblib import parallel_config
 
 from posefield.motion.curves import distances
-from posefield_train.evaluate import (
-    compared_motion,
-    motion_errors,
-    predictions,
-    protocol,
-    summary,
-)
+from posefield_train.evaluate import compared_motion, motion_errors, predictions, protocol, summary
 from posefield_train.evaluate.predictions import OURS, Queries
 from posefield_train.evaluate.summary import NOT_APPLICABLE
 from posefield_train.parallel.jobs import ProcessJobs
@@ -90,17 +84,6 @@ def test_curves_that_differ_in_timing_alone_are_near():
     assert unwarped > 0.05
 
 
-def test_means_pool_the_errors_of_curves():
-    true = smooth(SHARES)
-    parts = [
-        motion_errors.compare_motions(resting(true + off), resting(true), ())
-        for off in (0.0, 0.02, 0.06)
-    ]
-    mean = motion_errors.mean(parts)
-    assert mean.curves == pytest.approx(np.mean([part.curves for part in parts], axis=0))
-    assert mean.counted == pytest.approx(np.mean([part.counted for part in parts], axis=0))
-
-
 def test_every_method_predicts_the_curves_within_their_limits(family, alone):
     recipe = expressions.recipe(alone)
     rest = [example for i, example in enumerate(family) if i != HELD]
@@ -137,12 +120,3 @@ def test_measures_of_positions_are_not_applicable_without_a_skeleton(result, alo
     text = "\n".join(summary.trust_text(result))
     assert ("n/a, the clips have no skeleton" in text) == alone
     assert (summary.ALONE in summary.legend([result])) == alone
-
-
-def test_a_family_without_curves_has_no_measure_of_them(result, alone):
-    if alone:
-        return
-    plain = replace(result, curves=())
-    assert summary.columns(plain) == summary.COLUMNS
-    assert "curve" not in summary.table(plain)
-    assert not [key for key in summary.facts(plain)["methods"][OURS] if "curve" in key]

@@ -227,37 +227,6 @@ def test_facts_are_the_measured_errors(results):
     json.dumps(facts, allow_nan=False)
 
 
-def test_sigma_of_each_joint_is_compared_with_that_joint(results):
-    result = results[0][0]
-    ratios = summary.facts(result)["joint_sigma_ratio"]
-    assert tuple(ratios) == result.joints
-    joint = len(result.joints) - 1
-    errors = [error.joints[joint] for error in result.errors[OURS]]
-    expected = np.mean(errors / result.joint_sigma[:, joint] ** 2)
-    assert ratios[result.joints[joint]] == pytest.approx(expected, rel=1e-5)
-    squares = [np.mean(error.joints) for error in result.errors[OURS]]
-    assert squares == pytest.approx([error.mean_squared_error for error in result.errors[OURS]])
-
-
-def test_the_table_has_a_row_for_every_method_with_its_number_of_clips(results):
-    result = results[0][0]
-    partial = tuple(e if i > 2 else None for i, e in enumerate(result.errors["gp"]))
-    shown = replace(result, errors={**result.errors, "gp": partial})
-    lines = summary.table(shown).split("\n\n")[1].splitlines()
-    assert len({len(line) for line in lines}) == 1
-    rows = [line.split("|")[1].strip() for line in lines[2:]]
-    assert rows == [OURS, f"gp ({CLIPS - 3} clips)", "mean"]
-    (row,) = (one for one in summary.summarize(shown) if one.name == "gp")
-    assert (row.clips, row.left_out) == (CLIPS - 3, 3)
-    ours, process = (
-        summary.clip_distances(shown, shown.of(name, range(3, CLIPS))) for name in (OURS, "gp")
-    )
-    # On the clips of both; beside all clips of posefield it would be another figure.
-    assert row.worse == pytest.approx(float(np.mean(process - ours)))
-    everyone = summary.clip_distances(shown, shown.of(OURS))
-    assert row.worse != pytest.approx(float(process.mean() - everyone.mean()))
-
-
 def test_clips_that_agree_within_takes_count_as_one(rng):
     takes, values = np.repeat(np.arange(6), 5), rng.standard_normal(6)
     error = summary.clustered_standard_error(values[takes], takes)

@@ -1,7 +1,5 @@
 """Tests of the effect of coefficients on the joint of the event."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -50,12 +48,3 @@ def test_errors_are_the_way_that_residuals_move_the_joint(judge, trained):
     linear = np.einsum("nkm,nm->nk", jacobian, residuals[:, :COEFFICIENTS])
     gaps = np.linalg.norm(linear, axis=1) - found
     assert np.sqrt(np.mean(gaps**2)) < 0.5 * np.sqrt(np.mean(found**2))
-
-
-def test_without_an_event_no_joint_is_weighted(judge, trained):
-    assert event_blend.effector_weights(replace(judge, event_frame=None), trained.full) is None
-    weights = event_blend.effector_weights(judge, trained.full)
-    plain = event_blend.event_jacobians(judge, trained.full, judge.event_frame)
-    # Half of the weight of all joints in forty frames.
-    ratio = weights / plain
-    assert np.abs(ratio**2 / (0.5 * 40 * trained.tensor.weight) - 1.0).max() < 1e-9

@@ -42,17 +42,6 @@ def test_who_sets_off_does_not_leap():
     assert outlier_detection.largest_jump(still) is None
 
 
-def test_a_size_names_the_unit_that_explains_it():
-    offsets = (
-        np.repeat(SKELETON.offsets[None], 5, axis=0) * np.array([1, 1, 100, 1, 1.1])[:, None, None]
-    )
-    assert clip_joints.relative_sizes(offsets) == pytest.approx([1, 1, 100, 1, 1.1])
-    assert clip_joints.guess_unit(1.0, 100.0) == "centimetres"
-    assert clip_joints.guess_unit(0.0564444, 1 / 17.72) == "metres"
-    assert clip_joints.guess_unit(0.01, 1 / 2.54) == "inches"
-    assert clip_joints.guess_unit(1.0, 1.7) == ""
-
-
 @pytest.fixture
 def offsets(rng):
     """Bones of three performers, three clips of each."""
@@ -80,13 +69,6 @@ def test_bones_of_nobody_are_found_where_others_agree(offsets):
     wrong[1] *= 1.1
     assert clip_joints.find_foreign_bones(wrong, WHO, 1).nearest_performer == ""
     assert clip_joints.find_foreign_bones(wrong, ("",) * 9, 1) is None, "nobody says who moved"
-
-
-def test_of_two_clips_that_differ_neither_is_believed(offsets):
-    wrong = offsets[1:].copy()
-    wrong[0] *= 1.1
-    assert clip_joints.find_foreign_bones(wrong, WHO[1:], 0) is None
-    assert clip_joints.find_foreign_bones(wrong, WHO[1:], 1) is None
 
 
 def test_sides_are_known_by_their_names():

@@ -138,33 +138,6 @@ def test_matches_are_those_of_the_recursion(seed):
     assert found.starts[finite].tolist() == np.array(starts)[finite].tolist()
 
 
-def test_no_match_leads_from_one_take_to_the_next():
-    apart = np.ones((9, 60))
-    apart[:, 30:32] = np.inf
-    found = motion_features.match_ends(apart)
-    ends = np.flatnonzero(np.isfinite(found.costs))
-    assert np.all((ends < 30) == (found.starts[ends] < 30))
-
-
-def test_distances_are_euclidean_and_infinite_between_takes():
-    rng = np.random.default_rng(3)
-    query, known = rng.normal(size=(4, 3)), rng.normal(size=(6, 3))
-    known[2] = np.nan
-    found = motion_features.distances(query, motion_features.searched_frames(known))
-    expected = np.linalg.norm(query[:, None] - known, axis=-1)
-    assert np.all(np.isinf(found[:, 2]))
-    np.testing.assert_allclose(np.delete(found, 2, 1), np.delete(expected, 2, 1), atol=1e-7)
-
-
-def test_components_keep_most_of_the_variance():
-    rng = np.random.default_rng(6)
-    values = rng.normal(size=(500, 6)) * [5.0, 5.0, 5.0, 0.5, 0.3, 0.1]
-    mean, basis = motion_features.principal_components(values)
-    kept = np.var((values - mean) @ basis, axis=0).sum() / np.var(values, axis=0).sum()
-    assert basis.shape == (6, 3) and kept >= 0.9
-    np.testing.assert_allclose(basis.T @ basis, np.eye(3), atol=1e-12)
-
-
 def test_an_example_may_end_with_its_take(corpus):
     seconds = (len(corpus.takes[0]) - 1) / corpus.takes[0].rate
     for end in (seconds, seconds + 0.04):

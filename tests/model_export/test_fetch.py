@@ -267,25 +267,6 @@ def test_a_folder_without_files_or_without_a_skeleton_is_refused(posefield, tmp_
     assert code == 3 and "found none of 60 clips" in err
 
 
-def test_the_package_has_tables_and_no_motion():
-    kinds = {path.suffix for path in data_folder.RECIPES.rglob("*") if path.is_file()}
-    assert kinds == {".toml", ".json", ".csv"}
-    for own in (data_sets.CMU, data_sets.HDM05):
-        table = own.rows(own.table)
-        assert {row["file"] for row in table} <= own.hashes().keys()
-        assert all(re.fullmatch("[0-9a-f]{64}", text) for text in own.hashes().values())
-
-
-def test_the_help_names_the_subjects_of_the_table(posefield):
-    code, out, _ = posefield("fetch", "--help")
-    assert code == 0
-    (listed,) = re.findall(r"subjects ((?:\d+,\s+)*\d+);", re.sub(r"[│\s]+", " ", out))
-    rows = {row["performer"].removeprefix("cmu_") for row in data_sets.CMU.rows("strides.csv")}
-    assert {int(text) for text in listed.split(", ")} == {int(n) for n in rows if n.isdecimal()}
-    files = {row["file"] for row in data_sets.CMU.rows("strides.csv") if "_u" in row["performer"]}
-    assert len(files) == 5
-
-
 def test_a_data_folder_without_a_table_takes_the_shipped_one_and_says_so(walks, tmp_path):
     own = recipe.read(data_folder.RECIPES / "cmu_walk.toml")
     performer = {"performer": Condition(among=["cmu_07"])}

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from posefield_train.parallel import finished_jobs
 from posefield_train.parallel.finished_jobs import FinishedJobs
 
 
@@ -68,14 +67,3 @@ def test_a_result_that_was_cut_short_is_computed_anew(tmp_path):
     again = HereJobs()
     assert totals(again, tmp_path) == [6.0, 12.0, 18.0]
     assert len(again.ran) == 1
-
-
-def test_no_half_written_file_remains(tmp_path):
-    totals(HereJobs(), tmp_path)
-    assert {file.suffix for file in tmp_path.iterdir()} == {finished_jobs.SUFFIX}
-    assert len(list(tmp_path.iterdir())) == len(EACH)
-
-
-def test_the_key_of_the_code_is_stable():
-    assert finished_jobs.code_key() == finished_jobs.code_key()
-    assert len(finished_jobs.code_key()) == 64

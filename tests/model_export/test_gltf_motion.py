@@ -123,15 +123,6 @@ def test_tangents_of_a_spline_are_scaled_by_the_time_between_keys(read):
     assert np.abs(found.translations[:, 0, 0] - (np.arange(21) / 10.0) ** 2).max() < 1e-6
 
 
-def test_a_curve_that_ends_early_keeps_its_last_value(read):
-    file = GltfFile(arm(), [{"joints": [0, 1]}])
-    file.animate(
-        (0, "rotation", TIMES, xyzw(swing()), "LINEAR"),
-        (0, "translation", TIMES[:3], [[0, 0, 0], [1, 0, 0], [2, 0, 0]], "LINEAR"),
-    )
-    assert np.all(read(file).translations[3:, 0, 0] == 2.0)
-
-
 def test_a_turned_and_scaled_armature_above_the_root_counts(read):
     """As of tools that keep centimetres with z up below a node of their own."""
     outer = {"rotation": [-QUARTER, 0, 0, QUARTER], "scale": [0.01] * 3, "translation": [3, 0, 0]}
@@ -242,25 +233,18 @@ def keyed(times):
     ("file", "said"),
     [
         (b"", "not glTF"),
-        (b"glTF\2\0", "6 bytes, expected a GLB file"),
         (lambda: edited().glb()[:-40], "expected a whole file"),
-        (b"{}", "version None of glTF"),
         (b'{"asset": {"version": "1.0"}}', "'1.0' of glTF, expected 2.0"),
         (b'{"asset": {"version": "2.0"}, "nodes": 3}', "breaks its format"),
         (edited(animations=[]), "no animation, a skeleton or mesh without motion"),
         (edited(extensionsRequired=["KHR_draco_mesh_compression"]), "KHR_draco_mesh_compression"),
-        (edited(extensionsRequired=["EXT_meshopt_compression"]), "EXT_meshopt_compression"),
-        (swinging(GltfFile([{"name": "camera", "camera": 0}])), "without a skeleton"),
         (swinging(GltfFile([{"name": "box"}])), "'box' without a skeleton"),
         (two_skeletons(), r"2 skeletons \(a, c\), expected one"),
         (scaled(GROWING), "'upper' has scales from 1 to 1.4"),
         (scaled(np.tile([1.0, 2.0, 1.0], (FRAMES, 1))), "one positive scale along all axes"),
-        (keyed([0.0]), "1 key, a pose without motion"),
         (keyed(UNEVEN), "uneven times, 0.05 to 0.25 s apart.*source.rate"),
         (keyed(LOST), "2 dropped frames of 40 at 30 a second, the first after 0.333.*source.rate"),
-        (keyed([0.0, 0.5, 1.0]), "3 keys at 2 a second.*source.rate"),
         (keyed([0.0, 0.2, 0.1]), "increasing times"),
-        (keyed([0.0, np.nan, 0.1]), "not finite"),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_its_reason(read, file, said):

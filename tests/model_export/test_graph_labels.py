@@ -6,7 +6,7 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
-from label_kernels import performers, vary
+from label_kernels import performers
 from model_files import written
 from numpy.random import PCG64, Generator
 from running import bank_values, outputs
@@ -119,13 +119,6 @@ def test_who_is_not_said_is_nobody_that_was_seen():
     assert apart(silent, graph_of(bank)(controls, labels=mixed(len(NAMES)))) > 0.1
 
 
-def test_one_row_of_labels_is_for_the_whole_batch():
-    run, controls, bob = graph_of(labelled_bank()), asked(), np.eye(4)[[1]]
-    whole = run(controls, labels=bob)
-    assert apart(whole, run(controls, labels=np.repeat(bob, BATCH, axis=0))) < 1e-6
-    assert apart(whole, run(controls, labels=np.eye(4)[[2]])) > 0.1
-
-
 def test_a_batch_of_several_performers_is_each_of_them_alone():
     run, controls, labels = graph_of(labelled_bank()), asked(), mixed(len(NAMES))
     whole = run(controls, labels=labels)
@@ -134,15 +127,6 @@ def test_a_batch_of_several_performers_is_each_of_them_alone():
         # Float32 sums a batch in another order than a row.
         assert apart([value[row : row + 1] for value in whole], alone) < 2e-5
     assert apart([value[:1] for value in whole], [value[1:2] for value in whole]) > 0.1
-
-
-def test_performers_without_offsets_who_move_alike_are_not_told_apart():
-    bank = labelled_bank()
-    pose = universal_kriging.solve(
-        vary(bank.pose.hyper, correlation=1.0, offset=0.0), bank.pose.samples, np.eye(SAMPLES)
-    )
-    run = graph_of(replace(bank, pose=pose, others=dict.fromkeys(bank.others, pose)), SAMPLES)
-    assert apart(run(asked()), run(asked(), labels=mixed(len(NAMES)))) < 1e-6
 
 
 # --- a whole model --------------------------------------------------------------------------------
@@ -209,11 +193,6 @@ def question_of_nobody(opened):
     return points, np.linspace(0.0, 1.0, 5)[None], None
 
 
-def test_the_card_names_the_performers_of_the_table(labelled_path, model_path):
-    assert session.load(labelled_path).card.performers == ("middle", "short", "tall")
-    assert session.load(model_path).card.performers == ()
-
-
 def quiet():
     options = onnxruntime.SessionOptions()
     # One level above the remark that an input with a default cannot be folded.
@@ -261,19 +240,6 @@ def test_the_same_labelled_model_is_the_same_bytes(labelled_recipe, labelled, la
     )
 
 
-def test_labels_are_stored_as_one_number_a_sample(labelled_path, labelled, labelled_exported):
-    weights = {w.name: w for w in onnx.load(labelled_path).graph.initializer}
-    whose = onnx.numpy_helper.to_array(weights["whose_0"])
-    assert whose.dtype == np.int64
-    told = labelled_exported.model.bank.pose.samples
-    d = len(labelled.model.bank.low)
-    # In the order in which samples say most of the others, each with the controls that it had.
-    assert np.array_equal(np.argmax(told[:, d:], axis=1), whose)
-    points = labelled.samples.points.tolist()
-    names = [labelled.examples[points.index(own)].row.performer for own in told.tolist()]
-    assert names == [labelled.model.bank.labels["performer"][i] for i in whose]
-
-
 # --- files that do not fit ------------------------------------------------------------------------
 
 
@@ -293,17 +259,3 @@ def test_a_card_of_other_performers_than_the_graph_takes_is_refused(labelled_pat
     said = f"constant 'labels' has shape .1, 3., expected .1, {len(names)}. by its card"
     with pytest.raises(ModelError, match=said):
         session.open_bytes(written(graph), "damaged")
-
-
-def test_a_card_without_the_performers_that_the_graph_takes_is_refused(labelled_path, opened):
-    making = replace(opened.card.making, fields={})
-    plain = replace(opened.card.kriging, labels=())
-    entries = model_card.dump(replace(opened.card, labels=(), kriging=plain, making=making))
-    graph = onnx.load(labelled_path)
-    for entry in graph.metadata_props:
-        entry.value = entries.get(entry.key, entry.value)
-    with pytest.raises(ModelError) as caught:
-        session.open_bytes(written(graph), "damaged")
-    assert caught.value.message == (
-        "its graph's constant 'labels' has shape (1, 3), expected () by its card"
-    )

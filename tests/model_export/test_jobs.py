@@ -25,14 +25,6 @@ def test_one_process_runs_jobs_here_and_in_order():
     assert found == [(12, os.getpid()), (6, os.getpid()), (4, os.getpid())]
 
 
-def test_a_single_job_needs_no_other_process():
-    assert list(ProcessJobs(8).run(divide, [(3,)], (12,))) == [(4, os.getpid())]
-
-
-def test_no_jobs_have_no_results():
-    assert list(ProcessJobs().run(divide, [])) == []
-
-
 def test_arguments_are_read_as_jobs_are_started():
     read = []
 
@@ -45,11 +37,6 @@ def test_arguments_are_read_as_jobs_are_started():
     assert next(results) == 0
     assert len(read) < 5
     assert len(list(results)) == 49
-
-
-def test_an_error_in_a_job_is_raised():
-    with pytest.raises(TrainingError, match="divided by 0"):
-        list(ProcessJobs(1).run(divide, [(1,), (0,), (2,)], (12,)))
 
 
 @pytest.mark.system

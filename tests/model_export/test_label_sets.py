@@ -12,12 +12,7 @@ from scipy.optimize import check_grad
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train import train
-from posefield_train.kriging import (
-    kriging_tuning,
-    sample_points,
-    thinning,
-    universal_kriging,
-)
+from posefield_train.kriging import kriging_tuning, sample_points, thinning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.sample_points import SamplePoints
@@ -86,20 +81,6 @@ def test_joint_covariance_of_names_mixtures_and_open_sets_is_positive_definite(h
     # Negative control: styles that are further from one another than opposites.
     beyond = replace(hyper, labels=(KERNELS[0], LabelKernel(2, -3.0, 0.0)), trend=0.0)
     assert least_eigenvalue(beyond, points) < -0.5
-
-
-def test_own_controls_and_labels_give_the_clip_back_without_nugget(hyper, laid, rng):
-    values = rng.normal(size=(COUNT, 3))
-    field = universal_kriging.solve(replace(hyper, nugget=0.0), laid, values)
-    assert np.abs(field.predict(laid) - values).max() < 1e-7
-    assert np.abs(field.variance(laid)).max() < 1e-7
-    # Negative controls: the other style, an open style, and a nugget.
-    other, open_ = laid.copy(), laid.copy()
-    other[:, 5:], open_[:, 5:] = laid[:, [6, 5]], 0.0
-    assert np.abs(field.predict(other) - values).max() > 0.1
-    assert np.abs(field.predict(open_) - values).max() > 0.1
-    noisy = universal_kriging.solve(hyper, laid, values)
-    assert np.abs(noisy.predict(laid) - values).max() > 1e-2
 
 
 def test_a_mixture_lies_between_its_names_and_is_less_certain(hyper, laid, rng):

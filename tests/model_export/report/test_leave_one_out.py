@@ -26,11 +26,10 @@ def predicted(trained, kept, clip):
     return field.predict(samples[[clip]]).reshape(trained.tensor.values.shape[:2])
 
 
-@pytest.fixture(scope="module", params=["worst", "first", "last"])
+@pytest.fixture(scope="module", params=["worst", "last"])
 def clip(request, trained):
     return {
         "worst": int(np.argmax(trained.left_out_errors)),
-        "first": 0,
         "last": len(trained.left_out_errors) - 1,
     }[request.param]
 
@@ -66,13 +65,6 @@ def test_the_body_drawn_as_captured_is_the_aligned_clip(trained, clip):
         trained, clip, left_out_clips.predicted_motion(trained, clip)
     )
     assert np.abs(guess.joints - expected).max() > SEEN
-
-
-def test_end_sites_keep_their_distance_from_their_joints(trained, clip):
-    own = trained.examples[clip].clip.skeleton
-    body = left_out_clips.body_motion(trained, clip, left_out_clips.predicted_motion(trained, clip))
-    bones = np.linalg.norm(body.tips - body.joints[:, list(own.tip_joints)], axis=-1)
-    assert np.abs(bones - np.linalg.norm(own.tip_offsets, axis=-1)).max() < ROUNDING
 
 
 def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):

@@ -7,10 +7,8 @@ from dataclasses import replace
 from html import unescape
 from itertools import pairwise
 
-import numpy as np
 import pytest
 
-from posefield.inference.graph_ports import OUTPUTS
 from posefield_train.report import levels_of_detail
 
 SLOWER = (4e-6, 3e-6, 2e-6, 1e-6)
@@ -52,13 +50,6 @@ def test_a_pixel_is_as_large_as_the_error_at_its_distance(facts, exported):
         assert 540 * level.rms / half_image < 0.5
 
 
-def test_a_level_is_for_no_nearer_than_the_finer_one(levels):
-    first, *others = levels.chosen.levels
-    odd = replace(levels, chosen=replace(levels.chosen, levels=(replace(first, pose=9.0), *others)))
-    assert odd.distances == pytest.approx([9.0 * levels_of_detail.CAMERA.pixels] * 4)
-    assert levels.distances != pytest.approx([levels.distances[0]] * 4)
-
-
 def test_every_level_is_said_what_it_is_for(page, levels):
     first, second, third, fourth = (f"{distance:.0f} m" for distance in levels.distances)
     assert f"Level 0 is for export and measurement, and for characters up to {second}." in page
@@ -98,45 +89,11 @@ def test_alternatives_go_from_fine_to_coarse(exported, alternatives, small_recip
     assert not any(own["rms_m"] <= 0.5 * own["times_budget"] * budget for own in others[:5])
 
 
-@pytest.mark.system
-def test_an_alternative_answers_as_coarsely_as_its_figures_say(trained, exported, alternatives):
-    found = alternatives
-    low, high = exported.model.bank.low, exported.model.bank.high
-    points = np.linspace(low, high, 200)
-    # At the event, where only the finest level has a second prediction.
-    times = exported.model.durations(points, np.zeros((200, 0)))[:, None]
-    best = exported.model.evaluate(points, times).positions(trained.skeleton.parents)
-
-    def off(level):
-        rotations, root, offsets, *_ = found.opened.run(points, times, *OUTPUTS, level=level)
-        told = exported.model.evaluate(points, times)
-        answer = replace(told, rotations=rotations, root_position=root, bone_offsets=offsets)
-        gaps = answer.positions(trained.skeleton.parents) - best
-        return float(np.sqrt(np.mean(np.sum(gaps**2, axis=-1))))
-
-    errors = [off(1 + number) for number in range(len(found.levels))]
-    # The model keeps tighter limits than the recipe's budgets, which the first alternative keeps.
-    assert off(0) < 1e-4 < errors[0] < errors[-1]
-    assert all(finer < 1.15 * coarser for finer, coarser in pairwise(errors))
-
-
 def test_two_reports_differ_only_in_seconds_per_pose(levels):
     text, other = (json.dumps(one.chapter().facts) for one in (levels, retimed(levels)))
     assert text != other and without_seconds(text) == without_seconds(other)
     nearer = json.dumps(replace(levels, times=(0.5, *levels.times[1:])).chapter().facts)
     assert without_seconds(text) != without_seconds(nearer)
-
-
-def test_times_on_the_page_are_those_measured(levels):
-    slower = retimed(levels).chapter().section
-    assert [row[-1] for row in slower.tables[0].rows] == ["4.00", "3.00", "2.00", "1.00"]
-    assert "in 25 % of the time of the finest level" in slower.paragraphs[-1]
-    assert [row[-1] for row in levels.chapter().section.tables[0].rows] != [
-        "4.00",
-        "3.00",
-        "2.00",
-        "1.00",
-    ]
 
 
 def test_no_time_is_in_the_model(exported):
