@@ -100,12 +100,6 @@ def test_controls_are_what_is_measured_of_the_clips_in_the_recipes_order(own, ex
         assert np.ptp(expected) > 10 * KEPT, "negative control: it is not the same in all"
 
 
-def test_what_is_typed_stays_what_was_typed(own, examples):
-    found = columns(own, examples)["typed"]
-    assert found.tolist() == [example.row.controls[0] for example in examples]
-    assert all(len(example.row.controls) == 1 for example in examples)
-
-
 def test_measured_strides_are_those_that_were_made(own, examples):
     found, haste = columns(own, examples), columns(own, examples)["typed"] / 3.6
     veer = np.array([-0.5, -0.2, 0.2, 0.5] * 5)
@@ -130,11 +124,6 @@ def test_a_clip_elsewhere_that_faces_another_way_measures_the_same(tmp_path):
     assert np.abs(found[0] - found[2]).max() > 100 * WRITTEN, "negative control"
 
 
-def test_one_performers_legs_have_one_length(strides):
-    found = columns(auto_recipe(LEG), ingest.ingest(auto_recipe(LEG), strides)[0])["leg"]
-    assert np.unique(found).tolist() == [sample_walk.THIGH + sample_walk.SHIN]
-
-
 def test_a_leg_is_that_of_the_roles_where_no_joints_are_named(strides):
     roles = {"leftUpperLeg": "RightUpLeg", "leftFoot": "RightFoot"}
     own = auto_recipe(control("leg", quantity="leg_length"), roles=roles)
@@ -144,23 +133,10 @@ def test_a_leg_is_that_of_the_roles_where_no_joints_are_named(strides):
     )
 
 
-@pytest.mark.parametrize(
-    ("ends", "said"),
-    [
-        (["LeftFoot", "LeftUpLeg"], "'LeftUpLeg' does not hang below 'LeftFoot'"),
-        (["LeftUpLeg", "RightFoot"], "'RightFoot' does not hang below 'LeftUpLeg'"),
-        (["LeftFoot", "LeftFoot"], "'LeftFoot' does not hang below 'LeftFoot'"),
-    ],
-)
-def test_a_leg_of_no_chain_is_refused(strides, ends, said):
-    own = auto_recipe(control("leg", quantity="leg_length", joints=ends))
-    with pytest.raises(TrainingError, match=f"controls.leg.auto: {said}, expected the upper end"):
-        ingest.ingest(own, strides)
-
-
-def test_a_joint_that_is_not_there_is_named(strides):
-    own = auto_recipe(control("hand", quantity="height", joint=["LeftFoot", "Hand"], at="end"))
-    with pytest.raises(RecipeError, match=r"has no joints 'Hand' that the recipe names"):
+def test_a_leg_of_no_chain_is_refused(strides):
+    own = auto_recipe(control("leg", quantity="leg_length", joints=["LeftUpLeg", "RightFoot"]))
+    said = "controls.leg.auto: 'RightFoot' does not hang below 'LeftUpLeg', expected the upper end"
+    with pytest.raises(TrainingError, match=said):
         ingest.ingest(own, strides)
 
 

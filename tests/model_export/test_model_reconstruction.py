@@ -87,19 +87,6 @@ def wrong_nuggets(reopened, fields):
     return found
 
 
-def test_the_motions_of_the_samples_come_back_in_the_cards_order(labelled, reopened):
-    decoder = reopened.known.model.decoder
-    place = np.tile(np.arange(labelled.model.timing.frames, dtype=float), (5, 1))
-    own, its = (d.reduced.bases[2][:5] for d in (labelled.model.decoder, decoder))
-    expected = labelled.model.decoder.numpy(own, place)
-    found = decoder.numpy(its, place)
-    assert np.abs(found[0] - expected[0]).max() < SAME
-    assert np.abs(found[1] - expected[1]).max() < SAME
-    # Negative control: other samples are other motions.
-    shifted = decoder.numpy(decoder.reduced.bases[2][1:6], place)
-    assert np.abs(shifted[1] - expected[1]).max() > 100 * SAME
-
-
 def test_what_is_known_is_what_training_knows(labelled_recipe, labelled, reopened):
     expected, found = canonical_clips.adaptable(labelled_recipe, labelled), reopened.known
     assert np.array_equal(found.joint_weights, expected.joint_weights)

@@ -21,23 +21,15 @@ from posefield_train.source.motion_readers import MotionFiles
 PAGE = Path(__file__).parents[2] / "docs/guide/motion-files.md"
 
 
-def test_every_format_and_refusal_is_on_the_page():
+def test_every_format_and_refusal_is_on_the_page(tmp_path):
     text = PAGE.read_text()
     suffixes = {suffix for own in motion_readers.FORMATS for suffix in own.suffixes}
     assert suffixes.isdisjoint(motion_readers.REFUSED)
     for suffix in suffixes | motion_readers.REFUSED.keys():
         assert f"`{suffix}`" in text, suffix
-
-
-@pytest.mark.parametrize("suffix", motion_readers.REFUSED)
-def test_a_refused_format_names_the_way_out(tmp_path, suffix):
-    path = tmp_path / f"a{suffix.upper()}"
-    path.write_bytes(b"")
-    with pytest.raises(MotionFileError, match=re.escape(motion_readers.REFUSED[suffix])):
-        motion_readers.read(path)
-
-
-def test_an_unknown_suffix_names_those_that_are_read(tmp_path):
+    for suffix, way_out in motion_readers.REFUSED.items():
+        with pytest.raises(MotionFileError, match=re.escape(way_out)):
+            motion_readers.read(tmp_path / f"a{suffix.upper()}")
     with pytest.raises(MotionFileError, match=r"'.xyz', expected one of .bvh, .amc, .glb, .gltf"):
         motion_readers.read(tmp_path / "a.xyz")
 
@@ -173,11 +165,7 @@ def test_a_recipe_that_contradicts_a_file_is_an_error(tmp_path):
     ):
         with pytest.raises(MotionFileError, match=said):
             ingest.ingest(recipe_with(source=source), tmp_path)
-
-
-def test_a_bvh_file_of_another_rate_than_the_recipe_is_an_error(tmp_path):
     folder = write_clips(tmp_path, [small_clip()])
-    assert ingest.ingest(recipe_with(source={"rate": 30.0}), folder)
     with pytest.raises(MotionFileError, match=r"30 frames a second \(frame time .*\), .*rate 60"):
         ingest.ingest(recipe_with(source={"rate": 60.0}), folder)
 

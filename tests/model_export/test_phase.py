@@ -63,13 +63,9 @@ def test_cycles_cut_anywhere_begin_at_one_moment(cuts):
     found = begun(family)
     shifts = np.array([example.shift for example in found])
     assert np.ptp(shifts + cuts) < 2 * HALF_A_FRAME
-    assert disagreement(found) < 0.1 * disagreement(family)
-
-
-def test_the_mean_shift_is_zero(cuts):
-    shifts = np.array([example.shift for example in begun([cycle(cut) for cut in cuts])])
     assert abs(np.angle(np.exp(2j * np.pi * shifts).mean())) < 2 * np.pi * HALF_A_FRAME
     assert np.abs(shifts).max() > 10 * HALF_A_FRAME, "negative control: there are shifts"
+    assert disagreement(found) < 0.1 * disagreement(family)
 
 
 def test_sizes_do_not_tell_the_time(cuts, rng):
@@ -85,7 +81,7 @@ def test_half_a_cycle_away_is_found_too(cuts):
     assert abs(found[3].shift) > 0.3
 
 
-@pytest.mark.parametrize("frames", [1, 30, 99, -20])
+@pytest.mark.parametrize("frames", [30, -20])
 def test_what_is_cut_off_goes_on_at_the_other_end(frames):
     """As if the walker had walked on and the cycle had been cut later."""
     found = phase_alignment.shift_start(cycle(0.0), frames / FRAMES)
@@ -138,17 +134,11 @@ def test_a_landmark_that_would_pass_the_cut_is_refused():
     assert np.ptp([e.landmarks[0] for e in met]) < 4 * HALF_A_FRAME
 
 
-@pytest.mark.parametrize("begin", ["as_cut", None])
-def test_the_frames_say_where_a_cycle_begins_unless_the_recipe_says_else(cuts, begin):
-    own = recipe_with(motion={"cyclic": True}, alignment={"begin": begin} if begin else {})
+@pytest.mark.parametrize(("cyclic", "begin"), [(True, "as_cut"), (True, None), (False, "in_phase")])
+def test_the_frames_say_where_a_cycle_begins_unless_the_recipe_says_else(cuts, cyclic, begin):
+    own = recipe_with(motion={"cyclic": cyclic}, alignment={"begin": begin} if begin else {})
     family = tuple(cycle(cut) for cut in cuts)
     assert phase_alignment.align_phases(own, family, np.ones(5)) is family
-
-
-def test_what_is_no_cycle_has_a_beginning(cuts):
-    family = tuple(cycle(cut) for cut in cuts)
-    open_ended = recipe_with(alignment={"begin": "in_phase"})
-    assert phase_alignment.align_phases(open_ended, family, np.ones(5)) is family
 
 
 def test_in_place_stays_in_place():

@@ -97,32 +97,6 @@ def test_tiny_and_vanishing_vectors_are_no_special_case(family, weights):
         assert np.max(np.abs(found - expected)) < TOLERANCE * np.max(np.abs(expected))
 
 
-def test_each_joint_adds_its_own_mass(family, weights):
-    alone = [
-        gram(*family, weight * row) for weight, row in zip(weights, np.eye(JOINTS), strict=True)
-    ]
-    assert np.max(np.abs(sum(alone) - gram(*family, weights))) < 1e-12
-    assert all(np.max(np.abs(part)) > 1e-2 for part in alone)
-
-
-def test_joint_is_moved_by_those_above_it_and_no_others(family):
-    tip = 3
-    found = gram(*family, np.eye(JOINTS)[tip])
-    moved = np.diagonal(found)[3:].reshape(JOINTS, 3).max(axis=1) > 1e-9
-    assert moved.tolist() == [True, True, True, True, False, False]
-
-
-def test_gram_matrix_is_symmetric_and_has_no_negative_direction(family, weights):
-    found = gram(*family, weights)
-    assert np.array_equal(found, found.T)
-    assert np.linalg.eigvalsh(found)[0] > 0.0
-
-
-def test_root_moves_the_whole_mass(family, weights):
-    found = gram(*family, weights)[:3, :3]
-    assert np.max(np.abs(found - weights.sum() * np.eye(3))) < 1e-12
-
-
 def test_whitening_is_the_square_root_and_its_inverse(family, weights):
     found = gram(*family, weights)
     root, inverse = motion_tensor.whitening(found)

@@ -77,35 +77,6 @@ def test_gradient_is_that_of_finite_differences(laid, rng):
     assert np.abs(loss.value_and_slope(x + 0.05)[1] - expected).max() > 1e-3
 
 
-def errors(laid, loss, rng, families=40):
-    """Mean squared error of tuned models in new points of drawn fields with a nugget of one."""
-    true = replace(HYPER, nugget=1.0)
-    asked = laid.points[rng.permutation(COUNT)].copy()
-    asked[:, :2] = rng.uniform(-1.0, 1.0, (COUNT, 2))
-    both = np.vstack([laid.points, asked])
-    root = np.linalg.cholesky(
-        universal_kriging.covariances(true, both, both) + 1e-9 * np.eye(2 * COUNT)
-    )
-    found = []
-    for _ in range(families):
-        field = root @ rng.normal(size=(2 * COUNT, 1))
-        values = field[:COUNT] + rng.normal(size=(COUNT, 1))
-        problem = TuningProblem(laid, values, strength=tuning_loss.OTHER_STRENGTH)
-        tuned = kriging_tuning.tune_beside(problem, true, loss)
-        predicted = universal_kriging.solve(tuned.hyper, laid.points, values).predict(asked)
-        found.append(np.mean(np.square(predicted - field[COUNT:])))
-    return float(np.mean(found))
-
-
-def test_single_values_are_predicted_better_than_by_squared_residuals(laid):
-    drawn = (np.random.Generator(np.random.PCG64(7)) for _ in range(2))
-    density, squares = (
-        errors(laid, loss, own)
-        for loss, own in zip((PredictiveDensityLoss, LeaveOneOutLoss), drawn, strict=True)
-    )
-    assert density < 0.98 * squares
-
-
 def test_only_a_single_value_is_tuned_by_its_density(laid, rng):
     values = rng.normal(size=(COUNT, 2)) + laid.half_ranges
     for columns, kind in ((1, PredictiveDensityLoss), (2, LeaveOneOutLoss)):

@@ -11,12 +11,8 @@ from pydantic import ValidationError
 from posefield.common.errors import TrainingError
 from posefield.model_file import card_reader, onnx_check
 from posefield.model_file.model_card import Preset
-from posefield_train.graph import onnx_export
-from posefield_train.source import data_folder, ingest
+from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
-from posefield_train.source.recipe import read as read_recipe
-
-LABEL = '[kriging]\nlabel = "performer"\n'
 
 
 def parsed(presets, before=""):
@@ -34,12 +30,7 @@ def test_presets_keep_their_order_and_name_a_value_for_each_control():
 @pytest.mark.parametrize(
     ("presets", "said"),
     [
-        (
-            "[presets.stroll]\nspeed = 1.0\npace = 2.0\n",
-            "found speed, pace, expected a",
-        ),
-        ("[presets.stroll]\n", "found nothing, expected a value for each of"),
-        ("[presets.stroll]\nspeed = 'slow'\n", "presets.stroll.speed"),
+        ("[presets.stroll]\nspeed = 1.0\npace = 2.0\n", "found speed, pace, expected a"),
         ("[presets.stroll]\nspeed = nan\n", "presets.stroll.speed"),
         ("[presets.Stroll]\nspeed = 1.0\n", "presets.Stroll"),
         (
@@ -61,23 +52,18 @@ def with_preset(values, performer=None):
     return Recipe.model_validate({**plain, "presets": {"reach": preset}})
 
 
-def test_a_preset_within_the_clips_is_accepted():
-    examples = fixture_models.reaches()
-    who = examples[0].row.performer
-    assert ingest.check_presets(with_preset({}, who), examples) is None
-
-
 @pytest.mark.parametrize(
     ("values", "performer", "said"),
     [
         ({"turn": 120.0}, None, "presets.reach.turn: found 120, expected -"),
-        ({"turn": -120.0}, None, "the sampled range"),
         ({}, "nobody", "presets.reach.performer: found 'nobody', expected one of "),
     ],
 )
 def test_a_preset_outside_the_clips_is_refused(values, performer, said):
     with pytest.raises(TrainingError, match=re.escape(said)):
         ingest.check_presets(with_preset(values, performer), fixture_models.reaches())
+    performer = fixture_models.reaches()[0].row.performer
+    ingest.check_presets(with_preset({}, performer), fixture_models.reaches())
 
 
 def test_the_card_carries_the_presets_of_the_recipe():
@@ -87,15 +73,3 @@ def test_the_card_carries_the_presets_of_the_recipe():
     assert list(own) == ["high_shelf", "to_the_side", "seated"]
     expected = [Preset(name, preset.values, {}) for name, preset in own.items()]
     assert list(card.presets) == expected
-
-
-def test_a_model_of_held_out_clips_has_no_presets():
-    own = fixture_models.small_recipe()
-    content = onnx_export.export_finest(own, fixture_models.trained("reaching"))
-    assert card_reader.decode(onnx_check.check(content).metadata).presets == ()
-
-
-@pytest.mark.parametrize("name", data_folder.shipped_names())
-def test_shipped_recipes_name_presets(name):
-    own = read_recipe(data_folder.RECIPES / f"{name}.toml")
-    assert len(own.presets) >= 2

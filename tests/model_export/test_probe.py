@@ -16,7 +16,7 @@ from posefield_train.sample import noise_free
 from posefield_train.source import bvh, clip_table, recipe
 
 POINT = {"stature": 1.75, "hip_height": 0.94, "turn": 10.0, "target_height": 1.1}
-UNITS = {"metres": 1.0, "centimetres": 0.01, "inches": 0.0254, "ASF units": 0.0564444}
+UNITS = {"metres": 1.0, "ASF units": 0.0564444}
 
 
 @pytest.fixture(scope="module")
@@ -82,11 +82,14 @@ def test_an_odd_unit_has_a_low_confidence(clip, written):
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
-def test_the_up_axis_follows_from_body_and_floor(clip, written, up):
-    found = proposed(written(clip if up == "y" else z_up(clip)), "up")
+def test_the_up_axis_and_the_facing_follow_from_body_and_floor(clip, written, up):
+    path = written(clip if up == "y" else z_up(clip))
+    found = proposed(path, "up")
     assert (found.value, found.confidence) == (up, "high")
     assert len(found.evidence) == 3
     assert all(f"+{up}" in said for said in found.evidence)
+    facing = proposed(path, "facing")
+    assert abs(facing.value) < 10.0 and facing.confidence == "high"
 
 
 def test_an_axis_that_cannot_be_read_is_not_proposed(clip, written):
@@ -114,12 +117,6 @@ def test_files_of_two_rates_are_told(clip, written):
     found = probe_report.probe(paths).proposed["fps"]
     assert (found.value, found.confidence) == (30.0, "medium")
     assert found.evidence[1] == "2 files at 30, 1 files at 60"
-
-
-@pytest.mark.parametrize("up", ["y", "z"])
-def test_the_body_faces_forward(clip, written, up):
-    found = proposed(written(clip if up == "y" else z_up(clip)), "facing")
-    assert abs(found.value) < 10.0 and found.confidence == "high"
 
 
 def test_a_root_that_faces_elsewhere_is_told(clip, written):
@@ -209,12 +206,6 @@ def test_probe_tells_people_and_answers_as_json(posefield, clip, written):
     assert said["proposed"]["metres_per_unit"]["value"] == 0.01
     assert set(said["proposed"]) == {"metres_per_unit", "up", "fps", "feet", "facing", "licence"}
     assert all(found["evidence"] for found in said["proposed"].values())
-
-
-def test_a_damaged_file_is_refused(posefield, tmp_path):
-    (tmp_path / "bad.bvh").write_text("HIERARCHY\nROOT a {")
-    code, out, err = posefield("probe", tmp_path / "bad.bvh")
-    assert (code, out) == (3, "") and "bad.bvh:2: " in err
 
 
 @pytest.fixture
