@@ -45,7 +45,7 @@ def truncation(full, triple):
 
 
 @pytest.mark.parametrize("per_rank", PRICES, ids=str)
-@pytest.mark.parametrize("share", [0.3, 0.1, 0.03, 1e-3, 1e-5])
+@pytest.mark.parametrize("share", [0.3, 0.03, 1e-5])
 def test_smallest_ranks_are_those_of_trying_all(full, share, per_rank):
     allowed = share * np.sum(np.square(full.core))
     triples = list(product(*(range(1, size + 1) for size in full.core.shape)))
@@ -56,34 +56,10 @@ def test_smallest_ranks_are_those_of_trying_all(full, share, per_rank):
     assert stored(found, per_rank) > min(stored(triple, per_rank) for triple in triples)
 
 
-def test_price_of_a_rank_decides_between_modes(rng):
-    core = hosvd.decompose(rng.normal(size=(6, 6, 6))).core
-    allowed = 0.4 * np.sum(np.square(core))
-    dear_first = smallest(core, allowed, (10_000, 1, 1))
-    dear_last = smallest(core, allowed, (1, 1, 10_000))
-    assert dear_first[0] < dear_last[0]
-    assert dear_first[2] > dear_last[2]
-
-
-def test_no_error_allowed_keeps_all(full):
-    assert smallest(full.core, 0.0) == full.core.shape
-
-
 def test_no_error_allowed_keeps_no_more_than_there_is(rng):
     core = np.zeros((6, 5, 7))
     core[:3, :2, :4] = rng.normal(size=(3, 2, 4))
     assert smallest(core, 0.0) == (3, 2, 4)
-
-
-def test_every_error_allowed_keeps_one(full):
-    assert smallest(full.core, np.sum(np.square(full.core))) == (1, 1, 1)
-
-
-def test_larger_budget_never_stores_more(full):
-    total = np.sum(np.square(full.core))
-    sizes = [stored(smallest(full.core, s * total)) for s in np.geomspace(1e-6, 1, 30)]
-    assert sizes == sorted(sizes, reverse=True)
-    assert sizes[0] > sizes[-1]
 
 
 def test_front_holds_every_triple_to_which_nothing_cheaper_is_as_good(full):
@@ -120,7 +96,7 @@ def strained(front, bend):
     return strain
 
 
-@pytest.mark.parametrize("bend", [0.2, 0.7, 1.0, 1.4, 5.0])
+@pytest.mark.parametrize("bend", [0.2, 1.0, 5.0])
 def test_budget_is_one_on_true_errors_whatever_the_metric_says(full, bend):
     front = truncation_cost.pareto_front(full.core, RankCost(PER_RANK))
     strain = strained(front, bend)
@@ -135,7 +111,7 @@ def test_budget_is_one_on_true_errors_whatever_the_metric_says(full, bend):
         assert found != front[by_metric], "negative control: the metric's own ranks"
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(3))
 def test_what_is_returned_keeps_the_budget_even_where_true_errors_do_not_fall(full, seed):
     front = truncation_cost.pareto_front(full.core, RankCost(PER_RANK))
     noise = np.random.Generator(np.random.PCG64(seed)).uniform(0.5, 2.0, len(front.errors))
@@ -146,15 +122,11 @@ def test_what_is_returned_keeps_the_budget_even_where_true_errors_do_not_fall(fu
     assert np.any(np.diff(strains) > 0.0), "negative control: they do not fall"
 
 
-def test_given_ranks_are_kept(full):
+def test_given_ranks_are_kept_and_those_beyond_the_tensor_refused(full):
     assert truncation_cost.recipe_ranks(full.core, [6, 1, 3]) == (6, 1, 3)
-
-
-@pytest.mark.parametrize("wanted", [[7, 5, 7], [6, 6, 7], [1, 1, 8]])
-def test_ranks_beyond_the_tensor_are_refused(full, wanted):
     with pytest.raises(TrainingError) as refusal:
-        truncation_cost.recipe_ranks(full.core, wanted)
+        truncation_cost.recipe_ranks(full.core, [1, 1, 8])
     assert str(refusal.value) == (
-        f"size.ranks {wanted}, expected at most [6, 5, 7]: degrees of freedom, frames and "
+        "size.ranks [1, 1, 8], expected at most [6, 5, 7]: degrees of freedom, frames and "
         "samples of the tensor"
     )

@@ -14,16 +14,6 @@ from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.source import control_sources, recipe
 
 RECIPES = Path(recipe.__file__).parents[1] / "recipes"
-SHIPPED = (
-    "hdm05_grab_high",
-    "hdm05_deposit_floor",
-    "hdm05_grab_return",
-    "hdm05_deposit_return",
-    "hdm05_kick",
-    "hdm05_hop",
-    "bandai_raise_hand",
-    "cmu_walk",
-)
 MINIMAL = TOML.replace("metres_per_unit = 1.0", "metres_per_unit = 0.01")
 SECOND = """[[controls]]
 name = "speed"
@@ -75,28 +65,13 @@ def test_the_least_recipe_is_read_and_the_rest_has_its_defaults(read):
 # there, and what was expected.
 FAULTS = {
     "unknown key": ("frames = 20", "frames = 20\nframez = 3", ["motion.framez", "not permitted"]),
-    "unknown table": ("[size]", "[sizes]\n[size]", ["sizes", "not permitted"]),
     "missing unit of a control": ('unit = "m/s"\n', "", ["controls.0.unit", "required"]),
-    "empty unit": ('unit = "m/s"', 'unit = ""', ["controls.0.unit", "at least 1", "''"]),
-    "scale of zero": (
-        "metres_per_unit = 0.01",
-        "metres_per_unit = 0",
-        ["source.metres_per_unit", "greater than 0", "found 0"],
-    ),
     "third up axis": ('up = "y"', 'up = "x"', ["source.up", "'y' or 'z'", "'x'"]),
-    "number as text": ("frames = 20", 'frames = "20"', ["motion.frames", "integer", "'20'"]),
-    "too few frames": ("frames = 20", "frames = 7", ["motion.frames", "equal to 8", "found 7"]),
     "ranks and a budget": (
         "rms_budget_cm = 1.0",
         "rms_budget_cm = 1.0\nranks = [3, 3, 3]",
         ["size", "found ['ranks', 'rms_budget_cm']", "either ranks or budgets"],
     ),
-    "ranks and a cost": (
-        "rms_budget_cm = 1.0",
-        'cost = "numbers"\nranks = [3, 3, 3]',
-        ["size", "found ['cost', 'ranks']", "either ranks or budgets"],
-    ),
-    "a negative p99": ("rms_budget_cm = 1.0", "p99_budget_cm = -1.0", ["size.p99", "than 0"]),
     "an effector budget without an event": (
         "rms_budget_cm = 1.0",
         "effector_budget_cm = 2.5",
@@ -107,22 +82,14 @@ FAULTS = {
         '[event]\njoint = "hand"\nat = "hit"\n[size]',
         ["event.at: found 'hit'", "'farthest' or a column of clips.landmarks []"],
     ),
-    "an event without its joint": ("[size]", '[event]\nat = "end"\n[size]', ["event.joint"]),
     "neither ranks nor budget": (
         "rms_budget_cm = 1.0",
         "",
         ["size", "found neither", "either ranks or budgets (rms_budget_cm, p99_budget_cm"],
     ),
-    "two ranks": ("rms_budget_cm = 1.0", "ranks = [3, 3]", ["size.ranks", "at least 3", "[3, 3]"]),
-    "reserved control name": ('"speed"', '"fps"', ["controls.0.name", "'fps'", "query parameter"]),
     "control named twice": ("[motion]", f"{SECOND}[motion]", ["controls", "twice", "'speed'"]),
     "name with a blank": ('"tiny"', '"tiny one"', ["name", "pattern", "'tiny one'"]),
     "another version": ("schema = 1", "schema = 2", ["schema", "should be 1", "found 2"]),
-    "degree two": (
-        "[size]",
-        "[kriging]\ndrift = 2\n[size]",
-        ["kriging.drift", "0, 1 or 'chosen'", "found 2"],
-    ),
     "unknown label": (
         "[size]",
         '[kriging]\nlabel = "mood"\n[size]',
@@ -154,12 +121,6 @@ def test_a_drift_is_a_degree_or_a_constant_with_a_trend(read, said, degrees):
 def test_every_covariance_may_be_named(read, name):
     own = read(MINIMAL + f'[kriging]\ncovariance = "{name}"\n').kriging
     assert own.covariances == (("matern52", "gaussian") if name == "chosen" else (name,))
-
-
-@pytest.mark.parametrize("name", ["prediction", "mean"])
-def test_a_reference_may_be_named(read, name):
-    assert read(MINIMAL + f'[alignment]\nreference = "{name}"\n').alignment.reference == name
-    assert read(MINIMAL).alignment.reference == "prediction"
 
 
 def test_a_label_needs_the_column_that_says_who_moved(read):
@@ -194,7 +155,6 @@ ONE_LABEL = '[kriging]\nlabel = "performer"\n'
         ('label = ["performer", "stile"]', "kriging.label: found 'stile' (did you mean 'style'?)"),
         ('label = ["style", "style"]', "expected each label set once"),
         ('label = "performer"', "clips.labels.style: found 'style', which kriging.label does not"),
-        ('label = ["style", 3]', "kriging.label"),
     ],
 )
 def test_label_sets_that_do_not_fit_are_refused(read, kriging, said):
@@ -208,7 +168,6 @@ def test_label_sets_that_do_not_fit_are_refused(read, kriging, said):
         ("speed", "found 'speed', which is a control, too, expected another name"),
         ("level", "found 'level', which is a parameter of requests, expected another name"),
         ("performer", "clips.labels.performer: found 'performer', whose column is clips.performer"),
-        ("Style", "clips.labels.Style"),
     ],
 )
 def test_a_label_set_has_a_name_of_its_own(read, name, said):
@@ -223,18 +182,6 @@ def test_a_preset_names_labels(read):
     assert read(both + preset).presets["stroll"].labels == {"performer": "ann", "style": "calm"}
     with pytest.raises(RecipeError, match=re.escape("found 'calm' and no kriging.label 'mood'")):
         read(both + preset.replace("style =", "mood ="))
-
-
-def test_feet_are_named_or_there_are_none(read):
-    assert read(MINIMAL).motion.feet == []
-    footed = MINIMAL.replace("cyclic = false", 'cyclic = false\nfeet = ["l", "r"]')
-    assert read(footed).motion.feet == ["l", "r"]
-
-
-def test_roles_are_named_or_there_are_none(read):
-    assert read(MINIMAL).roles == {}
-    cast = MINIMAL.replace("[size]", '[roles]\nhips = "Hips"\nleftToes = "ltoe"\n[size]')
-    assert read(cast).roles == {"hips": "Hips", "leftToes": "ltoe"}
 
 
 @pytest.mark.parametrize(
@@ -255,7 +202,6 @@ def test_a_role_that_is_none_and_a_joint_with_two_are_refused(read, roles, said)
     ("size", "budgets"),
     [
         ("rms_budget_cm = 1.0", {"rms": 0.01}),
-        ("p99_budget_cm = 2.5", {"p99": 0.025}),
         ("rms_budget_cm = 1.0\neffector_budget_cm = 2.0", {"rms": 0.01, "effector": 0.02}),
         ("ranks = [3, 4, 5]", {}),
     ],
@@ -273,8 +219,6 @@ def test_an_event_may_be_at_a_landmark(read):
     assert read(marked.replace("[size]", event.format("hit"))).event.at == "hit"
     with pytest.raises(RecipeError, match=r"found 'hat', .*clips.landmarks \['touch', 'hit'\]"):
         read(marked.replace("[size]", event.format("hat")))
-    with pytest.raises(RecipeError, match=r"found 'hihgest' \(did you mean 'highest'\?\), "):
-        read(marked.replace("[size]", event.format("hihgest")))
 
 
 def test_an_event_may_be_at_every_moment_at_which_a_control_is_measured(read):
@@ -299,22 +243,11 @@ def test_every_reserved_name_is_refused_and_a_free_one_is_not(read):
     assert read(MINIMAL.replace('"speed"', '"pace"')).controls[0].name == "pace"
 
 
-def test_all_faults_are_told_at_once(read):
-    with pytest.raises(RecipeError, match=r"(?s)source.up.*motion.frames"):
-        read(MINIMAL.replace('up = "y"', 'up = "x"').replace("frames = 20", "frames = 0"))
-
-
 def test_bad_toml_is_refused_with_its_line(read, tmp_path):
     with pytest.raises(RecipeError, match="not TOML") as caught:
         read(MINIMAL.replace("[source]", "[source"))
     assert caught.value.line == 5
     assert str(caught.value).startswith(f"{tmp_path / 'recipe.toml'}:5: not TOML")
-
-
-def test_a_key_said_twice_is_refused_with_its_line(read):
-    with pytest.raises(RecipeError, match="not TOML") as caught:
-        read(MINIMAL.replace('name = "tiny"', 'name = "tiny"\nname = "other"'))
-    assert caught.value.line == 3
 
 
 def test_text_that_is_not_utf_8_is_refused(read):
@@ -330,13 +263,11 @@ DEEP = "tables or arrays nested deeper than 16 levels, expected at most that man
     "text",
     [
         "a = " + "[" * 100_000,
-        "a = " + "[" * 17 + "]" * 17,
         "a = " + "{a = " * 17 + "1" + "}" * 17,
-        ".".join("a" * 900) + " = 1",
         ".".join("a" * 60_000) + " = 1",
         "[" + ".".join("a" * 1_000) + "]",
     ],
-    ids=["open arrays", "arrays", "inline tables", "dots", "many dots", "table names"],
+    ids=["open arrays", "inline tables", "many dots", "table names"],
 )
 def test_nesting_is_bounded(read, tmp_path, text):
     with pytest.raises(RecipeError) as caught:
@@ -385,8 +316,6 @@ UNMEASURABLE = {
         [],
         ["controls.0.auto.quantity", "'left'", "'root_height'", "found 'pace'"],
     ),
-    "no quantity": ('{ at = "end" }', [], ["controls.0.auto.quantity", "required"]),
-    "unknown key": ('{ quantity = "stature", bone = "a" }', [], ["controls.0.auto.bone"]),
     "a place without a joint": (
         '{ quantity = "height", at = "end" }',
         [],
@@ -397,11 +326,6 @@ UNMEASURABLE = {
         [],
         ["found joint besides quantity 'left', expected joint and at"],
     ),
-    "the root of another joint": (
-        '{ quantity = "root_height", joint = "a", at = "end" }',
-        [],
-        ["found joint and at besides quantity 'root_height', expected at"],
-    ),
     "the root away from itself": (
         '{ quantity = "root_height", at = "farthest" }',
         [],
@@ -411,21 +335,6 @@ UNMEASURABLE = {
         '{ quantity = "speed", joint = "a" }',
         [CYCLE],
         ["found joint besides quantity 'speed', expected nothing"],
-    ),
-    "a step at a moment": (
-        '{ quantity = "step_length", at = "end" }',
-        [CYCLE],
-        ["found at besides quantity 'step_length', expected joints or nothing"],
-    ),
-    "three feet": (
-        '{ quantity = "step_length", joints = ["a", "b", "c"] }',
-        [CYCLE],
-        ["controls.0.auto.joints", "at most 2"],
-    ),
-    "no joints in a list": (
-        '{ quantity = "left", joint = [], at = "end" }',
-        [],
-        ["controls.0.auto.joint", "at least 1"],
     ),
     "a moment that no landmark is": (
         '{ quantity = "left", joint = "a", at = "hit" }',
@@ -439,13 +348,6 @@ UNMEASURABLE = {
         '{ quantity = "speed" }',
         [],
         ["controls.0.auto.quantity: found 'speed' and motion.cyclic = false, expected a cycle"],
-    ),
-    "a turn of no cycle": ('{ quantity = "turn" }', [], ["found 'turn' and motion.cyclic"]),
-    "a stride of no cycle": ('{ quantity = "stride_length" }', [], ["motion.cyclic = false"]),
-    "a step of no cycle": (
-        '{ quantity = "step_length", joints = ["a", "b"] }',
-        [],
-        ["found 'step_length' and motion.cyclic = false"],
     ),
     "a speed in place": (
         '{ quantity = "speed" }',
@@ -486,22 +388,14 @@ def test_what_cannot_be_measured_is_refused_by_key_found_and_expected(read, faul
     assert "default factory" not in str(caught.value)
 
 
-def test_neither_a_column_nor_a_measure_is_refused(read):
-    with pytest.raises(RecipeError, match=r"controls\.0: expected either column, .* or auto"):
-        read(MINIMAL.replace('column = "v"\n', ""))
-
-
 @pytest.mark.parametrize(
     ("auto", "unit"),
     [
         ('{ quantity = "left", joint = ["a", "b"], at = "farthest" }', "m"),
-        ('{ quantity = "height", joint = "a", at = "strike" }', "m"),
         ('{ quantity = "root_height", at = "lowest" }\nunit = "m"', "m"),
         ('{ quantity = "speed" }', "m/s"),
         ('{ quantity = "turn" }\nunit = "deg"', "deg"),
-        ('{ quantity = "step_length" }', "m"),
         ('{ quantity = "leg_length", joints = ["a", "b"] }', "m"),
-        ('{ quantity = "stature" }', "m"),
     ],
 )
 def test_what_is_measured_knows_its_unit_and_keeps_the_schema(read, schema, auto, unit):
@@ -520,17 +414,10 @@ def test_what_is_measured_knows_its_unit_and_keeps_the_schema(read, schema, auto
 def test_the_published_schema_is_the_one_of_the_code():
     published = (RECIPES / "recipe.schema.json").read_text(encoding="utf-8")
     assert published == recipe.json_schema()
+    jsonschema.Draft202012Validator.check_schema(json.loads(published))
 
 
-def test_the_schema_is_itself_valid(schema):
-    jsonschema.Draft202012Validator.check_schema(schema)
-
-
-def test_what_ships_is_the_recipes_of_this_list():
-    assert {path.stem for path in RECIPES.glob("*.toml")} == set(SHIPPED)
-
-
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", sorted(path.stem for path in RECIPES.glob("*.toml")))
 def test_shipped_recipes_are_read_and_keep_the_schema(name, schema):
     path = RECIPES / f"{name}.toml"
     assert recipe.read(path).name == name
@@ -545,8 +432,3 @@ def test_the_schema_refuses_what_the_reader_refuses(fault, schema):
     jsonschema.Draft202012Validator(schema).validate(tomllib.loads(MINIMAL))
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft202012Validator(schema).validate(tomllib.loads(MINIMAL.replace(old, new)))
-
-
-def test_every_key_of_the_source_section_is_explained_in_the_schema(schema):
-    for key in schema["$defs"]["Source"]["properties"].values():
-        assert re.search(r"\w{3}", key["description"])

@@ -137,14 +137,6 @@ def test_a_root_that_slides_over_the_floor_is_collapsed_too(read):
     assert np.abs(np.linalg.norm(wanted, axis=1) - np.linalg.norm(got, axis=1)).max() < WRITTEN
 
 
-def test_two_dummy_roots_are_collapsed(read):
-    clips = [below(clip, *standing_root(clip)) for clip in family()]
-    clips = [below(clip, *standing_root(clip), name="World") for clip in clips]
-    found, notes = read(clips)
-    assert notes[0].startswith("'World' and 'Reference' are dummy roots above 'Hips'")
-    assert found[0].clip.skeleton.names == BODY.names
-
-
 def test_a_root_that_moves_with_its_body_is_kept():
     clip = walker()
     tumbling = quat.exp(np.linspace(0, 1, len(clip))[:, None] * np.array([0.5, 0.2, 0.1]))
@@ -223,12 +215,6 @@ def spined():
     for clip in clips:
         clip.translations[:, 3, 1] += 0.1 * np.sin(np.linspace(0, 6, len(clip)))
     return clips
-
-
-def test_siblings_that_are_left_out_let_the_root_collapse(read):
-    clips = [below(clip, *standing_root(clip), siblings=1) for clip in family()]
-    found, notes = read(clips, drop_joints=["Target0"])
-    assert found[0].clip.skeleton.names == BODY.names and "dummy root" in notes[0]
 
 
 # --- bodies and rest poses

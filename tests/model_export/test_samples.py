@@ -49,27 +49,12 @@ def test_without_a_label_nobody_is_told_apart():
     assert laid.unnamed
 
 
-def test_one_performer_and_named_ones_are_not_unnamed():
-    assert not sample_points.make_samples(recipe(), examples())[0].unnamed
-    assert not sample_points.make_samples(recipe(label=None), examples(who=["ann"] * 6))[0].unnamed
-
-
 def test_clips_of_one_file_are_one_group():
     groups = sample_points.make_samples(recipe(), examples())[0].groups
     same = [[a == b for a in FILES] for b in FILES]
     assert (groups[:, None] == groups).tolist() == same
     alone = sample_points.make_samples(recipe(), examples(files="abcdef"))[0].groups
     assert len(np.unique(alone)) == 6
-
-
-def test_samples_lie_in_the_order_of_their_examples(rng):
-    order = rng.permutation(6)
-    shuffled, performers = sample_points.make_samples(recipe(), [examples()[i] for i in order])
-    laid, names = sample_points.make_samples(recipe(), examples())
-    assert performers == names
-    assert np.array_equal(shuffled.points, laid.points[order])
-    assert np.array_equal(shuffled.groups, laid.groups[order])
-    assert not np.array_equal(shuffled.points, laid.points)
 
 
 def test_one_performer_is_told_apart_from_nobody_and_it_is_noted():

@@ -1,11 +1,8 @@
 """Tests that skeletons of one joint and of hundreds train, answer, and reach every format."""
 
-import subprocess
-
 import numpy as np
 import pytest
-from minimal import TOML, recipe_with, write_clips
-from serving import POSEFIELD
+from minimal import recipe_with, write_clips
 
 from posefield.encode.formats import CLIP_ENCODERS
 from posefield.inference import session
@@ -56,18 +53,3 @@ def test_a_skeleton_of_any_size_trains_and_is_written(tmp_path, joints):
     assert np.abs(answer.clip.positions()[-1] - wanted[-1]).max() < 0.05
     for encoder in CLIP_ENCODERS.values():
         assert len(encoder.encode(answer)) > 500
-
-
-@pytest.mark.system
-def test_one_joint_passes_the_commands(tmp_path):
-    folder = write_clips(tmp_path / "clips", [clip(1, value) for value in range(8)])
-    (folder / "tiny.toml").write_text(TOML.replace("[motion]", '[motion]\nfacing = "none"'))
-    model = folder / "tiny.onnx"
-    for words in (
-        ["train", folder / "tiny.toml", "-o", model, "--report", folder / "tiny.html"],
-        ["inspect", model],
-        ["clip", model, "-c", "speed=3", "-o", folder / "prop.usdc"],
-        ["why", model, "-c", "speed=3"],
-    ):
-        done = subprocess.run([POSEFIELD, *map(str, words)], capture_output=True, text=True)
-        assert done.returncode == 0, (words, done.stderr)
