@@ -265,9 +265,10 @@ def travel():
 DRIFTS = ((0,), (1,), (0, 1))
 CASES = {
     **{
-        f"fields, {name}, drifts {drifts}": (field_bank, {"covariance": name, "drifts": drifts})
+        f"{kind}, {name}, drifts {drifts}": (make, {"covariance": name, "drifts": drifts})
+        for kind, make in (("fields", field_bank), ("spread", spread))
         for name in COVARIANCES
-        for drifts in DRIFTS
+        for drifts in (DRIFTS if name == "matern52" else DRIFTS[1:2])
     },
     "fields, one constant": (field_bank, {"constant": ("duration",)}),
     "fields, all but the pose constant": (
@@ -275,23 +276,11 @@ CASES = {
         {"constant": ("offsets", "duration", "warp")},
     ),
     "fields, constant without drift": (field_bank, {"constant": ("warp",), "drifts": (0,)}),
-    **{
-        f"fields, drifts {drifts}, bones {offsets}": (
-            field_bank,
-            {"drifts": drifts, "offsets": offsets},
-        )
-        for drifts in DRIFTS
-        for offsets in DRIFTS
-        if drifts != offsets
-    },
-    **{
-        f"spread, {name}, drifts {drifts}": (spread, {"covariance": name, "drifts": drifts})
-        for name in COVARIANCES
-        for drifts in DRIFTS
-    },
-    **{f"timing, {knots} knots": (timing, {"knots": knots}) for knots in (3, 4, 6, 12, 24)},
-    **{f"bank, level {n}": (level_of_bank, {"level": n}) for n in (1, 2, 3, 4)},
-    **{f"decoder, level {n}": (level_of_decoder, {"level": n}) for n in (0, 1, 2, 3)},
+    "fields, less drift of bones": (field_bank, {"drifts": (0, 1), "offsets": (0,)}),
+    "fields, more drift of bones": (field_bank, {"drifts": (0,), "offsets": (1,)}),
+    **{f"timing, {knots} knots": (timing, {"knots": knots}) for knots in (3, 6, 24)},
+    **{f"bank, level {n}": (level_of_bank, {"level": n}) for n in (1, 4)},
+    **{f"decoder, level {n}": (level_of_decoder, {"level": n}) for n in (0, 2, 3)},
     "decoder": (decoder, {"stage": decoder_stage()}),
     "decoder of rotation vectors": (decoder, {"stage": decoder_stage("rotation_vector")}),
     "decoder with stiff axes": (decoder, {"stage": stiff_stage()}),
@@ -312,27 +301,6 @@ def test_graph_answers_what_the_reference_does(name):
         assert np.max(np.abs(found - expected)) < case.allowed
     beside = zip(case.found, case.wrong, strict=True)
     assert max(np.max(np.abs(found - wrong)) for found, wrong in beside) > 3.0 * case.allowed
-
-
-def test_constant_field_ignores_the_controls():
-    own = bank(constant=("duration",))
-    values = own.numpy(points(own, asked()))
-    lengths = values["duration"]
-    assert np.array_equal(lengths, np.repeat(lengths[:1], BATCH, axis=0))
-    assert np.ptp(values["pose"], axis=0).min() > 1e-2
-
-
-def test_sampled_range_is_minus_one_to_one():
-    assert np.max(np.abs(points(bank(), np.stack([LOW, HIGH])) - [[-1.0], [1.0]])) < 1e-12
-
-
-def test_labels_stand_behind_the_controls():
-    told = np.eye(2)
-    found = replace(bank(), labels={"performer": ("ann", "bob")}).points(
-        np.stack([LOW, HIGH]), told
-    )
-    assert np.array_equal(found[:, :CONTROLS], points(bank(), np.stack([LOW, HIGH])))
-    assert np.array_equal(found[:, CONTROLS:], told)
 
 
 def test_spread_at_a_sample_is_never_less_than_the_nugget():

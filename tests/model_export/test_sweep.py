@@ -93,7 +93,6 @@ def test_a_recipe_that_makes_no_model_stops_no_other(folder, alone, tmp_path):
     ("words", "said"),
     [
         (("-o", "made.onnx"), "output: 'made.onnx', expected a folder for several models"),
-        (("-o", "made", "--report", "a.html"), "report: of several recipes, expected none"),
         (("-o", "made", "--resume", "kept"), "resume: of several recipes, expected none"),
         (("-o", "made", "--jobs", "0"), "jobs: 0, expected 1 or more"),
     ],

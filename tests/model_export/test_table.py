@@ -52,11 +52,6 @@ def test_a_row_says_file_controls_and_frames(rows, tmp_path):
     assert [row.line for row in found] == [2, 3]
 
 
-def test_without_frame_columns_a_clip_is_its_whole_file(rows):
-    (row,) = rows("file,v\na.bvh,1\n")
-    assert (row.first_frame, row.last_frame, row.performer) == (0, None, "")
-
-
 def test_motion_files_stand_beside_the_table(tmp_path):
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / "a.bvh").touch()
@@ -68,9 +63,7 @@ def test_motion_files_stand_beside_the_table(tmp_path):
 @pytest.mark.parametrize(
     ("clips", "column", "why"),
     [
-        ({"file": "path"}, "path", "clips.file"),
         ({"performer": "who"}, "who", "clips.performer"),
-        ({"last_frame": "to"}, "to", "clips.last_frame"),
         ({"landmarks": ["hit"]}, "hit", "clips.landmarks"),
         ({"where": {"kind": {"among": ["x"]}}}, "kind", "clips.where"),
     ],
@@ -81,12 +74,7 @@ def test_a_missing_column_is_named_with_the_columns_that_are_there(refused, clip
     assert fault.message == f"no column {column!r} ({why}); there are file, v, turn"
 
 
-def test_a_missing_column_of_a_control_names_the_control(refused):
-    fault = refused("file,w\na.bvh,1\n")
-    assert fault.message == "no column 'v' (control speed); there are file, w"
-
-
-@pytest.mark.parametrize("cell", ["fast", "", "1,5", "nan", "inf", "-Infinity", "1e999", "0x10"])
+@pytest.mark.parametrize("cell", ["", "1,5", "nan", "1e999"])
 def test_a_cell_that_is_no_finite_number_is_named_by_line_and_column(refused, tmp_path, cell):
     fault = refused(f'file,v\na.bvh,1\nb.bvh,"{cell}"\n')
     assert str(fault).startswith(f"{tmp_path / 'clips.csv'}:3: ")
@@ -109,7 +97,7 @@ def test_a_quote_that_never_ends_is_refused(refused):
     assert refused('file,v\na.bvh,"1\n').message.startswith("not CSV: unexpected end of data")
 
 
-@pytest.mark.parametrize("text", ["file,v\n", "", "\n\n", "file,v"])
+@pytest.mark.parametrize("text", ["file,v\n", ""])
 def test_a_table_without_rows_is_refused(refused, text):
     assert refused(text).message == "no rows below the heading"
 
@@ -117,6 +105,7 @@ def test_a_table_without_rows_is_refused(refused, text):
 def test_a_byte_order_mark_is_no_part_of_the_first_column(rows):
     (row,) = rows(codecs.BOM_UTF8 + b"file,v\r\na.bvh,1\r\n")
     assert row.controls.tolist() == [1.0]
+    assert (row.first_frame, row.last_frame, row.performer) == (0, None, "")
 
 
 def test_text_that_is_not_utf_8_is_refused(refused):
@@ -129,11 +118,8 @@ THREE = "file,v,who,turn\na.bvh,1,ann,-5\nb.bvh,2,bob,0\nc.bvh,3,ann,7.5\n"
 @pytest.mark.parametrize(
     ("where", "left"),
     [
-        ({}, [1, 2, 3]),
         ({"who": {"among": ["ann"]}}, [1, 3]),
         ({"who": {"without": ["ann"]}}, [2]),
-        ({"turn": {"minimum": 0.0}}, [2, 3]),
-        ({"turn": {"maximum": 0.0}}, [1, 2]),
         ({"turn": {"minimum": -5.0, "maximum": 5.0}}, [1, 2]),
         ({"who": {"among": ["ann"]}, "turn": {"maximum": 0.0}}, [1]),
     ],
@@ -145,11 +131,6 @@ def test_conditions_choose_rows_and_their_bounds_count_in(rows, where, left):
 def test_a_table_of_which_no_row_belongs_is_refused(refused):
     fault = refused(THREE, where={"who": {"among": ["eve"]}})
     assert fault.message == "none of 3 rows meets the conditions"
-
-
-def test_a_condition_on_a_number_refuses_a_cell_that_is_none(refused):
-    fault = refused(THREE.replace("7.5", "left"), where={"turn": {"minimum": 0.0}})
-    assert (fault.line, fault.message) == (4, "column 'turn': 'left', expected a number")
 
 
 def test_rows_that_do_not_belong_may_hold_anything(rows):
@@ -165,14 +146,9 @@ def test_a_clip_has_two_frames_at_least(rows, refused, last):
 
 
 @pytest.mark.parametrize("cell", ["1.5", "-1"])
-@pytest.mark.parametrize("column", ["from", "to"])
-def test_a_frame_is_a_whole_number_from_zero(refused, column, cell):
-    row = {"from": "0", "to": "9"} | {column: cell}
-    fault = refused(f"file,v,from,to\na.bvh,1,{row['from']},{row['to']}\n", **FRAMES)
-    assert (fault.line, fault.message) == (
-        2,
-        f"column {column!r}: {cell!r}, expected a frame from 0",
-    )
+def test_a_frame_is_a_whole_number_from_zero(refused, cell):
+    fault = refused(f"file,v,from,to\na.bvh,1,{cell},9\n", **FRAMES)
+    assert (fault.line, fault.message) == (2, f"column 'from': {cell!r}, expected a frame from 0")
 
 
 def test_a_motion_file_that_is_missing_is_named_by_row_and_column(refused, tmp_path):

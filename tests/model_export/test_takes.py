@@ -20,7 +20,6 @@ from posefield_train.kriging import sample_points
 from posefield_train.source import ingest, take_groups
 from posefield_train.source.take_groups import ClipPair
 
-NAMES = ("Hips", "Spine", "LeftArm", "LeftHand", "RightArm", "RightHand")
 SWAPPED = (0, 1, 4, 5, 2, 3)
 
 
@@ -126,13 +125,6 @@ def read(tmp_path):
 
 
 STATED = {"clips": {"take": "take"}}
-
-
-def test_a_take_column_groups_clips(read):
-    rows = [f"{i}.bvh,{i},{'ab'[i % 2]}" for i in range(8)]
-    _, takes, notes = read(EIGHT, rows, "file,v,take", **STATED)
-    assert (takes, notes) == ([0, 1] * 4, [])
-    assert read(EIGHT)[1:] == (list(range(8)), [])
 
 
 def test_takes_of_two_performers_may_have_the_same_name(read):

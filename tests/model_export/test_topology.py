@@ -183,7 +183,6 @@ def test_a_lacking_role_is_named_with_the_way_out(clips):
         ({"head": ["Nothing"]}, "skeleton.roles: no file has joint 'Nothing'"),
         ({"head": ["Head", "Neck1"]}, "skeleton.roles.head: found joints .*expected one"),
         ({"leftHand": ["LeftFoot"], "leftFoot": ["LeftHand"]}, "is not below"),
-        ({"hips": ["LeftThumb1"]}, r"'Head' \(head\) is not below 'LeftThumb1' \(hips\)"),
         ({"hips": ["Neck1"]}, "no joint of the spine between 'Neck1'"),
     ],
 )
@@ -200,19 +199,6 @@ def test_a_role_that_some_lack_is_left_out_with_a_note(clips):
         f"{side}Toes is left out: 1 of 2 clips, such as 1.bvh, have no joint for it"
         for side in ("left", "right")
     ]
-
-
-def test_points_of_a_longer_chain_lie_at_the_shares_of_the_shorter(clips):
-    mixed = [clips[0], with_joint(clips[1], "Waist", "Spine", 0.5)]
-    found = unified_clips.unify(mixed, {})
-    chain = [found.points[1][name] for name in ("spine1", "spine2", "spine3")]
-    names = [mixed[1].skeleton.names[point.joint] for point in chain]
-    # The joint between stays where it is in the shorter chain, at the end of the waist.
-    assert names in (["LowerBack", "Spine", "Spine1"], ["LowerBack", "Waist", "Spine1"])
-    motion = unified_clips.joint_motion(mixed[1], found.points[1])
-    wanted = mixed[1].positions()[:, index(mixed[1], "Spine")[0]]
-    place = motion.positions[:, found.topology.index("spine2")]
-    assert np.linalg.norm(place - wanted, axis=-1).max() < 5e-3
 
 
 def test_a_neck_that_carries_the_arms_is_a_spine(clips):
@@ -242,7 +228,6 @@ def test_a_neck_that_carries_the_arms_is_a_spine(clips):
     ("spine", "roles"),
     [
         (1, {"spine": "spine1"}),
-        (2, {"spine": "spine1", "chest": "spine2"}),
         (5, {"spine": "spine1", "chest": "spine3", "upperChest": "spine5"}),
     ],
 )
