@@ -10,16 +10,9 @@ from families import sample_walk
 from posefield.common.errors import TrainingError
 from posefield.motion import quat
 from posefield_train import train
-from posefield_train.adapt import (
-    adaptation,
-    canonical_clips,
-    extended_models,
-    model_reconstruction,
-    tensor_extension,
-)
+from posefield_train.adapt import adaptation, canonical_clips, extended_models, tensor_extension
 from posefield_train.evaluate import compared_motion, motion_errors, predictions
 from posefield_train.evaluate.predictions import Queries
-from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
 from posefield_train.source import canonical, ingest
 from posefield_train.tensor import hosvd
@@ -196,14 +189,6 @@ def test_a_range_that_grows_moves_no_field(trained, known):
     assert np.abs(after(bank.pose.hyper) - before).max() > 1e-3
 
 
-def test_sigma_says_that_the_newcomer_is_known(adapted):
-    model, who = adapted.model, adapted.model.bank.labels["performer"].index("cy")
-    point, time = np.array([[7.0]]), np.zeros((1, 1))
-    own = model.evaluate(point, time, np.eye(4)[[who]]).sigma
-    nobody = model.evaluate(point, time, np.zeros((1, 4))).sigma
-    assert own < 0.8 * nobody
-
-
 def test_a_clip_of_another_action_is_refused_with_the_numbers(trained, known):
     good = examples(trained, "cy", SHOWN)
     canonical_clips.refuse_outliers(known, canonical_clips.to_canonical(known, good))
@@ -228,27 +213,6 @@ def test_a_clip_in_another_unit_is_refused_by_its_bones(trained, known, size):
         canonical_clips.refuse_outliers(known, of_size(size))
     # Negative control: a performer of another stature is none.
     canonical_clips.refuse_outliers(known, of_size(1.1))
-
-
-def test_a_reopened_model_is_adapted_as_the_trained_one(recipe, trained, known, adapted):
-    content = onnx_export.export_model(recipe, trained, []).content
-    reopened = model_reconstruction.reconstruct(content, "small.onnx").known
-    found = adaptation.adapt(reopened, examples(trained, "cy", SHOWN), "cy").model
-    rng = np.random.Generator(np.random.PCG64(2))
-    question = (
-        rng.uniform(0, 14, (60, 1)),
-        rng.uniform(0, 1, (60, 2)),
-        np.eye(5, 4)[[*range(5)] * 12],
-    )
-    parents = known.skeleton.parents
-    expected = adapted.model.evaluate(*question).positions(parents)
-    assert np.linalg.norm(
-        found.evaluate(*question).positions(parents) - expected, axis=-1
-    ).max() < (1e-4)
-    # Negative control: one clip fewer is another model.
-    fewer = adaptation.adapt(reopened, examples(trained, "cy", SHOWN[:2]), "cy").model
-    gaps = np.linalg.norm(fewer.evaluate(*question).positions(parents) - expected, axis=-1)
-    assert gaps.max() > 1e-3
 
 
 @pytest.fixture(scope="module")

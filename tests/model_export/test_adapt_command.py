@@ -2,7 +2,6 @@
 
 import json
 
-import exported_clips
 import newcomers
 import numpy as np
 import pytest
@@ -180,35 +179,3 @@ def test_clips_that_cannot_be_read_are_named(posefield, measuring, table, tmp_pa
     assert not out.exists()
     # Negative control: those that are there are read.
     assert posefield("adapt", measuring, *clips, "-o", out, *SAID)[0] == 0
-
-
-def test_a_wrong_unit_is_refused_where_all_controls_are_measured(
-    posefield, measuring, table, tmp_path
-):
-    clips, out = [table.with_name(f"{i}.bvh") for i in range(3)], tmp_path / "x.onnx"
-    for unit in ("0.6", "1.6"):
-        words = (measuring, *clips, "-o", out, *SAID[:3], unit, *SAID[4:])
-        assert refused(posefield, "times as long as is usual here", *words) == 4
-    assert not out.exists()
-
-
-def test_clips_of_other_formats_adapt_alike(posefield, adapted, base, table, tmp_path):
-    rows = ["file,speed"]
-    for index, value in enumerate(SHOWN):
-        content = exported_clips.encoded(newcomers.clip("cy", value), "glb")
-        (table.parent / f"{index}.glb").write_bytes(content)
-        rows.append(f"{index}.glb,{value:g}")
-    other = table.with_name("glb.csv")
-    other.write_text("\n".join(rows) + "\n")
-    path = tmp_path / "glb.onnx"
-    assert posefield("adapt", base, "--table", other, "-o", path, *SAID)[0] == 0
-    asked = ClipQuestion(controls={"speed": 4.0}, performer="cy")
-    one, two = (
-        clips.synthesize_clip(Synthesizer("small", session.load(own)), asked).clip.positions()
-        for own in (adapted[0], path)
-    )
-    assert np.abs(one - two).max() < 1e-4
-    # Negative control: another performer moves otherwise.
-    asked = ClipQuestion(controls={"speed": 4.0}, performer="a")
-    other = clips.synthesize_clip(Synthesizer("small", session.load(path)), asked)
-    assert np.abs(other.clip.positions()[-1] - one[-1]).max() > 1e-3

@@ -81,12 +81,3 @@ def test_labels_that_the_model_lacks_are_refused(
     asked = ("--table", table, "-o", tmp_path / "new.onnx", *SAID, "--label", option)
     code, _, err = posefield("adapt", styled_path, *asked)
     assert code and said in err
-
-
-def test_an_unknown_style_in_the_table_is_refused_with_its_line(
-    posefield, styled_path, table, tmp_path
-):
-    table.write_text(table.read_text().replace("marching", "marshing"))
-    asked = ("--table", table, "-o", tmp_path / "new.onnx", *SAID)
-    code, _, err = posefield("adapt", styled_path, *asked)
-    assert code and "cy.csv:3: column 'style': 'marshing' (did you mean 'marching'?)" in err

@@ -213,16 +213,6 @@ def test_every_euler_order():
         assert_positions(clip_of(text), worlds(joints, rows))
 
 
-def test_six_channels_on_every_joint_replace_the_offset():
-    six = f"{XYZ_POSITION} {ZXY}"
-    rows = [[1, 2, 3, 10, 20, 30, 0, 11, 0.5, 40, 50, 60, 3.5, 4.5, 5.5, 70, 80, 90]]
-    joints, text = chain(six, six, six, rows=rows)
-    clip = clip_of(text)
-    assert_positions(clip, worlds(joints, rows))
-    np.testing.assert_array_equal(clip.translations[0, 1], [0, 11, 0.5])
-    np.testing.assert_array_equal(clip.skeleton.offsets[1], [0, 10, 0])
-
-
 def test_rotation_and_position_channels_mixed():
     mixed = "Zrotation Yposition Xrotation Zposition Yrotation Xposition"
     joints, text = chain(mixed, ZXY, "", rows=(rows := [[*range(7, 70, 7)]]))
@@ -238,15 +228,6 @@ def test_no_one_and_two_rotation_channels():
         f"{XYZ_POSITION} Yrotation", "Xrotation", "", rows=(rows := [[1, 2, 3, 30, 40]])
     )
     assert_positions(clip_of(text), worlds(joints, rows))
-
-
-def test_root_without_position_channels_stays_at_its_offset():
-    offsets = ((1, 90, 2), (0, 10, 0), (3, 4, 5))
-    joints, text = chain(ZXY, ZXY, ZXY, rows=(rows := [[*range(9)]]), offsets=offsets)
-    for root_offset in ("replace", "add"):
-        clip = clip_of(text, root_offset=root_offset)
-        assert_positions(clip, worlds(joints, rows))
-        np.testing.assert_array_equal(clip.root_path, [[1, 90, 2]])
 
 
 def test_missing_position_channel_takes_the_offset():
@@ -303,12 +284,6 @@ def test_unit_scales_every_length_and_no_angle():
 def test_a_unit_that_is_no_length_is_refused(unit):
     with pytest.raises(ValueError, match="expected a positive number"):
         clip_of(PLAIN, metres_per_unit=unit)
-
-
-@pytest.mark.parametrize("choice", [{"up": "x"}, {"root_offset": "auto"}])
-def test_an_unknown_choice_is_refused(choice):
-    with pytest.raises(ValueError, match="expected 'y' or 'z', 'replace' or 'add'"):
-        clip_of(PLAIN, **choice)
 
 
 @pytest.mark.parametrize(

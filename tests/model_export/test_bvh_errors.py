@@ -70,20 +70,9 @@ HIERARCHY_FAULTS = [
     (line_changed(2, "ROOT"), 2, "found no name, expected a joint's name on this line"),
     (line_changed(9, "SCALE 1"), 9, f"found 'SCALE', {JOINT_PLACES} 'spine' of line 6"),
     (
-        line_changed(8, ""),
-        14,
-        "found the end of joint 'spine' of line 6, expected its OFFSET first",
-    ),
-    (line_changed(9, "OFFSET 1 2 3"), 9, "found a second OFFSET in joint 'spine', expected one"),
-    (
         line_changed(9, "End Site { OFFSET 0 0 0 }\nCHANNELS 1 Xrotation"),
         10,
         "found CHANNELS of joint 'spine' after a child, expected it before",
-    ),
-    (
-        line_changed(8, "OFFSET 0 10"),
-        9,
-        "found 'CHANNELS', expected a number, the Z of an OFFSET of three",
     ),
     (
         line_changed(8, "OFFSET 0 10,5 0"),
@@ -112,11 +101,6 @@ HIERARCHY_FAULTS = [
     ),
     (line_changed(15, ""), 16, f"found MOTION, {JOINT_PLACES} 'hips' of line 2"),
     (
-        line_changed(15, "} }"),
-        15,
-        "found '}', expected a line MOTION after the root's closing brace",
-    ),
-    (
         VALID[: VALID.index("    End Site")],
         10,
         f"found the end of the file, {JOINT_PLACES} 'spine' of line 6",
@@ -125,11 +109,6 @@ HIERARCHY_FAULTS = [
         line_changed(15, "}\nROOT prop\n{\nOFFSET 0 0 0\nCHANNELS 0\n}"),
         16,
         "one root expected, found a second at line 16",
-    ),
-    (
-        VALID[: VALID.index("MOTION")],
-        16,
-        "found the end of the file, expected a line MOTION after the root's closing brace",
     ),
     (
         "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 999999999999\nFrame Time: 1\n",
@@ -141,11 +120,6 @@ HIERARCHY_FAULTS = [
 FRAME_TIME = "expected a positive number of seconds from 1e-06 to 1e+06"
 
 MOTION_FAULTS = [
-    (
-        line_changed(17, ""),
-        18,
-        "found 'Frame Time: 0.0333333', expected 'Frames: N', N a whole number",
-    ),
     (line_changed(17, "Frames: 0"), 17, "found 0 frames, expected at least 1"),
     (line_changed(18, ""), 19, f"found '{ROW.strip()}', expected 'Frame Time: seconds'"),
     (line_changed(18, "Frame Time: 1e-320"), 18, f"found frame time 1e-320, {FRAME_TIME}"),
@@ -231,12 +205,6 @@ def test_a_huge_declared_count_allocates_nothing():
     assert peak < 1_000_000
 
 
-def test_a_count_of_thousands_of_digits_is_refused():
-    error = refused(changed("Frames: 3", f"Frames: {'9' * 10_000}"))
-    assert error.line == 17
-    assert error.message.endswith("...', expected 'Frames: N', N a whole number")
-
-
 def test_joints_that_cost_the_file_nothing_are_bounded():
     frames = 10_001
     text = flat(1000).replace("Frames: 1\n", f"Frames: {frames}\n") + "0\n" * (frames - 1)
@@ -252,11 +220,6 @@ def test_a_long_word_is_refused_in_linear_time_and_cut_in_the_message():
     assert (error.line, len(error.message)) == (20, len("found '', expected a number") + 40)
     assert refused(line_changed(8, f"OFFSET 0 0 {digits}")).line == 8
     assert refused(line_changed(18, f"Frame Time: {digits}")).line == 18
-
-
-def test_a_long_blank_line_is_passed_in_linear_time():
-    assert refused(" " * 1_000_000 + "\n" + "\t" * 1_000_000).line == 2
-    assert refused(line_changed(17, " " * 1_000_000 + "Frames")).line == 17
 
 
 @pytest.mark.parametrize(("line", "blank"), [(12, "\r\n"), (17, "\n"), (19, " \n")])

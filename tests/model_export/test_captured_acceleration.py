@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield.inference import session
 from posefield.model_file import card_reader, model_card
-from posefield.model_file.captured_acceleration import RATE, mean_accelerations
+from posefield.model_file.captured_acceleration import RATE
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
@@ -49,22 +48,6 @@ def test_clips_of_every_rate_have_the_acceleration_of_their_motion(rate):
     assert np.abs(found - right).max() < PRECISION * right.max()
 
 
-def test_straight_lines_between_frames_would_double_the_acceleration():
-    """Negative control: lines between the frames of a clip of half the rate."""
-    places = swinging(30.0).positions()
-    steps = np.arange(2 * len(places) - 1) / 2.0
-    lines = np.stack(
-        [
-            np.interp(steps, np.arange(len(places)), each)
-            for each in places.reshape(len(places), -1).T
-        ],
-        axis=1,
-    ).reshape(-1, 2, 3)
-    found = mean_accelerations(lines, RATE)
-    right = expected(len(found))
-    assert np.abs(found - right).max() > 25.0 * PRECISION * right.max()
-
-
 def test_the_card_has_the_percentiles_over_all_frames(exported, trained):
     found = exported.card.captured_acceleration
     every = np.sort(np.concatenate([clip_accelerations(own.clip) for own in trained.examples]))
@@ -85,23 +68,12 @@ def test_a_cycle_counts_as_it_was_before_its_seam_was_closed(strides):
     assert captured_acceleration(bare).p99 != captured_acceleration(swung).p99
 
 
-def test_clips_of_two_frames_have_none(strides):
-    clip = swinging(RATE, 1.0 / RATE)
-    assert captured_acceleration([replace(strides[0], clip=clip, captured=None)]) is None
-
-
 def earlier_file(exported, folder):
     """Return the path of the model as a file of an earlier version."""
     old = replace(exported.card, captured_acceleration=None)
     path = folder / "old.onnx"
     path.write_bytes(exported.model.onnx(model_card.dump(old), {"producer_name": "posefield"}))
     return path
-
-
-def test_a_file_of_an_earlier_version_has_none(exported, tmp_path):
-    opened = session.load(earlier_file(exported, tmp_path))
-    assert opened.card.captured_acceleration is None
-    assert "captured_acceleration" not in model_card.plain_values(opened.card)
 
 
 def test_inspect_tells_of_the_accelerations(model_path, exported, tmp_path, posefield):

@@ -15,7 +15,6 @@ from posefield_train import train
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.adapt.adaptation import adapt
 from posefield_train.adapt.model_reconstruction import reconstruct
-from posefield_train.align import phase_alignment
 from posefield_train.contacts import contact_labels
 from posefield_train.graph import onnx_export
 from posefield_train.sample import sample_files
@@ -110,18 +109,6 @@ def test_contacts_of_the_table_stand_for_detected_ones(rail):
     assert trained.contacts.statistics[2].height == pytest.approx(sample_walk.HIPS, abs=0.1)
 
 
-def test_contacts_of_the_table_follow_a_shifted_cycle(rail):
-    folder, own = rail
-    examples, _ = ingest.ingest(own, folder)
-    example = examples[0]
-    later = phase_alignment.shift_start(example, 0.25)
-    clip, shifted = labelled(own, [example, later])
-    gone = round(later.shift * (len(clip.contacts) - 1))
-    rolled = np.roll(clip.contacts[:-1], -gone, axis=0)
-    assert np.mean(rolled == shifted.contacts[:-1]) > 0.97
-    assert np.mean(clip.contacts[:-1] == shifted.contacts[:-1]) < 0.8
-
-
 @pytest.mark.parametrize("cell", ["20-10", "1-5 4-9", "a-b"])
 def test_a_cell_that_is_no_intervals_is_refused(rail, cell):
     folder, own = rail
@@ -140,19 +127,6 @@ def test_a_column_or_joint_that_is_missing_is_refused(rail):
     unknown = walk_recipe(contacts={"columns": {"Hand": "rail"}})
     with pytest.raises(RecipeError, match="no joints 'Hand'"):
         ingest.ingest(unknown, folder)
-
-
-def test_a_joint_that_contacts_nothing_is_noted_and_left_out(rail):
-    folder, own = rail
-    table = folder / "strides.csv"
-    table.write_text(table.read_text().replace("10-19", ""))
-    examples, _ = ingest.ingest(own, folder)
-    trained = train.train(own, examples, lambda _: None)
-    assert [one.joint for one in trained.contacts.statistics] == [3, 6]
-    assert trained.contact_notes[0].startswith("Hips contacts nothing in any clip")
-    assert "contacts nothing" in " ".join(
-        onnx_export.export_model(own, trained, []).card.diagnostics["notes"]
-    )
 
 
 def newcomers():

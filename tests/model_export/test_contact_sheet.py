@@ -5,13 +5,11 @@ import json
 import re
 import shutil
 
-import discover_takes
-import numpy as np
 import pytest
 import rigid_takes
 from decided_page import decide
 
-from posefield_train.families import contact_sheet, review
+from posefield_train.families import review
 
 WORDS = ("--licence", "ours", "--candidates", "60")
 
@@ -79,15 +77,3 @@ def test_choices_become_decisions_and_their_command(page, tmp_path):
     words = ["posefield", "review", str(page.parent), "--accept", "1", "--merge", "1,2", "--drop"]
     assert decided.command[:-1] == words
     assert decided.command[-1].startswith(f"{read.drop[0].family}:")
-
-
-def test_figures_keep_the_proportions_of_the_body():
-    take = discover_takes.take("a.bvh", 3.0, hands=np.zeros((181, 3)))
-    strip = contact_sheet.draw(take, 0, 90)
-    assert strip.body.count("M") == contact_sheet.INSTANTS * 9
-    assert strip.right.count("M") == contact_sheet.INSTANTS * 7
-    numbers = [float(word) for word in re.findall(r"-?\d+", strip.body + strip.right)]
-    assert min(numbers) >= 0.0 and max(numbers[1::2]) <= strip.height + 1.0
-    # The body stands 1.65 legs high, from its toes to its head.
-    ys = numbers[1::2]
-    assert max(ys) - min(ys) == pytest.approx(1.65 * contact_sheet.UNIT, abs=2.0)

@@ -3,14 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-import onnx
 import pytest
 from families import sample_walk
 
 from posefield.common.errors import ExportRefused, ModelError
 from posefield.inference import graph_ports, session
 from posefield.inference.graph_ports import CONTACTS
-from posefield.model_file import model_card, subgraph
+from posefield.model_file import model_card
 from posefield_train.contacts import contact_labels, contact_model
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import universal_kriging
@@ -114,35 +113,6 @@ def test_contacts_are_probabilities_beyond_the_sampled_ranges_too(opened):
     others = opened.run(points, times, "sigma", "rotations", "duration", labels=weights)
     for one, other in zip((sigma, rotations, duration), others, strict=True):
         assert np.array_equal(one, other)
-
-
-def test_the_end_of_a_cycle_has_the_contacts_of_its_begin(opened):
-    points = opened.bounds.limit(questions(opened.card)[0])
-    durations = opened.durations(points).astype(float)
-    times = np.stack([np.zeros_like(durations), durations], axis=1)
-    (found,) = opened.run(points, times, CONTACTS)
-    assert np.abs(found[:, 0] - found[:, 1]).max() < 1e-3
-    (later,) = opened.run(points, 0.75 * times, CONTACTS)
-    assert np.abs(later[:, 1] - found[:, 0]).max() > 0.5
-
-
-def test_the_rest_of_the_graph_is_that_of_a_model_without_contacts(walk_exported, opened):
-    """So no other answer changes its bytes or becomes slower."""
-    model = walk_exported.model
-    bare = replace(model, contacts=None, bank=replace(model.bank, contacts=None))
-    card = replace(walk_exported.card, contacts=())
-    graphs = []
-    for one, own in ((model, walk_exported.card), (bare, card)):
-        content = one.onnx(model_card.dump(own), {})
-        pruned = subgraph.select_outputs(content, *graph_ports.outputs(own))
-        graphs.append(onnx.load_from_string(pruned).graph)
-    assert list(graphs[0].node) == list(graphs[1].node)
-    assert list(graphs[0].initializer) == list(graphs[1].initializer)
-    whole = onnx.load_from_string(walk_exported.content).graph
-    assert len(whole.node) > len(graphs[1].node)
-    for name in graph_ports.outputs(card):
-        asked = {"controls": np.zeros((1, 2), np.float32), "time": np.zeros((1, 1), np.float32)}
-        assert len(opened.graph.run([name], asked, 0)) == 1
 
 
 def test_a_model_without_feet_has_no_contacts(exported):

@@ -35,12 +35,6 @@ def test_sill_is_one_and_five_per_cent_are_left_at_the_range(name):
     assert abs(COVARIANCES[name].numpy(np.array([0.9]))[0] - left) > 3e-4
 
 
-def test_covariance_falls_with_distance(name):
-    values = COVARIANCES[name].numpy(SQUARED)
-    assert np.all(np.diff(values) <= 0.0)
-    assert values[-1] >= 0.0
-
-
 def test_matrix_of_covariances_is_positive_definite(name, rng):
     # The spherical one is valid in three dimensions and no more.
     points = rng.uniform(-1.0, 1.0, size=(80, 3))
@@ -68,19 +62,3 @@ def test_exponential_is_the_matern_of_one_half():
     a = 3.0 * np.sqrt(SQUARED[1:])
     bessel = 2.0**0.5 / gamma(0.5) * np.sqrt(a) * kv(0.5, a)
     assert np.max(np.abs(COVARIANCES["exponential"].numpy(SQUARED[1:]) - bessel)) < 1e-12
-
-
-@pytest.mark.parametrize(
-    ("name", "smooth"),
-    [
-        ("exponential", False),
-        ("spherical", False),
-        ("matern32", True),
-        ("matern52", True),
-        ("gaussian", True),
-    ],
-)
-def test_only_smooth_covariances_are_flat_at_a_sample(name, smooth):
-    step = 1e-4
-    slope = (1.0 - COVARIANCES[name].numpy(np.array([step**2]))[0]) / step
-    assert (slope < 0.01) == smooth

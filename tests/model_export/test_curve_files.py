@@ -89,12 +89,6 @@ def test_a_cycle_closes_its_curves_within_their_range(folder):
         assert found.min() >= 0.0 and found.max() <= 1.0
 
 
-def test_of_named_curves_the_others_are_left_out(folder):
-    found = read(folder, names=["smile"])[0].clip
-    assert found.curves.names == ["smile"]
-    assert np.abs(found.curve_values[:, 0] - values(0)[:, 1]).max() < WRITTEN
-
-
 def test_a_curve_has_its_own_range_and_distance(folder):
     own = read(folder, range=[-1.0, 1.0], of={"smile": {"range": [0.0, 5.0], "distance_cm": 7.0}})
     jaw, smile = own[0].clip.curves.curves
@@ -145,17 +139,6 @@ def test_a_value_outside_its_range_is_refused(folder):
     said = r"column 'smile': 0\.605, expected 0 to 0\.6 \(curves\.range\)"
     with pytest.raises(RecipeError, match=said):
         read(folder, of={"smile": {"range": [0.0, 0.6]}})
-
-
-def test_keys_of_an_unknown_curve_are_refused(folder):
-    with pytest.raises(RecipeError, match=r"curves\.of\.smil \(did you mean 'smile'\?\)"):
-        read(folder, of={"smil": {"distance_cm": 3.0}})
-
-
-def test_a_file_without_curves_is_refused(folder):
-    (folder / "0.curves.csv").write_text("frame\n0\n1\n")
-    with pytest.raises(RecipeError, match="found no column beside 'frame', expected curves"):
-        read(folder)
 
 
 @pytest.mark.parametrize(

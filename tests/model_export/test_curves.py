@@ -11,7 +11,7 @@ from posefield.constraints import constrained_motion
 from posefield.inference import graph_ports, session
 from posefield.model_file import model_card
 from posefield.motion import quat
-from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -51,14 +51,6 @@ def test_an_expression_between_the_examples_is_near_the_truth(opened):
     assert away.max() < NEAR
     other = np.sqrt(np.mean(np.square(clip.curve_values - truth(CALM, clip)), axis=0))
     assert other.max() > 4 * NEAR
-
-
-def test_poses_have_the_curves_of_the_clip_at_their_times(opened):
-    clip = clips.synthesize_clip(opened, ClipQuestion(controls=LAUGH, fps=10.0)).clip
-    times = [frame / 10.0 for frame in range(len(clip))]
-    found = poses.synthesize_poses(opened, PoseQuestion(controls=LAUGH, times=times))
-    assert np.abs(found.curves - clip.curve_values).max() < SINGLE
-    assert np.abs(found.curves[1:] - clip.curve_values[:-1]).max() > 0.1
 
 
 def test_every_level_answers_with_curves_within_their_limits(opened):
@@ -103,16 +95,6 @@ def test_a_pose_with_curves_has_the_same_bytes_in_every_batch(opened):
     assert all(poses.is_batch_exact(opened, level) for level in range(4))
 
 
-def test_one_unit_of_a_curve_counts_as_its_distance(face):
-    own, joints = face.tensor, len(face.skeleton)
-    numbers = own.numbers(own.values)
-    moved = numbers[0, 0].copy()
-    moved[3 + 3 * joints + 2] += 0.5
-    apart = own.whiten @ (moved - numbers[0, 0])
-    assert np.linalg.norm(apart) == pytest.approx(0.5 * own.curves[2].distance)
-    assert own.weight == joints + len(own.curves)
-
-
 def test_curves_follow_the_warp_of_their_clip(face):
     """The jaw turns and the mouth opens by the same law, before the alignment and after."""
     jaw = face.skeleton.names.index("Jaw")
@@ -123,12 +105,6 @@ def test_curves_follow_the_warp_of_their_clip(face):
     # Of another clip, whose warp differs, the same does not hold.
     mixed = np.roll(turned, 1, axis=0) * (turned[:, -1] / np.roll(turned[:, -1], 1))[:, None]
     assert np.abs(opened - strengths[:, None] * mixed).max() > NEAR
-
-
-def test_curves_without_a_skeleton_are_aligned_by_themselves(alone):
-    """Beside one joint that rests, the warps can come from the curves alone."""
-    assert np.ptp(alone.aligned.logs, axis=0).max() > 0.05
-    assert alone.tensor.values.shape[0] == len(face_motion.CURVE_NAMES)
 
 
 def test_sigma_of_curves_alone_is_that_of_their_errors(alone, models_trained):

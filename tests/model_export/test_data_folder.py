@@ -49,13 +49,6 @@ def test_a_place_can_be_sent_to_another_process(filled):
     assert text(sent) == content
 
 
-def test_a_folder_goes_before_a_zip(tmp_path):
-    write_zip(tmp_path / "takes.zip", [NAME])
-    (tmp_path / NAME).parent.mkdir(parents=True)
-    (tmp_path / NAME).write_text("unpacked")
-    assert text(data_folder.find(tmp_path, NAME)) == "unpacked"
-
-
 def test_what_is_not_there_is_refused_with_every_place_that_was_tried(tmp_path):
     write_zip(tmp_path / "takes.zip", ["bvh/run.bvh"])
     with pytest.raises(RecipeError, match=r"no file 'takes/bvh/walk\.bvh'") as caught:
@@ -63,12 +56,6 @@ def test_what_is_not_there_is_refused_with_every_place_that_was_tried(tmp_path):
     tried = caught.value.message.partition("tried ")[2].split(", ")
     archive = tmp_path / "takes.zip"
     assert tried == [f"{tmp_path / NAME}", f"{archive}/{NAME}", f"{archive}/bvh/walk.bvh"]
-
-
-def test_a_folder_is_no_file(filled):
-    folder, _ = filled
-    with pytest.raises(RecipeError, match="no file"):
-        data_folder.find(folder, "takes/bvh")
 
 
 @pytest.mark.parametrize("name", ["takes/../../secret.bvh", "/etc/hostname", ""])

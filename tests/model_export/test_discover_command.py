@@ -6,12 +6,14 @@ import json
 import discover_takes
 import numpy as np
 import pytest
+from minimal import plain_recipe
 
 from posefield.common.errors import RecipeError
 from posefield.motion import bvh_writer
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.source import clip_table, recipe
+from posefield_train.source import clip_table
+from posefield_train.source.recipe import Recipe
 
 WALK = {"speed": 1.0, "swing": 0.6, "period": 1.2}
 NAMES = {
@@ -123,38 +125,15 @@ def test_the_example_comes_first_and_is_accepted(posefield, folder):
     assert int(found[1]["last_frame"]) % 72 in (*range(7), *range(66, 72))
 
 
-RECIPE = """
-schema = 1
-name = "walk"
-description = "d"
-licence = "l"
-[source]
-metres_per_unit = 1.0
-up = "y"
-[clips]
-table = "strides.csv"
-file = "file"
-first_frame = "first_frame"
-last_frame = "last_frame"
-where = { accepted = { among = ["true"] } }
-[[controls]]
-name = "speed"
-auto = { quantity = "speed" }
-description = "Mean speed"
-[motion]
-frames = 60
-cyclic = true
-root = "travelling"
-[size]
-rms_budget_cm = 1.0
-"""
-
-
 def test_a_recipe_takes_the_rows_that_a_person_accepted(posefield, folder):
     table = folder / "strides.csv"
     posefield("discover", folder, "--strides", "-o", table)
-    (folder / "walk.toml").write_text(RECIPE)
-    own = recipe.read(folder / "walk.toml")
+    columns = {name: name for name in ("file", "first_frame", "last_frame")}
+    accepted = {"accepted": {"among": ["true"]}}
+    plain = plain_recipe()
+    plain["clips"] = {"table": "strides.csv", **columns, "where": accepted}
+    plain["controls"][0]["column"] = "seconds"
+    own = Recipe.model_validate(plain)
     with pytest.raises(RecipeError, match="none of 5 rows meets the conditions"):
         clip_table.read(own, folder)
     lines = table.read_text().splitlines()

@@ -9,7 +9,6 @@ from minimal import SKELETON, TOML, recipe_with, small_clip, write_clips
 from posefield.common.errors import RecipeError
 from posefield.motion import quat
 from posefield.motion.clip import Clip
-from posefield.motion.skeleton import Skeleton
 from posefield_train.source import bvh, clip_joints, ingest
 
 CLIP = small_clip()
@@ -28,14 +27,6 @@ def tips(clip):
             turns[:, joint] = quat.mul(turns[:, parent], clip.rotations[:, joint])
     own = list(joints.tip_joints)
     return clip.positions()[:, own] + quat.rotate(turns[:, own], joints.tip_offsets)
-
-
-def test_end_sites_are_named_after_their_joints():
-    assert clip_joints.end_site_names(SKELETON) == ["Head_end", "LeftHand_end"]
-    forked = Skeleton(
-        ("a", "b", "b_end"), (-1, 0, 1), np.zeros((3, 3)), (0, 1, 0, 2), np.zeros((4, 3))
-    )
-    assert clip_joints.end_site_names(forked) == ["a_end", "", "a_end_2", "b_end_end"]
 
 
 def test_an_end_joint_is_where_the_end_site_was_and_changes_nothing_else():

@@ -93,12 +93,6 @@ def test_jerks_are_counted(captured, rng):
     assert motion_errors.compare_motions(shaken, captured, FEET).acceleration > 3.0
 
 
-def test_durations_are_compared_as_ratios(captured):
-    longer = motion_errors.compare_motions(made(captured.points, 3.0), captured, FEET)
-    shorter = motion_errors.compare_motions(made(captured.points, 0.75), captured, FEET)
-    assert longer.duration == -shorter.duration == pytest.approx(math.log(2.0))
-
-
 def test_without_an_event_there_is_no_effector(captured):
     assert math.isnan(motion_errors.compare_motions(made(captured.points), captured, FEET).effector)
 

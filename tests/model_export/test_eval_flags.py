@@ -6,7 +6,6 @@ import pytest
 from posefield.kriging import support
 from posefield_train.evaluate import support_flags
 from posefield_train.evaluate.folds import Fold
-from posefield_train.evaluate.support_flags import SupportFlags
 
 NAMES = ("left", "up")
 
@@ -33,11 +32,3 @@ def test_a_fold_does_not_know_what_it_holds_out(controls, parts):
     # Both clips of the last fold are flagged, which lie far beyond all others.
     assert apart.alarms >= 2 / 62
     assert (support.fit_support(alone).beyond(alone[60:]) == 0.0).all()
-
-
-def test_flags_are_given_as_a_sentence_and_as_figures():
-    flags = SupportFlags(0.1034, {"left": 1.0, "up": 0.75})
-    text = flags.text()
-    assert "10.3 % of held-out clips are flagged" in text
-    assert text.endswith("left 100 %, up 75 %")
-    assert flags.facts() == {"false_alarms": 0.1034, "beyond": {"left": 1.0, "up": 0.75}}

@@ -12,7 +12,7 @@ from posefield_train.graph import onnx_export
 from posefield_train.kriging import coefficient_models, universal_kriging
 from posefield_train.kriging.kriging_bank import POSE
 from posefield_train.tensor import event_blend, truncation_error
-from posefield_train.tensor.event_blend import LOST_SHARE, WIDTH
+from posefield_train.tensor.event_blend import LOST_SHARE
 
 
 @pytest.fixture(scope="module")
@@ -32,16 +32,6 @@ def blended(judge, trained):
     bank = replace(model.bank, event=event)
     decoder = replace(model.decoder, event=blend)
     return replace(trained, model=replace(model, bank=bank, decoder=decoder))
-
-
-def test_weights_fall_from_one_at_the_event_with_the_distance_in_time():
-    found = event_blend.event_weights(61, 40, cyclic=False)
-    assert found[40] == 1.0 and np.argmax(found) == 40
-    assert found[33] == pytest.approx(np.exp(-0.5 * (7 / 60 / WIDTH) ** 2))
-    around = event_blend.event_weights(61, 58, cyclic=True)
-    assert around[1] == pytest.approx(around[55]), "three frames after the event of a cycle"
-    alone = event_blend.event_weights(61, 58, cyclic=False)
-    assert alone[1] < 1e-9 < around[1], "negative control: a motion that ends"
 
 
 def test_the_core_blends_two_predictions_by_the_weights(blended):

@@ -18,7 +18,6 @@ from posefield_train.tensor import truncation_error
 
 FRAMES, HAND = 41, SKELETON.names.index("LeftHand")
 EVENT = {"event": {"joint": "LeftHand", "at": "highest"}}
-MARKED = {"clips": {"landmarks": ["touch"]}}
 
 
 def raised(peak, height, frames=FRAMES):
@@ -82,22 +81,6 @@ def test_a_moment_at_the_end_of_a_clip_is_refused_by_line(read):
     assert refused.value.message == (
         "LeftHand is highest at the end of 3.bvh, expected a moment within the clip: cut it "
         "longer, set event.at to 'end', or name a column of clips.landmarks"
-    )
-
-
-def test_landmarks_keep_their_order_in_time_around_the_event(read):
-    rows = [f"{i}.bvh,{i},{30 + i}" for i in range(8)]
-    recipe, examples = read(LIFTED, rows, "file,v,touch", **MARKED, **EVENT)
-    assert all(example.landmarks[0] > example.landmarks[1] for example in examples)
-    trained = train.train(recipe, examples, lambda _: None)
-    peaks = np.argmax(trained.aligned.rotations[:, :, 3, 3], axis=1)
-    assert np.ptp(peaks) <= 1
-    rows[5] = "5.bvh,5,3"
-    with pytest.raises(RecipeError) as refused:
-        read(LIFTED, rows, "file,v,touch", **MARKED, **EVENT)
-    assert refused.value.line == 7
-    assert refused.value.message == (
-        "found touch at 8%, highest at 42% of 5.bvh, expected the order of line 2, highest, touch"
     )
 
 

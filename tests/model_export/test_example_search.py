@@ -76,15 +76,6 @@ def shared(one, other):
     return common / (max(one.end, other.end) - min(one.start, other.start))
 
 
-def test_matches_do_not_overlap(corpus):
-    example = Span(0, 4.0, 6.0)
-    spans = [example, *(match.span for match in family_search.find_like(corpus, [example], 30))]
-    for at, span in enumerate(spans):
-        assert all(span.overlap(other) <= 0.2 for other in spans[:at])
-        assert 0.9 <= span.end - span.start <= 4.1
-        assert 0.0 <= span.start and span.end <= 20.0
-
-
 def test_place_heading_and_floor_change_no_feature():
     hands = waving(5, [(3.0, 2.0)])
     one = discover_takes.take("a.bvh", 20.0, hands=hands, speed=0.3)
@@ -136,10 +127,3 @@ def test_matches_are_those_of_the_recursion(seed):
     assert finite.any() and not finite.all()
     starts = [start for _, start in expected]
     assert found.starts[finite].tolist() == np.array(starts)[finite].tolist()
-
-
-def test_an_example_may_end_with_its_take(corpus):
-    seconds = (len(corpus.takes[0]) - 1) / corpus.takes[0].rate
-    for end in (seconds, seconds + 0.04):
-        found = family_search.find_like(corpus, [Span(0, seconds - 2.0, end)], 3)
-        assert len(found) == 3 and np.isfinite([match.cost for match in found]).all()

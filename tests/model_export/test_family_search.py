@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 
 from posefield_train.discover import family_search, found_clips, motion_features
-from posefield_train.discover.family_search import Family
-from posefield_train.discover.motion_features import Match, Span
 
 SECONDS, TAKES = 24.0, 3
 ORDERS = ("RCCRRC", "CRRRCC", "CCRCRR")
@@ -100,38 +98,10 @@ def test_a_hand_that_wanders_without_a_pattern_is_not_offered(seed):
     assert clips <= 0.2 * TAKES * SECONDS / family_search.SHORTEST
 
 
-def test_rests_are_not_searched(corpus):
-    searched = []
-    families = family_search.find_families(corpus, 10_000, searched.append)
-    assert 0 < len(searched) < len(family_search.candidates(corpus))
-    joined = motion_features.join_features(corpus)
-    for family in families:
-        motion = joined.clip(family.example).var(axis=0).sum()
-        assert motion > family_search.LEAST_MOTION * joined.variance
-
-
 def test_the_search_reports_each_candidate_and_is_repeated_exactly(corpus):
     counts = []
     one = family_search.find_families(corpus, 40, counts.append)
     assert counts == list(range(1, 41)) and one == family_search.find_families(corpus, 40)
-
-
-def test_equal_clips_differ_by_nothing_and_others_do(corpus):
-    joined = motion_features.join_features(corpus)
-
-    def quality(spans):
-        return found_clips.assess(joined, Family(spans[0], tuple(Match(s, 0.1) for s in spans)))
-
-    raises = [Span(take, begin, begin + seconds) for take, begin, seconds in RAISES]
-    circles = [Span(take, begin, begin + seconds) for take, begin, seconds in CIRCLES]
-    same, alike, mixed = (
-        quality([raises[0]] * 3),
-        quality(raises),
-        quality(raises[:2] + circles[:2]),
-    )
-    assert same.within < 1e-12 and same.shared == pytest.approx(1.0)
-    assert same.within < alike.within < 0.2 * mixed.within and not alike.reasons
-    assert any(reason.startswith("clips differ by") for reason in mixed.reasons)
 
 
 def paths(length, frames):

@@ -14,7 +14,6 @@ from posefield.motion import clip as clips
 from posefield.motion.skeleton import Skeleton
 from posefield_train.fetch import cmu_trials, data_sets
 from posefield_train.source import bvh, data_folder, ingest, recipe
-from posefield_train.source.recipe_sections import Condition
 
 UNIT = cmu_trials.METRES_PER_UNIT
 # Given files are written to four decimals of the unit: 5.3e-6 m was measured.
@@ -83,23 +82,6 @@ def test_reaches_are_converted_with_their_rows_and_hashes(fetch, downloaded, rea
     for example in made:
         expected = by_file[example.row.place.name].controls
         assert np.abs(example.controls - expected).max() < WRITTEN
-
-
-def test_line_ends_make_no_other_motion_and_numbers_do(fetch, downloaded, tmp_path):
-    source = tmp_path / "own"
-    source.mkdir()
-    for path in downloaded.rglob("HDM_bd*"):
-        (source / path.name).write_bytes(path.read_bytes().replace(b"\r\n", b"\n"))
-    code, _, err = fetch("hdm05", source)
-    assert code == 0 and "warning" not in err
-    path = source / "HDM_bd_grabHighR_001_120.amc"
-    assert path.read_bytes() != (downloaded / "grabHighR" / path.name).read_bytes()
-    path.write_bytes(re.sub(rb"(?m)^ltibia .*", b"ltibia 45", path.read_bytes(), count=1))
-    code, _, err = fetch("hdm05", source)
-    assert code == 0
-    (line,) = (line for line in err.splitlines() if line.startswith("warning"))
-    assert line.endswith("not the content of which the table was measured")
-    assert "HDM_bd_grabHighR_001_120.amc" in line
 
 
 def test_another_cut_and_two_files_of_one_name_are_refused(fetch, downloaded, tmp_path):
@@ -188,15 +170,6 @@ def test_a_t_pose_before_the_first_frame_is_left_out(fetch, walks, tmp_path):
     assert_same_motion(tmp_path / "data/cmu_walk" / WALK, walks(WALK))
 
 
-def test_the_files_of_the_table_are_copied_as_they_are(fetch, walks, tmp_path):
-    with walks(WALK).open("rb") as file:
-        content = file.read()
-    (tmp_path / "own").mkdir()
-    (tmp_path / "own" / Path(WALK).name).write_bytes(content)
-    assert fetch("cmu", tmp_path / "own")[0] == 0
-    assert (tmp_path / "data/cmu_walk" / WALK).read_bytes() == content
-
-
 def test_another_subject_another_motion_and_two_trials_are_no_match(fetch, acclaim_texts, tmp_path):
     write_trial(tmp_path / "other", acclaim_texts[WALK], 8, 1)
     code, _, err = fetch("cmu", tmp_path / "other")
@@ -265,25 +238,3 @@ def test_a_folder_without_files_or_without_a_skeleton_is_refused(posefield, tmp_
     (tmp_path / "07.asf").write_text(ARM_ASF)
     code, _, err = posefield("fetch", "cmu", tmp_path, *words)
     assert code == 3 and "found none of 60 clips" in err
-
-
-def test_a_data_folder_without_a_table_takes_the_shipped_one_and_says_so(walks, tmp_path):
-    own = recipe.read(data_folder.RECIPES / "cmu_walk.toml")
-    performer = {"performer": Condition(among=["cmu_07"])}
-    own = own.model_copy(update={"clips": own.clips.model_copy(update={"where": performer})})
-    for row in data_sets.CMU.rows("strides.csv"):
-        if row["performer"] == "cmu_07":
-            path = tmp_path / "cmu_walk" / row["file"]
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with walks(row["file"]).open("rb") as file:
-                path.write_bytes(file.read())
-    said = "cmu_walk/strides.csv: the data folder has no such table, the one that ships was used"
-    shipped, notes = ingest.ingest(own, tmp_path)
-    assert said in notes
-    table = (data_folder.RECIPES / "cmu_walk/strides.csv").read_bytes()
-    (tmp_path / "cmu_walk/strides.csv").write_bytes(table)
-    own_table, notes = ingest.ingest(own, tmp_path)
-    assert said not in notes
-    assert len(shipped) == len(own_table) == 2
-    for one, other in zip(shipped, own_table, strict=True):
-        assert np.array_equal(one.clip.rotations, other.clip.rotations)

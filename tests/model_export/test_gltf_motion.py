@@ -87,16 +87,6 @@ def test_sparse_values_replace_those_of_the_view(read):
     assert np.abs(found.translations[:, 0] - expected).max() == 0.0
 
 
-def test_values_may_be_interleaved(read):
-    file = GltfFile(arm(), [{"joints": [0, 1]}])
-    both = np.concatenate([xyzw(swing()), np.full((FRAMES, 2), 9.0)], axis=1).astype("<f4")
-    view = file.view(both.tobytes(), byteStride=24)
-    out = file.accessor(xyzw(swing()))
-    file.facts["accessors"][out]["bufferView"] = view
-    found = read(file.animate((0, "rotation", TIMES, out, "LINEAR")))
-    assert np.abs(places(found)[:, 1] - hand()).max() < 1e-6
-
-
 def test_interpolations_follow_the_format(read):
     """Two keys a second apart, sampled at 20 frames a second: constant, straight and Hermite."""
     ends = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])

@@ -110,25 +110,6 @@ def test_the_graph_tells_performers_apart_as_the_reference_does(given):
     assert apart(found, reference_of(bank, controls, 0 * labels)) > 4 * allowed
 
 
-def test_who_is_not_said_is_nobody_that_was_seen():
-    bank, controls = labelled_bank(), asked()
-    nobody = np.zeros((BATCH, len(NAMES)))
-    silent = graph_of(bank)(controls)
-    assert apart(silent, graph_of(bank)(controls, labels=nobody)) == 0.0
-    assert apart(silent, reference_of(bank, controls, nobody)) < 2e-4
-    assert apart(silent, graph_of(bank)(controls, labels=mixed(len(NAMES)))) > 0.1
-
-
-def test_a_batch_of_several_performers_is_each_of_them_alone():
-    run, controls, labels = graph_of(labelled_bank()), asked(), mixed(len(NAMES))
-    whole = run(controls, labels=labels)
-    for row in range(0, BATCH, 7):
-        alone = run(controls[row : row + 1], labels=labels[row : row + 1])
-        # Float32 sums a batch in another order than a row.
-        assert apart([value[row : row + 1] for value in whole], alone) < 2e-5
-    assert apart([value[:1] for value in whole], [value[1:2] for value in whole]) > 0.1
-
-
 # --- a whole model --------------------------------------------------------------------------------
 
 

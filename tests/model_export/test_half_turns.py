@@ -44,14 +44,6 @@ def apart(a, b):
     return np.max(np.linalg.norm(quat.log(quat.mul(quat.conj(a), b)), axis=-1))
 
 
-def test_small_joints_carry_nothing_beyond_a_hand():
-    assert canonical.small_joints(PARENTS, OFFSETS).tolist() == [False, False, True, True]
-    assert canonical.small_joints(PARENTS, 0.1 * OFFSETS).tolist() == [True] * 4
-    # A straight chain counts to its end, not to its next joint.
-    chain = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0, 0], [0.1, 0, 0]])
-    assert canonical.small_joints(PARENTS, chain).tolist() == [False, False, True, True]
-
-
 def test_jump_of_a_small_joint_is_taken_out(smooth):
     broken = smooth.copy()
     broken[20:, FINGER] = quat.mul(broken[20:, FINGER], HALF_TURN)
@@ -128,10 +120,3 @@ def test_a_twist_about_the_bone_moves_to_the_child_and_moves_no_joint(smooth):
     assert apart(clean.rotations[:30], smooth[:30]) < 1e-7
     # Only the twist from the frame before to that after the jump is lost.
     assert apart(clean.rotations, smooth) < 0.2
-
-
-@pytest.mark.parametrize("frames", [slice(20), slice(20, 24)])
-def test_the_longest_part_without_a_jump_tells_the_side(smooth, frames):
-    clean, _ = canonical.move_twists(clip(twisted(smooth, ARM, frames)), 0)
-    assert steps(clean.rotations).max() < 0.1
-    assert apart(clean.rotations[30:], smooth[30:]) < 0.1

@@ -27,14 +27,6 @@ def off_diagonal(matrix):
     return np.max(np.abs(matrix - np.diag(np.diagonal(matrix))), initial=0.0)
 
 
-def test_unfolding_holds_the_fibres_of_its_mode_as_columns():
-    tensor = np.arange(24.0).reshape(2, 3, 4)
-    assert hosvd.unfold(tensor, 0).tolist() == tensor.reshape(2, 12).tolist()
-    assert hosvd.unfold(tensor, 1)[:, 1].tolist() == tensor[0, :, 1].tolist()
-    assert hosvd.unfold(tensor, 2)[:, 5].tolist() == tensor[1, 2, :].tolist()
-    assert [hosvd.unfold(tensor, mode).shape for mode in range(3)] == [(2, 12), (3, 8), (4, 6)]
-
-
 def test_full_ranks_restore_the_tensor(tensor):
     full = hosvd.decompose(tensor)
     assert np.max(np.abs(full.restored() - tensor)) < TOLERANCE
@@ -74,17 +66,6 @@ def test_norms_of_slices_are_the_singular_values(tensor):
         assert np.max(np.abs(norms[: len(singular)] - singular)) < 1e-7
 
 
-def test_decomposition_at_given_ranks_is_the_truncated_one(tensor):
-    ranks = tuple(max(1, size - 1) for size in tensor.shape)
-    found, full = hosvd.decompose_truncated(tensor, ranks), hosvd.decompose(tensor)
-    expected = full.truncated(ranks)
-    assert found.core.shape == ranks
-    assert np.max(np.abs(found.core - expected.core)) < TOLERANCE
-    for basis, other in zip(found.bases, expected.bases, strict=True):
-        assert np.array_equal(basis, other)
-    assert np.max(np.abs(found.restored() - full.restored())) > 1e-3, "negative control"
-
-
 def left_out(core, ranks):
     """Squared singular values that ranks cut off, summed for each mode."""
     unfolded = (hosvd.unfold(core, mode) for mode in range(core.ndim))
@@ -119,26 +100,6 @@ def test_error_of_every_truncation_keeps_within_the_bounds(tensor):
         ]
         worst.append(np.sum(np.square(full.core)) - np.sum(np.square(last)) - sum(left))
     assert max(worst) > 1e-1, "keeping the last vectors and not the first breaks the upper bound"
-
-
-def test_truncations_are_nested_prefixes(rng):
-    full = hosvd.decompose(rng.normal(size=(6, 5, 4)))
-    wide = full.truncated((5, 4, 3))
-    narrow = full.truncated((3, 2, 2))
-    again = wide.truncated((3, 2, 2))
-    assert np.array_equal(narrow.core, again.core)
-    assert np.array_equal(narrow.core, full.core[:3, :2, :2])
-    for a, b, whole in zip(narrow.bases, again.bases, full.bases, strict=True):
-        assert np.array_equal(a, b)
-        assert np.array_equal(a, whole[:, : a.shape[1]])
-
-
-def test_tensor_of_low_rank_is_restored_by_that_rank(rng):
-    bases = [rng.normal(size=(size, 2)) for size in (8, 7, 6)]
-    tensor = np.einsum("ar,bs,ct,rst->abc", *bases, rng.normal(size=(2, 2, 2)))
-    full = hosvd.decompose(tensor)
-    assert np.max(np.abs(full.truncated((2, 2, 2)).restored() - tensor)) < 1e-10
-    assert np.max(np.abs(full.truncated((2, 1, 2)).restored() - tensor)) > 1e-2
 
 
 def test_largest_entry_of_every_basis_vector_is_positive(tensor):

@@ -57,13 +57,6 @@ def test_labels_are_ones_own_and_none_for_a_stranger():
     assert sample_points.label_weights([{"performer": "ann"}, {}], {}).shape == (2, 0)
 
 
-def test_a_performer_varies_with_an_offset_and_correlates_with_all_others(hyper):
-    points = np.hstack([np.zeros((5, 2)), who("ann", "bob", "cy", "ann", "eve")])
-    near = universal_kriging.covariances(hyper, points, points[:4])
-    same = np.array([n == m for n in "abcae" for m in "abca"]).reshape(5, 4)
-    assert far(near, np.where(same, 1.0 + OFFSET, CORRELATION)) < 1e-12
-
-
 def test_covariance_is_stationary_with_an_offset_and_a_trend(hyper, laid):
     controls = laid[:, :2]
     gaps = (controls[:, None] - controls) * hyper.scales
@@ -106,33 +99,6 @@ def test_far_outside_only_linear_functions_are_left(hyper, laid, values):
         alike = universal_kriging.solve(vary(own, offset=0.0), laid, values).predict(asked)
         assert far(alike, alike[:1]) < TOLERANCE
         assert far(field.predict(0.5 * asked), expected) > 1e-2
-
-
-def test_performers_alike_without_offsets_are_the_field_without(hyper, laid, controls, values):
-    groups = np.arange(24) // 2
-    own = vary(hyper, correlation=1.0, offset=0.0)
-    with_labels = universal_kriging.solve(own, laid, values)
-    unlabelled = replace(own, labels=())
-    without = universal_kriging.solve(unlabelled, controls, values)
-    assert far(with_labels.predict(laid), without.predict(controls)) < 1e-12
-    assert far(with_labels.variance(laid), without.variance(controls)) < 1e-12
-    both = [
-        universal_kriging.leave_out(own, laid, groups),
-        universal_kriging.leave_out(unlabelled, controls, groups),
-    ]
-    assert far(*both) < 1e-12
-    apart = universal_kriging.solve(hyper, laid, values)
-    assert far(apart.predict(laid), without.predict(controls)) > 1e-2
-    assert far(universal_kriging.leave_out(hyper, laid, groups), both[1]) > 1e-2
-
-
-def test_a_stranger_is_answered_with_less_certainty(hyper, laid, controls, names, values):
-    field = universal_kriging.solve(hyper, laid, values)
-    stranger = np.hstack([controls, who(*["eve"] * 24)])
-    assert np.all(field.variance(stranger) > field.variance(laid))
-    alike = vary(hyper, correlation=1.0, offset=0.0)
-    same = universal_kriging.solve(alike, laid, values)
-    assert far(same.variance(stranger), same.variance(laid)) < 1e-12
 
 
 def test_a_performer_left_out_is_a_stranger(hyper, laid, names, values):

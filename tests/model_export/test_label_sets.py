@@ -1,7 +1,6 @@
 """Tests of several label sets: covariance, tuning, graph, and what knowing labels is worth."""
 
 from dataclasses import replace
-from itertools import permutations
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from scipy.optimize import check_grad
 from posefield.kriging import kriging_model
 from posefield.kriging.kriging_model import LabelKernel
 from posefield_train import train
-from posefield_train.kriging import kriging_tuning, sample_points, thinning, universal_kriging
+from posefield_train.kriging import sample_points, thinning, universal_kriging
 from posefield_train.kriging.covariance_graph import COVARIANCES
 from posefield_train.kriging.kriging_bank import KrigingBank
 from posefield_train.kriging.sample_points import SamplePoints
@@ -97,28 +96,6 @@ def test_a_mixture_lies_between_its_names_and_is_less_certain(hyper, laid, rng):
     assert named < mixture < unknown
 
 
-def test_the_order_of_label_sets_does_not_matter(hyper, laid, rng):
-    values = rng.normal(size=(COUNT, 3))
-    turned = replace(hyper, labels=KERNELS[::-1])
-    columns = [0, 1, 5, 6, 2, 3, 4]
-    points = mixtures(rng, 9)
-    found = universal_kriging.solve(hyper, laid, values).predict(points)
-    other = universal_kriging.solve(turned, laid[:, columns], values).predict(points[:, columns])
-    assert np.abs(found - other).max() < 1e-9
-    wrong = universal_kriging.solve(turned, laid[:, columns], values).predict(
-        points[:, [0, 1, 6, 5, 2, 3, 4]]
-    )
-    assert np.abs(found - wrong).max() > 1e-2
-
-
-def test_linear_functions_and_stationary_covariances_hold_every_covariance(hyper, laid, rng):
-    points = mixtures(rng, 9)
-    terms = kriging_model.linear_terms(hyper, laid)
-    found = kriging_model.linear_functions(hyper, points) @ terms
-    found[:, :COUNT] += kriging_model.stationary_covariances(hyper, points, laid)
-    assert np.abs(found - kriging_model.basis_functions(hyper, points, laid)).max() < 1e-12
-
-
 # --- tuning ---------------------------------------------------------------------------------------
 
 
@@ -146,25 +123,6 @@ def test_gradient_of_the_loss_is_that_of_both_sets(laid, rng):
     # Negative control: the slopes of the two correlations are not each other's.
     slope = loss.value_and_slope(at)[1]
     assert abs(slope[3] - slope[4]) > 1e-2 * size
-
-
-def test_each_set_gets_the_offset_of_its_own_effect(rng):
-    """Styles differ by ten times as much as performers, and the other way round."""
-    named = [{"performer": p, "style": s} for p in SETS["performer"] for s in SETS["style"]] * 8
-    points = np.hstack([rng.uniform(-1.0, 1.0, (48, 2)), weights(named)])
-    samples = SamplePoints(points, 2, np.arange(48), (3, 2))
-    wave = np.sin(2.0 * points[:, :2])
-
-    def offsets(sizes):
-        own = np.hstack([sizes[0] * points[:, 2:5], sizes[1] * points[:, 5:]])
-        values = wave + own @ rng.normal(size=(5, 2)) + 0.02 * rng.normal(size=(48, 2))
-        found = kriging_tuning.tune(TuningProblem(samples, values), "matern52", None).hyper
-        return [own.offset for own in found.labels]
-
-    few_performers, more_styles = offsets((0.05, 2.0))
-    more_performers, few_styles = offsets((2.0, 0.05))
-    assert more_styles > 1.5 * few_performers and more_performers > 1.5 * few_styles
-    assert more_styles > 1.5 * few_styles and more_performers > 1.5 * few_performers
 
 
 # --- the graph ------------------------------------------------------------------------------------
@@ -249,11 +207,3 @@ def test_a_set_of_one_name_is_left_out_and_noted(strides):
     assert sample_points.data_notes(recipe, plain) == [
         "all clips are of one style, 'calm': kriging.label has no effect"
     ]
-
-
-@pytest.mark.parametrize("order", list(permutations(("performer", "style"))))
-def test_sets_keep_the_order_of_the_recipe(strides, order):
-    recipe = sample_walk.styled_recipe()
-    kriging = recipe.kriging.model_copy(update={"label": list(order)})
-    known = sample_points.make_samples(recipe.model_copy(update={"kriging": kriging}), strides)[1]
-    assert tuple(known) == order

@@ -14,7 +14,6 @@ from posefield.model_file import subgraph
 from posefield.motion import skeleton
 from posefield_train.graph import levels
 from posefield_train.kriging import thinning
-from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.source.recipe_sections import Detail
 
 HAND = "LeftHand"
@@ -60,11 +59,6 @@ def test_errors_keep_the_budgets_times_what_the_level_may_cost(small_recipe, exp
         assert level.rms < level.p99 < level.max
 
 
-def test_a_finer_level_is_nearer_to_the_whole_model(exported):
-    errors = [level.rms for level in exported.card.levels]
-    assert errors == sorted(errors)
-
-
 def test_the_card_says_what_an_exam_of_other_questions_finds(exported, exam, trained, small_recipe):
     """Errors are those of the level, not of the questions: half of them tell nearly the same."""
     half = slice(None, None, 2)
@@ -106,32 +100,6 @@ def test_the_order_of_samples_changes_no_answer(trained, rng):
         assert np.abs(after[name] - values).max() < 1e-9
     other = replace(bank, pose=replace(bank.pose, samples=bank.pose.samples[::-1]))
     assert np.abs(other.numpy(points)["pose"] - before["pose"]).max() > 1e-3
-
-
-def test_as_many_covariances_as_there_are_answer_exactly(trained, rng):
-    """Least squares over the whole basis finds the weights of kriging again."""
-    bank = thinning.sort_samples(trained.model.bank)
-    rank = bank.pose.dual.shape[1] + bank.event_columns
-    points = rng.uniform(-1.0, 1.0, (50, len(bank.low)))
-    exact = bank.numpy(points)
-
-    def away(columns):
-        own = replace(
-            bank, coarse=(thinning.thinning_data(bank).weights(columns, rank, 0.0),)
-        ).numpy(points, 1)
-        return max(np.abs(own[name] - exact[name]).max() for name in exact if name != VARIANCE)
-
-    assert away(bank.columns(0)) < 2e-3
-    assert away(8) > 1e-2
-
-
-def test_sigma_of_a_coarser_level_counts_its_own_error(exported, rng):
-    bank = exported.model.bank
-    points = rng.uniform(-1.0, 1.0, (200, len(bank.low)))
-    sigma = [np.mean(bank.sigma(bank.numpy(points, at)[VARIANCE])) for at in range(4)]
-    assert sigma == sorted(sigma)
-    coarsest = exported.card.levels[3].rms
-    assert sigma[3] > coarsest > sigma[0] / 2
 
 
 def test_joints_that_a_level_drops_do_not_move(still, trained):
@@ -193,23 +161,7 @@ def test_a_level_fed_to_the_file_is_the_level_of_the_service(model_path, questio
         assert max(np.abs(a - b).max() for a, b in zip(fed, other, strict=True)) > 1e-3
 
 
-def test_who_feeds_no_level_gets_the_finest(model_path, question):
-    plain = runtime(model_path.read_bytes())
-    feed = dict(zip(("controls", "time"), question, strict=True))
-    silent = plain.run(None, feed)
-    finest = plain.run(None, {**feed, "level": np.array(0)})
-    assert all(np.array_equal(a, b) for a, b in zip(silent, finest, strict=True))
-
-
 @pytest.mark.parametrize("cut", [1, 10_000])
 def test_half_a_file_cannot_be_frozen(model_path, cut):
     with pytest.raises(ValueError):
         subgraph.fix_level(model_path.read_bytes()[:-cut], 0)
-
-
-def test_the_worst_pose_is_off_by_no_more_than_some_times_the_rest(exported, small_recipe):
-    """Levels are chosen by it: one bad pose would keep a level from being taken at all."""
-    budget = small_recipe.size.budgets["rms"]
-    for times, level in zip((2, 4, 8), exported.card.levels[1:], strict=True):
-        # Others than it was tried with may be somewhat worse.
-        assert level.rms < level.pose < 1.3 * levels.TAIL_RATIO * times * budget

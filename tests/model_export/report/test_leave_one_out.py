@@ -46,14 +46,6 @@ def test_a_clip_is_predicted_from_all_others_and_not_from_itself(trained, clip):
     assert np.abs(found - predicted(trained, fewer, clip)).max() > 100 * ROUNDING
 
 
-def test_its_distance_from_the_capture_is_what_training_measured(trained, clip):
-    gap = trained.tensor.values[:, :, clip] - left_out_clips.predicted_motion(trained, clip)
-    frames = gap.shape[1]
-    assert np.sum(gap**2) / (trained.tensor.weight * frames) == pytest.approx(
-        trained.left_out_errors[clip]
-    )
-
-
 def test_the_body_drawn_as_captured_is_the_aligned_clip(trained, clip):
     offsets = np.stack([example.offsets for example in trained.examples])
     expected = time_alignment.joint_positions(trained.aligned, trained.skeleton.parents, offsets)[
@@ -76,15 +68,3 @@ def test_the_metric_of_training_and_the_drawing_tell_nearly_the_same(trained):
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.sqrt(np.mean(missed**2)), rel=0.05)
     assert np.abs(drawn / missed - 1.0).max() < 1.0 / 3.0
     assert np.abs(drawn[::-1] / missed - 1.0).max() > 1.0
-
-
-def test_the_nearest_clip_is_the_nearest(trained, clip):
-    pair = clip_errors.compare_clip(trained, clip)
-    points = trained.samples.half_ranges
-    distances = np.linalg.norm(points - points[clip], axis=1)
-    distances[clip] = np.inf
-    assert pair.nearest_distance == distances.min()
-    other = int(np.argmin(distances))
-    gap = np.sum(np.square(slices(trained)[clip] - slices(trained)[other]))
-    shared = trained.tensor.weight * trained.tensor.values.shape[1]
-    assert pair.nearest_rms == pytest.approx(np.sqrt(gap / shared))

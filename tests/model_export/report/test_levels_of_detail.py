@@ -58,13 +58,6 @@ def test_every_level_is_said_what_it_is_for(page, levels):
     assert f"from {first} " not in page
 
 
-def test_a_model_of_one_level_has_a_report_too(levels):
-    own = levels_of_detail.TimedLevels(levels.chosen.levels[:1], levels.chosen.seconds[:1])
-    section = replace(levels, chosen=own).chapter().section
-    assert section.paragraphs[1:] == ("Level 0 is for export and measurement.",)
-    assert [len(table.rows) for table in section.tables] == [1, 1]
-
-
 @pytest.mark.system
 def test_alternatives_go_from_fine_to_coarse(exported, alternatives, small_recipe):
     facts = levels_of_detail.time_levels(exported, alternatives).chapter().facts
