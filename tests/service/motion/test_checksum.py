@@ -26,7 +26,7 @@ def test_every_bit_counts():
         assert not checksum.is_valid(bytes(damaged))
 
 
-@pytest.mark.parametrize("cut", [1, 10, checksum.SIZE - 1, checksum.SIZE, checksum.SIZE + 1, 1000])
+@pytest.mark.parametrize("cut", [1, checksum.SIZE, 1000])
 def test_a_file_that_is_cut_does_not_hold(cut):
     whole = checksum.append_checksum(CONTENT)
     assert not checksum.is_valid(whole[:-cut])

@@ -164,7 +164,7 @@ def test_contacts_are_the_stances_of_the_report(stage, answer):
     assert seen == {False, True}
 
 
-@pytest.mark.parametrize(("rate", "frames"), [(1.0, 9), (29.97, 200), (60.0, 400), (240.0, 1700)])
+@pytest.mark.parametrize(("rate", "frames"), [(29.97, 200), (240.0, 1700)])
 def test_frames_enclose_their_segment(rate, frames, rng):
     for _ in range(200):
         # Segments begin and end at a sixtieth of a second, rounded in the report.

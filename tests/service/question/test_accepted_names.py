@@ -22,16 +22,6 @@ TARGET = '{"controls": {}, "times": [0], "targets": [{"joint": "A", %s}]}'
             "targets/0/at: Invalid enum value 'strat' (did you mean 'start'?), expected one of "
             "start, end, event, highest, lowest, farthest",
         ),
-        (
-            '{"controls": {}, "times": [0], "extrapolate": "wran"}',
-            "extrapolate: Invalid enum value 'wran' (did you mean 'warn'?), expected one of ok, "
-            "warn, refuse",
-        ),
-        (
-            '{"colour": 1}',
-            "colour: Object contains unknown field `colour`, expected some of controls, extrapolate"
-            ", performer, labels, level, joint_sigma, exact, targets, take, variety, detail, times",
-        ),
     ],
 )
 def test_an_unknown_name_is_answered_with_those_that_are_known(body, said):

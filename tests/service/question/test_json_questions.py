@@ -36,14 +36,10 @@ def pointer(content):
     [
         ({"inner": [], "frames": 3}, "/frames"),
         ({}, "/inner"),
-        ({"inner": 3}, "/inner"),
         ({"inner": [{"size": 1}, {"size": -1}]}, "/inner/1/size"),
-        ({"inner": [{"size": 1, "x": 1}]}, "/inner/0/x"),
-        ({"inner": [{}]}, "/inner/0/size"),
         ([], ""),
         ({"inner": [], "a/b~c": 1}, "/a~1b~0c"),
         ({"inner": [], "line\nfeed`": 1}, "/line\nfeed`"),
-        ({"inner": [], "field `x` - ": 1}, "/field `x` - "),
     ],
 )
 def test_a_complaint_leads_to_its_place(content, expected):
@@ -72,15 +68,7 @@ def test_a_long_key_takes_no_time_that_grows_with_its_square():
             "controls/b",
             "Expected `float`, got `str` 'x'",
         ),
-        (
-            FileQuestion,
-            '{"controls":{"a":1,"b":[]}}',
-            "controls/b",
-            "Expected `float`, got `array`",
-        ),
         (FileQuestion, '{"controls":{"a":1e400}}', "controls/a", "Number out of range"),
-        (FileQuestion, '{"controls":{},"level":0.5}', "level", "Expected `int`, got `float` 0.5"),
-        (FileQuestion, '{"controls":{},"loop":1}', "loop", "Expected `bool`, got `int` 1"),
         (FileQuestion, "{", "", "expected UTF-8 JSON; Input data was truncated"),
         (FileQuestion, "[" * 100_000, "", "Expected `object`, got `array`"),
         (

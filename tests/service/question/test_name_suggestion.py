@@ -12,15 +12,7 @@ JOINTS = ("Hips", "LeftHand", "RightHand", "RightHandThumb", "Head")
 
 @pytest.mark.parametrize(
     ("name", "expected"),
-    [
-        ("RightHnd", "RightHand"),
-        ("right_hand", "RightHand"),
-        ("RIGHT HAND", "RightHand"),
-        ("LeftHadn", "LeftHand"),
-        ("Hip", "Hips"),
-        ("Tail", None),
-        ("", None),
-    ],
+    [("right_hand", "RightHand"), ("LeftHadn", "LeftHand"), ("Tail", None), ("", None)],
 )
 def test_the_most_similar_name_is_suggested(name, expected):
     assert similar_name(name, JOINTS) == expected

@@ -5,7 +5,7 @@ import pytest
 
 from posefield.common.errors import FormError, InvalidField
 from posefield.question import text_decoding
-from posefield.question.model_question import SigmaQuestion, WhyQuestion
+from posefield.question.model_question import SigmaQuestion
 from posefield.question.motion_question import FileQuestion, PoseQuestion, Target
 from posefield.question.walk_question import WalkQuestion
 
@@ -15,10 +15,6 @@ from posefield.question.walk_question import WalkQuestion
     [
         ("rhand@end:0.3,1.2,-0.4", Target("rhand", (0.3, 1.2, -0.4), at="end")),
         ("rhand@0.8:1,2,3", Target("rhand", (1, 2, 3), time=0.8)),
-        (
-            "mixamorig:Hand@farthest:1e-3,0,0",
-            Target("mixamorig:Hand", (0.001, 0, 0), at="farthest"),
-        ),
         ("a@b@event:0,0,0", Target("a@b", (0, 0, 0), at="event")),
         ("左手@-1:0,0,0", Target("左手", (0, 0, 0), time=-1.0)),
     ],
@@ -33,17 +29,11 @@ def test_words_are_targets(text, expected):
     [
         "",
         "rhand",
-        "rhand@end",
-        "@end:0,0,0",
         "rhand:0,0,0",
-        "rhand@:0,0,0",
         "rhand@soon:0,0,0",
         "rhand@end:0,0",
-        "rhand@end:0,0,0,0",
-        "rhand@end:0,0,nan",
         "rhand@end:0,0,1e999",
         "rhand@end:0,0, 1",
-        "rhand@1_0:0,0,0",
     ],
 )
 def test_other_words_are_none(text):
@@ -65,19 +55,13 @@ def test_plain_values_are_targets():
 @pytest.mark.parametrize(
     "found",
     [
-        None,
         [],
         "hand@end:0,0,0",
-        {**HAND, "joint": 3},
         {**HAND, "position": [0, 1]},
         {**HAND, "position": [0, 1, True]},
-        {**HAND, "position": "0,1,2"},
         {**HAND, "at": "end"},
         {**HAND, "frame": 3},
-        {**HAND, "time": None},
-        {"joint": "hand", "position": [0, 1, 2]},
         {"joint": "hand", "position": [0, 1, 2], "at": "soon"},
-        {"joint": "hand", "position": [0, 1, 2], "at": ["end"]},
     ],
 )
 def test_other_values_are_none(found):
@@ -114,15 +98,11 @@ def test_a_name_that_is_no_parameter_is_a_control():
     [
         (PoseQuestion, [], "time: missing, expected time from the start"),
         (PoseQuestion, [("time", "0"), ("turn", "1"), ("turn", "2")], "turn: given twice"),
-        (PoseQuestion, [("time", "0"), ("level", "1"), ("level", "1")], "level: given twice"),
         (PoseQuestion, [("time", "nan")], "time: 'nan', expected a finite number"),
         (PoseQuestion, [("time", "0"), ("turn", "1_0")], "turn: '1_0', expected a finite number"),
         (PoseQuestion, [("time", "0"), ("level", "1.0")], "level: '1.0', expected a whole number"),
         (FileQuestion, [("up", "x")], "up: 'x', expected one of y, z"),
         (FileQuestion, [("loop", "1")], "loop: '1', expected one of true, false"),
-        (FileQuestion, [("exact", "")], "exact: '', expected auto, none or names"),
-        (SigmaQuestion, [("across", "a")], "along: missing, expected the name of a control"),
-        (WhyQuestion, [("nearest", "x")], "nearest: 'x', expected a whole number"),
         (WalkQuestion, [("camera", "1,2")], "camera: '1,2', expected x,y,z in metres"),
     ],
 )
@@ -136,7 +116,6 @@ def test_words_that_are_no_question_are_named(form, pairs, said):
     [
         (SigmaQuestion, [("across", "a"), ("along", "a")], "along"),
         (SigmaQuestion, [("across", "a"), ("along", "b"), ("rows", "1")], "rows"),
-        (WhyQuestion, [("nearest", "0")], "nearest"),
         (WalkQuestion, [("fov", "1")], "fov"),
     ],
 )

@@ -51,7 +51,7 @@ def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places,
         assert [a.tobytes() for a in row] == [a.tobytes() for a in own]
 
 
-@pytest.mark.parametrize("count", [2, 3, 4, 5, 7, 8, 15, 17])
+@pytest.mark.parametrize("count", [2, 5, 15])
 def test_the_last_question_of_a_batch_gets_the_same_bytes(model, count):
     """The last numbers of arrays may not fill a register."""
     places = [((share, 0.4, 0.9, 0.2), 0.2, 0) for share in np.linspace(0.03, 0.97, 11)]

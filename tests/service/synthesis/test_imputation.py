@@ -107,7 +107,7 @@ def left_out(model, asked):
     return part, whole
 
 
-@pytest.mark.parametrize("given", [{}, {"turn": 20.0}, {"turn": 20.0, "stature": 1.7}])
+@pytest.mark.parametrize("given", [{}, {"turn": 20.0}])
 @pytest.mark.parametrize("performer", [None, "tall"])
 def test_the_answer_is_that_of_the_whole_question(model, given, performer):
     asked = ClipQuestion(controls=given, performer=performer)

@@ -130,10 +130,7 @@ def test_a_loop_of_what_is_no_cycle_is_refused(reacher):
 
 @pytest.mark.parametrize(
     ("span", "said"),
-    [
-        ({"start": 0.2}, "start: 0.2 s with loop, expected none: a loop is a whole cycle"),
-        ({"end": 0.5}, "end: 0.5 s with loop, expected none: a loop is a whole cycle"),
-    ],
+    [({"start": 0.2}, "start: 0.2 s with loop, expected none: a loop is a whole cycle")],
 )
 def test_a_part_of_a_loop_is_refused(walker, span, said):
     for ask in (clips.synthesize_clip, clips.check):

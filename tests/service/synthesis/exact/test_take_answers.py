@@ -145,9 +145,7 @@ def test_a_target_within_reach_of_the_mean_is_within_reach_of_every_take(reach):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"take": -1}, "take: -1, expected 0 to 999999999"),
         ({"take": 10**9}, "take: 1000000000, expected 0 to 999999999"),
-        ({"take": 1, "variety": 1.1}, "variety: 1.1, expected 0 to 1"),
         ({"variety": float("nan")}, "variety: nan, expected 0 to 1"),
     ],
 )
