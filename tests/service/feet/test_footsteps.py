@@ -179,17 +179,6 @@ def test_the_pelvis_is_lowered_within_its_limit_and_stances_end_that_need_more()
     assert all(len(stance) < FRAMES for steps in plan.steps for stance in steps.stances)
 
 
-def test_a_kept_limb_keeps_its_path_while_the_pelvis_is_lowered():
-    motion = sliding(speed=0.8)
-    character = body(FEET[:2], {FEET[2]})
-    assert [limb.tip for limb in character.kept] == [FEET[2]]
-    known = [contact(motion, foot) for foot in FEET[:2]]
-    plan = body_plans.plan_feet(character, motion, known, np.ones((FRAMES, 2)))
-    assert plan.lowered.max() > 0.0
-    kept = feet_of(placed(motion, plan))[:, 2] - feet_of(motion)[:, 2]
-    assert np.abs(kept).max() < 1e-9
-
-
 def test_the_cover_is_smooth_and_nowhere_below(rng):
     needed = np.maximum(rng.normal(size=200), 0.0)
     for cyclic in (False, True):

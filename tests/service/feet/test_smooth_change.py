@@ -7,7 +7,6 @@ from few_feet import foot_rows
 
 from posefield.feet import ball_path, smooth_change, stance_rows
 from posefield.feet.stances import Cycle, FootPath, Interval
-from posefield.locomotion import floor_plane
 from posefield.motion.foot_contacts import FootContact
 
 RATE = 60.0
@@ -83,15 +82,3 @@ def test_feet_keep_their_places_around_stances_as_one_foot_does(rng, cyclic):
     ]
     own = [[(one.begin, one.end) for one in row] for row in found.by_row(len(every))]
     assert own == [[(one.begin, one.end) for one in row] for row in expected]
-
-
-def test_given_places_of_stances_are_met(rng):
-    every, held = paths(rng, False)
-    feet, runs = foot_rows(every, FOOT), stance_rows.from_intervals(held)
-    means = ball_path.mean_places(feet, runs)
-    for row, begin, end, mean in zip(runs.rows, runs.begins, runs.ends, means, strict=True):
-        assert mean == pytest.approx(every[row].floor[begin:end].mean())
-    goal = np.full((len(feet.floor), 3), np.nan)
-    placed = ball_path.plan_paths(feet, runs, goal, means)
-    floor = floor_plane.project(placed)
-    assert (floor[feet.rows.flat(runs.rows, runs.begins)] == means).all()

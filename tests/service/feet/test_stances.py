@@ -32,12 +32,6 @@ def test_runs_cover_their_frames_and_no_others(down, cyclic):
     assert sum(map(len, found)) == down.sum()
 
 
-def test_a_run_of_a_cycle_goes_over_its_end():
-    down = np.array([True, True, False, False, True])
-    assert stances.runs(down, True) == [Interval(4, 7)]
-    assert stances.runs(down, False) == [Interval(0, 2), Interval(4, 5)]
-
-
 def test_a_long_swing_is_cut_where_the_foot_goes_most():
     forward = np.concatenate([np.zeros(40), np.linspace(0.0, 0.5, 20), np.full(40, 0.5)])
     held = [Interval(0, 10), Interval(90, 100)]

@@ -40,8 +40,3 @@ def test_the_motion_of_the_root_does_not_count():
     # Negative control: a motion of the joint alone does.
     jolted[:, 0] = places[:, 0]
     assert np.abs(mean_accelerations(jolted, 60.0) - still).max() > 1.0
-
-
-@pytest.mark.parametrize("frames", [0, 1, 2])
-def test_less_than_three_frames_have_no_acceleration(frames):
-    assert len(mean_accelerations(np.zeros((frames, 4, 3)), 60.0)) == 0

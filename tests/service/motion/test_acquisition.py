@@ -44,9 +44,3 @@ def test_each_is_worth_what_the_variance_falls_by_with_those_before_it(samples, 
 def test_none_is_ranked_twice_and_all_there_are_at_most(samples, candidates):
     found = acquisition.rank_candidates(candidates[:5], samples, 10)
     assert sorted(at for at, _ in found) == [0, 1, 2, 3, 4]
-
-
-def test_progress_counts_the_ranked_candidates(samples, candidates):
-    ranked = []
-    acquisition.rank_candidates(candidates, samples, 3, lambda *done: ranked.append(done))
-    assert ranked == [(1, 3), (2, 3), (3, 3)]

@@ -34,14 +34,6 @@ def on_a_full_disk(write, target):
     return done.stdout.strip()
 
 
-def test_content_arrives_and_replaces_what_was_there(tmp_path):
-    target = tmp_path / "model.onnx"
-    atomic_files.write(b"first", target)
-    atomic_files.write(b"second", target)
-    assert target.read_bytes() == b"second"
-    assert list(tmp_path.iterdir()) == [target]
-
-
 @pytest.mark.parametrize("mask", [0o077, 0o000])
 def test_everyone_may_read_and_the_owner_write_whatever_the_mask(tmp_path, mask):
     before = os.umask(mask)

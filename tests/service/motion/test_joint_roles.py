@@ -25,11 +25,6 @@ def test_every_convention_has_a_name_of_its_own_for_every_role():
         assert len(set(table.values())) == len(joint_roles.ROLES) == 22
 
 
-def test_own_names_need_no_roles():
-    own = chain("root", "thorax")
-    assert joint_roles.rename_joints(own, {}, "own") is own
-
-
 def test_names_that_a_convention_takes_are_left_to_it():
     """CMU's spine is shifted by one: LowerBack, Spine, Spine1 become Spine, Spine1, Spine2."""
     given = chain("Hips", "LowerBack", "Spine", "Spine1", "Neck")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from families import sample_walk
 
-from posefield.common.units import UP
-from posefield.motion import measures, quat
+from posefield.motion import measures
 from posefield.motion.measures import Measure, MeasuredMotion
 from posefield_train.source.measured_controls import travel
 
@@ -113,13 +112,6 @@ def test_a_step_of_the_stroll_is_half_its_stride():
     assert abs(ahead.mean()) < 0.1 * length < np.abs(ahead).max(), "negative control"
     swapped = Measure("step_length", (6, 3))
     assert measures.evaluate(swapped, seen) == measures.evaluate(feet, seen)
-
-
-def test_heading_is_the_roots_own_and_not_its_sway():
-    t = np.linspace(0.0, 1.0, 11)
-    rolled = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), 0.2 * np.sin(2 * np.pi * t))
-    roots = quat.mul(quat.from_axis_angle(UP, 0.7 * t), rolled)
-    assert travel(roots, np.zeros((11, 3)))[2] == pytest.approx(0.7)
 
 
 @pytest.mark.parametrize(

@@ -56,11 +56,6 @@ def test_logarithm_takes_the_shorter_turn():
     assert near(quat.log(quat.exp(long_way)), np.array([0.0, -0.5 * np.pi, 0.0]))
 
 
-def test_logarithm_keeps_tiny_turns():
-    tiny = np.array([3e-14, -2e-14, 1e-14])
-    assert np.allclose(quat.log(quat.exp(tiny)), tiny, rtol=1e-6, atol=0.0)
-
-
 def test_slerp_meets_both_ends_at_an_even_pace(rng, turns):
     other = quat.normalize(rng.normal(size=(50, 4)))
     shares = np.linspace(0.0, 1.0, 5)[:, None]
@@ -72,10 +67,6 @@ def test_slerp_meets_both_ends_at_an_even_pace(rng, turns):
     straight = quat.normalize((1.0 - shares[..., None]) * turns + shares[..., None] * other)
     uneven = np.linalg.norm(quat.log(quat.mul(quat.conj(straight[:-1]), straight[1:])), axis=-1)
     assert not near(uneven, uneven[:1])
-
-
-def test_slerp_goes_the_shorter_way(turns):
-    assert near(quat.slerp(turns, -turns, np.full(50, 0.5)), turns)
 
 
 def test_unrolled_rotations_are_the_same_and_lie_close(rng):

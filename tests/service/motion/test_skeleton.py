@@ -77,14 +77,6 @@ def test_poses_in_several_blocks_are_those_one_by_one(rng):
     assert not np.array_equal(positions[0], positions[skeleton.POSES_PER_BLOCK])
 
 
-def test_a_chain_leads_from_the_root_to_its_joint():
-    assert [skeleton.joint_chain(PARENTS, joint) for joint in (0, 2, 4)] == [
-        (0,),
-        (0, 1, 2),
-        (0, 1, 3, 4),
-    ]
-
-
 def test_descendants_are_the_joints_whose_way_up_passes_by():
     expected = np.zeros((6, 6))
     for joint in range(6):
@@ -126,10 +118,3 @@ def test_few_poses_are_those_of_many_bit_for_bit(rng, count):
         assert own.tobytes() == expected[:count].tobytes()
         assert own.flags.c_contiguous
     assert skeleton.positions(PARENTS, *few).tobytes() == found[0].tobytes()
-
-
-def test_levels_of_a_tree_hold_each_joint_after_its_parent():
-    found = skeleton.tree_levels(PARENTS)
-    assert found.order.tolist() == [0, 1, 5, 2, 3, 4]
-    assert [own.parents.tolist() for own in found.levels] == [[0, 0], [1, 1], [4]]
-    assert found.order[found.places].tolist() == list(range(6))

@@ -111,7 +111,3 @@ def test_far_away_is_no_overflow(own, controls):
     far = controls[:2] + 1e6 * WIDE
     assert own.supported(far).tolist() == [False, False]
     assert not own.is_supported(far[0].tolist())
-
-
-def test_of_the_captured_clips_a_twentieth_is_beyond_the_limit(own, controls):
-    assert np.count_nonzero(own.left_out > own.limit) == len(controls) // 20

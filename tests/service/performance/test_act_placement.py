@@ -58,13 +58,6 @@ def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
     assert abs(floor_plane.project(once.roots)[0] - position) > 1e-4
 
 
-def test_a_target_that_contradicts_the_place_is_missed(reach):
-    root = reach.session.card.skeleton.names[0]
-    asked = MotionQuestion(controls={}, targets=(Target(root, (0.3, 0.9, 0.0), at="start"),))
-    found = act_placement.act_from(reach, asked, 0j, 0.0, [0])
-    assert not found.act.trust.targets[0].reached
-
-
 def test_targets_that_move_the_first_pose_on_and_on_are_refused(reach):
     near = act_segment.act_passage(reach, MotionQuestion(controls={})).motion_to(0j, 0.0)
     asked = hand_to(tuple(near.place(np.array([-0.1, 1.5, 0.5]))))
@@ -79,15 +72,6 @@ def test_a_free_act_takes_place_where_its_target_is(reach):
         assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
         first = found.act.passage.placed(found.by)
         assert first.heading() == pytest.approx(facing)
-
-
-def test_a_target_at_a_time_places_an_act(reach):
-    asked = MotionQuestion(controls={}, targets=(Target("RightHand", (2.0, 1.0, -3.0), time=0.7),))
-    found = act_placement.place_by_target(reach, asked).facing(1.0)
-    path = acting.joint_path(reach, found.act, "RightHand", found.by)
-    times = found.act.begins + np.arange(len(path)) / 60.0
-    at = [np.interp(0.7, times, axis) for axis in path.T]
-    assert np.linalg.norm(np.array(at) - (2.0, 1.0, -3.0)) < 5e-3
 
 
 def test_a_target_in_the_segment_is_met_beside_the_one_that_places(reach):

@@ -109,13 +109,3 @@ def test_given_poses_count_by_their_own_accelerations(walk):
     bent = {**still, "rotations": [[0.8, 0.6, 0.0, 0.0]] * len(names)}
     jumping = performed([WALK], {"walk": walk}, start={"poses": [still, bent] * 5}).joins
     assert jumping[0].usual > 10.0 * p99
-
-
-def test_feet_of_a_script_are_planned_with_models_that_have_no_gait(walk):
-    script = resolved([WALK, HOLD, WALK], {"walk": walk})
-    first, _, last = script.sources
-    # As the source of an act is: it knows contacts, but no gait.
-    act = replace(script, sources=(first, None, replace(last, own_gait=None)))
-    assert act.contacts == script.contacts
-    alone = replace(script, sources=(None, None, replace(last, own_gait=None)))
-    assert len(alone.contacts) == len(script.contacts) > 0

@@ -104,12 +104,3 @@ def test_other_trees_are_refused_in_words():
     ):
         skeleton_match.match(source(), turned(source(), 2, 0.45))
     skeleton_match.match(source(), turned(source(), 2, 0.34))
-
-
-def test_matches_of_equal_pairs_are_made_once_and_read_only():
-    found = skeleton_match.match(source(), turned(source(), 2, 0.2), FEET)
-    assert skeleton_match.match(source(), turned(source(), 2, 0.2), FEET) is found
-    assert skeleton_match.match(source(), turned(source(), 2, 0.2), ()) is not found
-    assert skeleton_match.match(source(), turned(source(), 2, 0.21), FEET) is not found
-    with pytest.raises(ValueError, match="read-only"):
-        found.turns[0] = 0.0

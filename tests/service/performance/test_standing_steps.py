@@ -174,18 +174,6 @@ def test_an_opening_step_is_a_closing_step_backwards():
     assert not np.array_equal(opened.roots, bare.roots)
 
 
-def test_a_part_of_a_walk_has_the_steps_that_are_whole_in_it():
-    plan, made = walked(WalkRequest(1.1, to=(0.0, 6.0), **BOTH))
-    steps, count = plan.standing, len(plan)
-    assert plan.part(0, count).standing == steps
-    last = plan.part(count - steps.closing, count)
-    assert (last.standing.opening, last.standing.closing) == (0, steps.closing)
-    found = walk_passage.walk_passage(walk(), last)
-    assert np.allclose(found.roots, made.roots[-steps.closing :], atol=2e-3)
-    assert not plan.part(count - steps.closing + 1, count).closes
-    assert plan.part(0, steps.opening - 1).standing.opening == 0
-
-
 def test_a_walk_too_short_for_a_step_stops_in_double_support_and_says_so():
     plan, _ = walked(WalkRequest(0.8, seconds=0.3, **BOTH))
     assert plan.standing is None
@@ -210,18 +198,6 @@ def test_placed_feet_skate_no_more_in_starts_and_stops(speed):
     assert both.feet.lowered < 0.045
     assert both.script_warnings == ()
     assert len(both.segments[0].notes) == 2
-
-
-def test_a_walk_goes_on_from_where_another_one_stands():
-    first = {"kind": "walk", "to": [0, 4], "stop": "standing"}
-    then = {"kind": "walk", "to": [0, 8]}
-    stood = performed(first, then | {"start": "standing"}).trust
-    (join,) = stood.joins
-    assert join.distance < 0.02
-    assert not join.hard
-    rolling = performed(first, then).trust
-    assert len(rolling.joins) == 1
-    assert rolling.joins[0].distance > join.distance
 
 
 @pytest.mark.parametrize("way", [6.0, 6.5, 7.0, 7.5])

@@ -1,7 +1,5 @@
 """Targets of acts in performances: before the next join and hold, at moments, and in the report."""
 
-from dataclasses import replace
-
 import acting
 import msgspec
 import numpy as np
@@ -89,18 +87,6 @@ def test_a_target_at_a_moment_of_the_motion_is_met_by_the_character(find, own_ha
     assert np.linalg.norm(path(answer) - wanted, axis=-1).min() < EXACT
 
 
-def test_a_target_shortly_before_the_event_is_met_while_the_act_comes_to_rest(find, own_hand):
-    before = 2
-    wanted = own_hand[-1 - before] + [0.0, 0.02, 0.0]
-    seconds = (len(own_hand) - 1 - before) / 60.0 + 0.0076
-    asked = reach(wanted, "reach", time=seconds)
-    answer = performed(find, asked, {"kind": "hold", "seconds": 0.5})
-    away = np.linalg.norm(path(answer) - wanted, axis=-1)
-    assert away.min() < EXACT
-    # The act has slowed down by then, so that the frame is later than without a hold.
-    assert int(np.argmin(away)) > len(own_hand) - 1 - before
-
-
 def test_a_hold_that_would_cut_off_a_target_is_refused(find, own_hand):
     asked = reach(own_hand[-5], "early", time=(len(own_hand) - 5) / 60.0)
     with pytest.raises(
@@ -131,17 +117,3 @@ def test_a_held_hand_is_still_while_the_feet_are_placed(find, joint):
     assert answer.trust.feet.lowered > 0.01
     free = performed(find, walk, {"kind": "hold", "seconds": 1.0}, walk)
     assert np.ptp(path(free, joint)[rows], axis=0).max() > 100.0 * STILL
-
-
-def test_a_character_that_hops_walks_as_walkers_do(find):
-    content = {"segments": [{"kind": "walk", "model": "cmu_walk", "seconds": 2.0}]}
-    question = json_decoding.decode_question(PerformanceQuestion, msgspec.json.encode(content))
-    script = resolve_script(question, find)
-    captured = script.character.contacts
-    assert script.contacts == captured
-    lifted = tuple(replace(own, clearance=0.3, longest_swing=0.2) for own in captured)
-    hopping = replace(script, character=replace(script.character, contacts=lifted))
-    for own, known in zip(hopping.contacts, captured, strict=True):
-        assert own.clearance == pytest.approx(1.5 * known.clearance)
-        assert own.longest_swing == known.longest_swing
-        assert own.height == known.height

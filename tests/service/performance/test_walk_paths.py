@@ -11,7 +11,6 @@ from posefield.locomotion import floor_splines
 from posefield.performance.passages.passage import RATE, FloorMotion
 from posefield.performance.walks import discs, speed_profile, turning_curves
 from posefield.performance.walks.discs import Disc
-from posefield.performance.walks.floor_path import FloorPath
 from posefield.performance.walks.speed_profile import SpeedRamps
 from posefield.performance.walks.turning_curves import Radii
 
@@ -36,16 +35,6 @@ def test_curves_end_where_they_should_and_keep_to_their_radii(turn, bearing, hea
 def test_there_is_no_room_to_turn_within_a_circle():
     with pytest.raises(ValueError, match="no curve"):
         turning_curves.connect(FloorMotion(), 0.5j, None, Radii(3.0, 3.0))
-
-
-def test_a_path_of_an_even_curvature_is_a_circle():
-    path = FloorPath(0j, np.linspace(0.0, 2.0 * np.pi, 401), 2.0 * np.pi * 3.0 / 400)
-    assert abs(path.end) < 1e-9
-    assert np.abs(path.places - 3.0j) == pytest.approx(3.0)
-    assert path.curvatures == pytest.approx(1.0 / 3.0)
-    places, headings = path.at(np.array([0.0, 0.5 * np.pi * 3.0, path.length]))
-    assert np.abs(places - [0.0, 3.0 + 3.0j, 0.0]).max() < 1e-9
-    assert headings == pytest.approx([0.0, 0.5 * np.pi, 2.0 * np.pi])
 
 
 def test_a_spline_begins_and_ends_with_given_slopes():

@@ -104,16 +104,6 @@ def test_feet_stand_on_other_proportions(figure, onto, kind):
     assert np.abs(np.diff(made.clip.root_path, 2, axis=0)).max() < 0.01
 
 
-@pytest.mark.parametrize("frames", [1, 2, 5])
-def test_short_clips_are_retargeted(walk, figure, onto, frames):
-    short = replace(
-        walk, rotations=walk.rotations[:frames], translations=walk.translations[:frames]
-    )
-    made = onto(figure.longer(1.2, *LEGS), clip=short)
-    assert len(made.clip) == frames and np.isfinite(made.clip.rotations).all()
-    assert made.report.penetration <= 0.01
-
-
 def test_told_stances_are_kept(walk, figure, onto):
     """A foot that is told to stand in frames in which it does not moves as the motion's does."""
     tall = figure.longer(1.25, *SHINS)

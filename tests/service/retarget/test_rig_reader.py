@@ -107,20 +107,6 @@ def test_files_that_are_no_rig_are_refused(figure, tmp_path):
             read_rig(path)
 
 
-def test_bodies_without_legs_are_refused(figure, tmp_path):
-    kept = [j for j, name in enumerate(figure.names) if "Leg" not in name and "Foot" not in name]
-    kept = [j for j in kept if "Toe" not in figure.names[j] and "Hip" not in figure.names[j][1:]]
-    kept = sorted({0, *kept})
-    own = rig_files.Figure(
-        tuple(figure.names[j] for j in kept),
-        tuple(kept.index(figure.parents[j]) if figure.parents[j] >= 0 else -1 for j in kept),
-        figure.offsets[kept],
-        figure.frames[kept],
-    )
-    with pytest.raises(MotionFileError, match="expected hips and two legs"):
-        read_rig(rig_files.write_usd(tmp_path / "a.usda", own))
-
-
 def test_an_unusual_size_is_told(figure, tmp_path):
     path = rig_files.write_usd(tmp_path / "a.usda", figure.longer(100.0, *figure.names))
     (note,) = read_rig(path).notes

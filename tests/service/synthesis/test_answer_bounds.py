@@ -6,9 +6,9 @@ import pytest
 from posefield.inference import session
 from posefield.model_file import answer_bounds
 from posefield.question.model_question import WhyQuestion
-from posefield.question.motion_question import ClipQuestion, PoseQuestion
+from posefield.question.motion_question import ClipQuestion
 from posefield.question.results import band
-from posefield.synthesis import clips, poses
+from posefield.synthesis import clips
 from posefield.synthesis.explanation import explain_result
 from posefield.synthesis.synthesizer import Synthesizer
 
@@ -138,24 +138,6 @@ def test_within_the_ranges_the_answer_is_the_graph_s(model, rng):
     for own, expected in zip(both, raw, strict=True):
         np.testing.assert_allclose(own[:50], expected, atol=1e-6)
     assert np.abs(both[0][50:] - raw[0]).max() > 1e-2
-
-
-def test_poses_clips_and_states_agree_outside(model):
-    card = model.session.card
-    for control in card.controls:
-        for share in (-0.4, 3.0):
-            asked = {c.name: c.default for c in card.controls} | {control.name: at(control, share)}
-            clip = trust(model, asked, exact="none")
-            pose = poses.synthesize_poses(
-                model, PoseQuestion(controls=asked, times=[0.3 * clip.duration], exact="none")
-            )
-            point = np.array([list(asked.values())])
-            state = model.session.state(point, np.array([0.3 * clip.duration]))
-            assert pose.trust.duration == pytest.approx(clip.duration, rel=1e-6)
-            assert state.duration == pytest.approx(clip.duration, rel=1e-6)
-            assert state.asked_sigma == pytest.approx(clip.sigma, rel=1e-5)
-            last = model.session.state(point, np.array([clip.duration])).frames[0]
-            assert last == pytest.approx(card.frames - 1.0, abs=1e-3)
 
 
 def test_weights_are_those_of_the_answer_and_shares_positive(model):

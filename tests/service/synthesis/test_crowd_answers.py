@@ -236,16 +236,6 @@ def test_what_is_wrong_with_one_character_names_it(model, field, value, said):
     assert (caught.value.field, caught.value.index) == (field, 17)
 
 
-def test_missing_and_unknown_controls_are_named(model):
-    question = asked(model)
-    fewer = {name: values for name, values in question.controls.items() if name != "turn"}
-    with pytest.raises(InvalidField, match="controls/turn: missing"):
-        crowd_synthesis.synthesize_crowd(model, replace(question, controls=fewer))
-    more = {**question.controls, "mood": np.zeros(COUNT)}
-    with pytest.raises(InvalidField, match="controls/mood: no such control"):
-        crowd_synthesis.synthesize_crowd(model, replace(question, controls=more))
-
-
 def test_outside_the_samples_is_said_once_a_control_or_refused(model):
     high = model.session.card.control("stature").maximum
     question = broken(model, "controls/stature", 9, high + 0.05)

@@ -113,22 +113,3 @@ def test_walkers_have_the_curves_of_the_graph(treading, plan):
         (expected,) = own.run(controls, times, graph_ports.CURVES, labels=labels, level=level)
         assert np.abs(found - expected[:, 0]).max() < FLOAT32
         assert np.ptp(found, axis=0).max() > 0.05
-
-
-def test_curves_of_walkers_blend_where_levels_change(treading, plan):
-    shape = plan.phases.shape
-    finest, coarsest = (
-        level_transitions.constant_schedule(level, shape)
-        for level in (0, len(treading.session.card.levels) - 1)
-    )
-    who = np.arange(shape[0])
-    fine, coarse = (
-        walking_crowd.motions(treading.session, plan, who, shown).curves
-        for shown in (finest, coarsest)
-    )
-    shares = np.full(shape, 0.25)
-    between = replace(coarsest, previous=finest.levels, shares=shares)
-    found = walking_crowd.motions(treading.session, plan, who, between).curves
-    assert np.abs(found - (fine + 0.25 * (coarse - fine))).max() < FLOAT32
-    assert np.abs(fine - coarse).max() > 1e-3
-    assert found.min() >= 0.0 and found.max() <= 1.0

@@ -57,16 +57,6 @@ def test_no_two_characters_of_other_seeds_are_alike(walk):
     assert np.array_equal(taken.duration, plain.duration)
 
 
-def test_a_take_without_variety_is_the_prediction(walk, reach):
-    for model in (walk, reach):
-        for level in (0, 1):
-            plain = crowd(model, level=level)
-            still = crowd(model, take="index", variety=0, level=level)
-            assert apart(plain, still).max() < 2e-6
-            assert np.abs(plain.root_position - still.root_position).max() < 2e-6
-            assert apart(plain, crowd(model, take="index", level=level)).max() > 1e-4
-
-
 def test_a_character_has_the_pose_of_its_take(reach):
     found = crowd(reach, take=[0, 7, 8, 7, 0, 9], variety=[1, 1, 1, 0.5, 1, 1])
     controls = {c.name: c.default for c in reach.session.card.controls}

@@ -98,21 +98,6 @@ def test_the_nearest_come_first_and_a_clip_is_nearest_to_itself(case):
         assert tuple(found[0].controls.values()) == card.examples[index]
 
 
-def test_distance_is_that_of_scaled_controls_whoever_moved(labelled_path):
-    model = model_registry.load([labelled_path]).find("labelled")
-    card = model.session.card
-    hyper = card.kriging
-    found = explain_result(model, asked(card, card.examples[0], "tall"))
-    low, high = np.transpose([(c.minimum, c.maximum) for c in card.controls])
-    for clip in found.nearest:
-        gap = np.array([*clip.controls.values()]) - card.examples[0]
-        expected = np.sum(np.square(2.0 * gap / (high - low) * hyper.scales))
-        assert abs(clip.distance - np.sqrt(expected)) < 1e-9
-    unscaled = np.linalg.norm(2.0 * gap / (high - low))
-    assert abs(found.nearest[-1].distance - unscaled) > 1e-2
-    assert {clip.performer for clip in found.nearest} == set(card.performers)
-
-
 def test_what_cannot_be_answered_is_refused(case):
     model = case[1]
     card = model.session.card

@@ -41,15 +41,6 @@ def test_the_model_does_what_was_wanted_whoever_walks(own, opened, rng):
     assert np.abs(usual.turning - turning).max() > 0.01
 
 
-def test_a_cycle_of_all_that_was_sampled_is_within_and_twice_that_is_not(own):
-    assert own.region.contains(*own.rates.T).all()
-    assert own.region.contains(np.array([0.71, 1.1, 1.49]), np.zeros(3)).all()
-    assert not own.region.contains(own.rates[:, 0], 2.0 * own.rates[:, 1])[[0, 3, 16, 19]].any()
-    low, high = own.region.turning(np.array([1.0, 1.4]))
-    assert own.region.contains(np.array([1.0, 1.4]), high).all()
-    assert not own.region.contains(np.array([1.0, 1.4]), low - 0.01).any()
-
-
 def test_the_hull_of_a_square_is_the_square(rng):
     corners = np.array([[1.0, -1.0], [2.0, -1.0], [2.0, 1.0], [1.0, 1.0]])
     inner = rng.uniform([1.0, -1.0], [2.0, 1.0], (50, 2))

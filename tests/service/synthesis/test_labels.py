@@ -116,19 +116,6 @@ def test_a_performer_in_both_ways_is_refused(model):
         posed(model, performer="ann", labels={"performer": "ann"})
 
 
-def test_reasons_name_the_labels_and_weight_the_own_style_most(model):
-    question = WhyQuestion(controls=POINT, labels={"style": "marching"}, nearest=36)
-    found = explanation.explain_result(model, question)
-    assert found.labels == {"style": "marching"}
-    shares = dict.fromkeys(("marching", "plain", "sneaking"), 0.0)
-    for clip in found.nearest:
-        shares[clip.labels["style"]] += clip.share
-        assert clip.performer in ("ann", "ben") and "performer" not in clip.labels
-    assert shares["marching"] > 2.0 * max(shares["plain"], shares["sneaking"])
-    both = explanation.explain_result(model, WhyQuestion(controls=POINT, nearest=36))
-    assert sum(c.share for c in both.nearest if c.labels["style"] == "marching") < 0.6
-
-
 def test_open_controls_are_those_of_clips_with_the_asked_labels(model):
     card = model.session.card
     asked = model.validator.question({}, "warn", "ben", 0, {"style": "sneaking"})

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from posefield.inference.level_selection import HYSTERESIS, Camera, LevelTable
-from posefield.locomotion import crowd_order, gait, level_transitions, walking_crowd
-from posefield.locomotion.crowd_order import CrowdOrder
+from posefield.inference.level_selection import HYSTERESIS, LevelTable
+from posefield.locomotion import gait, level_transitions, walking_crowd
 from posefield.motion import skeleton
 from posefield.registry import model_registry
 
@@ -124,17 +123,3 @@ def test_a_switch_does_not_pop(own):
     usual = pop(level_transitions.constant_schedule(3, plan.phases.shape))
     assert mixed < 1.5 * usual
     assert sudden > 1.7 * mixed
-
-
-def test_a_camera_changes_levels_and_hardly_the_walk(model, own):
-    camera = Camera(np.array([-40.0, 1.7, 0.0]), 1.0472, 1080.0)
-    far = crowd_order.build_crowd(
-        model, own, CrowdOrder(count=12, seconds=2.0, camera=camera, pixels=2.0)
-    )
-    near = crowd_order.build_crowd(model, own, CrowdOrder(count=12, seconds=2.0))
-    assert far.facts["level_shares"][0] < 1.0 == near.facts["level_shares"][0]
-    gaps = [
-        np.abs(a.root_position - b.root_position).max()
-        for a, b in zip(far.batches, near.batches, strict=True)
-    ]
-    assert 0.0 < max(gaps) < 0.2

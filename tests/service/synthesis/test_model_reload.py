@@ -220,17 +220,6 @@ def test_a_link_that_is_turned_is_a_change(put, tmp_path):
     assert identities(shelf) == [f"walk@{new}"]
 
 
-def test_a_second_place_of_a_name_leaves_the_first(put, tmp_path):
-    walk = put("walk/1.onnx", 1)
-    shelf = ReloadingRegistry([tmp_path], ROOM)
-    put("other/walk.onnx", 2)
-    put("walk/2.onnx", 3)
-    put("walk.onnx", 4)
-    followed(shelf)
-    assert {f.error.message for f in shelf.reloads.faults} == {"a second model named 'walk'"}
-    assert f"walk@{walk}" in {m.identity for m in shelf.registry.versions("walk")}
-
-
 def test_a_broken_file_stops_the_start(put, tmp_path):
     put("a.onnx", 1)
     (tmp_path / "b.onnx").write_bytes(b"broken")

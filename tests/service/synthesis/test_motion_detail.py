@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from posefield.inference import reduced_motion, session
-from posefield.question.motion_question import ClipQuestion, Target
+from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 
@@ -66,17 +66,6 @@ def test_a_loop_with_detail_closes(walk):
     found, _ = clip(walk, detail=True, loop=True, root="in_place")
     assert np.abs(found[-1] - found[0]).max() < 1e-9
     assert np.abs(found - clip(walk, loop=True, root="in_place")[0]).max() > 0.005
-
-
-def test_targets_are_met_with_detail(walk):
-    at, frame = walk.session.card.feet[0], 20
-    found = clip(walk, detail=True)[0][frame, at]
-    goal = found + np.array([0.0005, 0.0, 0.0])
-    target = Target(walk.session.card.skeleton.names[at], tuple(goal.tolist()), frame / 50.0)
-    held = clip(walk, detail=True, targets=(target,))[0][frame, at]
-    assert np.linalg.norm(held - goal) < 1e-6
-    # The motion without detail is elsewhere.
-    assert np.linalg.norm(clip(walk)[0][frame, at] - goal) > 1e-3
 
 
 def test_a_file_without_detail_answers_with_a_warning(plain):

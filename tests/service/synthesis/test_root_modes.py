@@ -5,7 +5,6 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.common.units import UP
-from posefield.locomotion import floor_plane, stride
 from posefield.motion import quat
 from posefield.question.motion_question import ClipQuestion, PoseQuestion
 from posefield.registry import model_registry
@@ -94,20 +93,6 @@ def test_a_loop_goes_on_as_smoothly_over_its_seam_as_elsewhere(walker):
     assert steps[seam].max() < 1.5 * np.delete(steps, seam, axis=0).max()
 
 
-def test_a_cycle_in_place_is_posed_as_in_crowds(walker):
-    found = clip(walker, STROLL, root="in_place", feet="as_predicted")
-    point = np.array([[STROLL[c.name] for c in walker.session.card.controls]])
-    count = len(found)
-    _, duration = end_of(walker, STROLL)
-    phases = np.arange(count) / 30.0 / duration
-    labels = stride.labels(walker.session, np.full(count, -1))
-    crowd = stride.synthesize_poses(walker.session, np.tile(point, (count, 1)), labels, phases)
-    own = stride.strides(walker.session, point, labels[:1])
-    assert np.abs(found.rotations - crowd.rotations).max() < FLOAT32
-    assert np.abs(floor_plane.project(found.root_path) - own.starts - crowd.places).max() < FLOAT32
-    assert np.abs(found.root_path[:, 1] - crowd.heights).max() < FLOAT32
-
-
 def test_what_is_no_cycle_ends_over_where_it_began(reacher):
     _, duration = end_of(reacher, POINT)
     # The clip's last frame is its end.
@@ -137,14 +122,6 @@ def test_a_part_of_a_loop_is_refused(walker, span, said):
         with pytest.raises(InvalidField) as caught:
             ask(walker, ClipQuestion(controls=STROLL, loop=True, **span))
         assert str(caught.value) == said
-
-
-def test_joints_are_called_as_asked_for_and_stay_where_they_are(reacher):
-    own, theirs = clip(reacher, POINT), clip(reacher, POINT, names="mixamo")
-    assert theirs.skeleton.names[:2] == ("mixamorig:Hips", "mixamorig:LeftUpLeg")
-    assert "LeftThumb1" in theirs.skeleton.names
-    assert np.array_equal(own.positions(), theirs.positions())
-    assert clip(reacher, POINT, names="mixamo").skeleton is theirs.skeleton
 
 
 def test_names_of_a_convention_need_roles(walker):

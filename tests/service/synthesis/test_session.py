@@ -10,7 +10,7 @@ from model_files import written
 from onnx import TensorProto, helper, numpy_helper
 
 from posefield.common.errors import ModelError
-from posefield.inference import graph_ports, onnx_runtime, session
+from posefield.inference import onnx_runtime, session
 from posefield.inference.graph_ports import OUTPUTS
 
 
@@ -70,17 +70,6 @@ def test_durations_alone_are_those_of_the_whole_graph(labelled_path, rng):
         whole = [opened.run(p, times, "duration", labels=w, level=n)[0][0] for p, w, n in asked]
         assert np.array_equal(alone, whole)
         assert np.ptp(alone) > 0.01
-
-
-def test_outputs_are_rows_in_their_shapes(walk_path):
-    opened = session.load(walk_path)
-    examples, times = np.array(opened.card.examples[:3]), np.full((3, 5), 0.2)
-    feed = {"controls": examples.astype(np.float32), "time": times.astype(np.float32)}
-    names = graph_ports.outputs(opened.card)
-    shaped = opened.run(examples, times, *names)
-    for name, own, other in zip(names, shaped, opened.graph.run(names, feed, 0), strict=True):
-        assert own.shape == other.shape, name
-        assert np.array_equal(own, other), name
 
 
 def test_a_damaged_file_is_refused(refused, model_path):

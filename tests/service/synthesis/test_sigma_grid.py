@@ -63,14 +63,6 @@ def test_the_whole_graph_says_the_same(model):
     assert np.abs(found.sigma.ravel()[::-1] - whole).max() > 1e-4
 
 
-def test_axes_go_as_far_as_was_sampled_and_no_farther(model):
-    found = grid(model, structs.replace(ASKED, margin=0.0))
-    for axis in (found.across, found.along):
-        ends = axis.control.minimum, axis.control.maximum
-        assert (axis.values[0], axis.values[-1]) == ends
-    assert found.inside.all()
-
-
 @pytest.mark.parametrize(
     ("change", "field", "words"),
     [

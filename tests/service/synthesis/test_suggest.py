@@ -53,18 +53,6 @@ def test_candidates_that_are_given_are_ranked_and_no_others(model):
     assert max(found.suggestions, key=lambda each: each.variance).controls == given[-1]
 
 
-def test_of_a_performer_little_was_captured(model):
-    everybody, tall = (
-        suggest(model, SuggestQuestion(count=1, performer=who)) for who in (None, "tall")
-    )
-    assert tall.performer == "tall"
-    assert tall.suggestions[0].variance > everybody.suggestions[0].variance
-    card = model.session.card
-    named = zip(card.sources, card.moved_by, strict=True)
-    own = {source for source, who in named if card.performers[who] == "tall"}
-    assert tall.suggestions[0].nearest in own
-
-
 @pytest.mark.parametrize(
     ("asked", "field"),
     [

@@ -114,11 +114,6 @@ def test_a_combination_that_was_not_captured_has_clips_of_either_label(own):
     assert found == {("ann", "plain"), ("ann", "sneaking"), ("ben", "marching")}
 
 
-def test_the_largest_number_draws_a_combination_with_a_share(own):
-    last = dataclasses.replace(own.labels, shares=np.array([0.1, 0.2, 0.3, 0.4, 0.0, 0.0]))
-    assert last.draw(np.array([0.0, np.nextafter(1.0, 0.0)])).tolist() == [0, 3]
-
-
 @pytest.mark.parametrize(
     ("asked", "said"),
     [

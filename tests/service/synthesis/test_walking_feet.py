@@ -9,7 +9,6 @@ from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.locomotion import (
     gait,
-    level_transitions,
     walking_crowd,
 )
 from posefield.locomotion.crowd_order import CrowdOrder
@@ -82,41 +81,6 @@ def test_a_standing_foot_stays_in_one_place_on_the_floor(model, own):
     slow = np.linalg.norm(np.diff(joints(card, free)[:, :, list(card.feet)], axis=1), axis=-1)
     # Half of all frames or so, where the prediction has none.
     assert 0.3 < still.mean() < 0.8 and (slow < 2e-6).mean() < 0.02
-
-
-def test_only_legs_turn_and_only_the_height_of_the_root_changes(model, own):
-    card = model.session.card
-    _, stood, _ = built(model, own)
-    _, free, _ = built(model, own, feet="as_predicted")
-    legs = walking_feet.choose_legs(card).character.legs
-    moved = {joint for leg in legs for joint in (leg.upper, leg.middle, leg.lower)}
-    for joint in range(len(card.skeleton)):
-        same = np.array_equal(stood["rotations"][:, :, joint], free["rotations"][:, :, joint])
-        assert same != (joint in moved)
-    level = [0, 2]
-    gap = stood["root_position"] - free["root_position"]
-    assert np.abs(gap[..., level]).max() < 1e-6 and np.abs(gap).max() < 0.1
-    assert np.array_equal(stood["bone_offsets"], free["bone_offsets"])
-
-
-def test_contacts_are_those_of_the_level(model, own):
-    plan = walking_crowd.plan_random(own, 4, 2.0, RATE, 0)
-    who, shape = np.arange(4), plan.phases.shape
-
-    def likely(shown):
-        return walking_feet.contact_probabilities(own.session, plan, who, shown)
-
-    fine, coarse = (
-        likely(level_transitions.constant_schedule(level, shape))
-        for level in (0, len(model.session.card.levels) - 1)
-    )
-    levels = np.full(shape, len(model.session.card.levels) - 1)
-    half = likely(
-        level_transitions.LevelSchedule(levels, np.zeros_like(levels), np.full(shape, 0.5))
-    )
-    assert half == pytest.approx(0.5 * (fine + coarse), abs=1e-6)
-    assert np.abs(fine - coarse).max() > 1e-3
-    assert fine.min() >= 0.0 and fine.max() <= 1.0
 
 
 def test_the_same_crowd_has_the_same_bytes(model, own):

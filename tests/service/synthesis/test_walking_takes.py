@@ -7,7 +7,6 @@ import pytest
 
 from posefield.common.errors import InvalidField
 from posefield.inference import session
-from posefield.inference.level_selection import Camera
 from posefield.kriging import kriging_model
 from posefield.locomotion import (
     floor_plane,
@@ -173,20 +172,6 @@ def _paths(model, walk, order, apart):
     )
 
 
-def test_takes_do_not_jump_while_levels_change(model, walk):
-    card = model.session.card
-    near = Camera(np.array([-8.0, 1.7, 0.0]), 1.0472, 1080.0)
-    asked = {"count": 30, "seconds": 8.0, "camera": near, "pixels": 3.0}
-    facts, varied = built(model, walk, take="index", **asked)
-    _, mean = built(model, walk, **asked)
-    assert sum(share > 0.0 for share in facts["level_shares"]) > 1
-    steps = [
-        np.linalg.norm(np.diff(joints(card, made), axis=1), axis=-1).max()
-        for made in (varied, mean)
-    ]
-    assert steps[0] < 1.5 * steps[1]
-
-
 @pytest.mark.parametrize(
     ("asked", "field"),
     [({"take": -1}, "take"), ({"take": 3, "variety": 1.5}, "variety")],
@@ -195,14 +180,6 @@ def test_numbers_out_of_range_are_refused(model, walk, asked, field):
     with pytest.raises(InvalidField) as caught:
         built(model, walk, **asked)
     assert caught.value.field == field
-
-
-def test_a_model_without_takes_refuses_them(model):
-    card = model.session.card
-    spherical = replace(card, kriging=replace(card.kriging, covariance="spherical"))
-    with pytest.raises(InvalidField, match="spherical kriging"):
-        walking_takes.of_order(spherical, CrowdOrder(count=2, take="index"))
-    assert walking_takes.of_order(spherical, CrowdOrder(count=2)) is None
 
 
 def test_variances_of_deviations_are_those_of_kriging(model, twins):

@@ -8,7 +8,6 @@ import pytest
 from posefield.common.errors import InvalidField
 from posefield.constraints import targets as goals
 from posefield.inference import session
-from posefield.model_file.model_card import Event
 from posefield.motion.measures import Measure
 from posefield.question.motion_question import MotionQuestion, Target
 from posefield.validation.question_validation import QuestionValidator
@@ -102,14 +101,3 @@ def test_a_target_counts_before_the_control_of_the_same_joint(card):
     assert len(found(card, Target("RightHand", PLACE, at="start")).controls) == 1
     with pytest.raises(InvalidField, match="for whose joint there is a target"):
         found(card, Target("RightHand", PLACE, at="end"), exact=("target_height",))
-
-
-def test_the_event_is_the_cards_own(card):
-    middle = replace(card, event=Event(card.skeleton.names.index("RightHand"), 0.4))
-    asked = Target("LeftHand", PLACE, at="event")
-    assert found(middle, asked).targets[0].moment.share == 0.4
-    ends = replace(card, event=Event(0, 1.0))
-    assert found(ends, asked).targets[0].moment.at == "end"
-    with pytest.raises(InvalidField, match="names none") as fault:
-        found(replace(card, event=None), asked)
-    assert fault.value.field == "targets/0/at"

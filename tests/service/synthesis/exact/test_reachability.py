@@ -59,20 +59,6 @@ def test_distances_are_in_what_is_missed_of_the_captured_clips(walking):
     assert abs(other / expected - 1.0) > 1e-3
 
 
-def test_all_of_the_way_is_gone_within_the_limit():
-    near = judged(np.array([0.1, 0.2, -0.1]), 0.01 * np.eye(3), np.ones((3, 1)))
-    assert near.distance < reachability.distance_limit(3)
-    assert np.array_equal(near.reachable, near.differences)
-    far = judged(10.0 * near.differences[0], near.covariance[0], near.members)
-    assert np.allclose(
-        far.reachable,
-        reachability.distance_limit(3) / far.distance * far.differences,
-        rtol=1e-6,
-        atol=0,
-    )
-    assert not np.array_equal(far.reachable, far.differences)
-
-
 def test_aims_that_are_near_are_not_given_up_for_one_that_is_far(rng):
     left = np.array([0.01, 0.0, 0.02, 3.0, 2.0, 1.0])
     own = 0.02 * rng.standard_normal((6, 6))
