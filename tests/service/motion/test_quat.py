@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from posefield.motion import quat
+from posefield.motion import quat, quat_planes
 
 # A few roundings of numbers of size one.
 TOLERANCE = 1e-12
@@ -142,3 +142,50 @@ def test_locked_euler_angles_mean_the_same_rotation_and_end_in_zero(order, middl
     assert np.array_equal(found[:, 2], np.zeros(50))
     dropped = quat.from_euler(angles * [1.0, 1.0, 0.0], order)
     assert np.max(np.abs(quat.to_matrix(dropped) - quat.to_matrix(q))) > 1e-2
+
+
+@pytest.fixture
+def pairs(rng):
+    return quat.normalize(rng.normal(size=(2, 7, 5, 4)))
+
+
+@pytest.fixture
+def turning_vectors(rng):
+    # Zero and a half turn too, where the sine over the angle is zero over zero and zero.
+    turning_vectors = rng.normal(size=(7, 5, 3))
+    turning_vectors[0] = 0.0
+    turning_vectors[1] *= np.pi / np.linalg.norm(turning_vectors[1], axis=-1, keepdims=True)
+    return turning_vectors
+
+
+def planes(values):
+    """Values (..., k) as planes (k, ...)."""
+    return np.ascontiguousarray(np.moveaxis(values, -1, 0))
+
+
+def same(found, expected):
+    return np.array_equal(found, planes(expected))
+
+
+def test_product_has_the_same_bits(pairs):
+    a, b = pairs
+    found = np.empty((4, 7, 5))
+    quat_planes.product(planes(a), planes(b), out=found)
+    assert same(found, quat.mul(a, b))
+    assert not same(found, quat.mul(b, a))
+
+
+def test_turned_vectors_have_the_same_bits(pairs, turning_vectors):
+    found = np.empty((3, 7, 5))
+    quat_planes.rotate(planes(pairs[0]), planes(turning_vectors), out=found)
+    assert same(found, quat.rotate(pairs[0], turning_vectors))
+    assert not same(found, quat.rotate(pairs[1], turning_vectors))
+
+
+def test_one_quaternion_alone_has_the_same_bits(pairs, turning_vectors):
+    """Components are then single numbers, which NumPy cannot write to."""
+    turned, both = np.empty(3), np.empty(4)
+    quat_planes.rotate(pairs[0, 2, 2], turning_vectors[2, 2], out=turned)
+    quat_planes.product(pairs[0, 2, 2], pairs[1, 2, 2], out=both)
+    assert np.array_equal(turned, quat.rotate(pairs[0, 2, 2], turning_vectors[2, 2]))
+    assert np.array_equal(both, quat.mul(pairs[0, 2, 2], pairs[1, 2, 2]))

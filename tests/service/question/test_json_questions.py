@@ -9,7 +9,8 @@ import pytest
 
 from posefield.common.errors import FormError
 from posefield.question import json_decoding as bodies
-from posefield.question.motion_question import ClipsQuestion, FileQuestion
+from posefield.question.json_decoding import decode_question
+from posefield.question.motion_question import ClipsQuestion, FileQuestion, PoseQuestion
 
 
 class Inner(msgspec.Struct, forbid_unknown_fields=True):
@@ -97,3 +98,27 @@ def test_whole_numbers_may_be_written_as_json_writes_them():
         body = f'{{"controls":{{"a":1.0}},"level":{level}}}'.encode()
         found = bodies.decode_question(FileQuestion, body)
         assert found == FileQuestion(controls={"a": 1.0}, level=1) and type(found.level) is int
+
+
+TARGET = '{"controls": {}, "times": [0], "targets": [{"joint": "A", %s}]}'
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        (
+            TARGET % '"pos": [0, 1, 0]',
+            "targets/0/pos: Object contains unknown field `pos` (did you mean 'position'?), "
+            "expected some of joint, position, time, at",
+        ),
+        (
+            TARGET % '"position": [0, 1, 0], "at": "strat"',
+            "targets/0/at: Invalid enum value 'strat' (did you mean 'start'?), expected one of "
+            "start, end, event, highest, lowest, farthest",
+        ),
+    ],
+)
+def test_an_unknown_name_is_answered_with_those_that_are_known(body, said):
+    with pytest.raises(FormError) as caught:
+        decode_question(PoseQuestion, body.encode())
+    assert str(caught.value) == said

@@ -1,16 +1,20 @@
 """Clips of many questions at once: the bytes and the errors of each alone."""
 
 import msgspec
+import numpy as np
+import onnx
 import pytest
+import recorded
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from model_files import written
 
 from posefield.common.errors import QueryError
 from posefield.inference import session
 from posefield.question.floor import Floor
-from posefield.question.motion_question import ClipQuestion, Target
+from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.registry import shipped_models
-from posefield.synthesis import clips
+from posefield.synthesis import clip_batch, clips, poses
 from posefield.synthesis.synthesizer import Synthesizer
 
 KINDS = ("shipped", "labelled_path", "walk_path")
@@ -77,3 +81,136 @@ def test_a_clip_has_the_same_bytes_alone_and_in_a_batch(pair, places):
         assert found.clip.rotations.tobytes() == alone.clip.rotations.tobytes()
         assert found.clip.translations.tobytes() == alone.clip.translations.tobytes()
         assert found.trust == alone.trust
+
+
+FILES = ("model_path", "labelled_path", "walk_path")
+
+
+@pytest.fixture(scope="module", params=FILES)
+def model(request):
+    path = request.getfixturevalue(request.param)
+    return Synthesizer(path.stem, session.load(path))
+
+
+def posed(model, place, level):
+    """A question at shares of the ranges and, if there are performers, as one of them."""
+    card, (shares, time, who) = model.session.card, place
+    ranges = [(c, c.minimum, c.maximum - c.minimum) for c in card.controls]
+    controls = {c.name: low + s * span for (c, low, span), s in zip(ranges, shares, strict=False)}
+    names = (None, *card.performers)
+    time *= card.durations[0]
+    return poses.prepare(
+        model,
+        PoseQuestion(
+            controls=controls, times=[time], performer=names[who % len(names)], level=level
+        ),
+    )
+
+
+PLACE = st.tuples(st.tuples(*[SHARE] * 4), st.floats(0.0, 0.5), st.integers(0, 9))
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(places=st.lists(PLACE, min_size=2, max_size=40), number=st.integers(0, 11))
+def test_a_question_gets_the_same_bytes_whatever_it_is_asked_with(model, places, number):
+    level = number % len(model.session.card.levels)
+    asked = [posed(model, place, level) for place in places]
+    for each, row in zip(asked, poses.run_batch(model, asked), strict=True):
+        (own,) = poses.run_batch(model, [each])
+        assert [a.tobytes() for a in row] == [a.tobytes() for a in own]
+
+
+@pytest.mark.parametrize("count", [2, 5, 15])
+def test_the_last_question_of_a_batch_gets_the_same_bytes(model, count):
+    """The last numbers of arrays may not fill a register."""
+    places = [((share, 0.4, 0.9, 0.2), 0.2, 0) for share in np.linspace(0.03, 0.97, 11)]
+    for level in range(len(model.session.card.levels)):
+        for place in places:
+            asked = [posed(model, each, level) for each in (*[places[0]] * (count - 1), place)]
+            (own,) = poses.run_batch(model, asked[-1:])
+            last = poses.run_batch(model, asked)[-1]
+            assert [a.tobytes() for a in last] == [a.tobytes() for a in own]
+
+
+def test_a_graph_whose_rows_depend_on_each_other_is_found_out(model_path, tmp_path):
+    """One whose softmax is over the questions, not over each question's own numbers."""
+    graph = onnx.load(model_path)
+    (softmax,) = (node for node in graph.graph.node if node.op_type == "Softmax")
+    softmax.attribute[0].i = 0
+    path = tmp_path / "reaching.onnx"
+    path.write_bytes(written(graph))
+    model = Synthesizer("reaching", session.load(path))
+    assert not poses.is_batch_exact(model, 0)
+
+
+def performed_question(model, place, level, **more):
+    """A question at shares of the ranges and, if there are performers, as one of them."""
+    card, (shares, fps, who) = model.session.card, place
+    ranges = [(c, c.minimum, c.maximum - c.minimum) for c in card.controls]
+    controls = {c.name: low + s * span for (c, low, span), s in zip(ranges, shares, strict=False)}
+    names = (None, *card.performers)
+    known = {"controls": controls, "fps": fps, "performer": names[who % len(names)]}
+    return ClipQuestion(**{**known, "level": level, **more})
+
+
+def facts(found):
+    """All of an answer, or of an error, for comparison."""
+    if isinstance(found, Exception):
+        return type(found), str(found)
+    own = found.clip
+    names, arrays = own.skeleton.names, (own.rotations, own.translations, own.curve_values)
+    return names, own.rate, found.trust, [array.tobytes() for array in arrays]
+
+
+def counted(path):
+    """A model whose levels are known to be exact, and the feeds of its graph's calls."""
+    opened, feeds = recorded.session(session.load(path))
+    model = Synthesizer("reaching", opened)
+    assert clip_batch.is_exact(model, 0)
+    feeds.clear()
+    return model, feeds
+
+
+def spread(model, count, **more):
+    shares = np.linspace(0.1, 0.9, count)
+    return [performed_question(model, ((s, 0.5, 0.3, 0.7), 30.0, 0), 0, **more) for s in shares]
+
+
+def test_clips_share_one_call_for_their_durations_and_few_for_their_frames(model_path):
+    model, feeds = counted(model_path)
+    asked = spread(model, 12)
+    found = clips.synthesize_clips(model, asked)
+    sizes = [len(feed["controls"]) for feed in feeds]
+    assert sizes[0] == sum(sizes[1:]) == 12
+    padded = [feed["time"].size for feed in feeds[1:]]
+    assert max(padded) <= clip_batch.MAX_FRAMES
+    # As few as fit: two neighbours together would exceed the limit.
+    frames = sum(len(answer.clip) for answer in found)
+    assert len(padded) == -(-frames // clip_batch.MAX_FRAMES)
+
+
+def test_a_model_whose_clips_depend_on_their_batch_is_asked_one_by_one(model_path, tmp_path):
+    """One whose softmax is over the questions, not over each question's own numbers."""
+    graph = onnx.load(model_path)
+    (softmax,) = (node for node in graph.graph.node if node.op_type == "Softmax")
+    softmax.attribute[0].i = 0
+    path = tmp_path / "reaching.onnx"
+    path.write_bytes(written(graph))
+    opened, feeds = recorded.session(session.load(path))
+    model = Synthesizer("reaching", opened)
+    assert not clip_batch.is_exact(model, 0)
+    feeds.clear()
+    asked = spread(model, 3)
+    found = clips.synthesize_clips(model, asked)
+    assert {len(feed["controls"]) for feed in feeds} == {1}
+    assert list(map(facts, found)) == [facts(clips.synthesize_clip(model, each)) for each in asked]
+
+
+def test_the_bound_of_frames_holds_and_is_near(model_path):
+    model = Synthesizer("reaching", session.load(model_path))
+    for more in ({}, {"start": 0.3}, {"end": 0.5}, {"start": 0.1, "end": 0.4}):
+        for asked in spread(model, 9, **more):
+            frames = len(clips.synthesize_clip(model, asked).clip)
+            assert frames <= clip_batch.longest(model, asked)
+            if "end" in more:
+                assert clip_batch.longest(model, asked) < frames + 1.0 + 1e-9

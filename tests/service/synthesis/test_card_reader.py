@@ -1,11 +1,16 @@
 """Tests of the card reader: round trip, and errors with path and value."""
 
+import base64
 import json
+import re
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from model_cards import CARD
 
 from posefield.model_file import card_reader, model_card, onnx_check
+from posefield.model_file.model_card import Preset, TrainingParameters
 
 WRITTEN = {key: text.encode() for key, text in model_card.dump(CARD).items()}
 
@@ -107,3 +112,98 @@ def test_deep_nesting_is_refused(name, inner):
 def test_a_card_of_too_many_bytes_is_refused():
     text = json.dumps("x" * card_reader.MAX_BYTES).encode()
     assert "bytes, expected at most" in refusal(WRITTEN | {"posefield.description": text})
+
+
+POINT = {"height": 1.7, "turn": 20.0}
+
+
+PRESETS = (
+    Preset("near", POINT, {"performer": "ada"}),
+    Preset("far", {"height": 1.6, "turn": -60.0}),
+)
+
+
+def entries(presets):
+    return {k: v.encode() for k, v in model_card.dump(replace(CARD, presets=presets)).items()}
+
+
+def test_presets_are_read_as_they_were_written():
+    read = card_reader.decode(entries(PRESETS))
+    assert read.presets == PRESETS
+    assert entries(read.presets) == entries(PRESETS)
+    assert model_card.plain_values(read)["presets"] == (
+        {"name": "near", "controls": POINT, "labels": {}, "performer": "ada"},
+        {
+            "name": "far",
+            "controls": {"height": 1.6, "turn": -60.0},
+            "labels": {},
+            "performer": None,
+        },
+    )
+
+
+def test_a_file_without_presets_keeps_its_bytes_and_is_read():
+    written = entries(())
+    assert "posefield.presets" not in written
+    assert card_reader.decode(written).presets == ()
+    assert model_card.plain_values(CARD)["presets"] == ()
+
+
+@pytest.mark.parametrize(
+    ("preset", "said"),
+    [
+        (
+            Preset("far", {"height": 1.7}),
+            "presets[1].controls is ['height'], expected a value for",
+        ),
+        (
+            Preset("far", {**POINT, "turn": 61.0}),
+            "presets[1].controls.turn is 61.0, expected -60.0",
+        ),
+        (
+            Preset("far", POINT, {"performer": "cay"}),
+            "presets[1].labels.performer is cay, expected one of",
+        ),
+        (PRESETS[0], "presets is ['near'], expected each entry once"),
+    ],
+)
+def test_a_wrong_preset_is_refused(preset, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        card_reader.decode(entries((PRESETS[0], preset)))
+
+
+def test_making_is_in_the_file_and_not_sent_to_clients():
+    entries = model_card.dump(CARD)
+    assert json.loads(entries["posefield.making"]) == {
+        "fields": {"warp": [0.25, 1, 0]},
+        "landmarks": {"peak": 0.4},
+        "joint_weights": {"chest": 2.0},
+        "in_phase": True,
+        "takes": [0, 0, 1],
+        "take_root": [[row] * 28 for row in (0.1, 0.2, 0.3, 0.4)],
+        "detail": base64.b64encode(CARD.making.detail).decode(),
+    }
+    assert "making" not in model_card.plain_values(CARD)
+
+
+def test_parameters_at_their_default_take_no_bytes():
+    few = model_card.dump(replace(CARD, making=TrainingParameters({"warp": (0.25, 1)})))
+    assert few["posefield.making"] == '{"fields": {"warp": [0.25, 1]}}'
+    assert model_card.dump(replace(CARD, making=TrainingParameters()))["posefield.making"] == "{}"
+    controls = json.loads(few["posefield.controls"])
+    assert controls[0]["measure"] == {"quantity": "stature"}
+    assert "measure" not in controls[1]
+
+
+def test_equal_cards_give_equal_text_in_equal_order():
+    shuffled = replace(CARD, diagnostics=dict(reversed(list(CARD.diagnostics.items()))))
+    assert list(model_card.dump(shuffled).items()) == list(model_card.dump(CARD).items())
+    assert list(model_card.dump(CARD)) == sorted(model_card.dump(CARD))
+    assert model_card.dump(replace(CARD, rate=30.0)) != model_card.dump(CARD)
+
+
+def test_bones_are_written_to_the_micrometre():
+    offsets = CARD.skeleton.offsets + 1.23456789e-5
+    entries = model_card.dump(replace(CARD, skeleton=replace(CARD.skeleton, offsets=offsets)))
+    away = np.abs(np.array(json.loads(entries["posefield.skeleton"])["offsets"]) - offsets).max()
+    assert 0.0 < away <= 0.5e-6

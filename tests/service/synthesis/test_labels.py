@@ -158,3 +158,70 @@ def test_over_http_labels_are_parameters_bodies_and_answers(styled_path):
         assert answer.status_code == 200, answer.text
     card = ask("GET", path).json()
     assert next(own["names"] for own in card["labels"]) == card["performers"]
+
+
+REACH = {"stature": 1.75, "hip_height": 0.9, "turn": 10.0, "target_height": 1.0}
+
+
+NAMES = ("middle", "short", "tall")
+
+
+@pytest.fixture(scope="module")
+def reaching(labelled_path):
+    return model_registry.load([labelled_path]).models["labelled"]
+
+
+@pytest.fixture(scope="module")
+def plain(model_path):
+    return model_registry.load([model_path]).models["reaching"]
+
+
+# A pose is asked for twice: alone it would be summed in another order.
+TWICE = np.array([[0.5], [0.5]])
+
+
+def test_the_answer_for_a_name_is_that_of_its_label(reaching):
+    point = np.array([[REACH[c.name] for c in reaching.session.card.controls]])
+    for name, label in zip(NAMES, np.eye(3), strict=True):
+        answer = poses.synthesize_poses(
+            reaching, PoseQuestion(controls=REACH, times=[0.5], performer=name)
+        )
+        rotations = [
+            reaching.session.run(point.repeat(2, 0), TWICE, "rotations", labels=labels)[0][0, 0]
+            for labels in (np.tile(label, (2, 1)), np.tile(np.roll(label, 1), (2, 1)))
+        ]
+        assert np.array_equal(answer.rotations[0], rotations[0])
+        assert not np.array_equal(answer.rotations[0], rotations[1])
+
+
+HINT = " (did you mean 'tall'?)"
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("Tall", HINT), ("", ""), ("nobody", "")],
+)
+def test_an_unknown_performer_is_refused_with_those_there_are(reaching, name, hint):
+    for ask in (
+        lambda: poses.synthesize_poses(
+            reaching, PoseQuestion(controls=REACH, times=[0.0], performer=name)
+        ),
+        lambda: clips.synthesize_clip(
+            reaching, ClipQuestion(controls=REACH, fps=30.0, extrapolate="warn", performer=name)
+        ),
+    ):
+        with pytest.raises(InvalidField) as caught:
+            ask()
+        assert caught.value.field == "performer"
+        assert caught.value.message == f"{name!r}{hint}, expected one of middle, short, tall"
+
+
+def test_a_model_that_knows_nobody_refuses_every_name(plain):
+    with pytest.raises(InvalidField) as caught:
+        poses.synthesize_poses(plain, PoseQuestion(controls=REACH, times=[0.0], performer="tall"))
+    assert caught.value.field == "performer"
+    assert caught.value.message == "'tall', expected none: this model knows none"
+    assert (
+        poses.synthesize_poses(plain, PoseQuestion(controls=REACH, times=[0.0])).trust.performer
+        is None
+    )

@@ -5,11 +5,14 @@ from dataclasses import replace
 
 import pytest
 
-from posefield.common.errors import InvalidField
+from posefield.common.errors import InvalidField, OutOfReach
 from posefield.constraints import targets as goals
+from posefield.constraints.targets import ConstraintSet, JointTarget
 from posefield.inference import session
 from posefield.motion.measures import Measure
 from posefield.question.motion_question import MotionQuestion, Target
+from posefield.question.results import ConstraintResult
+from posefield.synthesis import synthesizer
 from posefield.validation.question_validation import QuestionValidator
 
 PLACE = (0.3, 1.2, 0.4)
@@ -101,3 +104,43 @@ def test_a_target_counts_before_the_control_of_the_same_joint(card):
     assert len(found(card, Target("RightHand", PLACE, at="start")).controls) == 1
     with pytest.raises(InvalidField, match="for whose joint there is a target"):
         found(card, Target("RightHand", PLACE, at="end"), exact=("target_height",))
+
+
+HIGH = Measure("height", (3,), "highest")
+
+
+GOALS = ConstraintSet(
+    (("speed", Measure("speed"), 2.0),), (JointTarget("hand at 1 s", HIGH, (0, 0, 0), 1.0),)
+)
+
+
+SLOW = ConstraintResult("speed", 0.1234, "m/s", False)
+
+
+SHORT = ConstraintResult("hand at 1 s", 0.1234, "m", False)
+
+
+FINE = ConstraintResult("hand at 1 s", 1e-6, "m", True)
+
+
+def test_each_miss_is_a_sentence():
+    assert synthesizer.miss_warnings([SLOW, SHORT]) == (
+        "speed stays 0.123 m/s from its target: out of reach",
+        "hand at 1 s stays 12.3 cm from its target: out of reach",
+    )
+    assert synthesizer.miss_warnings([FINE]) == ()
+
+
+@pytest.mark.parametrize(
+    ("met", "field"),
+    [
+        ([SLOW, SHORT], "controls/speed"),
+        ([SLOW, FINE], "controls/speed"),
+        ([ConstraintResult("speed", 0.0, "m/s", True), SHORT], "targets/0"),
+    ],
+)
+def test_the_first_miss_is_named(met, field):
+    with pytest.raises(OutOfReach) as caught:
+        synthesizer.check_targets(GOALS, met)
+    assert caught.value.field == field
+    assert caught.value.message == "; ".join(synthesizer.miss_warnings(met))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import InvalidField
-from posefield.inference import session
+from posefield.inference import reduced_motion, session
 from posefield.inference.takes import TakeSampler
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
-from posefield.synthesis.synthesizer import Synthesizer
+from posefield.synthesis.synthesizer import NO_DETAIL, Synthesizer
 
 SEED = 7
 
@@ -161,3 +161,60 @@ def test_a_spherical_covariance_has_no_takes(walk):
     model = Synthesizer("walk", replace(walk.session, card=spherical))
     with pytest.raises(InvalidField, match="take: 7, but no takes can be drawn of spherical"):
         clip(model, take=SEED)
+
+
+DEVIATIONS = np.outer([0.0, 0.02, 0.0, 0.01], np.linspace(1.0, 0.5, 12))
+
+
+@pytest.fixture(scope="module")
+def detailed(walk) -> Synthesizer:
+    """The same with detail."""
+    opened = walk.session
+    making = replace(opened.card.making, detail=reduced_motion.to_bytes(DEVIATIONS))
+    return Synthesizer("walk", replace(opened, card=replace(opened.card, making=making)))
+
+
+def detailed_question(model, **more):
+    controls = {c.name: c.default for c in model.session.card.controls}
+    own = {"exact": "none", "feet": "as_predicted"}
+    return ClipQuestion(controls=controls, fps=50.0, **own | more)
+
+
+def detailed_clip(model, **more):
+    """Joint positions (F, J, 3) of a clip with detail, and its trust."""
+    answer = clips.synthesize_clip(model, detailed_question(model, **more))
+    return answer.clip.positions(), answer.trust
+
+
+def test_samples_have_the_deviations_and_close(rng):
+    frames, seeds = 41, 400
+    drawn = np.array([reduced_motion.sample(DEVIATIONS, frames, seed) for seed in range(seeds)])
+    assert np.abs(drawn[:, 0] - drawn[:, -1]).max() < 1e-12
+    variances = np.sum(np.square(DEVIATIONS), axis=0)
+    ratios = np.mean(np.square(drawn), axis=(0, 1)) / variances
+    assert np.allclose(ratios, 1.0, atol=0.2) and ratios.mean() == pytest.approx(1.0, abs=0.05)
+    doubled = reduced_motion.sample(2.0 * DEVIATIONS, frames, SEED)
+    assert np.allclose(doubled, 2.0 * drawn[SEED])
+
+
+def test_detail_is_sampled_by_the_seed_of_the_take(detailed):
+    mean, trust = detailed_clip(detailed)
+    one, own = detailed_clip(detailed, detail=True)
+    assert np.abs(one - mean).max() > 0.005 and own.sigma == trust.sigma
+    assert np.array_equal(detailed_clip(detailed, detail=True)[0], one)
+    taken, _ = detailed_clip(detailed, take=SEED)
+    both, _ = detailed_clip(detailed, take=SEED, detail=True)
+    assert np.abs(both - taken).max() > 0.005 and np.abs((both - taken) - (one - mean)).max() > 1e-3
+    assert own.warnings == ()
+
+
+def test_a_loop_with_detail_closes(detailed):
+    found, _ = detailed_clip(detailed, detail=True, loop=True, root="in_place")
+    assert np.abs(found[-1] - found[0]).max() < 1e-9
+    assert np.abs(found - detailed_clip(detailed, loop=True, root="in_place")[0]).max() > 0.005
+
+
+def test_a_file_without_detail_answers_with_a_warning(walk):
+    found, trust = detailed_clip(walk, detail=True)
+    assert trust.warnings == (NO_DETAIL,)
+    assert np.array_equal(found, detailed_clip(walk)[0])
