@@ -58,19 +58,6 @@ def test_each_format_is_had_by_its_media_type(which, ask, controls):
     assert refused.status_code == 406 and first.media_type in refused.json()["detail"]
 
 
-def test_lines_of_a_header_are_one_header(ask, controls):
-    path = f"{REACH}/clip?{urlencode({**controls, 'end': 0.1})}"
-    lines = [("accept", "application/json;q=0.2"), ("accept", "application/x-bvh;q=0.3")]
-    assert ask("GET", path, headers=lines).headers["content-type"] == "application/x-bvh"
-    assert ask("GET", path, headers=lines[:1]).headers["content-type"] == "application/json"
-
-
-def test_a_path_with_a_format_does_not_ask(ask, controls):
-    path = f"{REACH}/clip.bvh?{urlencode({**controls, 'end': 0.1})}"
-    answer = ask("GET", path, headers={"accept": "application/json"})
-    assert answer.headers["content-type"] == "application/x-bvh"
-
-
 def test_what_is_accepted_is_asked_before_anything_else(ask):
     path = f"{REACH}/clip?turn=never"
     assert ask("GET", path, headers={"accept": "image/png"}).status_code == 406

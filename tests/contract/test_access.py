@@ -129,14 +129,6 @@ def test_nobody_gets_in_without_a_key(guarded, issued, spec):
     assert ask("GET", "/v1/models", headers={"authorization": f"bearer {key}"}).status_code == 200
 
 
-def test_the_challenge_names_an_error_only_where_something_was_sent(guarded):
-    ask = asker(guarded)
-    bare = ask("GET", "/v1/models").headers["www-authenticate"]
-    assert bare == 'Bearer realm="posefield"'
-    sent = ask("GET", "/v1/models", headers={"Authorization": "Bearer pf_x"})
-    assert sent.headers["www-authenticate"].endswith('error="invalid_token"')
-
-
 def test_every_operation_with_a_scope_refuses_who_is_unknown_and_who_lacks_it(guarded, as_):
     """401 and 403 are what the contract says of each, and of no other."""
     ask, tried = asker(guarded), 0
@@ -157,14 +149,6 @@ def test_every_operation_with_a_scope_refuses_who_is_unknown_and_who_lacks_it(gu
     assert tried > 20
 
 
-def test_who_is_not_let_in_is_told_nothing_of_the_request(guarded):
-    """The door comes before parameters, bodies and models are looked at."""
-    ask = asker(guarded)
-    for path in ("/v1/models/nobody", "/v1/models/reach?x=1", "/v1/models/reach/pose"):
-        assert ask("GET", path).status_code == 401
-    assert ask("POST", "/v1/models/reach/pose", content=b"{").status_code == 401
-
-
 def test_probes_need_no_key_and_name_no_model(guarded, loaded, ask):
     probed = asker(guarded)
     assert probed("GET", "/livez").status_code == 200
@@ -172,12 +156,6 @@ def test_probes_need_no_key_and_name_no_model(guarded, loaded, ask):
     assert (ready["status"], ready["models"]) == ("ready", [])
     assert not [name for name in loaded.models if name in json.dumps(ready)]
     assert len(ask("GET", "/readyz").json()["models"]) == len(loaded.models) > 0
-
-
-def test_without_keys_nothing_is_asked_for(ask):
-    assert names(ask("GET", "/v1/models")) == ["reach", "walk"]
-    headers = {"Authorization": "Bearer anything"}
-    assert names(ask("GET", "/v1/models", headers=headers)) == ["reach", "walk"]
 
 
 def test_a_token_reads_what_its_scopes_say(loaded, signed):
@@ -192,25 +170,6 @@ def test_a_token_reads_what_its_scopes_say(loaded, signed):
     assert seen("openid profile").status_code == 403
     late = seen("read:*", seconds=-100)
     assert late.status_code == 401 and "expired" in late.json()["detail"]
-
-
-@pytest.mark.parametrize("end", [10**400, 1e999, "9" * 20], ids=["whole", "float", "text"])
-def test_a_signed_token_with_an_absurd_end_is_refused(end, loaded, signed):
-    trusted, token = signed
-    ask = asker(create_app(loaded, Settings(**trusted)))
-    answer = ask(
-        "GET", "/v1/models", headers={"Authorization": f"Bearer {token('read:*', exp=end)}"}
-    )
-    assert (answer.status_code, answer.json()["status"]) == (401, 401)
-    assert answer.headers["www-authenticate"].endswith('error="invalid_token"')
-
-
-def test_keys_and_tokens_go_together(loaded, signed, lines, issued):
-    trusted, token = signed
-    ask = asker(create_app(loaded, Settings(keys=lines, **trusted)))
-    for secret, status in [(token("read:*"), 200), (issued["every"], 200), ("pf_no", 401)]:
-        headers = {"Authorization": f"Bearer {secret}"}
-        assert ask("GET", "/v1/models", headers=headers).status_code == status
 
 
 def test_each_refusal_is_one_line_without_secrets(guarded, as_, issued, caplog):
@@ -256,11 +215,6 @@ def test_an_open_service_on_an_open_address_does_not_start(host, lines):
     assert create_app(ModelRegistry({}), Settings(host=host, keys=lines))
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.10", "::1", "localhost"])
-def test_on_this_machine_alone_no_keys_are_needed(host):
-    assert create_app(ModelRegistry({}), Settings(host=host))
-
-
 def test_a_file_without_keys_lets_nobody_start(tmp_path):
     empty = tmp_path / "keys"
     empty.write_text("# none yet\n")
@@ -281,15 +235,6 @@ def test_an_algorithm_of_shared_secrets_is_refused(signed):
     for algorithm in ("HS256", "none", "rs256"):
         with pytest.raises(InvalidField, match="POSEFIELD_JWT_ALGORITHM"):
             create_app(ModelRegistry({}), Settings(**signed[0], jwt_algorithm=algorithm))
-
-
-@pytest.mark.system
-def test_the_command_refuses_with_code_2(models):
-    posefield = Path(sys.executable).with_name("posefield")
-    command = [posefield, "serve", models, "--host", "0.0.0.0", "--port", "0"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert len(done.stderr.splitlines()) == 1 and "POSEFIELD_OPEN=1" in done.stderr
 
 
 @pytest.mark.system

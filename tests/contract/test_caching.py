@@ -55,14 +55,6 @@ def test_a_tag_is_known_without_asking_the_model(loaded, controls):
     assert calls != []
 
 
-def test_what_accepts_the_same_has_the_same_tag(ask, controls):
-    url = asked(controls, "clip?")
-    given = ("*/*", "model/vnd.usdc", "text/html, */*;q=0.1", "application/json")
-    tags = [ask("GET", url, headers={"accept": accept}).headers["etag"] for accept in given]
-    assert len(set(tags[:3])) == 1
-    assert tags[3] != tags[0]
-
-
 def test_tags_differ_wherever_answers_may(ask, controls):
     other = {**controls, "turn": controls["turn"] + 1.0}
     urls = [
@@ -119,12 +111,6 @@ def test_what_is_not_for_keeping_says_so(method, path, ask):
     answer = ask(method, path)
     assert answer.headers["cache-control"] == "no-store"
     assert "etag" not in answer.headers
-
-
-def test_a_refusal_has_no_tag(ask, controls):
-    answer = ask("GET", asked(controls, "clip.usdc?fps=0&"))
-    assert answer.status_code == 422
-    assert (answer.headers["cache-control"], "etag" in answer.headers) == ("no-store", False)
 
 
 def test_a_head_is_answered_as_a_get_is(ask, controls):

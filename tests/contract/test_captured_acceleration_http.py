@@ -51,12 +51,6 @@ def test_the_card_has_the_accelerations_of_captured_clips(now, spec, opened):
         check(spec, "ModelCard", {**card, "captured_acceleration": {"median": 1.0}})
 
 
-def test_the_card_of_an_earlier_file_has_none(earlier, spec):
-    card = earlier("GET", "/v1/models/walk").json()
-    check(spec, "ModelCard", card)
-    assert "captured_acceleration" not in card
-
-
 @pytest.mark.parametrize("plan", ["", "?plan=true"])
 def test_joins_tell_what_they_are_compared_with(now, earlier, spec, opened, plan):
     found = [

@@ -21,18 +21,13 @@ def raw(ask, url, accepted):
 @pytest.mark.parametrize(
     ("accepted", "coding"),
     [
-        ("zstd", "zstd"),
-        ("gzip", "gzip"),
         ("gzip, zstd", "zstd"),
         ("gzip, deflate, br, zstd", "zstd"),
         ("gzip;q=1, zstd;q=0.5", "gzip"),
-        ("GZIP", "gzip"),
         ("*", "zstd"),
         ("*, zstd;q=0", "gzip"),
         ("identity;q=1, gzip;q=0.5", None),
-        ("zstd;q=0, gzip;q=0.000", None),
         ("identity", None),
-        ("br", None),
         ("", None),
         (";;,q=1,", None),
     ],
@@ -58,11 +53,6 @@ def test_text_shrinks_and_comes_out_the_same(rest, coding, app, ask, controls):
 def test_binary_files_are_sent_as_they_are(rest, app, controls):
     answer = sent(app, f"/v1/models/reach/{rest}?{urlencode(controls)}", "zstd, gzip")
     assert not answer["headers"].keys() & {b"content-encoding", b"vary"}
-
-
-def test_what_fits_in_a_packet_is_sent_as_it_is(app):
-    answer = sent(app, "/livez", "zstd, gzip")
-    assert b"content-encoding" not in answer["headers"]
 
 
 @pytest.mark.parametrize("coding", ["zstd", "gzip"])

@@ -26,8 +26,3 @@ def test_the_card_of_a_walk_lists_its_feet_with_their_swings(asked, spec, walk_p
     wrong = {**card, "contacts": [{"joint": 3}]}
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft202012Validator(schema).validate(wrong)
-
-
-def test_the_card_of_a_reach_without_feet_lists_none(asked):
-    card = asked("GET", "/v1/models/reach").json()
-    assert "contacts" not in card and "contacts" not in card["diagnostics"]

@@ -2,11 +2,9 @@
 
 import json
 
-import contract_examples
 import jsonschema
 import numpy as np
 import orjson
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -20,13 +18,6 @@ from posefield.motion.skeleton import Skeleton
 def checker(spec, name):
     schema = {**spec["components"]["schemas"][name], "components": spec["components"]}
     return jsonschema.Draft202012Validator(schema)
-
-
-@pytest.mark.parametrize("form", CROWD_ENCODERS)
-def test_the_example_is_a_question(spec, form):
-    body = contract_examples.request("queryCrowdInFormat", form)["body"]
-    checker(spec, "CrowdQuestion").validate(body)
-    assert len(crowd_query.of_body(json.dumps(body).encode(), 100)) == 2
 
 
 def test_what_json_holds_matches_the_schema(spec):

@@ -52,16 +52,6 @@ def test_pose_and_clip_have_equal_curves(face, spec):
     assert np.abs(found[1:] - expected[:-1]).max() > 0.1
 
 
-def test_messagepack_and_npz_have_the_curves_of_the_json(face):
-    body = {"controls": CONTROLS, "times": [0.5]}
-    expected = face("POST", "/v1/models/face/pose", json=body).json()["curves"]
-    packed = msgspec.msgpack.decode(
-        face("POST", "/v1/models/face/pose.msgpack", json=body).content
-    )["curves"]
-    found = np.frombuffer(packed["data"], packed["dtype"]).reshape(packed["shape"])
-    assert np.allclose(found, expected, atol=SINGLE)
-
-
 def test_a_crowd_has_the_curves_of_its_poses(face, spec):
     times = [0.2, 0.6]
     asked = {"controls": CONTROLS, "time": times, "position": [[0, 0, 0], [1, 0, 0]]}
@@ -128,11 +118,3 @@ def test_archives_and_exports_of_bvh_say_so_in_the_manifest(face, model_file, po
         words = ("export", model_file("face"), table, "-o", tmp_path / form, "--format", form)
         assert posefield(*words)[0] == 0
         assert json.loads((tmp_path / form / "manifest.jsonl").read_bytes())["warnings"] == expected
-
-
-def test_the_clip_command_prints_what_bvh_leaves_out(model_file, posefield, tmp_path):
-    asked = ("-c", "smile=0.7", "-c", "openness=0.5", "-o")
-    code, _, err = posefield("clip", model_file("face"), *asked, tmp_path / "laugh.bvh")
-    assert code == 0 and "warning: bvh files carry no curves: 11 are left out" in err
-    code, _, err = posefield("clip", model_file("face"), *asked, tmp_path / "laugh.usdc")
-    assert code == 0 and "curves" not in err

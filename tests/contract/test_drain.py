@@ -8,7 +8,7 @@ import time
 
 import httpx
 import pytest
-from serving import Clients, address, exchange, host_and_port, process, started, within
+from serving import Clients, address, host_and_port, process, started, within
 
 pytestmark = pytest.mark.system
 
@@ -70,14 +70,6 @@ def test_it_listens_on_for_a_while_but_is_not_ready(models):
         assert child.wait(20) == 0
         with pytest.raises(httpx.ConnectError):
             httpx.get(url + "/livez")
-
-
-def test_an_idle_connection_does_not_hold_the_end_up(models):
-    with process(models) as child, socket.create_connection(host_and_port(address(child))) as wire:
-        assert not exchange(wire)
-        child.send_signal(signal.SIGTERM)
-        assert child.wait(10) == 0
-        assert wire.recv(1) == b""
 
 
 def opened_for_good(child):

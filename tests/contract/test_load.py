@@ -46,14 +46,6 @@ def test_more_requests_than_can_be_answered_are_turned_away():
     assert alive.status_code == 200
 
 
-def test_room_is_made_when_answers_end():
-    app = app_with(listModels=slow)
-    for _ in range(3):
-        both = asyncio.run(ask_many(app, ["/v1/models"] * 2))
-        assert [a.status_code for a in both] == [200, 200]
-    assert app.site.open == 0
-
-
 async def stuck(service, request):
     await asyncio.sleep(100)
 

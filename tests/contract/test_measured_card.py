@@ -31,11 +31,6 @@ def test_a_measured_control_says_how(card, spec):
     valid(spec, "ModelCard", card)
 
 
-def test_a_typed_control_says_nothing_of_it(ask):
-    controls = ask("GET", "/v1/models/reach").json()["controls"]
-    assert controls and not any("measure" in control for control in controls)
-
-
 def test_the_contract_knows_all_that_can_be_measured(spec):
     known = spec["components"]["schemas"]["Measure"]["properties"]
     assert tuple(known["quantity"]["enum"]) == QUANTITIES

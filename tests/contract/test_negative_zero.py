@@ -12,20 +12,14 @@ CROWD = {"controls": CONTROLS, "time": [0.0, 0.1], "position": [[0.0, 0.0, 1.0]]
 ZERO = re.compile(r"(?<=[=@:])0(?=[&:,]|$)")
 QUERIES = {
     "pose": "pose?turn=0&time=0",
-    "pose.arrow": "pose.arrow?turn=0&time=0&time=0.5",
     "clip": "clip.usdc?turn=0&start=0",
     "held": "clip.json?turn=0&target=RightHand@0:0,1.1,0.49",
-    "why": "why?turn=0",
-    "sigma": "sigma?across=stature&along=hip_height&turn=0&margin=0",
 }
 BODIES = {
-    "pose": {"controls": CONTROLS, "times": [0.0, 0.5]},
     "pose.msgpack": {"controls": CONTROLS, "times": [0.0], "targets": [HAND]},
     "clip.json": {"controls": CONTROLS, "start": 0.0},
     "clips.tar": {"format": "npz", "clips": [{"controls": CONTROLS, "targets": [HAND]}]},
-    "why": {"controls": CONTROLS},
     "sigma": {"across": "stature", "along": "hip_height", "controls": {"turn": 0.0}},
-    "crowd.arrow": {**CROWD, "heading": 0.0},
     "crowd.json": {**CROWD, "heading": [0.0, 0.0]},
 }
 

@@ -48,13 +48,6 @@ def test_each_file_is_what_its_own_path_answers(extension, ask):
     assert len(set(found.values())) == len(found)
 
 
-def test_a_layout_holds_for_all_files(ask):
-    answer = ask("POST", f"{BATCH}.tar", json=asked("usdc", SCRIPTS[:2], layout="segments"))
-    contents = [*unpacked("tar", answer.content).values()][:2]
-    path = "/v1/performances.usdc?layout=segments"
-    assert contents == [ask("POST", path, json=alone(own)).content for own in SCRIPTS[:2]]
-
-
 @pytest.mark.parametrize("kind", ARCHIVE_WRITERS)
 def test_the_manifest_says_what_each_file_is(kind, ask, spec):
     answer = ask("POST", f"{BATCH}.{kind}", json=asked("json", SCRIPTS))
@@ -74,27 +67,6 @@ def test_the_manifest_says_what_each_file_is(kind, ask, spec):
     assert answer.headers["content-disposition"] == f'attachment; filename="performances.{kind}"'
 
 
-def test_the_format_is_negotiated_and_bytes_are_the_same(ask):
-    body = asked("bvh", SCRIPTS)
-    zipped, again = (ask("POST", BATCH, json=body) for _ in range(2))
-    assert zipped.headers["content-type"] == "application/zip"
-    assert zipped.content == again.content == ask("POST", f"{BATCH}.zip", json=body).content
-    tarred = ask("POST", BATCH, json=body, headers={"accept": "application/x-tar"})
-    assert tarred.content == ask("POST", f"{BATCH}.tar", json=body).content
-
-
-def test_warnings_are_counted(ask):
-    stop = {**bad_scripts.WALK, "stop": "standing"}
-    standing = {"segments": [stop, bad_scripts.HOLD, {**bad_scripts.WALK, "start": "standing"}]}
-    plan = ask("POST", "/v1/performances.json?plan=true", json=standing).json()
-    assert plan["trust"]["warnings"]
-    quiet = ask("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST]))
-    assert "posefield-warning" not in quiet.headers
-    answer = ask("POST", f"{BATCH}.zip", json=asked("bvh", [FIRST, standing, FIRST]))
-    said = json.loads(answer.headers["posefield-warning"])
-    assert said == "1 of 3 performances have warnings"
-
-
 def assert_refused(answer, status, pointer, words=""):
     problem = answer.json()
     assert answer.status_code == problem["status"] == status, problem
@@ -112,10 +84,7 @@ def test_a_script_at_fault_is_named(ask, scripts, status):
 
 
 WRONG = {
-    "no scripts": (asked("usdc", []), 422, "/scripts"),
-    "an unknown format": (asked("fbx", [FIRST]), 400, "/format"),
     "no such layout": (asked("glb", [FIRST], layout="segments"), 422, "/layout"),
-    "a script that is none": (asked("usdc", [5]), 400, "/scripts/0"),
     "a path for a name": (asked("usdc", [{**FIRST, "name": "../up"}]), 400, "/scripts/0/name"),
     "a name twice": (
         asked("usdc", [{**FIRST, "name": "Performance-000001"}, FIRST]),
@@ -154,15 +123,6 @@ def test_the_duration_of_all_is_limited(loaded):
     assert_refused(answer, 422, "/scripts", "s with script 3, expected at most 3 s in all")
 
 
-def test_a_performance_of_an_archive_is_as_large_as_one_alone_may_be(loaded):
-    small = asker(create_app(loaded, Settings(output_limit=70_000)))
-    script = bad_scripts.walk(seconds=20.0)
-    single = small("POST", "/v1/performances.json", json=script)
-    within = small("POST", f"{BATCH}.tar", json=asked("json", [script]))
-    assert single.status_code == within.status_code == 422
-    assert within.json()["detail"].endswith(single.json()["detail"].partition(": ")[2])
-
-
 def test_performances_are_made_as_they_are_requested(loaded):
     """One at a time is in memory: the next is made when its file is requested."""
     body = json.dumps(asked("npz", SCRIPTS)).encode()
@@ -180,14 +140,3 @@ def test_performances_are_made_as_they_are_requested(loaded):
         assert len(made) == count
     name, _ = next(members)
     assert name == "manifest.jsonl" and len(made) == 3
-
-
-def test_a_named_script_is_a_script_with_a_name(spec):
-    schemas = spec["components"]["schemas"]
-    named, plain = (schemas[name] for name in ("NamedScript", "PerformanceQuestion"))
-    assert named["required"] == plain["required"]
-    question = {k: v for k, v in named["properties"].items() if k != "name"}
-    assert question == plain["properties"]
-    assert schemas["PerformancesQuestion"]["properties"]["format"]["enum"] == [*CLIP_ENCODERS]
-    entry = schemas["PerformanceEntry"]["properties"]
-    assert entry.items() >= schemas["PerformanceReport"]["properties"].items()

@@ -1,7 +1,5 @@
 """Performances over HTTP: bad scripts are problems that name their place in the script."""
 
-import json
-
 import bad_scripts
 import pytest
 from bad_scripts import ABSENT, REFUSED, UNREADABLE
@@ -63,21 +61,13 @@ def test_a_format_that_does_not_carry_a_convention_refuses_it(ask, form, field, 
         (b'{"segments":[' + b" " * 2_000_000 + b"]}", 413),
         (b"[" * 100_000, 400),
         (b'{"segments":[{"kind":"walk","model":"walk","seconds":NaN}]}', 400),
-        (b'{"segments":[{"kind":"walk","model":"walk","seconds":1e999}]}', 400),
-        (b"", 400),
         (b"\xff", 400),
     ],
-    ids=["2 MB", "deep", "NaN", "1e999", "empty", "not UTF-8"],
+    ids=["2 MB", "deep", "NaN", "not UTF-8"],
 )
 def test_a_body_that_is_no_script_is_a_problem(ask, content, status):
     found = assert_problem(ask("POST", ADDRESS, content=content, headers=JSON), status)
     assert found["detail"]
-
-
-def test_a_script_that_is_deep_inside_is_a_problem(ask):
-    deep = "[" * 50_000 + "]" * 50_000
-    content = json.dumps(bad_scripts.walk(speed="deep")).replace('"deep"', deep)
-    assert_problem(ask("POST", ADDRESS, content=content.encode(), headers=JSON), 400)
 
 
 def test_segments_are_a_layout_of_usd(ask):
@@ -91,21 +81,3 @@ def test_segments_are_a_layout_of_usd(ask):
         assert (b"Segments" in parts.content) is (form == "usda")
         assert b"Segments" not in whole.content and parts.content != whole.content
         assert whole.content == ask("POST", f"/v1/performances.{form}", json=script).content
-
-
-@pytest.mark.parametrize("form", ["bvh"])
-def test_other_formats_refuse_a_layout(ask, form):
-    script = bad_scripts.walk()
-    answer = ask("POST", f"/v1/performances.{form}?layout=segments", json=script)
-    found = assert_problem(answer, 422)
-    assert found["type"] == "urn:posefield:problem:invalid-field"
-    assert found["errors"][0]["parameter"] == "layout"
-    assert f"{form} files have no layouts, usda, usdc and usdz do" in found["detail"]
-    assert ask("POST", f"/v1/performances.{form}?layout=whole", json=script).status_code == 200
-
-
-def test_an_unknown_layout_is_a_problem(ask):
-    answer = ask("POST", "/v1/performances.usdc?layout=parts", json=bad_scripts.walk())
-    found = assert_problem(answer, 400)
-    assert found["errors"][0]["parameter"] == "layout"
-    assert "'parts', expected one of whole, segments" in found["detail"]

@@ -41,32 +41,11 @@ def assert_refused(ask, spec):
 WRONG_PARAMETERS = [
     # changes to a right query, status, problem, parameter at fault, words of the detail
     ({"fps": "0"}, 422, "invalid-field", "fps", "expected 1 to 1000"),
-    ({"fps": "abc"}, 400, "bad-parameter", "fps", "expected a finite number"),
     ({"fps": "٣٠"}, 400, "bad-parameter", "fps", "expected a finite number"),
     ({"start": "-1"}, 422, "invalid-field", "start", "expected 0 to"),
     ({"turn": "1e400"}, 400, "bad-parameter", "turn", "expected a finite number"),
-    ({"spin": "1"}, 422, "invalid-field", "spin", "this model has stature, hip_height"),
-    ({"turm": "1"}, 422, "invalid-field", "turm", "no such control (did you mean 'turn'?); this"),
-    ({"extrapolate": "wran"}, 400, "bad-parameter", "extrapolate", "(did you mean 'warn'?)"),
     ({"turn": "1e3", "extrapolate": "refuse"}, 422, "outside-samples", "controls", "turn = 1000"),
     ({"turn": ["1", "2"]}, 400, "bad-parameter", "turn", "expected once"),
-    ({"performer": "Tall"}, 422, "invalid-field", "performer", "expected one of middle, short, t"),
-    (
-        {"label": "performer=Tall"},
-        422,
-        "invalid-field",
-        "label",
-        "expected one of middle, short, t",
-    ),
-    ({"label": "tall"}, 400, "bad-parameter", "label", "expected SET=NAME or SET=NAME:WEIGHT"),
-    (
-        {"label": "performer=tall", "performer": "tall"},
-        422,
-        "invalid-field",
-        "performer",
-        "'tall' and labels/performer, expected one",
-    ),
-    ({"fps": ["30", "30"]}, 400, "bad-parameter", "fps", "expected once"),
     ({"names": "maya"}, 400, "bad-parameter", "names", "expected one of own, mixamo, ue5, vrm"),
     (
         {"loop": "true"},
@@ -111,27 +90,14 @@ def test_an_unknown_parameter_is_named(assert_refused):
 
 WRONG_BODIES = [
     # body, status, problem, pointer to the fault
-    (b"", 400, "bad-body", ""),
     (b"{", 400, "bad-body", ""),
     (b"\xff\xfe", 400, "bad-body", ""),
-    (b'{"controls": {"\\ud800": 1}}', 400, "bad-body", ""),
-    (b"[]", 400, "bad-body", ""),
     (b"{}", 400, "bad-body", "/controls"),
     (b'{"controls": {}, "frames": 3}', 400, "bad-body", "/frames"),
     (b'{"controls": {"turn": NaN}}', 400, "bad-body", ""),
-    (b'{"controls": {"turn": 1e400}}', 400, "bad-body", "/controls/turn"),
-    (b'{"controls": {"turn": "20"}}', 400, "bad-body", "/controls/turn"),
     (b'{"controls": {"a/b~c": 1}}', 422, "invalid-field", "/controls/a~1b~0c"),
     (b'{"controls": {"turn": ' + b"[" * 20000 + b"]" * 20000 + b"}}", 400, "bad-body", "/controls"),
-    (b'{"controls": {}, "fps": "30"}', 400, "bad-body", "/fps"),
     (b'{"controls": {"spin": 1}}', 422, "invalid-field", "/controls/spin"),
-    (b'{"controls": {}, "performer": "Tall"}', 422, "invalid-field", "/performer"),
-    (
-        b'{"controls": {}, "labels": {"performer": {"tall": -1}}}',
-        422,
-        "invalid-field",
-        "/labels/performer/tall",
-    ),
     (
         b'{"controls": {}, "labels": {"a": "b", "c": {"d": 1, "e": "f"}}}',
         400,
@@ -139,35 +105,6 @@ WRONG_BODIES = [
         "/labels/c/e",
     ),
 ]
-
-
-@pytest.mark.parametrize(
-    ("said", "words"),
-    [
-        ({"unit": "cm"}, "0.01 m, expected 1 m: the law of glb"),
-        ({"up": "z"}, "'z', expected 'y': the law of glb"),
-    ],
-)
-def test_what_glTF_cannot_be_is_refused_by_name(said, words, assert_refused, controls):
-    path, (name,) = CLIP.replace("json", "glb"), said
-    query = urlencode({**controls, **said})
-    problem = assert_refused(422, "invalid-field", "GET", f"{path}?{query}")
-    assert problem["errors"][0]["parameter"] == name and words in problem["detail"]
-    problem = assert_refused(
-        422, "invalid-field", "POST", path, json={"controls": controls, **said}
-    )
-    assert problem["errors"][0]["pointer"] == f"/{name}"
-    many = {"format": "glb", "clips": [{"controls": controls}], **said}
-    problem = assert_refused(422, "invalid-field", "POST", "/v1/models/reach/clips.zip", json=many)
-    assert problem["errors"][0]["pointer"] == f"/{name}"
-
-
-def test_a_model_without_roles_has_no_names_but_its_own(assert_refused):
-    problem = assert_refused(
-        422, "invalid-field", "GET", "/v1/models/walk/clip.bvh?haste=4&veer=100&names=ue5"
-    )
-    assert problem["errors"][0]["parameter"] == "names"
-    assert "expected 'own': this model's recipe gives its joints no [roles]" in problem["detail"]
 
 
 @pytest.mark.parametrize(("content", "status", "kind", "pointer"), WRONG_BODIES)
@@ -186,23 +123,6 @@ def test_a_model_that_knows_no_performers_refuses_every_name(model_path, control
     assert ask("GET", "/v1/models/reaching").json()["performers"] == []
 
 
-def test_a_wrong_time_in_a_body_is_pointed_at(assert_refused, controls):
-    body = {"controls": controls, "times": [0, 99]}
-    problem = assert_refused(422, "invalid-field", "POST", POSE, json=body)
-    assert problem["errors"][0]["pointer"] == "/times/1"
-    body = {"controls": controls, "times": [0, "1"]}
-    problem = assert_refused(400, "bad-body", "POST", POSE, json=body)
-    assert problem["errors"][0]["pointer"] == "/times/1"
-
-
-def test_no_times_are_refused(assert_refused, controls):
-    body = {"controls": controls, "times": []}
-    assert (
-        "expected 1 to 10000"
-        in assert_refused(422, "invalid-field", "POST", POSE, json=body)["detail"]
-    )
-
-
 @pytest.mark.parametrize("media", ["text/plain", "application/xml", "application/json; charset=x"])
 def test_another_media_type_is_refused(media, assert_refused):
     headers = {"content-type": media}
@@ -212,28 +132,10 @@ def test_another_media_type_is_refused(media, assert_refused):
     assert "expected 'application/json'" in problem["detail"]
 
 
-def test_a_body_without_media_type_is_refused(assert_refused):
-    assert_refused(415, "unsupported-media-type", "POST", POSE, content=b"{}")
-
-
 def test_a_media_type_may_name_utf8(ask, controls):
     content = json.dumps({"controls": controls, "times": [0]})
     headers = {"content-type": "application/json; charset=UTF-8"}
     assert ask("POST", POSE, content=content, headers=headers).status_code == 200
-
-
-def test_an_integral_number_is_a_number(ask, controls):
-    body = {
-        "controls": {n: int(v) + 1 for n, v in controls.items()},
-        "times": [0],
-        "extrapolate": "warn",
-    }
-    assert ask("POST", POSE, json=body).status_code == 200
-
-
-def test_a_body_that_declares_too_much_is_refused(assert_refused):
-    content = b" " * (64 * 1024 + 1)
-    assert_refused(413, "body-too-large", "POST", POSE, content=content, headers=JSON)
 
 
 def test_reading_a_chunked_body_stops_at_the_limit(assert_refused):
@@ -248,20 +150,11 @@ def test_reading_a_chunked_body_stops_at_the_limit(assert_refused):
     assert len(read) <= 66
 
 
-def test_a_body_at_the_limit_is_read(assert_refused):
-    assert_refused(400, "bad-body", "POST", POSE, content=b" " * (64 * 1024), headers=JSON)
-
-
 @pytest.mark.parametrize("name", ["nobody", "reach@0000000000000000", "reach@", "..", "%00", "%2e"])
 def test_an_unknown_model_is_refused(name, assert_refused):
     problem = assert_refused(404, "unknown-model", "GET", f"/v1/models/{name}x")
     assert "there are reach@" in problem["detail"]
     assert problem["errors"][0]["parameter"] == "model"
-
-
-def test_a_model_is_found_by_its_hash(ask, loaded):
-    identity = loaded.find("reach").identity
-    assert ask("GET", f"/v1/models/{identity}").json()["identity"] == identity
 
 
 def test_an_unknown_format_names_the_formats_there_are(assert_refused):
@@ -294,20 +187,6 @@ def test_a_strange_host_is_no_failure(host, assert_refused):
 def test_another_method_is_told_which_are_allowed(path, allow, method, ask, assert_refused):
     assert_refused(405, "method-not-allowed", method, path)
     assert ask(method, path).headers["allow"] == allow
-
-
-@pytest.mark.parametrize(
-    ("path", "allow"), [(POSE, "GET, HEAD, OPTIONS, POST"), ("/livez", "GET, HEAD, OPTIONS")]
-)
-def test_options_says_what_is_allowed(path, allow, ask):
-    answer = ask("OPTIONS", path)
-    assert (answer.status_code, answer.content, answer.headers["allow"]) == (204, b"", allow)
-
-
-def test_too_many_times_are_refused(assert_refused, controls):
-    body = {"controls": controls, "times": [0] * 10_001}
-    problem = assert_refused(422, "invalid-field", "POST", POSE, json=body)
-    assert problem["errors"][0]["pointer"] == "/times"
 
 
 @pytest.mark.parametrize("time", [1e300, -1e300, 3.5e38])

@@ -51,12 +51,6 @@ def test_a_request_is_one_span_of_the_clients_trace(spans, loaded, controls):
     assert span.attributes["posefield.model"] == loaded.find("reach").identity
 
 
-def test_a_request_of_no_trace_begins_one(spans):
-    (first,), (second,) = spans("GET", "/livez"), spans("GET", "/livez")
-    assert first.parent is None
-    assert first.context.trace_id != second.context.trace_id
-
-
 def test_a_refusal_is_no_error_of_the_service(spans):
     (span,) = spans("GET", "/nowhere")
     assert span.attributes["http.response.status_code"] == 404
@@ -94,10 +88,6 @@ def test_spans_reach_the_endpoint_that_is_set(models, collector):
         child.terminate()
         assert child.wait(20) == 0
     assert names == ["GET getLiveness"]
-
-
-def test_nobody_traces_where_no_endpoint_is_set():
-    assert tracing.from_environment({"OTEL_SERVICE_NAME": "posefield"}) is None
 
 
 def test_an_endpoint_without_the_sdk_is_an_error(monkeypatch):

@@ -116,11 +116,6 @@ def test_a_line_holds_nothing_that_a_client_wrote_but_its_id(told):
     assert not any(word in text for word in ("secret", "token", "xyz", "uvw"))
 
 
-def test_a_moment_is_a_time_of_day():
-    assert log.timestamp(0.25) == "1970-01-01T00:00:00.250Z"
-    assert log.timestamp(1_763_742_000.999) == "2025-11-21T16:20:00.999Z"
-
-
 async def written(contents, target):
     lines = log.LogBuffer(target)
     for content in contents:

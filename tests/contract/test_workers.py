@@ -200,20 +200,6 @@ def test_as_many_as_the_container_may_use(quota, most, tmp_path):
     assert server.usable_processors(file) == min(most, len(os.sched_getaffinity(0)))
 
 
-def test_a_quota_without_limit_is_none(tmp_path):
-    (tmp_path / "cpu.max").write_text("max 100000\n")
-    assert server.usable_processors(tmp_path / "cpu.max") == len(os.sched_getaffinity(0))
-
-
-def test_as_many_as_there_are_processors(models):
-    with process(models, POSEFIELD_WORKERS="0") as child:
-        assert answers(address(child))
-        count = server.usable_processors(server.CPU_QUOTA_FILE)
-        assert len(workers(child)) == (count if count > 1 else 0)
-        child.send_signal(signal.SIGINT)
-        assert child.wait(30) == 0
-
-
 def test_ctrl_c_reaches_them_in_order(models):
     given = {**os.environ, "POSEFIELD_PORT": "0", "POSEFIELD_LOG": "off", "POSEFIELD_WORKERS": "2"}
     posefield = [Path(sys.executable).with_name("posefield"), "serve", str(models)]
