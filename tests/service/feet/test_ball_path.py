@@ -1,13 +1,10 @@
 """The path of a foot: the smoothest change that stands, against the quadratic form it minimises."""
 
-from dataclasses import replace
-
 import numpy as np
-import one_foot
 import pytest
 from few_feet import change_smoothly, foot_rows, plan_path
 
-from posefield.feet import ball_path, smooth_change, stance_rows, stances
+from posefield.feet import ball_path, smooth_change, stance_rows
 from posefield.feet.stances import Cycle, FootPath, Interval
 from posefield.locomotion import floor_plane
 from posefield.motion.foot_contacts import FootContact
@@ -35,8 +32,13 @@ def test_no_other_path_that_stands_changes_less(rng, cycle):
     found = change_smoothly(path, held, RATE, FOOT, cycle)
     least = energy(found - path, cycle)
     for _ in range(20):
-        other = found + 1e-3 * change_that_stands(rng, held, cycle)
-        assert energy(other - path, cycle) > least
+        change = change_that_stands(rng, held, cycle)
+        more, less = (energy(found + by * change - path, cycle) for by in (1.0, -1.0))
+        # At the least of a quadratic form both ways cost the same.
+        assert min(more, less) > least and abs(more - less) < 1e-9 * energy(change, cycle)
+    aside = found + 1e-3 * change
+    more, less = (energy(aside + by * change - path, cycle) for by in (1.0, -1.0))
+    assert more - less > 1e-4 * energy(change, cycle)
 
 
 def change_that_stands(rng, held, cycle):
@@ -82,20 +84,6 @@ def test_a_dragged_swing_is_lifted_and_a_lifted_one_is_not():
     lifted[20:40, 1] += 0.2 * np.sin(np.pi * np.linspace(0.0, 1.0, 20)) ** 2
     high = plan_path(FootPath(lifted, RATE), held, FOOT)
     assert high.positions[:, 1].max() == pytest.approx(lifted[:, 1].max(), abs=5e-3)
-
-
-@pytest.mark.parametrize("ends", ["leads", "trails"])
-def test_a_swing_at_an_end_of_the_clip_is_lifted(ends):
-    ahead = np.linspace(0.0, 0.3, 12)
-    ahead = [*ahead, *[0.3] * 30] if ends == "leads" else [*[0.0] * 30, *ahead]
-    path = FootPath(floor_plane.at_height(np.array(ahead) + 0j, np.full(42, 0.04)), RATE)
-    held = [Interval(12, 42)] if ends == "leads" else [Interval(0, 30)]
-    heights = plan_path(path, held, FOOT).positions[:, 1]
-    swing = ~stances.mask(held, 42)
-    assert heights[swing].max() > FOOT.height + 0.6 * FOOT.clearance
-    still = replace(FOOT, clearance=0.0)
-    low = plan_path(path, held, still).positions[swing, 1]
-    assert np.abs(low - FOOT.height).max() < 1e-12
 
 
 def test_a_foot_leaves_the_floor_and_comes_back_at_rest():
@@ -154,26 +142,6 @@ def paths(rng, cyclic):
 
 
 @pytest.mark.parametrize("cyclic", [False, True])
-def test_paths_are_those_of_dense_systems(rng, cyclic):
-    every, held = paths(rng, cyclic)
-    feet = foot_rows(every, FOOT)
-    runs = stance_rows.from_intervals(held)
-    floor = smooth_change.smooth_change(feet, feet.floor, runs)
-    values = rng.normal(size=len(runs.rows))
-    heights = smooth_change.smooth_change(feet, feet.heights, runs, values)
-    parts = [feet.rows.groups.split(own) for own in (floor, heights)]
-    for row, (path, own) in enumerate(zip(every, held, strict=True)):
-        dense = one_foot.smooth_change(path.floor, own, path.rate, path.cycle)
-        assert np.abs(parts[0][row] - dense).max() < 1e-9
-        level = Cycle(0.0, 0.0) if cyclic else None
-        given = values[runs.rows == row]
-        dense = one_foot.smooth_change(path.heights, own, path.rate, level, given)
-        assert np.abs(parts[1][row] - dense).max() < 1e-9
-    # A stance holds its path.
-    assert np.abs(parts[0][0] - every[0].floor).max() > 1e-3
-
-
-@pytest.mark.parametrize("cyclic", [False, True])
 def test_a_path_has_the_same_bytes_alone(rng, cyclic):
     every, held = paths(rng, cyclic)
     free = [np.full(own.positions.shape, np.nan) for own in every]
@@ -183,20 +151,3 @@ def test_a_path_has_the_same_bytes_alone(rng, cyclic):
     for path, own, goal, found in zip(every, held, free, whole, strict=True):
         one = ball_path.plan_paths(foot_rows([path], FOOT), stance_rows.from_intervals([own]), goal)
         assert one.tobytes() == found.tobytes()
-
-
-@pytest.mark.parametrize("cyclic", [False, True])
-def test_feet_keep_their_places_around_stances_as_one_foot_does(rng, cyclic):
-    every, held = paths(rng, cyclic)
-    led = [np.zeros(len(own), bool) for own in every]
-    if not cyclic:
-        led[0][12] = led[1][45] = led[2][3] = True
-    found = ball_path.held(
-        foot_rows(every, FOOT), stance_rows.from_intervals(held), np.concatenate(led)
-    )
-    goals = [np.where(own[:, None], 0.0, np.nan) * np.ones(3) for own in led]
-    expected = [
-        one_foot.held(path, own, goal) for path, own, goal in zip(every, held, goals, strict=True)
-    ]
-    own = [[(one.begin, one.end) for one in row] for row in found.by_row(len(every))]
-    assert own == [[(one.begin, one.end) for one in row] for row in expected]

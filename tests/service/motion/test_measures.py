@@ -53,15 +53,6 @@ def test_farthest_is_from_the_root():
     assert of("forward", 2, at="farthest", seen=seen) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_speed_is_way_over_time_and_turn_is_in_degrees():
-    assert of("stride_length") == pytest.approx(0.5)
-    assert of("speed") == pytest.approx(0.25)
-    assert of("turn") == pytest.approx(30.0)
-    twice = replace(thrown(), duration=4.0)
-    assert of("speed", seen=twice) == pytest.approx(0.125)
-    assert of("stride_length", seen=twice) == pytest.approx(0.5)
-
-
 def test_bodily_quantities_hang_on_bones_alone():
     assert of("leg_length", 2) == pytest.approx(np.hypot(0.8, 0.1))
     assert of("leg_length", 1, 2) == pytest.approx(0.5 + np.hypot(0.8, 0.1))

@@ -121,17 +121,6 @@ def hand(reach, placed):
     return acting.joint_path(reach, placed.act, "RightHand", placed.by)[placed.act.event]
 
 
-def test_a_world_target_is_met_where_the_segment_is_placed(reach):
-    by = FloorMotion(0.9, 3.0 - 2.0j)
-    wanted = by.place(np.array([-0.1, 1.5, 0.5]))
-    act = act_placement.act_at(reach, hand_to(tuple(wanted)), by, [0])
-    placed = act_placement.PlacedAct(act, by)
-    assert np.linalg.norm(hand(reach, placed) - wanted) < EXACT
-    # In the frame of the segment the same numbers are another place.
-    local = act_placement.act_at(reach, hand_to(tuple(wanted), extrapolate="ok"), by)
-    assert np.linalg.norm(hand(reach, act_placement.PlacedAct(local, by)) - wanted) > 10.0 * EXACT
-
-
 @pytest.mark.parametrize("facing", [0.0, 2.5])
 def test_an_act_begins_at_its_place_and_meets_its_world_target(reach, facing):
     position = 1.0 + 2.0j
@@ -162,23 +151,6 @@ def test_a_free_act_takes_place_where_its_target_is(reach):
         assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
         first = found.act.passage.placed(found.by)
         assert first.heading() == pytest.approx(facing)
-
-
-def test_a_target_in_the_segment_is_met_beside_the_one_that_places(reach):
-    left = act_segment.act_passage(reach, MotionQuestion(controls={"target_height": 1.5}))
-    wanted = acting.joint_path(reach, left, "LeftHand")[-1] + (0.0, 0.02, 0.0)
-    asked = MotionQuestion(
-        controls={},
-        targets=(
-            Target("LeftHand", tuple(wanted), at="event"),
-            Target("RightHand", (2.0, 1.5, -3.0), at="event"),
-        ),
-    )
-    targeted = act_placement.place_by_target(reach, asked, 1)
-    found = targeted.facing(0.5)
-    assert np.linalg.norm(hand(reach, found) - (2.0, 1.5, -3.0)) < EXACT
-    own = acting.joint_path(reach, found.act, "LeftHand")[found.act.event]
-    assert np.linalg.norm(own - wanted) < EXACT
 
 
 @pytest.mark.parametrize("extrapolate", ["warn", "refuse"])

@@ -93,15 +93,6 @@ def test_offsets_of_more_than_half_a_turn_do_not_flip():
     assert steps.min() > np.cos(np.radians(10.0))
 
 
-def test_a_blend_ends_with_a_short_passage():
-    before, after, cut, _ = joined("dead")
-    short = after.part(0, cut.entry + 10)
-    found = blends.entered(before, short, cut, "dead")
-    assert np.array_equal(found.roots[-1], short.roots[-1])
-    single = blends.entered(before, after.part(0, cut.entry + 1), cut, "dead")
-    assert len(single) == 1
-
-
 def cost(before, after, exit_frame, entry, motion):
     """The cost of a pair, written out."""
     own, other = joints_of(before), joints_of(after.placed(motion))

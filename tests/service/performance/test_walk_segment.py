@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from posefield.common.errors import InvalidField
 from posefield.inference import session
 from posefield.inference.takes import TakeSettings
-from posefield.locomotion import floor_plane, gait, stride
-from posefield.motion import quat, skeleton
+from posefield.locomotion import floor_plane, gait
+from posefield.motion import quat
 from posefield.performance.passages.passage import RATE, FloorMotion
 from posefield.performance.walks import path_following, walk_passage
 from posefield.performance.walks.discs import Disc
@@ -75,23 +75,6 @@ def planned(walking, request, start=ORIGIN, phase=0.1):
     return plan_walk(walking, request, None if request.along is not None else start, phase)
 
 
-def feet_of(walk, plan, passage):
-    """Return the paths (F, K, 3) of the feet, m."""
-    card = walk.session.card
-    bones = stride.bones(walk.session, plan.controls[:1], plan.walker.labels(1)).astype(float)
-    local = skeleton.translations(bones, passage.roots[None])
-    joints = skeleton.positions(card.skeleton.parents, passage.rotations[None], local)
-    return joints[0][:, list(card.feet)]
-
-
-def slide_per_metre(walk, plan, passage):
-    """Return how far standing feet slide for each metre walked."""
-    feet = feet_of(walk, plan, passage)
-    stands = np.minimum(passage.contacts[1:], passage.contacts[:-1]) > 0.5
-    moved = np.linalg.norm(np.diff(feet, axis=0)[..., [0, 2]], axis=-1)
-    return float((moved * stands).sum() / (plan.distances[-1] - plan.distances[0]))
-
-
 @pytest.mark.parametrize("name", WALKS)
 def test_walks_follow_their_paths(walk, walking, name):
     plan = planned(walking, WALKS[name])
@@ -118,24 +101,6 @@ def test_the_phase_advances_by_the_distance_over_the_stride(walking, name):
     assert np.allclose(by, np.diff(plan.distances), rtol=2e-3, atol=1e-7)
     shorter = 0.99 * by
     assert not np.allclose(shorter, np.diff(plan.distances), rtol=2e-3, atol=1e-7)
-
-
-def test_feet_slide_no_more_in_starts_and_stops(walk, walking):
-    def slide(request):
-        plan = planned(walking, request)
-        return slide_per_metre(walk, plan, walk_passage.walk_passage(walk, plan))
-
-    slow = walking.region.speeds[0]
-    steady = max(slide(WalkRequest(speed, to=(0.0, 10.0))) for speed in (slow, 0.8, 1.0, 1.2))
-    whole = WalkRequest(0.6, to=(0.0, 2.5), **BOTH)
-    for request in (whole, WalkRequest(1.2, to=(0.0, 10.0), **BOTH)):
-        assert slide(request) < 1.1 * steady
-    # With the phase tied to time instead, feet slide in starts and stops.
-    plan = planned(walking, whole)
-    durations = plan.walker.strides(plan.controls).durations
-    timed = replace(plan, phases=np.cumsum(1.0 / durations) / RATE)
-    made = walk_passage.walk_passage(walk, timed)
-    assert slide_per_metre(walk, timed, made) > 2.0 * steady
 
 
 def test_a_walk_stops_where_a_foot_passes_the_other_one(walking):

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from posefield.common import name_suggestion
-from posefield.common.name_suggestion import did_you_mean, similar_name
+from posefield.common.name_suggestion import similar_name
 
 JOINTS = ("Hips", "LeftHand", "RightHand", "RightHandThumb", "Head")
 
@@ -27,11 +27,6 @@ def test_a_beginning_suggests_the_only_name_that_it_begins():
 def test_two_equally_similar_names_suggest_none():
     assert similar_name("usd", ("usda", "usdc", "usdz")) is None
     assert similar_name("usdb", ("usda", "usdc", "usdz", "usd")) == "usd"
-
-
-def test_the_text_follows_the_unknown_name():
-    assert did_you_mean("speeed", ("speed", "turn")) == " (did you mean 'speed'?)"
-    assert did_you_mean("colour", ("speed", "turn")) == ""
 
 
 def test_a_long_name_gets_no_suggestion():

@@ -132,17 +132,6 @@ def test_the_last_question_of_a_batch_gets_the_same_bytes(model, count):
             assert [a.tobytes() for a in last] == [a.tobytes() for a in own]
 
 
-def test_a_graph_whose_rows_depend_on_each_other_is_found_out(model_path, tmp_path):
-    """One whose softmax is over the questions, not over each question's own numbers."""
-    graph = onnx.load(model_path)
-    (softmax,) = (node for node in graph.graph.node if node.op_type == "Softmax")
-    softmax.attribute[0].i = 0
-    path = tmp_path / "reaching.onnx"
-    path.write_bytes(written(graph))
-    model = Synthesizer("reaching", session.load(path))
-    assert not poses.is_batch_exact(model, 0)
-
-
 def performed_question(model, place, level, **more):
     """A question at shares of the ranges and, if there are performers, as one of them."""
     card, (shares, fps, who) = model.session.card, place

@@ -64,12 +64,6 @@ def solved(model, walk):
     return clips.synthesize_clip(model, bodies.decode_question(FileQuestion, body))
 
 
-def solved_open(model, walk):
-    """The same where the controls are left open."""
-    body = json.dumps({"controls": {}, "targets": contradictory(8)}).encode()
-    return clips.synthesize_clip(model, bodies.decode_question(FileQuestion, body))
-
-
 def mapped(model, walk):
     """A grid of sigma."""
     return grid(model, SigmaQuestion(across="turn", along="target_height", columns=128, rows=128))
@@ -122,7 +116,7 @@ def several(model, walk):
     return CLIP_ENCODERS["usda"].write(answers, CLIP_ENCODERS["usda"].usual)
 
 
-WORK = [solved, solved_open, mapped, suggested, archived, crowded, planned, walked, stood, several]
+WORK = [solved, mapped, suggested, archived, crowded, planned, walked, stood, several]
 
 
 @pytest.mark.parametrize("work", WORK, ids=lambda work: work.__name__)

@@ -1,9 +1,6 @@
 """Tests of reload: versions side by side, atomic replacement, and the old version on errors."""
 
-import contextlib
-import ctypes
 import gc
-import mmap
 import os
 import resource
 import shutil
@@ -281,46 +278,6 @@ def test_files_that_cannot_be_served_do_not_keep_others_from_being_taken(
     assert (shelf.reloads.failed, len(caplog.records)) == (len(hostile), before)
     assert len(shelf.reloads.faults) == len(hostile)
     assert time.process_time() - start < 60
-
-
-def address_space_but(room):
-    """Fill the address space that the limit leaves but for `room` bytes; return what fills it.
-
-    Objects of earlier tests that are freed meanwhile would else give room for both files.
-    """
-    filled, size = [], 1 << 20
-    with contextlib.suppress(OSError):
-        while True:
-            filled.append(mmap.mmap(-1, size))
-    return filled[: len(filled) - room // size]
-
-
-def test_an_error_that_no_check_foresees_is_a_fault_too(put, tmp_path, caplog):
-    with (tmp_path / "a.onnx").open("wb") as file:
-        file.truncate(checked_file.MAX_BYTES)
-    good = put("b.onnx", 1)
-    intake = ModelLoader([tmp_path], most=1)
-    before = resource.getrlimit(resource.RLIMIT_AS)
-    gc.collect()
-    # Free memory of the heap would be used without asking for more address space.
-    ctypes.CDLL(None).malloc_trim(0)
-    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
-    # There is room for one file, and not for the other.
-    room = checked_file.MAX_BYTES // 2
-    resource.setrlimit(resource.RLIMIT_AS, (used + room, before[1]))
-    try:
-        ballast = address_space_but(room)
-        for _ in range(3):
-            intake.scan()
-        del ballast
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, before)
-    (fault,) = intake.faults.values()
-    assert fault.error.message == "cannot be used: MemoryError: MemoryError"
-    assert [m.identity for models in intake.versions().values() for m in models] == [f"b@{good}"]
-    # With its traceback, and once.
-    assert [record.exc_info[0] for record in caplog.records] == [MemoryError]
-    assert intake.failed == 1
 
 
 def test_a_machine_without_a_process_to_spare_tries_again(put, tmp_path):

@@ -129,18 +129,3 @@ def test_a_duration_of_no_time_is_refused(refused, graph):
         node.output[:] = ["own" if name == "duration" else name for name in node.output]
     graph.graph.node.append(helper.make_node("Sub", ["own", "own"], ["duration"]))
     assert refused(graph) == "its duration is 0.0 s, expected above 0"
-
-
-def test_rows_outside_are_bounded_as_they_are_alone(walk_path):
-    own = session.load(walk_path)
-    low, high = own.bounds.low, own.bounds.high
-    inside = np.linspace(low, high, 4)
-    mixed = np.vstack([inside, high + 0.4 * (high - low), low - 0.4 * (high - low)])
-    found = own.durations(mixed)
-    assert np.array_equal(found[:4], own.durations(inside))
-    times = np.full((6, 1), 0.3)
-    (ran,) = own.run(mixed, times, "duration")
-    alone = np.concatenate([own.durations(mixed[[row]]) for row in range(6)])
-    assert np.abs(ran - alone).max() < 1e-6 and np.abs(found - alone).max() < 1e-6
-    least, most = own.bounds.duration_limits
-    assert ((found >= least) & (found <= most)).all()

@@ -16,7 +16,6 @@ from posefield.locomotion import (
     walker_labels,
     walking_crowd,
 )
-from posefield.motion import skeleton
 
 RATE, COUNT = 30.0, 60
 MIXED = {"style": {"marching": 0.7, "sneaking": 0.3}}
@@ -56,31 +55,6 @@ def test_walkers_with_a_captured_combination_move_as_that_combination(own):
     # Other combinations have these labels, too, so that they were asked for whatever is drawn.
     assert (labelled.labels.weights[:-1] == own.labels.weights[row]).all()
     assert not (own.labels.weights[:-1] == own.labels.weights[row]).all(axis=1).all()
-
-
-def test_marching_lifts_the_feet_and_a_mixture_lies_between(own):
-    """The highest foot of each style, and of the mixture, at the same speeds."""
-    lifted = {}
-    for name in ("marching", "sneaking"):
-        lifted[name] = feet(own, {"style": name})
-    between = feet(own, MIXED)
-    assert lifted["sneaking"] + 0.02 < between < lifted["marching"] - 0.02
-
-
-def feet(own, asked):
-    """Mean over the walkers of the highest point of a foot, m."""
-    labelled = own.with_labels(asked)
-    card = own.session.card
-    weights = labelled.labels.weights[:1].repeat(21, axis=0)
-    controls = np.tile([control.default for control in card.controls], (21, 1))
-    phases = np.linspace(0.0, 1.0, 21)
-    poses = stride.synthesize_poses(own.session, controls, weights, phases)
-    bones = stride.bones(own.session, controls[:1], weights[:1])[0]
-    offsets = np.tile(bones.astype(float), (21, 1, 1))
-    offsets[:, 0] = 0.0
-    offsets[:, 0, 1] = poses.heights
-    joints = skeleton.positions(card.skeleton.parents, poses.rotations, offsets)
-    return float(joints[:, list(card.feet), 1].max())
 
 
 def test_a_mixture_draws_its_names_by_their_weights(own):

@@ -79,19 +79,6 @@ def test_a_motion_begins_at_home_and_its_placement_puts_it_in_the_world(own):
     )
 
 
-def test_a_long_motion_is_made_alone_and_in_parts_that_do_not_show(own):
-    seconds = (walking_crowd.POSES_PER_CALL + 500) / RATE
-    _, motions = made(own, 1, seed=0, seconds=seconds)
-    plan = walking_crowd.plan_random(own, 1, seconds, RATE, 0)
-    frames = np.arange(walking_crowd.POSES_PER_CALL - 2, walking_crowd.POSES_PER_CALL + 3)
-    near = locomotion_plan.synthesize_poses(own.session, plan, np.zeros_like(frames), frames)
-    assert len(motions) == 1
-    found = motions[0].rotations[0, frames, 1:]
-    assert np.abs(found - near.rotations[:, 1:]).max() < 1e-6
-    # Another frame's pose is another.
-    assert np.abs(found[:-1] - near.rotations[1:, 1:]).max() > 1e-4
-
-
 @pytest.mark.parametrize(
     ("asked", "said"),
     [

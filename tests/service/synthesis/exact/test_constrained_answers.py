@@ -8,7 +8,6 @@ import pytest
 from posefield.constraints.targets import NO_CONSTRAINTS, ConstraintSet
 from posefield.inference import session
 from posefield.inference.session import Session
-from posefield.motion import skeleton
 from posefield.motion.measures import Measure
 from posefield.question.motion_question import ClipQuestion, PoseQuestion, Target
 from posefield.synthesis import clips, poses
@@ -74,20 +73,6 @@ def test_a_measured_control_is_met_unless_asked_otherwise(reach):
         controls["target_height"], abs=1e-4
     )
     assert [met.what for met in held.trust.targets] == ["target_height"]
-
-
-def test_poses_and_clips_of_a_held_motion_agree(reach):
-    controls = middle(reach)
-    hold = {"targets": (Target("LeftHand", (0.3, 1.2, 0.4), time=0.5),)}
-    clip = clips.synthesize_clip(reach, ClipQuestion(controls=controls, fps=10.0, **hold))
-    pose = poses.synthesize_poses(reach, PoseQuestion(controls=controls, times=[0.0, 0.5], **hold))
-    assert np.array_equal(pose.rotations[1], clip.clip.rotations[5])
-    translations = skeleton.translations(pose.bone_offsets, pose.root_position)
-    card = reach.session.card
-    places, _ = skeleton.forward_kinematics(card.skeleton.parents, pose.rotations, translations)
-    hand = places[1, card.skeleton.names.index("LeftHand")]
-    miss = np.linalg.norm(hand - [0.3, 1.2, 0.4])
-    assert miss == pytest.approx(pose.trust.targets[-1].miss, abs=1e-6)
 
 
 @pytest.mark.parametrize("level", [0, 1, 3])
