@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from posefield.common.errors import TrainingError
-from posefield_train import train
 from posefield_train.align import time_alignment
 from posefield_train.graph import truncation_cost
 from posefield_train.source.recipe_sections import Event
@@ -40,11 +39,6 @@ def test_whole_tensor_is_the_aligned_clips(trained, judge):
     assert np.abs(judge.whole - clips).max() < EXACT
     shuffled = time_alignment.joint_positions(trained.aligned, judge.parents, judge.offsets[::-1])
     assert np.abs(judge.whole - shuffled).max() > 1e-2
-
-
-def test_nothing_cut_off_costs_nothing(trained, judge, reduced):
-    assert judge.evaluate(trained.full).max < EXACT
-    assert judge.evaluate(reduced).max > 1e-2
 
 
 def test_distances_are_those_of_the_joints(judge, reduced, gaps):
@@ -174,16 +168,3 @@ def test_predicted_error_is_the_true_one(small_recipe, trained, judge):
     # Training computes on one thread, which rounds otherwise.
     assert vars(trained.truncation_errors) == pytest.approx(vars(judge.evaluate(kept)))
     assert abs(predicted / trained.truncation_errors.rms - 1.0) > 0.005
-
-
-def test_a_recipe_that_gives_ranks_is_told_what_they_cost(small_recipe, examples):
-    size = small_recipe.size.model_copy(update={"ranks": [9, 4, 9], "rms_budget_cm": None})
-    own = small_recipe.model_copy(update={"size": size})
-    trained = train.train(own, examples[::2], lambda _: None)
-    assert trained.model.decoder.reduced.core.shape == (9, 4, 9)
-    assert (
-        0.005
-        < trained.truncation_errors.rms
-        < trained.truncation_errors.p99
-        < trained.truncation_errors.max
-    )

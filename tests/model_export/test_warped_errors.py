@@ -31,14 +31,6 @@ def test_what_is_late_alone_is_no_error_and_what_is_elsewhere_is():
     assert found[2] == pytest.approx(0.1, rel=1e-6)
 
 
-def test_a_difference_in_space_is_not_lost_beside_one_in_time():
-    captured = swing(UNIFORM_SHARES)[None]
-    late, larger = swing(LATE)[None], swing(LATE, 0.6)[None]
-    errors = [warped_errors.mean_squared_errors(captured, own)[0] for own in (late, larger)]
-    aligned = np.mean(np.sum(np.square(swing(LATE, 0.6) - swing(LATE)), axis=-1))
-    assert 0.5 * aligned < errors[1] and errors[0] < 0.05 * errors[1]
-
-
 def test_predicted_and_captured_positions_of_a_model_are_those_of_its_clips(trained):
     """Without residuals the prediction is the clip: what is left is resampling and smoothing."""
     timing, values = trained.model.timing, trained.values
