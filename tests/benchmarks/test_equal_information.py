@@ -75,12 +75,6 @@ def test_rivals_have_the_information_of_posefield():
     assert found["known"]["takes"] == 4
 
 
-def test_a_family_without_labels_has_one_table():
-    found = equal_information.facts(result({"posefield": OURS, "gp": OURS + 0.01}))
-    assert list(found) == ["open"]
-    assert found["open"]["posefield"] == "posefield"
-
-
 def test_without_an_event_no_effector_is_compared():
     own = result({"posefield": OURS, "gp": OURS})
     bare = {

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from evaluation import (
-    corrections,
     ground_truth,
     methods,
     new_performers,
@@ -21,7 +20,6 @@ from posefield_train.evaluate.predictions import OURS
 from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.source import ingest
 from posefield_train.source.recipe import Recipe
-from posefield_train.train import train
 
 CLIPS = 12
 JOBS = ProcessJobs(1)
@@ -119,14 +117,6 @@ def test_clips_to_adapt_with_are_far_apart_and_never_of_the_asked_take(family):
     assert len(new_performers.choose_clips(held, 0, 20)) == CLIPS // 2 - 1
 
 
-def test_a_performer_of_few_takes_is_not_predicted(recipe, family):
-    trained = train(recipe, family[:9], lambda _: None)
-    few = [replace(e, row=replace(e.row, performer="z")) for e in family[9:]]
-    assert new_performers.predict_adapted(recipe, trained, few) == {
-        name: [None] * 3 for name in ADAPTATION_COUNTS
-    }
-
-
 def test_a_line_that_depends_on_one_clip_cannot_be_compared(recipe, family):
     lonely = [replace(e, controls=np.zeros(1)) for e in family[:5]]
     lonely[3] = replace(lonely[3], controls=np.ones(1))
@@ -145,8 +135,3 @@ def test_the_truth_is_nearer_to_a_model_than_to_the_mean(small_recipe, examples)
     means = {name: own["relative_cm"] for name, own in result.facts()["methods"].items()}
     assert means[OURS] < 0.5 * means["mean"]
     assert means[OURS] < means["nearest"]
-
-
-def test_targets_are_moved_away_from_the_root():
-    target = corrections.EventTarget(np.array([0.0, 2.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-    assert target.moved_outward(0.5).tolist() == [0.0, 2.5, 0.0]

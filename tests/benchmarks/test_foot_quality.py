@@ -41,12 +41,6 @@ def test_a_foot_that_slides_on_the_ground_skates_at_its_speed(leg):
     assert found.acceleration == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_standing_foot_does_not_skate(leg):
-    found = measured(moving(leg, along(0.0, 0.02)))
-    assert found.skate == found.weighted_skate == 0.0
-    assert found.lowest == pytest.approx(0.02)
-
-
 def test_a_single_low_frame_does_not_hide_a_slide_from_the_weighted_measure(leg):
     path = along(0.3, 0.01)
     path[30, 1] = -0.05
@@ -76,8 +70,3 @@ def test_the_knees_acceleration_is_that_of_their_path(leg):
     assert found.knee_peak == pytest.approx(4.0)
     # Mean over both joints but the root, of which the foot rests.
     assert found.acceleration == pytest.approx(2.0)
-
-
-def test_another_rate_of_the_same_motion_measures_alike(leg):
-    found = foot_quality.measure(moving(leg, along(0.3)), 30.0, (FOOT,), (KNEE,))
-    assert found.skate == pytest.approx(0.3)

@@ -8,7 +8,6 @@ from evaluation import field_statistics, standing_feet, takes
 from families import sample_walk
 
 from posefield.inference import session
-from posefield.kriging.kriging_model import KrigingWeights
 from posefield.question.motion_question import ClipQuestion
 from posefield_train.evaluate.folds import Fold
 from posefield_train.graph import onnx_export
@@ -46,24 +45,6 @@ def test_fields_are_as_the_model_says_and_their_controls_are_not(weights):
     assert mean["unconditioned"] > 1.3 and mean["shared_errors"] > 1.3
 
 
-def test_other_folds_have_other_seeds(weights):
-    first, again, other = (field_statistics.measure(weights, seed) for seed in (1, 1, 2))
-    assert first == again != other
-
-
-def test_a_covariance_without_fields_has_no_takes(weights):
-    spherical = replace(weights.hyper, covariance="spherical")
-    assert field_statistics.measure(KrigingWeights(spherical, weights.samples), 1) is None
-    assert takes.facts((), ()) == {}
-
-
-def test_few_samples_have_takes_without_statistics_of_fields(weights, found):
-    few = KrigingWeights(weights.hyper, weights.samples[:5])
-    assert field_statistics.measure(few, 1) is None
-    assert field_statistics.measure(KrigingWeights(weights.hyper, weights.samples[:6]), 1)
-    assert "variance" not in takes.facts(found.clips, ())
-
-
 def test_takes_of_held_out_clips_are_measured_at_the_default_rate(found):
     assert ClipQuestion(controls={}).fps == takes.RATE
     assert len(found.clips) == len(HELD)
@@ -72,14 +53,6 @@ def test_takes_of_held_out_clips_are_measured_at_the_default_rate(found):
         assert own.take.weighted_skate < own.sliding.weighted_skate + 1e-3
         # All time functions of a cycle vary, and this model has no detail.
         assert own.unlimited is own.detailed is own.detailed_take is None
-
-
-def test_a_take_of_a_motion_without_cycle_varies_few_time_functions(labelled_path, examples):
-    made = takes.take_results("reach", labelled_path.read_bytes(), examples[:2], (0, 1))
-    # Without feet no motion is measured.
-    assert made.clips == () and made.fields is not None
-    told = takes.facts((), [made.fields])
-    assert "acceleration" not in told and told["variance"] == pytest.approx(1.0, abs=0.2)
 
 
 def test_facts_of_takes_are_ratios_of_means(found):
@@ -113,13 +86,3 @@ def test_standing_feet_slide_less_and_cost_little(answers):
         for name in ("locked", "standing")
     )
     assert locked > standing
-
-
-def test_facts_of_feet_are_ratios_of_means_and_centimetres(answers):
-    facts = standing_feet.facts(answers)
-    captured = sum(one.captured.acceleration for one in answers)
-    standing = sum(one.standing.acceleration for one in answers)
-    assert facts["acceleration"]["standing"] == pytest.approx(standing / captured, rel=1e-5)
-    errors = [one.standing_error for one in answers]
-    assert facts["standing_error_cm"] == pytest.approx(100.0 * sum(errors) / 3.0, rel=1e-5)
-    assert standing_feet.facts([]) == {}

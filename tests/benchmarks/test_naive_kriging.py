@@ -6,7 +6,7 @@ from paper import naive_kriging
 from running import outputs
 from scipy.interpolate import RBFInterpolator
 
-from posefield_train.kriging import universal_kriging, variogram
+from posefield_train.kriging import variogram
 from posefield_train.kriging.covariance_graph import COVARIANCES
 
 SAMPLES, FRAMES, JOINTS = 25, 6, 4
@@ -50,15 +50,6 @@ def test_graph_answers_what_numpy_does(own, form, rng):
     assert other > 6e-3
 
 
-def test_frames_are_kriged_each_on_its_own(own, values, rng):
-    asked = rng.uniform(-1.0, 1.0, size=(9, 3))
-    found = own.numpy(asked)
-    for frame, field in enumerate(own.fields):
-        alone = universal_kriging.solve(field.hyper, field.samples, values[:, frame])
-        assert np.max(np.abs(found[:, frame] - alone.predict(asked))) < 1e-8
-    assert len({(field.hyper.scales[0], field.hyper.nugget) for field in own.fields}) > 1
-
-
 def test_frame_is_what_scipy_interpolates(points, positions, values, rng):
     own = naive_kriging.fit_naive(points, positions, values, "gaussian", variogram.fit_by_grid)
     asked = rng.uniform(-1.0, 1.0, size=(9, 3))
@@ -81,15 +72,3 @@ def test_nugget_and_range_are_those_of_each_frames_variogram(points, positions, 
         fit = variogram.fit_by_grid(variogram.experimental_variogram(points, left), "matern52")
         assert np.array_equal(field.hyper.scales, np.full(3, 1.0 / fit.range))
         assert 1e-4 <= field.hyper.nugget <= 10.0
-
-
-def test_fitter_is_the_one_that_is_given(points, positions, values):
-    by_grid = naive_kriging.fit_naive(points, positions, values, "gaussian", variogram.fit_by_grid)
-    by_search = naive_kriging.fit_naive(
-        points, positions, values, "gaussian", variogram.fit_by_search
-    )
-    gaps = [
-        abs(np.log(a.hyper.scales[0] / b.hyper.scales[0]))
-        for a, b in zip(by_grid.fields, by_search.fields, strict=True)
-    ]
-    assert max(gaps) > 1e-6

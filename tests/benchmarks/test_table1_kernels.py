@@ -54,12 +54,6 @@ def test_compiled_naive_poses_are_those_of_naive_kriging(made, question, field, 
     assert np.abs(found - frames[each, before + 1]).max() > 1e-4
 
 
-def test_a_call_answers_the_same_again(made, question, field):
-    answer = poses.naive(field, question)["dual, on a frame"]
-    first = answer().copy()
-    assert np.array_equal(first, answer())
-
-
 def test_solve_is_what_the_system_says(rng):
     system, b = rng.normal(size=(9, 9)), rng.normal(size=9)
     (columns, order, inverse), out = poses.lu_factors(system[None]), np.zeros(9)

@@ -13,7 +13,7 @@ from posefield_train.kriging import variogram
 from posefield_train.kriging.kriging_bank import VARIANCE
 from posefield_train.report import clip_errors, kriging, tensor
 from posefield_train.report import controls as chapters
-from posefield_train.report.drawing import left_out_clips, significant_digits
+from posefield_train.report.drawing import left_out_clips
 from posefield_train.report.tensor import TimeWarps
 
 # JSON holds six digits.
@@ -127,17 +127,6 @@ def test_along_a_control_stand_pairs_that_go_along_it(trained, controls):
         assert direction.name == controls[axis].name
 
 
-def test_a_control_of_three_values_has_too_few_lags_for_a_curve(trained, controls):
-    found = {d.name: d for d in kriging.measure_variograms(trained, controls)}
-    assert found["stature"].fit is None
-    assert found["turn"].fit is not None and found["all controls"].fit is not None
-
-
-def test_no_pairs_at_all_make_no_lags():
-    none = kriging.by_lag(np.zeros(0), np.zeros(0))
-    assert len(none.pairs) == len(none.values) == 0
-
-
 def test_a_control_with_one_value_a_performer_is_named(trained, controls):
     values = np.stack([example.controls for example in trained.examples])
     performers = [example.row.performer for example in trained.examples]
@@ -229,11 +218,6 @@ def test_calibration_statistics(rng):
         assert correlation == pytest.approx(expected)
 
 
-def test_clips_of_equal_distance_keep_their_order(trained):
-    even = replace(trained, left_out_errors=np.ones_like(trained.left_out_errors))
-    assert clip_errors.worst_first(even) == list(range(len(trained.left_out_errors)))
-
-
 def test_an_outlier_is_listed_with_the_evidence(trained, controls):
     evidence = ("lies far away", "leaps")
     outliers = tuple(Outlier(3, "far", text) for text in evidence)
@@ -246,10 +230,3 @@ def test_an_outlier_is_listed_with_the_evidence(trained, controls):
     clean = clip_errors.error_chapter(trained, controls)
     assert clean.section.tables[0].caption == "Clips with the largest error"
     assert "Outlined" not in clean.section.charts[0].caption
-
-
-def test_numbers_are_rounded_to_six_digits():
-    assert significant_digits.round_all({"a": np.array([[1 / 3, 1e-9 / 3]]), "b": (7, None)}) == {
-        "a": [[0.333333, 3.33333e-10]],
-        "b": [7, None],
-    }

@@ -16,8 +16,8 @@ import pytest
 
 from posefield_train.report import clip_errors, training_report
 from posefield_train.report import controls as control_chapters
-from posefield_train.report.drawing import left_out_clips, svg_chart
-from posefield_train.report.drawing.html_page import Page, Section, Table
+from posefield_train.report.drawing import svg_chart
+from posefield_train.report.drawing.html_page import Page, Section
 from posefield_train.report.training_report import TrainingStep
 
 LOADING = {"src", "href", "xlink:href", "srcset", "action", "data", "poster", "background"}
@@ -77,10 +77,8 @@ def test_the_page_and_its_charts_load_nothing(page):
     "planted",
     [
         '<img src="http://example.com/x.png">',
-        '<a href="https://example.com">x</a>',
         "<style>@import 'x.css';</style>",
         '<p style="background: url(x.png)">x</p>',
-        '<image xlink:href="picture.png"/>',
     ],
 )
 def test_a_planted_load_is_found(rendered, page, planted):
@@ -96,12 +94,9 @@ def test_every_id_is_unique_and_every_reference_has_its_target(page):
         assert len(part.references) > 5
 
 
-def test_every_chart_has_a_text_alternative_and_a_caption(page):
+def test_charts_and_tables_have_captions_text_alternatives_and_scopes(rendered, page):
     assert len(page.images) == page.tags["figcaption"] == 12
     assert all(len(image["alt"]) > 30 for image in page.images)
-
-
-def test_every_table_has_a_caption_and_scopes(rendered, page):
     assert page.tags["table"] == page.tags["caption"] > 10
     text = rendered.html.decode()
     assert text.count("<th ") == text.count('scope="col"') + text.count('scope="row"')
@@ -111,17 +106,6 @@ def test_every_section_is_linked_from_the_top(rendered, page):
     sections = re.findall(r'<section id="([a-z]+)">', rendered.html.decode())
     assert len(sections) == page.tags["section"] == 13
     assert set(sections) <= set(page.references)
-
-
-def test_columns_of_numbers_are_recognised():
-    rows = (("a", "1,234", "-0.5 %", "3 × 4", ""), ("b", "7", "+12.0 %", "x", "1.5 cm"))
-    assert Table("", ("",) * 5, rows).numeric == (False, True, True, False, True)
-
-
-def test_notes_and_steps_are_escaped(rendered, note):
-    assert b"<b>odd" not in rendered.html and b"reading <recipe>" not in rendered.html
-    text = unescape(rendered.html.decode())
-    assert note in text and "reading <recipe>" in text
 
 
 @pytest.fixture(scope="module")
@@ -153,20 +137,6 @@ def test_user_given_text_is_shown_and_not_interpreted(hostile, levels, steps, pa
     drawn = [element.text for svg in found.charts for element in ElementTree.fromstring(svg).iter()]
     assert MARKUP in drawn
     assert f"stature ({MARKUP})" in drawn
-
-
-def test_names_of_controls_are_shown_and_not_interpreted(trained, exported):
-    first, *others = exported.card.controls
-    controls = (replace(first, name=MARKUP), *others)
-    chapters = (
-        control_chapters.coverage_chapter(trained, controls),
-        clip_errors.error_chapter(trained, controls),
-    )
-    page = Page("", "", "", (), [chapter.section for chapter in chapters])
-    found = Parsed(page.html())
-    assert found.tags["script"] == 0 and found.tags["img"] == 2
-    assert found.texts.count(MARKUP) >= 2
-    assert f"{MARKUP} (m)".encode() in unescape(found.charts[0].decode()).encode()
 
 
 def test_a_long_name_leaves_space_for_the_charts(trained, exported):
@@ -226,13 +196,3 @@ def test_no_date_and_no_path_is_in_the_report(rendered, page, trained):
         assert not re.search(rb"20\d\d-\d\d-\d\d", content)
         assert folder.encode() not in content
         assert not re.search(rb"matplotlib v|<metadata|dc:date", content)
-
-
-def test_the_clip_with_the_largest_error_is_named_first(rendered, trained):
-    order = np.argsort(-trained.left_out_errors)
-    worst, best = (left_out_clips.clip_label(trained.examples[order[i]]) for i in (0, -1))
-    found = re.search(r"largest error is ([0-9.]+) cm, of (.*?)\.<", rendered.html.decode())
-    assert found.group(2) == worst != best
-    assert float(found.group(1)) == pytest.approx(
-        100 * np.sqrt(trained.left_out_errors.max()), abs=0.005
-    )

@@ -1,7 +1,5 @@
 """Tests of the generator's true motions: targets, standing feet and smoothness."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from numpy.random import PCG64, Generator
@@ -10,7 +8,7 @@ from posefield.common.errors import InvalidField
 from posefield.motion import quat, skeleton
 from posefield.motion.clip import assemble
 from posefield_train.sample import noise_free, sample_arms, sample_body, sample_controls
-from posefield_train.sample.reach_timing import TimingWarp, minimum_jerk
+from posefield_train.sample.reach_timing import TimingWarp
 
 PHASES = np.linspace(0.0, 1.0, 201)
 SITTING = {"stature": 1.70, "hip_height": 0.50, "turn": 40.0, "target_height": 1.2}
@@ -47,11 +45,8 @@ def miss(point, phase):
     return np.linalg.norm(found - noise_free.target(point))
 
 
-def test_hand_reaches_the_target_at_the_end():
+def test_hand_reaches_the_target_at_the_end_and_no_sooner():
     assert max(miss(point, 1.0) for point in points(60)) < 1e-6
-
-
-def test_hand_has_not_reached_the_target_before_the_end():
     assert min(miss(point, 0.8) for point in points(60)) > 1e-3
 
 
@@ -100,15 +95,6 @@ def test_hinges_turn_about_one_axis():
     for name in sample_body.HINGES:
         assert np.abs(joint(rotations, name)[:, 2:]).max() == 0.0
     assert np.abs(joint(rotations, "LeftFoot")[:, 2:]).max() > 1e-3
-
-
-def test_bones_keep_their_lengths():
-    for point in points(5):
-        places, _ = positions(point)
-        offsets = noise_free.poses(point, PHASES)[2]
-        bones = places[:, 1:] - places[:, sample_body.PARENTS[1:]]
-        lengths = np.linalg.norm(bones, axis=-1)
-        assert np.abs(lengths - np.linalg.norm(offsets[1:], axis=-1)).max() < 1e-12
 
 
 def test_no_rotation_comes_near_to_half_a_turn():
@@ -190,12 +176,6 @@ def test_a_warp_that_runs_backwards_is_refused():
         TimingWarp(0.8, 0.7)
 
 
-def test_minimum_jerk_stays_at_its_ends():
-    assert minimum_jerk(np.array([0.0, 0.2, 0.5, 0.8, 1.0]), 0.2, 0.8) == pytest.approx(
-        [0.0, 0.0, 0.5, 1.0, 1.0]
-    )
-
-
 @pytest.mark.parametrize("stature", sample_controls.STATURES.values())
 def test_rest_pose_stands_on_the_floor_and_is_as_tall_as_its_stature(stature):
     figure = sample_body.skeleton(stature)
@@ -206,22 +186,11 @@ def test_rest_pose_stands_on_the_floor_and_is_as_tall_as_its_stature(stature):
     assert tips[:, 1].max() == pytest.approx(stature, abs=1e-12)
 
 
-def test_performers_differ_in_more_than_size():
-    shapes = [
-        sample_body.skeleton(stature).offsets / stature
-        for stature in sample_controls.STATURES.values()
-    ]
-    assert min(np.abs(a - b).max() for a, b in pairwise(shapes)) > 0.003
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("stature", 1.5),
-        ("hip_height", 1.02),
         ("hip_height", 0.40),
         ("turn", 91.0),
-        ("target_height", 1.6),
         ("target_height", float("nan")),
     ],
 )
@@ -239,7 +208,3 @@ def test_missing_and_unknown_controls_are_refused_by_name():
     assert (missing.value.field, unknown.value.field) == ("hip_height", "weight")
     with pytest.raises(InvalidField, match="3 values, expected 4"):
         noise_free.target([1.7, 0.5, 0.0])
-
-
-def test_four_values_mean_what_their_names_mean():
-    assert noise_free.target(list(SITTING.values())).tolist() == noise_free.target(SITTING).tolist()
