@@ -118,28 +118,6 @@ def test_those_who_were_known_are_met_as_before(recipe, trained, known, adapted)
     assert gaps < 0.008 < np.linalg.norm(joints(new, wrong) - joints(old, whose), axis=-1).mean()
 
 
-def test_old_motions_stay_in_the_tensor_and_new_ones_within_what_may_be_lost(known, adapted):
-    extended, reduced = adapted.extended, known.model.decoder.reduced
-    n, k = len(reduced.bases[2]), len(SHOWN)
-    assert extended.tensor.values.shape[2] == n + k
-    numbers = extended.tensor.numbers(extended.full.truncated(extended.ranks).restored())
-    decoder = known.model.decoder
-    place = np.tile(np.arange(known.model.timing.frames, dtype=float), (n, 1))
-    expected = decoder.mean + decoder.reduced_poses(reduced.bases[2], place) @ decoder.directions
-    assert np.abs(numbers[:n] - expected).max() < 1e-9
-
-    def lost(numbers):
-        gaps = (numbers[n:] - adapted.new_clips.numbers) @ extended.tensor.whiten.T
-        return np.sqrt(np.sum(gaps**2) / (k * gaps.shape[1] * extended.tensor.weight))
-
-    assert lost(numbers) < known.truncation
-    # Negative control: by the old bases alone more is lost.
-    r1, r2, _ = reduced.core.shape
-    assert extended.ranks[:2] != (r1, r2)
-    fewer = extended.full.truncated((r1, r2, extended.ranks[2])).restored()
-    assert lost(extended.tensor.numbers(fewer)) > lost(numbers)
-
-
 def test_no_sign_hangs_on_the_machine(known, adapted, monkeypatch):
     def extended():
         numbers = adapted.new_clips.numbers

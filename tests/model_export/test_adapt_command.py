@@ -167,15 +167,3 @@ def measuring(folder):
     path = folder / "measuring.onnx"
     path.write_bytes(onnx_export.export_model(recipe, trained, []).content)
     return path
-
-
-def test_clips_that_cannot_be_read_are_named(posefield, measuring, table, tmp_path):
-    clips, out = [table.with_name(f"{i}.bvh") for i in range(3)], tmp_path / "x.onnx"
-    missing = table.with_name("none.bvh")
-    said = f"{missing}: cannot be read: No such file"
-    assert refused(posefield, said, measuring, *clips, missing, "-o", out, *SAID) == 3
-    said = f"{table.parent}: cannot be read: Is a directory"
-    assert refused(posefield, said, measuring, table.parent, "-o", out, *SAID) == 3
-    assert not out.exists()
-    # Negative control: those that are there are read.
-    assert posefield("adapt", measuring, *clips, "-o", out, *SAID)[0] == 0

@@ -13,7 +13,7 @@ from posefield.question.motion_question import ClipQuestion
 from posefield.synthesis import clips
 from posefield.synthesis.synthesizer import Synthesizer
 from posefield_train import train
-from posefield_train.adapt import adaptation, canonical_clips, model_reconstruction
+from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.align import phase_alignment
 from posefield_train.graph import onnx_export
 from posefield_train.kriging import sample_points
@@ -94,15 +94,6 @@ def test_a_newcomer_has_curves_of_their_own(base, adapted):
     # Negative controls: the same answer without a name, and of another performer.
     assert error(base, "cy", None) > 2.5 * NEAR
     assert error(path, "cy", "a") > 2.5 * NEAR
-
-
-def test_the_reconstructed_model_answers_as_the_trained_one(trained, base):
-    found = model_reconstruction.load(base).known.model
-    points, times = np.array([[0.3, 0.4], [0.8, 0.7]]), np.array([[0.2, 0.7], [0.4, 0.9]])
-    labels = np.eye(3)[[0, 2]]
-    expected = trained.model.evaluate(points, times, labels).curves
-    assert np.abs(found.evaluate(points, times, labels).curves - expected).max() < 1e-4
-    assert np.abs(found.evaluate(points, times, labels[::-1]).curves - expected).max() > 0.05
 
 
 def test_curves_of_another_name_are_refused_and_further_ones_noted(

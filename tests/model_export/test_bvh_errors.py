@@ -74,11 +74,6 @@ HIERARCHY_FAULTS = [
         10,
         "found CHANNELS of joint 'spine' after a child, expected it before",
     ),
-    (
-        line_changed(8, "OFFSET 0 10,5 0"),
-        8,
-        "found '10,5', expected a number, the Y of an OFFSET of three",
-    ),
     (line_changed(8, "OFFSET 1e999 10 0"), 8, "found '1e999', expected an OFFSET of at most 1e+09"),
     (line_changed(12, "OFFSET 0 5 0\nCHANNELS 1 Xrotation"), 13, "found 'CHANNELS', expected }"),
     (
@@ -86,11 +81,6 @@ HIERARCHY_FAULTS = [
         9,
         "found 'Wrotation', expected a channel, one of "
         "Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation",
-    ),
-    (
-        changed("3 Zrotation Xrotation", "3 Zrotation zROTATION"),
-        9,
-        "found channel Zrotation a second time in one joint, expected once",
     ),
     (changed("CHANNELS 3", "CHANNELS 2"), 9, "found 3 channel names, expected CHANNELS 2"),
     (
@@ -104,11 +94,6 @@ HIERARCHY_FAULTS = [
         VALID[: VALID.index("    End Site")],
         10,
         f"found the end of the file, {JOINT_PLACES} 'spine' of line 6",
-    ),
-    (
-        line_changed(15, "}\nROOT prop\n{\nOFFSET 0 0 0\nCHANNELS 0\n}"),
-        16,
-        "one root expected, found a second at line 16",
     ),
     (
         "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\n}\nMOTION\nFrames: 999999999999\nFrame Time: 1\n",
@@ -127,16 +112,6 @@ MOTION_FAULTS = [
         changed("Frames: 3", "Frames: 4"),
         21,
         "found 27 numbers in 3 lines, expected 4 frames x 9 channels = 36, " + OWN_LINES,
-    ),
-    (
-        changed("Frames: 3", "Frames: 2"),
-        21,
-        "found 27 numbers in 3 lines, expected 2 frames x 9 channels = 18, " + OWN_LINES,
-    ),
-    (
-        VALID[: -len(" 7 8 9\n")],
-        21,
-        "found 24 numbers in 3 lines, expected 3 frames x 9 channels = 27, " + OWN_LINES,
     ),
     (
         "\n".join([*VALID.split("\n")[:18], "1 2 3 4 5 6 7 8", ROW + "1 2 3 4 5 6 7 8 9 10", ""]),

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from posefield.model_file import card_reader, model_card
+from posefield.model_file import model_card
 from posefield.model_file.captured_acceleration import RATE
 from posefield.motion import quat
 from posefield.motion.clip import Clip
 from posefield.motion.skeleton import Skeleton
-from posefield_train.graph.trained_card import captured_acceleration, clip_accelerations
+from posefield_train.graph.trained_card import clip_accelerations
 
 ARM = 0.5
 PENDULUM = Skeleton(
@@ -59,15 +59,6 @@ def test_the_card_has_the_percentiles_over_all_frames(exported, trained):
     assert 0.0 < found.median < found.p99
 
 
-def test_a_cycle_counts_as_it_was_before_its_seam_was_closed(strides):
-    captured = [own for own in strides if own.captured is not None]
-    assert captured
-    bare = [replace(own, captured=None) for own in captured]
-    swung = [replace(own, captured=swinging(60.0)) for own in captured]
-    assert captured_acceleration(swung).p99 == pytest.approx(expected(119).max(), PRECISION)
-    assert captured_acceleration(bare).p99 != captured_acceleration(swung).p99
-
-
 def earlier_file(exported, folder):
     """Return the path of the model as a file of an earlier version."""
     old = replace(exported.card, captured_acceleration=None)
@@ -83,17 +74,3 @@ def test_inspect_tells_of_the_accelerations(model_path, exported, tmp_path, pose
     assert f"median {own.median:.1f} m/s², 99th percentile {own.p99:.1f} m/s²" in out
     code, out, _ = posefield("inspect", earlier_file(exported, tmp_path))
     assert code == 0 and "accelerations" not in out
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ('{"median": 3.0, "p99": 2.0}', "p99 is 2.0, expected at least the median, 3"),
-        ('{"median": -1.0, "p99": 2.0}', "captured_acceleration"),
-    ],
-)
-def test_other_accelerations_are_refused(exported, text, said):
-    entries = {name: own.encode() for name, own in model_card.dump(exported.card).items()}
-    entries["posefield.captured_acceleration"] = text.encode()
-    with pytest.raises(ValueError, match=said):
-        card_reader.decode(entries)

@@ -1,11 +1,13 @@
 """Contact labels of families: quadrupeds, motions in place, tables of clips, and new performers."""
 
+import json
 import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from families import quadruped_walk, sample_walk
+from joblib import parallel_config
 
 from posefield.common.errors import RecipeError
 from posefield.inference import session
@@ -14,9 +16,11 @@ from posefield.motion import bvh_writer
 from posefield_train import train
 from posefield_train.adapt import adaptation, canonical_clips
 from posefield_train.adapt.adaptation import adapt
-from posefield_train.adapt.model_reconstruction import reconstruct
-from posefield_train.contacts import contact_labels
+from posefield_train.contacts import contact_labels, held_out_contacts
+from posefield_train.contacts.held_out_contacts import FRAMES, SHARES, HeldOutClips
+from posefield_train.evaluate import protocol, summary
 from posefield_train.graph import onnx_export
+from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.sample import sample_files
 from posefield_train.source import ingest, recipe
 from posefield_train.source.recipe import Recipe
@@ -178,11 +182,40 @@ def test_adapting_leaves_out_contacts_of_the_table_with_a_note(rail):
     assert "LeftFoot, RightFoot, Hips" in note
 
 
-def test_a_reopened_model_has_the_contacts_of_the_trained_one(models_trained):
-    exported = models_trained.exported("stroll")
-    reopened = reconstruct(exported.content, "stroll.onnx")
-    points, times = np.array([[3.6, 100.0], [5.0, -200.0]]), np.array([[0.1, 0.5], [0.3, 0.7]])
-    expected = exported.model.evaluate(points, times).contacts
-    found = reopened.known.model.evaluate(points, times).contacts
-    assert np.abs(found - expected).max() < 1e-3
-    assert np.abs(found[::-1] - expected).max() > 0.1
+@pytest.fixture(scope="module")
+def clips(strides):
+    return HeldOutClips(strides[3:], strides[:3])
+
+
+@pytest.fixture(scope="module")
+def labels(clips):
+    asked = contact_labels.settings(sample_walk.recipe(), clips.held[0].clip.skeleton.names)
+    return np.stack([contact_labels.clip_contacts(e, asked).at(SHARES) for e in clips.held])
+
+
+def accuracies(clips, predicted):
+    asked = sample_walk.recipe(), clips, (3, 6)
+    return held_out_contacts.held_out_accuracies(*asked, lambda _: predicted)
+
+
+def test_true_contacts_agree_wholly_and_opposite_ones_nowhere(clips, labels):
+    right, wrong = accuracies(clips, labels), accuracies(clips, 1.0 - labels)
+    assert [(one.agreement, one.brier) for one in right] == [(1.0, 0.0)] * 3
+    assert [(one.agreement, one.brier) for one in wrong] == [(0.0, 1.0)] * 3
+    half = accuracies(clips, np.full_like(labels, 0.5))
+    assert [one.brier for one in half] == [0.25] * 3
+    assert all(0.0 < one.climatology < 0.1 for one in right)
+    assert held_out_contacts.mean_facts(right)["agreement"] == 1.0
+
+
+def test_an_evaluation_tells_the_contacts_of_clips_held_out(strides):
+    plain = sample_walk.recipe().model_dump(by_alias=True, exclude_unset=True)
+    own = Recipe.model_validate({**plain, "kriging": {"covariance": "matern52", "drift": 1}})
+    with parallel_config(backend="sequential"):
+        result = protocol.run_protocol(own, strides[:8], "clip", ProcessJobs(1), lambda *_: None)
+    assert len(result.contacts) == 8
+    found = json.loads(json.dumps(summary.facts(result)))["contacts"]
+    assert found == held_out_contacts.mean_facts(result.contacts)
+    assert found["agreement"] > 0.95 and FRAMES == 100
+    said = summary.trust_text(result)[-1]
+    assert said.startswith(f"contacts: {found['agreement']:.1%} of frames agree")

@@ -115,16 +115,6 @@ def test_contacts_are_probabilities_beyond_the_sampled_ranges_too(opened):
         assert np.array_equal(one, other)
 
 
-def test_a_model_without_feet_has_no_contacts(exported):
-    assert exported.card.contacts == ()
-    assert "posefield.contacts" not in model_card.dump(exported.card)
-    assert "contacts" not in model_card.plain_values(exported.card)
-    assert "contacts" not in exported.card.diagnostics
-    bare = session.open_bytes(exported.content, "reaching")
-    with pytest.raises(ValueError, match="model reaching has no contacts"):
-        bare.run(graph_ports.default_controls(bare.card), np.zeros((1, 1)), CONTACTS)
-
-
 def test_left_out_clips_agree_with_their_labels(walk, labels):
     accuracy = walk.contacts.accuracy
     assert accuracy.agreement > 0.97

@@ -50,16 +50,6 @@ def test_curves_are_found_by_a_suffix(folder):
         assert np.abs(example.clip.curve_values - values(clip + 1)).max() > 0.05
 
 
-def test_curves_are_found_by_a_column(folder):
-    rows = "\n".join(f"{clip}.bvh,{clip},{clip}.curves.csv" for clip in range(3))
-    (folder / "clips.csv").write_text(f"file,v,face\n{rows}\n")
-    found = ingest.ingest(recipe_with(curves={"column": "face"}), folder)[0]
-    assert all(
-        np.array_equal(a.clip.curve_values, b.clip.curve_values)
-        for a, b in zip(found, read(folder), strict=True)
-    )
-
-
 def test_curves_without_a_skeleton_move_one_joint_that_rests(folder):
     rows = "\n".join(f"{clip}.curves.csv,{clip}" for clip in range(3))
     (folder / "clips.csv").write_text(f"file,v\n{rows}\n")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from minimal import small_clip
 
-from posefield.common.units import UP
 from posefield.motion import quat
 from posefield_train.source import canonical
 
@@ -61,13 +60,3 @@ def test_the_seam_has_no_corner(opened, closed):
     assert corner(closed.rotations) < 0.35 * corner(opened.rotations)
     # Negative control: a linear fade leaves the corner.
     assert corner(faded_linearly(opened)) > 0.9 * corner(opened.rotations)
-
-
-def test_a_closed_cycle_nearly_stays_as_it_is(opened, closed):
-    again = canonical.close_cycle(closed, canonical.heading(closed))
-    gap = quat.log(quat.mul(quat.conj(closed.rotations[0, 1:]), closed.rotations[-1, 1:]))
-    assert np.abs(gap).max() < 1e-9
-    own, first, raw = (clip.positions() for clip in (again, closed, opened))
-    # Differences do not tell rates exactly.
-    assert np.abs(own - first).max() < 0.1 * np.abs(first - raw).max()
-    assert (closed.root_path[-1] - closed.root_path[0]) @ UP == pytest.approx(0.0, abs=1e-12)

@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import tomllib
 from dataclasses import replace
 
 import numpy as np
@@ -64,15 +63,6 @@ def test_no_model_is_made_of_a_recipe_that_nobody_accepted(posefield, made, take
     text = (made / "family_01.toml").read_text()
     (made / "family_01.toml").write_text(recipe_folder.with_accepted(text, True))
     assert recipe.read_accepted(made / "family_01.toml").accepted
-
-
-def test_unit_and_up_can_be_stated(posefield, takes, tmp_path):
-    out = tmp_path / "recipes"
-    words = ("--unit", "0.0125", "--up", "y", *LICENCE, *FEW)
-    assert posefield("discover", takes, "-o", out, *words)[0] == 0
-    text = (out / "family_01.toml").read_text()
-    assert tomllib.loads(text)["source"] == {"metres_per_unit": 0.0125, "up": "y"}
-    assert "# stated by an option of posefield discover" in text
 
 
 def with_a_hat(takes, folder, head="Head"):

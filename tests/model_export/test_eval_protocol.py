@@ -9,7 +9,7 @@ from joblib import parallel_config
 from minimal import TOML, plain_recipe, small_clip, write_clips
 
 from posefield.common.errors import TrainingError
-from posefield.common.units import UP
+from posefield.kriging import support
 from posefield_train.evaluate import (
     compared_motion,
     folds,
@@ -18,7 +18,9 @@ from posefield_train.evaluate import (
     predictions,
     protocol,
     summary,
+    support_flags,
 )
+from posefield_train.evaluate.folds import Fold
 from posefield_train.evaluate.predictions import DEFINITIONS, OURS, Queries
 from posefield_train.parallel.jobs import ProcessJobs
 from posefield_train.source import ingest
@@ -167,21 +169,6 @@ def test_training_errors_name_the_clips_that_are_held_out(recipe, family):
         protocol.run_protocol(recipe, family[:4], "performer", JOBS, lambda *_: None)
 
 
-def test_errors_of_a_cycle_are_those_to_the_open_one(recipe, family):
-    """A prediction is compared with the captured cycle, before its seam was closed."""
-    away = [
-        replace(e, captured=replace(e.clip, translations=e.clip.translations + UP))
-        for e in family[:6]
-    ]
-    plain = recipe.model_copy(update={"event": None})
-    closed, opened = (
-        protocol.run_fold(plain, examples, folds.Fold((2,))).errors["mean"][0]
-        for examples in (family[:6], away)
-    )
-    assert abs(opened.absolute.mean - closed.absolute.mean) > 0.3
-    assert opened.duration == closed.duration
-
-
 def test_facts_are_the_measured_errors(results):
     result = results[0][0]
     facts = summary.facts(result)
@@ -263,3 +250,14 @@ def test_what_cannot_be_evaluated_is_refused_first(tmp_path, folder, posefield, 
     assert code in (2, 3) and message in err
     # No protocol has run: its result would be printed at once.
     assert out == ""
+
+
+def test_clips_beyond_all_others_are_flagged_and_those_captured_evenly_seldom(rng):
+    controls, names = rng.random((60, 2)) * [1.0, 3.0], ("left", "up")
+    parts = [Fold((i, i + 1)) for i in range(0, 60, 2)]
+    flags = support_flags.measure_flags(controls, names, parts)
+    assert flags.alarms < 0.15 and flags.beyond == {"left": 1.0, "up": 1.0}
+    # A fold does not know what it holds out: its two clips far beyond all others are flagged.
+    alone = np.vstack([controls, [[5.0, 1.0]], [[5.0, 1.1]]])
+    assert support_flags.measure_flags(alone, names, [*parts, Fold((60, 61))]).alarms >= 2 / 62
+    assert (support.fit_support(alone).beyond(alone[60:]) == 0.0).all()

@@ -12,7 +12,7 @@ from posefield_train.graph import onnx_export
 from posefield_train.kriging import coefficient_models, universal_kriging
 from posefield_train.kriging.kriging_bank import POSE
 from posefield_train.tensor import event_blend, truncation_error
-from posefield_train.tensor.event_blend import LOST_SHARE
+from posefield_train.tensor.event_blend import COEFFICIENTS, LOST_SHARE
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +84,28 @@ def test_the_second_model_is_used_where_it_is_clearly_better(judge, trained, sma
     assert better.event < 0.7 * better.pose == 0.7 * same.pose and better.is_used
     swapped = coefficient_models.compare_models(judge, full, judge.event_frame, (perfect, pose))
     assert not swapped.is_used
+
+
+def at_event(judge, full, motions):
+    """Positions (N, 3) of the event's joint by forward kinematics of whole motions."""
+    whole = truncation_error.positions(
+        judge.own_tensor, full.slices(motions), judge.parents, judge.offsets
+    )
+    return whole[:, judge.event_frame.frame, judge.event_frame.joint]
+
+
+def test_jacobian_is_that_of_central_differences_of_forward_kinematics(judge, trained):
+    full, event = trained.full, judge.event_frame
+    found = event_blend.event_jacobians(judge, full, event)
+    assert found.shape == (len(trained.examples), 3, COEFFICIENTS)
+    step = 1e-3 * full.motions[:, 0].std()
+    for column in (0, 3, COEFFICIENTS - 1):
+        either = [full.motions.copy() for _ in range(2)]
+        either[0][:, column] += step
+        either[1][:, column] -= step
+        after, before = (at_event(judge, full, own) for own in either)
+        expected = (after - before) / (2.0 * step)
+        # Forward differences of 2 % of a deviation: the curvature's share is left.
+        assert np.abs(found[:, :, column] - expected).max() < 0.03 * np.abs(expected).max()
+        other = found[:, :, (column + 1) % COEFFICIENTS]
+        assert np.abs(other - expected).max() > 0.3 * np.abs(expected).max()

@@ -53,25 +53,6 @@ def test_the_highest_place_is_a_landmark_that_is_aligned(read):
     assert card.event.share == pytest.approx(np.mean(PEAKS), abs=1e-4)
 
 
-def test_every_moment_of_a_control_is_one_of_an_event(read):
-    expected = {"start": 0.0, "end": 1.0}
-    for at in ("start", "end", "highest", "lowest", "farthest"):
-        clips = [raised(peak, -0.5 if at == "lowest" else 0.7) for peak in PEAKS]
-        if at == "farthest":
-            clips = [stretched(clip) for clip in clips]
-        recipe, examples = read(clips, event={"joint": "LeftHand", "at": at})
-        found = truncation_error.event(recipe, examples)
-        assert found.share == pytest.approx(expected.get(at, np.mean(PEAKS)), abs=1e-4)
-
-
-def stretched(clip):
-    """The clip with its arm hanging sideways at rest, so that lifting it moves it away."""
-    rotations = clip.rotations.copy()
-    down = quat.from_axis_angle(np.array([0.0, 0.0, 1.0]), np.array(-1.2))
-    rotations[:, 3] = quat.mul(np.broadcast_to(down, rotations[:, 3].shape), rotations[:, 3])
-    return replace(clip, rotations=rotations)
-
-
 def test_a_moment_at_the_end_of_a_clip_is_refused_by_line(read):
     half = LIFTED[3]
     cut = replace(half, rotations=half.rotations[:12], translations=half.translations[:12])

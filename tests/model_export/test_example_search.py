@@ -6,7 +6,6 @@ import pytest
 
 from posefield_train.discover import family_search, motion_features
 from posefield_train.discover.motion_features import Span
-from posefield_train.discover.take_reading import Take
 
 PLANTED = ((0, 4.0, 2.0), (0, 12.0, 1.6), (1, 5.0, 2.4), (1, 15.0, 2.0), (2, 9.0, 1.8))
 """Take, begin and duration, s, of a raised hand in takes of other movements."""
@@ -74,22 +73,6 @@ def shared(one, other):
         return 0.0
     common = min(one.end, other.end) - max(one.start, other.start)
     return common / (max(one.end, other.end) - min(one.start, other.start))
-
-
-def test_place_heading_and_floor_change_no_feature():
-    hands = waving(5, [(3.0, 2.0)])
-    one = discover_takes.take("a.bvh", 20.0, hands=hands, speed=0.3)
-    other = discover_takes.take("a.bvh", 20.0, hands=hands, speed=0.3, heading=1.2)
-    moved = {role: own + np.array([3.0, 0.7, -5.0]) for role, own in other.places.items()}
-    roles = list(motion_features.WEIGHTS)
-    np.testing.assert_allclose(
-        motion_features.take_features(Take("a.bvh", discover_takes.RATE, moved), roles),
-        motion_features.take_features(one, roles),
-        atol=1e-9,
-    )
-    mirrored = {role: own * [-1.0, 1.0, 1.0] for role, own in one.places.items()}
-    changed = motion_features.take_features(Take("a.bvh", 60.0, mirrored), roles)
-    assert np.abs(changed - motion_features.take_features(one, roles)).max() > 0.1
 
 
 def brute_force(apart):

@@ -264,3 +264,22 @@ def test_time_ends_with_the_clip(opened, asked):
     for within, beyond in zip(inside, outside, strict=True):
         assert np.array_equal(within[:, :2], beyond[:, :2])
         assert np.abs(within[:, 2] - beyond[:, 2]).max() > 1e-3
+
+
+def fused_activations(content):
+    """Return the activations that onnxruntime-web 1.23 fuses with Gemm, an operator it lacks."""
+    graph = onnx.load_from_string(content).graph
+    products = {node.output[0] for node in graph.node if node.op_type == "Gemm"}
+    activations = ("Relu", "LeakyRelu", "Tanh", "Sigmoid", "Abs", "Elu", "HardSigmoid", "Softplus")
+    return [n.name or n.op_type for n in graph.node if n.op_type in activations
+            and n.input[0] in products]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["model_path", "labelled_path", "walk_path"])
+def test_older_browsers_engines_run_every_level(request, name):
+    content = request.getfixturevalue(name).read_bytes()
+    assert fused_activations(content) == []
+    broken = onnx.load_from_string(content)
+    product = next(n for n in broken.graph.node if n.op_type == "Gemm")
+    broken.graph.node.add(op_type="Relu", input=[product.output[0]], output=["refused"])
+    assert fused_activations(broken.SerializeToString()) == ["Relu"]

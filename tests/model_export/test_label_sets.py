@@ -72,6 +72,36 @@ def test_covariance_is_a_product_of_correlations_and_a_sum_of_offsets():
     assert np.abs(found - expected).max() < 1e-12
 
 
+def test_covariance_is_stationary_with_offsets_and_a_trend(hyper, laid):
+    controls = laid[:, :2]
+    gaps = (controls[:, None] - controls) * hyper.scales
+    expected = COVARIANCES[hyper.covariance].numpy(np.sum(gaps**2, axis=-1))
+    offsets = hyper.trend * controls @ controls.T
+    for kernel, columns in zip(KERNELS, (laid[:, 2:5], laid[:, 5:]), strict=True):
+        same = columns @ columns.T
+        expected *= np.where(same > 0.0, 1.0, kernel.correlation)
+        offsets += kernel.offset * same
+    expected += offsets
+    assert np.abs(kriging_model.covariances(hyper, laid, laid) - expected).max() < 1e-12
+    variances = kriging_model.prior_variances(hyper, laid)
+    assert np.abs(variances - np.diagonal(expected)).max() < 1e-12
+    steeper = replace(hyper, trend=0.9 * hyper.trend)
+    assert np.abs(kriging_model.covariances(steeper, laid, laid) - expected).max() > 1e-2
+
+
+def test_a_performer_left_out_is_a_stranger(hyper, laid, named, rng):
+    values = rng.normal(size=(COUNT, 3))
+    _, groups = np.unique([own["performer"] for own in named], return_inverse=True)
+    found = universal_kriging.leave_out(hyper, laid, groups) @ values
+    for performer in range(3):
+        own = groups == performer
+        field = universal_kriging.solve(hyper, laid[~own], values[~own])
+        nobody, other = laid[own].copy(), laid[own].copy()
+        nobody[:, 2:5], other[:, 2:5] = 0.0, np.eye(3)[performer - 1]
+        assert np.abs(found[own] - values[own] + field.predict(nobody)).max() < 1e-9
+        assert np.abs(found[own] - values[own] + field.predict(other)).max() > 1e-2
+
+
 def test_joint_covariance_of_names_mixtures_and_open_sets_is_positive_definite(hyper, laid, rng):
     points = np.vstack([laid, mixtures(rng, 30)])
     assert least_eigenvalue(hyper, points) > -1e-9

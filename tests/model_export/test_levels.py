@@ -24,11 +24,6 @@ def with_levels(recipe, *details):
 
 
 @pytest.fixture(scope="module")
-def exam(small_recipe, trained):
-    return levels.level_test(small_recipe, trained, 2_000)
-
-
-@pytest.fixture(scope="module")
 def still(small_recipe, trained):
     """Levels of which the coarser ones keep a hand, and then a whole arm, still."""
     details = Detail(times=2.0, drop_joints=[HAND]), Detail(times=8.0, drop_joints=["LeftArm"])
@@ -57,39 +52,6 @@ def test_errors_keep_the_budgets_times_what_the_level_may_cost(small_recipe, exp
         # Negative control: half of it would not do.
         assert level.rms > 0.5 * times * budgets["rms"]
         assert level.rms < level.p99 < level.max
-
-
-def test_the_card_says_what_an_exam_of_other_questions_finds(exported, exam, trained, small_recipe):
-    """Errors are those of the level, not of the questions: half of them tell nearly the same."""
-    half = slice(None, None, 2)
-    fewer = replace(
-        exam,
-        controls=exam.controls[half],
-        labels=exam.labels[half],
-        times=exam.times[half],
-        whole=exam.whole[half],
-        at_event=exam.at_event[half],
-    )
-    every = range(len(trained.skeleton))
-    for number, level in enumerate(exported.card.levels):
-        found = fewer.outputs(exported.model, number).errors(every)
-        assert found.rms == pytest.approx(level.rms, rel=0.15)
-    assert exported.card.levels[0].rms < 0.7 * exported.card.levels[1].rms
-
-
-def test_the_event_of_an_answer_is_that_of_the_whole_body(exported, exam):
-    """At the event the chain of its joint alone is computed, and the core at its frame alone."""
-    asked = exam.controls[:20], exam.labels[:20]
-    chain = skeleton.joint_chain(exam.parents, exam.moment.joint)
-    place = np.full((20, 1), float(exam.moment.frame))
-    for level in range(len(exported.card.levels)):
-        fields = exported.model.fields(*asked, level)
-        found = exported.model.joint_at_frame(fields, chain, exam.moment.frame, level)
-        whole = exported.model.outputs_at_frames(asked[0], place, asked[1], level).positions(
-            exam.parents
-        )[:, 0]
-        assert np.abs(found - whole[:, exam.moment.joint]).max() < 1e-12
-        assert np.abs(found - whole[:, chain[-2]]).max() > 0.1
 
 
 def test_the_order_of_samples_changes_no_answer(trained, rng):
